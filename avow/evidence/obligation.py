@@ -1,0 +1,52 @@
+"""Obligations: claims, generated from contract and plan, never typed in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from avow.diagnostics import Span
+
+
+class Kind(StrEnum):
+    WELL_FORMED = "well-formed"
+    SANITY = "sanity"
+    COMPOSITION = "composition"
+    GUARANTEE = "guarantee"
+    REQUIREMENT = "requirement"
+
+
+SYSTEM_LEVEL = "system"
+"""Stands in an id where an obligation belongs to no single node."""
+
+
+@dataclass(frozen=True, slots=True)
+class Obligation:
+    """One claim. Pure data.
+
+    `digest` is a SHA-256 of its *meaning* (typed, normalised formulas, the sorts that they use, the scenario where one
+    is used): comments, layout and bound names do not change it, a threshold does.
+    """
+
+    system: str
+    node: str
+    kind: Kind
+    name: str
+    claim: str
+    """A sentence for people."""
+    formula: str
+    """The formula as people write it (Unicode), or empty."""
+    digest: str
+    clauses: tuple[str, ...] = ()
+    """``node.clause`` names that the claim is about."""
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def id(self) -> str:
+        """``system/node/kind/name``: for people, stable under edits of the formula."""
+        return f"{self.system}/{self.node}/{self.kind}/{self.name}"
+
+    @property
+    def local_id(self) -> str:
+        """The id without the system: what plans name."""
+        return f"{self.node}/{self.kind}/{self.name}"

@@ -1,0 +1,47 @@
+"""One evidence record: one attempt by one method at one obligation (design: page "Obligations, evidence…")."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from avow.verdict import Counterexample, Link, Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """A line of the ledger, without its chain hash.
+
+    `key` is what the answer depends on, digested (obligation, options, input files, backend and tool versions): a
+    record is current while the key computed afresh is the same. Paths are relative to the workspace.
+    """
+
+    obligation: str
+    obligation_digest: str
+    key: str
+    method: str
+    """The method's id in the plan, or ``sanity``, ``compose``…"""
+    backend: str
+    tool: str
+    tool_version: str
+    command: tuple[str, ...]
+    verdict: Verdict
+    strength: Verdict
+    """The best verdict that the method can give."""
+    link: Link
+    summary: str
+    started: str
+    """ISO 8601, UTC."""
+    seconds: float
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    """Path → SHA-256 of every file that the answer rests on."""
+    outputs: Mapping[str, str] = field(default_factory=dict)
+    """Path → SHA-256 of every file that the attempt left: artifacts and logs."""
+    counterexample: Counterexample | None = None
+    hypotheses: tuple[str, ...] = ()
+    bound: Mapping[str, Any] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)
+    vacuous: bool = False
+    run: str = ""
+    """Id of the run that produced it."""

@@ -1,0 +1,1 @@
+"""RCL, the ROS Contract Language: text in, checked contract out."""

@@ -1,0 +1,109 @@
+"""A checked contract: what the language floor hands to all others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from avow.diagnostics import Span
+from avow.language.sorts import Sort
+from avow.language.terms import Role, Term, Variable
+
+
+class ClauseKind(StrEnum):
+    ASSUMPTION = "assumption"
+    GUARANTEE = "guarantee"
+
+
+@dataclass(frozen=True, slots=True)
+class Clause:
+    """One ``assume(…)`` or ``guarantee(…)``. `name` is the given one, else ``A1``, ``G2``… by position from 1."""
+
+    kind: ClauseKind
+    name: str
+    position: int
+    formula: Term
+    sentence: str | None = None
+    text: str = field(default="", compare=False)
+    """The formula as written in the file."""
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Port:
+    """An input or output: its name, sort, and the type as written (``WayP``)."""
+
+    role: Role
+    name: str
+    sort: Sort
+    type_name: str
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def variable(self) -> Variable:
+        return Variable(self.role, self.name, self.sort)
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """``gazebo_radiation_plugins/Snapshot at matches(in.at)``; `port` is the matched input or output."""
+
+    ros_type: str
+    name: str
+    port: Port | None
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    name: str
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    topics: tuple[Topic, ...]
+    assumptions: tuple[Clause, ...]
+    guarantees: tuple[Clause, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def clauses(self) -> tuple[Clause, ...]:
+        return self.assumptions + self.guarantees
+
+    def clause(self, name: str) -> Clause:
+        """The clause of that name. Raises KeyError."""
+        for clause in self.clauses:
+            if clause.name == name:
+                return clause
+        raise KeyError(name)
+
+    def input(self, name: str) -> Port:
+        """The input of that name. Raises KeyError."""
+        return _port(self.inputs, name)
+
+    def output(self, name: str) -> Port:
+        """The output of that name. Raises KeyError."""
+        return _port(self.outputs, name)
+
+
+@dataclass(frozen=True, slots=True)
+class Contract:
+    """All that one or more .rcl files declare. `types` are the context's names for sorts, in order;
+    `constants` are names for values (they are already expanded in every formula)."""
+
+    files: tuple[str, ...]
+    types: tuple[tuple[str, Sort], ...]
+    constants: tuple[tuple[str, Term], ...]
+    nodes: tuple[Node, ...]
+
+    def node(self, name: str) -> Node:
+        """The node of that name. Raises KeyError."""
+        for node in self.nodes:
+            if node.name == name:
+                return node
+        raise KeyError(name)
+
+
+def _port(ports: tuple[Port, ...], name: str) -> Port:
+    for port in ports:
+        if port.name == name:
+            return port
+    raise KeyError(name)

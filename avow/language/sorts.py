@@ -1,0 +1,119 @@
+"""Sorts: the types of many-sorted first-order logic that RCL's type declarations denote.
+
+A declared name is a name for a sort; sets of names become `EnumSort`, sets of constructors `DataSort`, and ``{}`` an
+`OpaqueSort`: an unspecified sort, never an empty one (design: page "RCL", section "Meaning").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class BoolSort:
+    """BOOL."""
+
+
+@dataclass(frozen=True, slots=True)
+class RealSort:
+    """REAL: the reals, exact."""
+
+
+@dataclass(frozen=True, slots=True)
+class IntegerSort:
+    """INTEGER: the integers."""
+
+
+@dataclass(frozen=True, slots=True)
+class NaturalSort:
+    """NATURAL: the integers that are at least 0; a subset of INTEGER."""
+
+
+@dataclass(frozen=True, slots=True)
+class StringSort:
+    """STRING."""
+
+
+@dataclass(frozen=True, slots=True)
+class EnumSort:
+    """Exactly the listed elements, all different."""
+
+    name: str
+    members: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Constructor:
+    """One way to build a value of a `DataSort`; injective, and disjoint from the others."""
+
+    name: str
+    parameters: tuple[Sort, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DataSort:
+    """A free algebraic data type: ``{ move(REAL, REAL), inspect(NATURAL) }``."""
+
+    name: str
+    constructors: tuple[Constructor, ...]
+
+    def constructor(self, name: str) -> Constructor:
+        return next(c for c in self.constructors if c.name == name)
+
+
+@dataclass(frozen=True, slots=True)
+class OpaqueSort:
+    """An unspecified, non-empty sort (``{}``)."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionSort:
+    """A total function ``A x B --> C``."""
+
+    parameters: tuple[Sort, ...]
+    result: Sort
+
+
+@dataclass(frozen=True, slots=True)
+class TupleSort:
+    """``(REAL, REAL)``."""
+
+    items: tuple[Sort, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceSort:
+    """A finite sequence ``<T>``."""
+
+    item: Sort
+
+
+@dataclass(frozen=True, slots=True)
+class SetSort:
+    """The sort of a finite set literal; it occurs only to the right of ``in``."""
+
+    item: Sort
+
+
+Sort = (
+    BoolSort
+    | RealSort
+    | IntegerSort
+    | NaturalSort
+    | StringSort
+    | EnumSort
+    | DataSort
+    | OpaqueSort
+    | FunctionSort
+    | TupleSort
+    | SequenceSort
+    | SetSort
+)
+
+BOOL = BoolSort()
+REAL = RealSort()
+INTEGER = IntegerSort()
+NATURAL = NaturalSort()
+STRING = StringSort()

@@ -1,0 +1,107 @@
+"""Concrete values of each sort, shared by everything that computes with them (evaluation, tests, monitors, simulation).
+
+BOOL is bool; INTEGER and NATURAL are int; REAL is `Fraction` (exact); STRING is str; an enumeration's element is an
+`Element`; an algebraic value is a `Data`; a tuple is a tuple; a sequence is a list frozen as `Sequence`; a function is
+a `FunctionValue`; an element of an unspecified sort is an `Opaque`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """An element of an enumeration."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """``move(1, 2)``."""
+
+    constructor: str
+    arguments: tuple[Value, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.constructor}({', '.join(map(show, self.arguments))})" if self.arguments else self.constructor
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    items: tuple[Value, ...]
+
+    def __str__(self) -> str:
+        return f"<{', '.join(map(show, self.items))}>"
+
+
+@dataclass(frozen=True, slots=True)
+class Opaque:
+    """The k-th known element of an unspecified sort."""
+
+    sort: str
+    index: int
+
+    def __str__(self) -> str:
+        return f"{self.sort}#{self.index}"
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionValue:
+    """A total function given by finitely many points and a default."""
+
+    table: Mapping[tuple[Value, ...], Value] = field(hash=False)
+    default: Value
+
+    def __call__(self, *arguments: Value) -> Value:
+        return self.table.get(arguments, self.default)
+
+    def __str__(self) -> str:
+        if self.default is False:
+            return "{" + ", ".join(_point(k) for k, v in self.table.items() if v is True) + "}"
+        points = [f"{_point(k)}: {show(v)}" for k, v in self.table.items() if v != self.default]
+        return "{" + ", ".join([*points, f"else: {show(self.default)}"]) + "}"
+
+
+Value = bool | int | Fraction | str | Element | Data | Sequence | Opaque | FunctionValue | tuple["Value", ...]
+
+
+def show(value: Value) -> str:
+    """A value as RCL writes it; a relation as the set of its tuples."""
+    match value:
+        case bool():
+            return "TRUE" if value else "FALSE"
+        case Fraction():
+            return _decimal(value)
+        case str():
+            return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        case tuple():
+            return f"({', '.join(map(show, value))})"
+        case _:
+            return str(value)
+
+
+def _point(arguments: tuple[Value, ...]) -> str:
+    return show(arguments[0]) if len(arguments) == 1 else show(arguments)
+
+
+def _decimal(value: Fraction) -> str:
+    if value.denominator == 1:
+        return str(value.numerator)
+    rest = value.denominator
+    for prime in (2, 5):
+        while rest % prime == 0:
+            rest //= prime
+    if rest != 1 or value.denominator > 10**9:
+        return f"{value.numerator}/{value.denominator}"
+    digits = 0
+    while (value * 10**digits).denominator != 1:
+        digits += 1
+    whole = f"{abs(value * 10**digits).numerator:0{digits + 1}d}"
+    return f"{'-' if value < 0 else ''}{whole[:-digits]}.{whole[-digits:]}"

@@ -1,0 +1,217 @@
+"""plan.yaml as data: what a person decides about a system (design: page "plan.yaml").
+
+Reading, validation and located errors are in `avow.system.plan_file`; nothing here touches the disk.
+Every part that can be wrong keeps its place in the file, so that a later stage can point at it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from avow.diagnostics import Span
+from avow.language.contract import Contract
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """A piece of YAML as plain data, with the place of every key and item in it.
+
+    `spans` maps a path, such as ``("predicates", "in.r")`` or ``("select", 0)``, to where its value stands.
+    """
+
+    data: Any
+    span: Span
+    spans: Mapping[tuple[str | int, ...], Span] = field(default_factory=dict, compare=False, repr=False)
+
+    def at(self, *path: str | int) -> Span:
+        """The place of a part, or of the nearest enclosing part that has one."""
+        while path:
+            if path in self.spans:
+                return self.spans[path]
+            path = path[:-1]
+        return self.span
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """``agent.command``: a node's port."""
+
+    node: str
+    port: str
+
+    def __str__(self) -> str:
+        return f"{self.node}.{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """An output that feeds an input. A delayed one carries the value of the step before, first `initial`."""
+
+    source: Endpoint
+    target: Endpoint
+    delayed: bool = False
+    initial: str | None = None
+    """An RCL formula over ``out.<port>`` of the source or a value, as text; None: any value."""
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class EnvironmentInput:
+    """What is assumed of an input that no node provides, and why that may be believed."""
+
+    port: str
+    """``in.wayP`` (every node's input of that name) or ``agent.wayP``."""
+    assume: str | None
+    because: str | None
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows of a scenario's CSV file or list. Cells are exact text; `columns` names them."""
+
+    name: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    path: Path | None = None
+
+    def column(self, name: str) -> tuple[str, ...]:
+        """Raises ValueError for an unknown column."""
+        at = self.columns.index(name)
+        return tuple(row[at] for row in self.rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A finite interpretation, used by every bounded check; a verdict from it says that it is bounded.
+
+    `interpret` says of a relation- or function-typed port at which rows it holds (``in.wayP`` → table, columns);
+    `domains` gives a quantified sort or an input its finite range (``NATURAL`` → ``waypoints.id`` or a list of values).
+    """
+
+    tables: tuple[Table, ...] = ()
+    interpret: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
+    domains: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    steps: int | None = None
+    digest: str = ""
+
+    def table(self, name: str) -> Table:
+        """Raises KeyError."""
+        for table in self.tables:
+            if table.name == name:
+                return table
+        raise KeyError(name)
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """One way in which a node's guarantees are settled: a backend and its options, as the plan gives them.
+
+    `id` tells several methods of one node apart (``hoare``, ``dafny``, ``ajpf-edge``); `guarantees` and
+    `assumptions` are clause names that it takes on (by default every guarantee).
+    """
+
+    id: str
+    backend: str
+    options: Located
+    guarantees: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NodePlan:
+    node: str
+    criticality: str
+    methods: tuple[Method, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """A system requirement in a person's words; a formula or a temporal property where there is one.
+
+    `supported_by` names guarantees (``agent.next_waypoint``), derivations (``D1``) or whole nodes (``agent``).
+    """
+
+    id: str
+    text: str
+    formula: str | None
+    temporal: str | None
+    supported_by: tuple[str, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class ComposeGoal:
+    """``D1: {select: [navigation, radiationSensor, agent], rule: R3}``; `rule` None lets the calculus choose."""
+
+    name: str
+    select: tuple[str, ...]
+    rule: str | None
+    options: Located
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """An expected or accepted finding: an obligation's id without the system (glob allowed), and its verdict."""
+
+    obligation: str
+    verdict: str
+    reason: str | None = None
+    who: str | None = None
+    date: str | None = None
+    expires: str | None = None
+    method: str | None = None
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A whole plan.yaml, checked against its schema and against the contract's names."""
+
+    system: str
+    title: str
+    path: Path
+    contract_files: tuple[Path, ...]
+    model: Located
+    messages: tuple[Path, ...]
+    connections: tuple[Connection, ...]
+    environment: tuple[EnvironmentInput, ...]
+    scenario: Scenario | None
+    requirements: tuple[Requirement, ...]
+    compose: tuple[ComposeGoal, ...]
+    nodes: tuple[NodePlan, ...]
+    policy: Located
+    expected: tuple[Finding, ...] | None
+    """None: no reproduction of known-bad material; a tuple (even empty): strict both ways."""
+    accepted: tuple[Finding, ...]
+    plugins: tuple[str, ...]
+    """Modules that hold further backends."""
+    lints_off: tuple[str, ...]
+
+    @property
+    def root(self) -> Path:
+        """The system's folder; every path in the plan is relative to it and stays within it."""
+        return self.path.parent
+
+    def node(self, name: str) -> NodePlan:
+        """The plan of a node; a node that the plan does not mention has no methods and criticality ``medium``."""
+        for node in self.nodes:
+            if node.node == name:
+                return node
+        return NodePlan(name, "medium", ())
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """A checked contract and the plan for it: what every later stage works on."""
+
+    plan: Plan
+    contract: Contract
+
+    @property
+    def name(self) -> str:
+        return self.plan.system

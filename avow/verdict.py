@@ -1,0 +1,101 @@
+"""The words for an answer (design: page "Obligations, evidence, and the assurance report").
+
+A verdict says what one tool run showed about one claim. Unknown, time-out, crash and a missing tool are verdicts too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+class Verdict(StrEnum):
+    """What one piece of evidence says of one claim."""
+
+    PROVED = "proved"
+    """For all behaviours and inputs, by a sound method."""
+    CHECKED = "checked"
+    """Exhaustively, within a finite scenario that the evidence names."""
+    TESTED = "tested"
+    """On n cases; the evidence says n and what n justifies."""
+    MONITORED = "monitored"
+    """On a recorded or live trace."""
+    REVIEWED = "reviewed"
+    """By a person who said what was read and concluded."""
+    JUSTIFIED = "justified"
+    """A person's dated reason, in place of evidence."""
+    REFUTED = "refuted"
+    """The claim is false: a counterexample is attached."""
+    UNKNOWN = "unknown"
+    """The method gave up: time, memory, incompleteness, a construct that it cannot treat."""
+    ERROR = "error"
+    """The tool failed or its answer could not be read."""
+    NOT_RUN = "not-run"
+    """The tool is not here; the evidence says how to install it."""
+
+    @property
+    def supports(self) -> bool:
+        """Whether this verdict speaks for the claim at all."""
+        return self in _SUPPORTING
+
+
+_SUPPORTING = frozenset(
+    {
+        Verdict.PROVED,
+        Verdict.CHECKED,
+        Verdict.TESTED,
+        Verdict.MONITORED,
+        Verdict.REVIEWED,
+        Verdict.JUSTIFIED,
+    }
+)
+
+
+class Link(StrEnum):
+    """How the thing that was verified hangs together with the contract's formula."""
+
+    GENERATED = "generated"
+    """Translated from the formula by Avow."""
+    MAPPED = "mapped"
+    """Through a table that a person wrote in the plan."""
+    GUIDED = "guided"
+    """By a person's judgement."""
+
+
+@dataclass(frozen=True, slots=True)
+class Counterexample:
+    """Why a claim is false, in the contract's own words.
+
+    `values` are (name, value) pairs such as ``("in.r", "125")``; `trace` is a run, one tuple of pairs a step, and
+    `loop` the index of the step to which its last step returns (a lasso), if it does.
+    """
+
+    values: tuple[tuple[str, str], ...] = ()
+    explanation: str = ""
+    trace: tuple[tuple[tuple[str, str], ...], ...] = ()
+    loop: int | None = None
+
+    def text(self) -> str:
+        """One line for people: ``in.r = 125, out.status = green: guarantee 1 demands orange``."""
+        values = ", ".join(f"{name} = {value}" for name, value in self.values)
+        return ": ".join(part for part in (values, self.explanation) if part)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a method says of one obligation; the core makes an evidence record of it.
+
+    `obligation` is the obligation's id. `bound` holds what limits the answer (cases, states, confidence, seed…),
+    `hypotheses` what the answer rests on without having shown it, `details` anything else worth keeping (JSON values).
+    """
+
+    obligation: str
+    verdict: Verdict
+    summary: str
+    counterexample: Counterexample | None = None
+    hypotheses: tuple[str, ...] = ()
+    bound: dict[str, object] = field(default_factory=dict)
+    details: dict[str, object] = field(default_factory=dict)
+    link: Link | None = None
+    vacuous: bool = False
+    """The claim held, but its trigger was never met: it supports nothing."""
