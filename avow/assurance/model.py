@@ -1,0 +1,341 @@
+"""The assurance case as data: what every report format is rendered from, and nothing else.
+
+One frozen object holds it all, so that two formats cannot disagree. The first part is what the pipeline hands in
+(`RunInfo`, `ToolInfo`, `MethodInfo`, `Derivation`, `Discrepancy`); the second is what `build_case` makes of it.
+Times and dates are texts in ISO 8601; paths are relative to the workspace; every text is data, never markup.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from avow.diagnostics import Span
+from avow.evidence.ledger import Entry
+from avow.evidence.obligation import Obligation
+from avow.evidence.status import Status
+from avow.verdict import Link, Verdict
+
+# -- handed in by the pipeline --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class RunInfo:
+    """The run that asked for this case. `limits` are what one needs to reproduce it (seed, seconds, megabytes…)."""
+
+    id: str
+    started: str
+    seconds: float
+    avow_version: str
+    fresh: bool = False
+    """Whether every cache was ignored (``avow verify --fresh``)."""
+    command: str = ""
+    revision: str = ""
+    """The git revision of the workspace, where there is one."""
+    limits: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolInfo:
+    """A tool as found on the machine; `version` is None where it is missing."""
+
+    name: str
+    version: str | None
+    install: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class MethodInfo:
+    """A kind of method that could be used: one backend, in the core's words."""
+
+    name: str
+    title: str
+    strength: Verdict
+    link: Link
+    green_means: str = ""
+    available: bool = True
+    install: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class SideCondition:
+    """One side condition of a rule's application: its text, and the composition obligation that settles it."""
+
+    text: str
+    obligation: str
+    """An obligation's full id; empty where the condition is settled by form alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Derivation:
+    """One derivation of the calculus, or one instance of a rule within it.
+
+    `text` is the derivation in the paper's notation, as lines of plain Unicode text (shown in a fixed-width font);
+    `latex` the same for the appendix; `premises` are the names of nodes (their guarantees are what it rests on) or of
+    other derivations; `conclusion` one line; `conditional` what the conclusion depends on without its being shown.
+    """
+
+    name: str
+    rule: str
+    text: str
+    conclusion: str
+    premises: tuple[str, ...] = ()
+    side_conditions: tuple[SideCondition, ...] = ()
+    latex: str = ""
+    conditional: tuple[str, ...] = ()
+
+
+class Fault(StrEnum):
+    """The kinds of discrepancy between the ledger and the world."""
+
+    LEDGER = "ledger"
+    """A line of the ledger was edited, removed, inserted or cannot be read."""
+    CHANGED = "changed"
+    """A file behind a record is not the file that it was."""
+    GONE = "gone"
+    """A file behind a record is no longer there."""
+    MISPLACED = "misplaced"
+    """A record points at another obligation, method or system than its key belongs to."""
+    IMPOSSIBLE = "impossible"
+    """A record says what its method cannot say."""
+    OUTDATED = "outdated"
+    """An input has changed since: not tampering, but the evidence is stale."""
+    SIGNATURE = "signature"
+
+
+@dataclass(frozen=True, slots=True)
+class Discrepancy:
+    """One thing that `avow audit` found. `serious` ones fail the integrity gate."""
+
+    fault: Fault
+    subject: str
+    """The path, ledger line or obligation that it is about."""
+    text: str
+    serious: bool = True
+
+
+# -- made by build_case ---------------------------------------------------------------------------------------------
+
+
+class Currency(StrEnum):
+    """Where a record stands in time; computed, never stored."""
+
+    CURRENT = "current"
+    REPEATED = "repeated"
+    """Answers the same question as a newer record, and counts as that does."""
+    STALE = "stale"
+    """The claim, an input, an option or a tool has changed since."""
+    WITHDRAWN = "withdrawn"
+    """The plan no longer uses this method for this claim."""
+
+
+@dataclass(frozen=True, slots=True)
+class EvidenceView:
+    entry: Entry
+    currency: Currency
+    counts: bool
+    """Whether it takes part in the claim's status (current or repeated)."""
+    cut_to: Verdict | None = None
+    """Set where the record claims more than its method can show: what it counts as instead."""
+
+
+@dataclass(frozen=True, slots=True)
+class Handled:
+    """A finding of the plan that was matched: `how` is ``expected`` or ``accepted``."""
+
+    how: str
+    pattern: str
+    verdict: str
+    method: str
+    reason: str
+    who: str
+    date: str
+    expires: str
+    expired: bool
+    obligations: tuple[str, ...]
+    """What it matched; empty: it matched nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Suggestion:
+    """The cheapest thing that would close a gap. `cost` orders suggestions and means nothing else."""
+
+    text: str
+    method: str = ""
+    cost: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ObligationView:
+    """One obligation with all that is known of it."""
+
+    obligation: Obligation
+    span: Span | None
+    criticality: str
+    status: Status
+    standing: Status
+    """The status all things considered: `unsupported` where its own evidence is good but what it rests on fails."""
+    evidence: tuple[EvidenceView, ...]
+    """Oldest first."""
+    planned: tuple[tuple[str, str], ...]
+    """(method, key as of now) of every attempt that the plan asks for."""
+    rests_on: tuple[str, ...] = ()
+    below: tuple[str, ...] = ()
+    """Claims beneath it that fail in themselves."""
+    hypotheses: tuple[str, ...] = ()
+    link: Link | None = None
+    handled: str = ""
+    """``expected`` or ``accepted``, where the plan speaks of its finding."""
+    suggestion: Suggestion | None = None
+
+    @property
+    def id(self) -> str:
+        return self.obligation.id
+
+    @property
+    def counting(self) -> tuple[EvidenceView, ...]:
+        return tuple(view for view in self.evidence if view.counts)
+
+
+@dataclass(frozen=True, slots=True)
+class RequirementView:
+    """A system requirement: the answer that a reader looks for first."""
+
+    id: str
+    text: str
+    formula: str
+    temporal: str
+    supported_by: tuple[str, ...]
+    """As the plan names them."""
+    rests_on: tuple[str, ...]
+    """The claims that those names stand for."""
+    unknown_names: tuple[str, ...]
+    """Names under `supported_by` that stand for nothing."""
+    status: Status
+    weakest: str
+    weakest_status: Status
+    below: tuple[str, ...]
+    hypotheses: tuple[str, ...]
+    link: Link | None
+    obligations: tuple[str, ...]
+    """Its own obligations (entailment, model checking), where it has a formula or a temporal property."""
+    answer: str
+    """One line for people."""
+    span: Span | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DerivationView:
+    derivation: Derivation
+    status: Status
+    weakest: str
+    weakest_status: Status
+    below: tuple[str, ...]
+    rests_on: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NodeView:
+    name: str
+    criticality: str
+    methods: tuple[tuple[str, str], ...]
+    """(method id, backend)."""
+    guarantees: tuple[tuple[str, str], ...]
+    """(clause name, sentence or formula)."""
+    assumptions: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HypothesisView:
+    """Something that results rest on without its having been shown, and the claims whose evidence says so."""
+
+    text: str
+    claims: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class EnvironmentView:
+    port: str
+    assume: str
+    because: str
+
+
+@dataclass(frozen=True, slots=True)
+class OpenItem:
+    """Something that a reader must know before believing the rest. `kind` is a status word, ``expired`` or the like."""
+
+    kind: str
+    claim: str
+    text: str
+    suggestion: str = ""
+    handled: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """One demand of the policy. `claims` are those that fail it; `excused` those that the plan's findings excuse."""
+
+    id: str
+    title: str
+    passed: bool
+    reason: str
+    claims: tuple[str, ...] = ()
+    suggestions: tuple[Suggestion, ...] = ()
+    excused: tuple[str, ...] = ()
+    tool_failure: bool = False
+    """It fails only because a tool is missing or broke (exit code 3)."""
+
+
+class Grade(StrEnum):
+    """How fresh the case is."""
+
+    CHECKED = "CHECKED"
+    """Some answers are from the ledger of an earlier run, or some digest was not verified."""
+    CERTIFIED = "CERTIFIED"
+    """Every answer was computed in this run, and every digest verified."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """The whole case. `exit_code`: 0 every gate passes; 1 one fails; 3 one fails for want of a tool, and no other."""
+
+    system: str
+    title: str
+    today: str
+    run: RunInfo
+    grade: Grade
+    grade_reason: str
+    policy: str
+    exit_code: int
+    ledger_head: str
+    digests: tuple[tuple[str, str], ...]
+    requirements: tuple[RequirementView, ...]
+    open_items: tuple[OpenItem, ...]
+    nodes: tuple[NodeView, ...]
+    obligations: tuple[ObligationView, ...]
+    derivations: tuple[DerivationView, ...]
+    hypotheses: tuple[HypothesisView, ...]
+    environment: tuple[EnvironmentView, ...]
+    findings: tuple[Handled, ...]
+    gates: tuple[Gate, ...]
+    single_method: tuple[str, ...]
+    """Guarantees that rest on one method alone."""
+    limits: tuple[tuple[str, str], ...]
+    not_shown: tuple[str, ...]
+    tools: tuple[ToolInfo, ...]
+    methods: tuple[MethodInfo, ...]
+    discrepancies: tuple[Discrepancy, ...]
+    graph_svg: str = ""
+    """The dataflow picture; shown as an image, never as markup."""
+
+    def obligation(self, name: str) -> ObligationView:
+        """The obligation of that id. Raises KeyError."""
+        for view in self.obligations:
+            if view.id == name:
+                return view
+        raise KeyError(name)
+
+    @property
+    def good(self) -> bool:
+        return self.exit_code == 0

@@ -1,0 +1,154 @@
+"""Derived claims: what follows when claims rest on claims, with hypotheses, weakest links and circles refused.
+
+A claim stands on its own evidence (`own`), on other claims (`rests_on`, all of them needed), or on both. Nothing is
+kept between calls: deleting an item of evidence and judging again is the same as never having had it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from avow.evidence.status import Status, weakest_link
+from avow.verdict import Link
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """`own` is the status from the claim's own evidence; None where it has none of its own by nature (a pure
+    combination of others). `prose` marks a claim whose tie to what it rests on is a person's word."""
+
+    id: str
+    own: Status | None = None
+    rests_on: tuple[str, ...] = ()
+    hypotheses: tuple[str, ...] = ()
+    link: Link | None = None
+    prose: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Where a claim stands, all things considered.
+
+    `direct`: its own evidence fails; `below`: those claims beneath it that fail in themselves (root causes);
+    `weakest`: the claim with the weakest status under it (itself included) and that status; `hypotheses` and `link`:
+    all that it and everything under it rests on, and the least mechanical link among them.
+    """
+
+    status: Status
+    direct: bool
+    below: tuple[str, ...]
+    weakest: tuple[str, Status]
+    hypotheses: tuple[str, ...]
+    link: Link | None
+    circle: tuple[str, ...] = ()
+
+
+def judge(claims: Iterable[Claim]) -> Mapping[str, Standing]:
+    """Every claim's standing. A name under `rests_on` that is no claim counts as a claim that nobody has tried."""
+    known = {claim.id: claim for claim in claims}
+    for claim in tuple(known.values()):
+        for name in claim.rests_on:
+            known.setdefault(name, Claim(name, Status.MISSING))
+    result: dict[str, Standing] = {}
+    for component in _components(known):
+        circle = _circle(component, known)
+        for name in component:
+            result[name] = _circular(known[name], circle) if circle else _stand(known[name], result)
+    return result
+
+
+def _stand(claim: Claim, done: Mapping[str, Standing]) -> Standing:
+    under = [(name, done[name]) for name in dict.fromkeys(claim.rests_on)]
+    own = claim.own
+    direct = own is not None and not own.supports
+    below = tuple(dict.fromkeys(cause for name, s in under for cause in _causes(name, s)))
+    candidates = [(claim.id, own)] if own is not None else []
+    candidates += [standing.weakest for _, standing in under]
+    if not candidates:
+        candidates = [(claim.id, Status.MISSING)]
+        direct = True
+    worst = min(candidates, key=lambda pair: (pair[1].rank, pair[0]))
+    if direct:
+        status = own or Status.MISSING
+    elif below:
+        status = Status.UNSUPPORTED
+    else:
+        status = Status.LINKED if claim.prose and worst[1].rank > Status.LINKED.rank else worst[1]
+    links = [link for link in (claim.link, *(s.link for _, s in under)) if link is not None]
+    if claim.prose:
+        links.append(Link.GUIDED)
+    return Standing(
+        status=status,
+        direct=direct,
+        below=below,
+        weakest=worst,
+        hypotheses=tuple(sorted({*claim.hypotheses, *(h for _, s in under for h in s.hypotheses)})),
+        link=weakest_link(links),
+    )
+
+
+def _causes(name: str, standing: Standing) -> tuple[str, ...]:
+    if standing.status.supports:
+        return ()
+    return (name, *standing.below) if standing.direct or standing.circle else standing.below
+
+
+def _circular(claim: Claim, circle: tuple[str, ...]) -> Standing:
+    worst = (claim.id, Status.CIRCULAR)
+    if claim.own is not None and claim.own.rank < Status.CIRCULAR.rank:  # a refutation is told even within a circle
+        return Standing(claim.own, True, (), (claim.id, claim.own), claim.hypotheses, claim.link, circle)
+    return Standing(Status.CIRCULAR, True, (), worst, claim.hypotheses, claim.link, circle)
+
+
+def _circle(component: tuple[str, ...], claims: Mapping[str, Claim]) -> tuple[str, ...]:
+    """The circle that makes a strongly connected component one, as a path that ends where it began; else nothing."""
+    if len(component) == 1 and component[0] not in claims[component[0]].rests_on:
+        return ()
+    members, start = set(component), min(component)
+    path, seen = [start], {start}
+    while True:  # within a strongly connected component some successor always stays inside
+        step = sorted(name for name in claims[path[-1]].rests_on if name in members)
+        fresh = [name for name in step if name not in seen]
+        if not fresh:
+            return (*path[path.index(step[0]) :], step[0])
+        path.append(fresh[0])
+        seen.add(fresh[0])
+
+
+def _components(claims: Mapping[str, Claim]) -> list[tuple[str, ...]]:
+    """Strongly connected components, those that others rest on first (Tarjan, with an explicit stack)."""
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    open_names: list[str] = []
+    is_open: set[str] = set()
+    found: list[tuple[str, ...]] = []
+    for root in sorted(claims):
+        if root in index:
+            continue
+        work = [(root, iter(claims[root].rests_on))]
+        index[root] = low[root] = len(index)
+        open_names.append(root)
+        is_open.add(root)
+        while work:
+            name, rest = work[-1]
+            child = next(rest, None)
+            if child is None:
+                work.pop()
+                if work:
+                    parent = work[-1][0]
+                    low[parent] = min(low[parent], low[name])
+                if low[name] == index[name]:
+                    at = open_names.index(name)
+                    component = tuple(sorted(open_names[at:]))
+                    del open_names[at:]
+                    is_open.difference_update(component)
+                    found.append(component)
+            elif child not in index:
+                index[child] = low[child] = len(index)
+                open_names.append(child)
+                is_open.add(child)
+                work.append((child, iter(claims[child].rests_on)))
+            elif child in is_open:
+                low[name] = min(low[name], index[child])
+    return found

@@ -1,0 +1,249 @@
+"""The evidence ledger: one JSON-lines file a system, append-only, hash-chained, safe against kills and full disks.
+
+    {"evidence": {…}, "hash": "…", "n": 7, "prev": "…"}        hash = SHA-256 of the line without its hash
+
+- A record is written whole under a lock and synced before `append` returns. A killed run leaves at most one torn last
+  line; the next append moves those bytes to ``<file>.torn`` and goes on, and says so in `Ledger.repaired`.
+- A line in the middle that cannot be read, does not match its hash or does not follow its predecessor is *damage*: it
+  is never used as evidence, and it is never passed over in silence (`Ledger.damage`, `avow audit`, a gate).
+- ``<file>.head`` names the newest record, so that cutting whole lines off the end is noticed too.
+- The same evidence appended twice is kept once.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from avow.evidence.encoding import Unreadable, canonical, decode, encode
+from avow.evidence.record import Evidence
+from avow.files import digest, write
+
+GENESIS = "0" * 64
+"""What the first record follows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A record with its place in the chain. `number` counts lines from 0."""
+
+    number: int
+    previous: str
+    hash: str
+    evidence: Evidence
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """A line of the ledger that must not be believed. `line` counts from 1."""
+
+    line: int
+    reason: str
+
+
+class Ledger:
+    """One system's ledger file. Safe to use from several threads and several processes at once."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.repaired: tuple[str, ...] = ()
+        """What was done about torn lines, in sentences."""
+        self._lock = threading.RLock()
+        self._forget()
+
+    # -- reading ------------------------------------------------------------------------------------------------
+
+    def records(self) -> tuple[Entry, ...]:
+        """Every record that can be believed, oldest first. Raises OSError where the file cannot be read."""
+        with self._lock:
+            self._refresh()
+            return tuple(self._entries)
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """Every line that cannot be believed, and a missing end."""
+        with self._lock:
+            self._refresh()
+            return (*self._damage, *self._cut_off())
+
+    @property
+    def head(self) -> str:
+        """The hash of the newest record; `GENESIS` where there is none."""
+        entries = self.records()
+        return entries[-1].hash if entries else GENESIS
+
+    def latest(self, obligation: str, method: str) -> Entry | None:
+        """The newest attempt of a method at an obligation, current or not."""
+        found = [e for e in self.records() if (e.evidence.obligation, e.evidence.method) == (obligation, method)]
+        return found[-1] if found else None
+
+    def current(self, obligation: str, key: str) -> tuple[Entry, ...]:
+        """All attempts at an obligation that answer the question as `key` puts it now, oldest first."""
+        with self._lock:
+            self._refresh()
+            return tuple(self._by_key.get((obligation, key), ()))
+
+    # -- writing ------------------------------------------------------------------------------------------------
+
+    def append(self, evidence: Evidence) -> Entry:
+        """Add a record; it is on the disk when this returns. Raises OSError (a full disk): then nothing was added."""
+        return self.append_all((evidence,))[0]
+
+    def append_all(self, evidences: Sequence[Evidence]) -> tuple[Entry, ...]:
+        """Add records under one lock with one sync. Raises OSError: then none of them was added."""
+        with self._lock, self._locked() as file:
+            self._mend(file)
+            self._refresh()
+            added, lines, result = dict[str, Entry](), [], []
+            previous, number = self._stated_head, self._lines
+            for evidence in evidences:
+                data = encode(evidence)
+                identity = canonical(data)
+                known = self._known.get(identity) or added.get(identity)
+                if known is not None:
+                    result.append(known)
+                    continue
+                body = {"evidence": data, "n": number, "prev": previous}
+                mark = digest(canonical(body))
+                entry = Entry(number, previous, mark, evidence)
+                lines.append(canonical({**body, "hash": mark}) + "\n")
+                added[identity] = entry
+                result.append(entry)
+                previous, number = mark, number + 1
+            if lines:
+                self._write(file, "".join(lines).encode())
+                self._refresh()
+                write(self._head_file, canonical({"hash": previous, "records": number}) + "\n")
+            return tuple(result)
+
+    # -- inside -------------------------------------------------------------------------------------------------
+
+    def _forget(self) -> None:
+        self._offset = 0
+        self._lines = 0
+        self._stated_head = GENESIS
+        self._entries: list[Entry] = []
+        self._damage: list[Damage] = []
+        self._known: dict[str, Entry] = {}
+        self._by_key: dict[tuple[str, str], list[Entry]] = {}
+
+    @property
+    def _head_file(self) -> Path:
+        return self.path.with_name(self.path.name + ".head")
+
+    @contextmanager
+    def _locked(self) -> Iterator[int]:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            yield file
+        finally:
+            os.close(file)  # releases the lock
+
+    def _write(self, file: int, data: bytes) -> None:
+        size = os.fstat(file).st_size
+        try:
+            done = 0
+            while done < len(data):
+                done += os.write(file, data[done:])
+            os.fsync(file)
+        except BaseException:
+            os.ftruncate(file, size)  # a reader never sees half of it; if even this fails, the next append mends it
+            raise
+
+    def _mend(self, file: int) -> None:
+        """Put a torn last line (a run was killed while writing it) aside, so that the chain goes on behind it."""
+        size = os.fstat(file).st_size
+        if size == 0 or os.pread(file, 1, size - 1) == b"\n":
+            return
+        start, step = size, 65536
+        tail = b""
+        while start > 0 and b"\n" not in tail:
+            begin = max(0, start - step)
+            tail = os.pread(file, start - begin, begin) + tail
+            start = begin
+        torn = tail.rpartition(b"\n")[2]
+        with self.path.with_name(self.path.name + ".torn").open("ab") as aside:
+            aside.write(torn + b"\n")
+            aside.flush()
+            os.fsync(aside.fileno())
+        os.ftruncate(file, size - len(torn))
+        self.repaired += (f"a torn last line of {len(torn)} bytes was put aside in {self.path.name}.torn",)
+
+    def _refresh(self) -> None:
+        """Read what was added since the last look (by this or another process)."""
+        try:
+            with self.path.open("rb") as file:
+                size = os.fstat(file.fileno()).st_size
+                if size < self._offset:
+                    self._forget()
+                file.seek(self._offset)
+                data = file.read()
+        except FileNotFoundError:
+            self._forget()
+            return
+        whole = data[: data.rfind(b"\n") + 1]
+        self._offset += len(whole)
+        for line in whole.split(b"\n")[:-1]:
+            self._take(line)
+
+    def _take(self, line: bytes) -> None:
+        number = self._lines
+        self._lines += 1
+        try:
+            entry = read_line(line)
+        except Unreadable as problem:
+            self._damage.append(Damage(number + 1, f"cannot be read as a record: {problem}"))
+            return
+        follows = entry.previous == self._stated_head and entry.number == number
+        self._stated_head = entry.hash
+        if not follows:  # told, but the record itself may still be whole: dropping it could hide a refutation
+            reason = "does not follow the record before it: a record was removed, inserted, moved or made unreadable"
+            self._damage.append(Damage(number + 1, reason))
+        body = {"evidence": encode(entry.evidence), "n": entry.number, "prev": entry.previous}
+        identity = canonical(body["evidence"])
+        if digest(canonical(body)) != entry.hash:
+            self._damage.append(Damage(number + 1, f"was changed after it was written ({entry.evidence.obligation})"))
+            return
+        self._entries.append(entry)
+        self._known.setdefault(identity, entry)
+        self._by_key.setdefault((entry.evidence.obligation, entry.evidence.key), []).append(entry)
+
+    def _cut_off(self) -> tuple[Damage, ...]:
+        try:
+            stated = json.loads(self._head_file.read_text())
+            mark, count = str(stated["hash"]), int(stated["records"])
+        except FileNotFoundError:
+            return ()
+        except (OSError, ValueError, KeyError, TypeError):
+            return (Damage(self._lines + 1, f"{self._head_file.name} cannot be read"),)
+        if count > self._lines:
+            return (Damage(self._lines + 1, f"{count - self._lines} record(s) were cut off the end"),)
+        if not any(entry.hash == mark and entry.number == count - 1 for entry in self._entries[-64:]) and not any(
+            entry.hash == mark for entry in self._entries
+        ):
+            return (Damage(self._lines, f"is not the newest record that {self._head_file.name} names"),)
+        return ()
+
+
+def read_line(line: bytes) -> Entry:
+    """One line of a ledger; its hash is not checked here. Raises Unreadable."""
+    try:
+        data = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise Unreadable(f"not JSON ({error})") from error
+    if not isinstance(data, dict) or data.keys() != {"evidence", "hash", "n", "prev"}:
+        raise Unreadable("not a ledger line")
+    number, previous, mark = data["n"], data["prev"], data["hash"]
+    if isinstance(number, bool) or not isinstance(number, int):
+        raise Unreadable("n is not a number")
+    if not isinstance(previous, str) or not isinstance(mark, str):
+        raise Unreadable("hash and prev are not texts")
+    return Entry(number, previous, mark, decode(data["evidence"]))

@@ -1,0 +1,152 @@
+"""The lattice: what a set of unlike evidence says of one claim (design: page 04, "Roll-up").
+
+A claim's evidence is weighed item by item into a `Weight`; weights are joined by taking the greatest of each part, so
+joining is associative, commutative and idempotent: order and duplication cannot matter, and nothing that is joined can
+take a refutation away. `Weight.status` reads the one word off it. Everything here is pure and small on purpose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import reduce
+
+from avow.evidence.record import Evidence
+from avow.verdict import Link, Verdict
+
+
+class Status(StrEnum):
+    """Where a claim stands. The first ten words are the verdicts' own; the others are only ever computed."""
+
+    PROVED = "proved"
+    CHECKED = "checked"
+    TESTED = "tested"
+    MONITORED = "monitored"
+    REVIEWED = "reviewed"
+    JUSTIFIED = "justified"
+    LINKED = "linked"
+    """A claim in prose: a person says that what stands below it, which holds, amounts to it."""
+    VACUOUS = "vacuous"
+    """Evidence whose trigger was never met: it supports nothing."""
+    UNKNOWN = "unknown"
+    NOT_RUN = "not-run"
+    ERROR = "error"
+    STALE = "stale"
+    """There was evidence, but what it was about has changed since."""
+    MISSING = "missing"
+    """Nobody has tried."""
+    UNSUPPORTED = "unsupported"
+    """Nothing speaks against the claim itself, but something that it rests on fails."""
+    CIRCULAR = "circular"
+    """The claim would support itself: refused."""
+    REFUTED = "refuted"
+    CONTRADICTORY = "contradictory"
+    """A proof and a refutation of the same claim: one of the tools is wrong."""
+
+    @property
+    def supports(self) -> bool:
+        """Whether a claim of this status may be relied upon at all (how far, the policy says)."""
+        return self in _SUPPORTING
+
+    @property
+    def rank(self) -> int:
+        """Greater is better; a total order, used for "weakest link" and for nothing that needs commensurability."""
+        return _RANK[self]
+
+
+_BEST_FIRST = tuple(Status)
+_RANK = {status: len(_BEST_FIRST) - at for at, status in enumerate(_BEST_FIRST)}
+_SUPPORTING = frozenset(_BEST_FIRST[: _BEST_FIRST.index(Status.LINKED) + 1])
+_LINK_RANK = {Link.GENERATED: 3, Link.MAPPED: 2, Link.GUIDED: 1}
+
+
+def weakest(statuses: Iterable[Status]) -> Status | None:
+    """The worst of them; None of none."""
+    return min(statuses, key=lambda status: status.rank, default=None)
+
+
+def weakest_link(links: Iterable[Link]) -> Link | None:
+    """The least mechanical link between contract and artifact; None of none."""
+    return min(links, key=_LINK_RANK.__getitem__, default=None)
+
+
+def best_link(links: Iterable[Link]) -> Link | None:
+    return max(links, key=_LINK_RANK.__getitem__, default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class Weight:
+    """What evidence amounts to: an element of the lattice."""
+
+    support: Status | None = None
+    """The best status that some item gives, if any supports."""
+    refuted: bool = False
+    idle: Status | None = None
+    """The most telling of the items that neither support nor refute."""
+
+    def join(self, other: Weight) -> Weight:
+        return Weight(
+            _greater(self.support, other.support),
+            self.refuted or other.refuted,
+            _greater(self.idle, other.idle),
+        )
+
+    @property
+    def status(self) -> Status:
+        if self.refuted:
+            return Status.CONTRADICTORY if self.support is Status.PROVED else Status.REFUTED
+        return self.support or self.idle or Status.MISSING
+
+
+NOTHING = Weight()
+"""No evidence at all."""
+OUTDATED = Weight(idle=Status.STALE)
+"""What evidence amounts to once its claim, its inputs or its method have moved on."""
+
+
+def effective(evidence: Evidence) -> Verdict:
+    """The verdict that counts. What a record says beyond the strength of its method is cut down to that strength, so
+    that no bounded method gives a proof, whatever its record claims; support from a method of no strength is none."""
+    if not evidence.verdict.supports:
+        return evidence.verdict
+    if not evidence.strength.supports:
+        return Verdict.UNKNOWN
+    stronger = Status(evidence.verdict).rank > Status(evidence.strength).rank
+    return evidence.strength if stronger else evidence.verdict
+
+
+def weigh(evidence: Evidence) -> Weight:
+    """One current record."""
+    verdict = effective(evidence)
+    if verdict is Verdict.REFUTED:
+        return Weight(refuted=True)
+    if not verdict.supports:
+        return Weight(idle=Status(verdict))
+    if evidence.vacuous:
+        return Weight(idle=Status.VACUOUS)
+    return Weight(support=Status(verdict))
+
+
+def join(weights: Iterable[Weight]) -> Weight:
+    return reduce(Weight.join, weights, NOTHING)
+
+
+def roll_up(current: Iterable[Evidence], *, outdated: bool = False) -> Status:
+    """The status of one claim from all its current evidence; `outdated` says that there is history besides."""
+    weight = join(weigh(evidence) for evidence in current)
+    return (weight.join(OUTDATED) if outdated else weight).status
+
+
+def hypotheses(current: Iterable[Evidence]) -> tuple[str, ...]:
+    """What the status rests on without its having been shown: the fewest hypotheses among the items that give it."""
+    items = tuple(current)
+    support = join(map(weigh, items)).support
+    giving = [tuple(sorted(set(e.hypotheses))) for e in items if support and weigh(e).support is support]
+    return min(giving, key=lambda h: (len(h), h), default=())
+
+
+def _greater(one: Status | None, other: Status | None) -> Status | None:
+    if one is None or other is None:
+        return one or other
+    return one if one.rank >= other.rank else other
