@@ -1,0 +1,63 @@
+"""From a folder (or bare .rcl files) to a checked `System`: the front door of everything that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from avow.diagnostics import Diagnostic, Rejected
+from avow.language.contract import Contract
+from avow.system.names import check_names
+from avow.system.plan import System
+from avow.system.plan_file import bare_plan, fill_methods, read_plan
+
+PLAN_FILE = "plan.yaml"
+
+
+def load_system(folder: Path) -> System:
+    """The system whose plan.yaml is in `folder`. A folder without a plan but with .rcl files is a bare system.
+
+    Raises Rejected with every fault found in the plan and in the contract.
+    """
+    path = folder / PLAN_FILE
+    if not path.is_file():
+        if path.exists() or not folder.is_dir():
+            raise Rejected(Diagnostic("PLAN100", f"there is no folder {folder} with a {PLAN_FILE}"))
+        files = sorted(folder.glob("*.rcl"))
+        if not files:
+            raise Rejected(Diagnostic("PLAN100", f"{folder} holds neither a {PLAN_FILE} nor an .rcl file"))
+        return load_bare(files, folder.resolve().name)
+    plan, root, faults = read_plan(path)
+    contract, more = _contract(plan.contract_files)
+    faults += more
+    if contract is None:
+        raise Rejected(*faults)
+    faults += check_names(plan, root, contract)
+    if any(fault.is_error for fault in faults):
+        raise Rejected(*faults)
+    guarantees = {node.name: tuple(clause.name for clause in node.guarantees) for node in contract.nodes}
+    return System(fill_methods(plan, guarantees), contract)
+
+
+def load_bare(files: Sequence[Path], name: str | None = None) -> System:
+    """The system of some .rcl files without a plan: names link. Raises Rejected."""
+    contract, faults = _contract(tuple(files))
+    if contract is None:
+        raise Rejected(*faults)
+    return System(bare_plan(name or (files[0].stem if files else "system"), tuple(files)), contract)
+
+
+def load_path(path: Path) -> System:
+    """A folder or an .rcl file, as commands take it. Raises Rejected."""
+    return load_system(path) if path.is_dir() else load_bare((path,))
+
+
+def _contract(files: tuple[Path, ...]) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
+    from avow.language.load import load_contract  # the grammar is slow to import
+
+    if not files:
+        return None, ()
+    try:
+        return load_contract(files), ()
+    except Rejected as rejected:
+        return None, rejected.diagnostics

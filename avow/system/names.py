@@ -1,0 +1,168 @@
+"""The names in a plan, held against the contract: nodes, ports, guarantees, tables' arities, all located."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from avow.diagnostics import Diagnostic, Span
+from avow.language.contract import Contract, Node, Port
+from avow.language.sorts import BOOL, FunctionSort
+from avow.system.plan import Plan
+from avow.system.schema import suggest
+from avow.system.strict_yaml import Piece
+
+_BASE_SORTS = ("BOOL", "INTEGER", "NATURAL", "REAL", "STRING")
+
+
+def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic, ...]:
+    """Everything that the plan names and the contract does not have."""
+    nodes = {node.name: node for node in contract.nodes}
+    return (
+        *_connections(root, nodes),
+        *_environment(root, nodes),
+        *_requirements(plan, root, nodes),
+        *_goals(root, nodes),
+        *_nodes(plan, root, nodes),
+        *_model(root, nodes),
+        *_scenario(plan, root, contract, nodes),
+        *_findings(root, nodes),
+    )
+
+
+def ports_named(name: str, nodes: Iterable[Node]) -> tuple[tuple[Node, Port], ...]:
+    """The ports that a plan means by ``in.p``, ``out.p`` (of every node) or ``node.p`` (either side of one node)."""
+    owner, _, port = name.partition(".")
+    found: list[tuple[Node, Port]] = []
+    for node in nodes:
+        sides = {"in": node.inputs, "out": node.outputs, node.name: node.inputs + node.outputs}
+        found += [(node, candidate) for candidate in sides.get(owner, ()) if candidate.name == port]
+    return tuple(found)
+
+
+def _unknown(what: str, name: str, known: Iterable[str], span: Span) -> Diagnostic:
+    return Diagnostic(
+        "PLAN106", f"{what} {name!r}: there is no such thing in the contract", span, hint=suggest(name, known)
+    )
+
+
+def _text_items(piece: Piece | None) -> list[Piece]:
+    if piece is None:
+        return []
+    return piece.items if piece.items is not None else [piece]
+
+
+def _connections(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    for index, piece in enumerate(_text_items(root.at("connections"))):
+        for key, side in (("from", "output"), ("to", "input")):
+            for item in _text_items(piece.at(key)):
+                name, _, port = item.text.partition(".")
+                where = f"connections[{index}].{key}"
+                if name not in nodes:
+                    yield _unknown(f"{where}: node", name, nodes, item.span)
+                    continue
+                ports = nodes[name].outputs if side == "output" else nodes[name].inputs
+                if port not in [p.name for p in ports]:
+                    yield _unknown(f"{where}: {side}", item.text, [f"{name}.{p.name}" for p in ports], item.span)
+
+
+def _environment(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    piece = root.at("environment")
+    for name in (piece.entries or {}) if piece else ():
+        owner, _, port = name.partition(".")
+        span = piece.key_span(name) if piece else root.span
+        if owner == "in":
+            known = sorted({p.name for node in nodes.values() for p in node.inputs})
+            if port not in known:
+                yield _unknown("environment: input", name, [f"in.{p}" for p in known], span)
+        elif owner not in nodes:
+            yield _unknown("environment: node", owner, ["in", *nodes], span)
+        elif port not in [p.name for p in nodes[owner].inputs]:
+            yield _unknown("environment: input", name, [f"{owner}.{p.name}" for p in nodes[owner].inputs], span)
+
+
+def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    goals = [goal.name for goal in plan.compose]
+    piece = root.at("requirements")
+    for name, requirement in (piece.entries or {}).items() if piece else ():
+        for item in _text_items(requirement.at("supported_by")):
+            owner, dot, clause = item.text.partition(".")
+            if item.text in goals or (not dot and owner in nodes):
+                continue
+            where = f"requirements.{name}.supported_by"
+            if owner not in nodes:
+                yield _unknown(where, item.text, [*nodes, *goals], item.span)
+            elif clause not in [g.name for g in nodes[owner].guarantees]:
+                yield _unknown(where, item.text, [f"{owner}.{g.name}" for g in nodes[owner].guarantees], item.span)
+
+
+def _goals(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    piece = root.at("compose")
+    for name, goal in (piece.entries or {}).items() if piece else ():
+        for item in _text_items(goal.at("select")):
+            if item.text not in nodes:
+                yield _unknown(f"compose.{name}.select: node", item.text, nodes, item.span)
+
+
+def _nodes(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    piece = root.at("nodes")
+    for entry in plan.nodes:
+        node = nodes.get(entry.node)
+        if node is None:
+            yield _unknown("nodes: node", entry.node, nodes, piece.key_span(entry.node) if piece else root.span)
+            continue
+        known = [g.name for g in node.guarantees]
+        for method in entry.methods:
+            for index, name in enumerate(method.guarantees):
+                if name not in known:
+                    where = f"nodes.{entry.node}.methods: {method.id}: guarantee"
+                    yield _unknown(where, name, known, method.options.at("guarantees", index))
+
+
+def _model(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    for key in ("compound", "external"):
+        piece = root.at("model", key)
+        for name in (piece.entries or {}) if piece else ():
+            if name not in nodes:
+                yield _unknown(f"model.{key}: node", name, nodes, piece.key_span(name) if piece else root.span)
+
+
+def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    if plan.scenario is None:
+        return
+    everything = [
+        *dict.fromkeys(f"in.{p.name}" for node in contract.nodes for p in node.inputs),
+        *dict.fromkeys(f"out.{p.name}" for node in contract.nodes for p in node.outputs),
+    ]
+    interpret = root.at("scenario", "interpret")
+    for name, (table, columns) in plan.scenario.interpret.items():
+        span = (interpret.at(name) or interpret).span if interpret else root.span
+        found = ports_named(name, contract.nodes)
+        if not found:
+            yield _unknown("scenario.interpret: port", name, everything, span)
+            continue
+        sort = found[0][1].sort
+        if not isinstance(sort, FunctionSort):
+            message = f"scenario.interpret.{name}: only a function or relation is given by a table"
+            yield Diagnostic("PLAN109", message, span, hint=f"give its values under domains: {name}")
+            continue
+        wanted = len(sort.parameters) + (0 if sort.result == BOOL else 1)
+        if len(columns) != wanted:
+            message = f"scenario.interpret.{name}: {wanted} columns are wanted, {table} gives {len(columns)} here"
+            yield Diagnostic("PLAN109", message, span)
+    domains = root.at("scenario", "domains")
+    types = [name for name, _ in contract.types]
+    for name in plan.scenario.domains:
+        span = domains.key_span(name) if domains else root.span
+        if name not in _BASE_SORTS and name not in types and not ports_named(name, contract.nodes):
+            yield _unknown("scenario.domains: type or port", name, [*_BASE_SORTS, *types, *everything], span)
+
+
+def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    for key in ("expected", "accepted"):
+        for item in _text_items(root.at(key)):
+            obligation = item.at("obligation")
+            if obligation is None:
+                continue
+            owner = obligation.text.split("/")[0]
+            if owner not in nodes and owner != "system" and not set(owner) & set("*?["):
+                yield _unknown(f"{key}: node", owner, [*nodes, "system"], obligation.span)

@@ -1,0 +1,354 @@
+"""Reads plan.yaml: from text to `Plan`, with every fault located and all of them told in one go.
+
+Two steps, since the contract's files are named by the plan: `read_plan` needs nothing else; `avow.system.names` then
+holds the plan's names against the contract, and `fill_methods` adds what a plan leaves to it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.files import digest
+from avow.system.paths import inside
+from avow.system.plan import (
+    ComposeGoal,
+    Connection,
+    Endpoint,
+    EnvironmentInput,
+    Finding,
+    Located,
+    Method,
+    NodePlan,
+    Plan,
+    Requirement,
+    Scenario,
+    Table,
+)
+from avow.system.schema import check_shape
+from avow.system.strict_yaml import Piece, read_yaml
+from avow.system.tables import domain, interpretation, plain, read_csv, read_rows
+
+RESERVED = ("interpret", "domains", "steps")
+"""Keys of `scenario` that are not tables."""
+
+_METHOD_ID = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,60}\Z")
+
+
+def read_plan(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...]]:
+    """The plan in a file, its names not yet held against a contract; the document; what is wrong with its values.
+
+    Raises Rejected where the file cannot be read or its shape is wrong: then nothing more can be said of it.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise Rejected(Diagnostic("PLAN100", f"{path} cannot be read: {error.strerror}")) from None
+    root, faults = read_yaml(data, str(path))
+    faults += check_shape(root)
+    if faults:
+        raise Rejected(*faults)
+    reader = _Reader(path, root)
+    plan = reader.plan()
+    return plan, root, tuple(reader.faults)
+
+
+def bare_plan(name: str, files: tuple[Path, ...]) -> Plan:
+    """The plan of a system for which nobody wrote one: names link, nothing else is decided."""
+    root = files[0].parent if files else Path()
+    nowhere = Located({}, Span(str(files[0]) if files else "", 1, 1, 1, 1))
+    return Plan(
+        system=name,
+        title=name,
+        path=root / "plan.yaml",
+        contract_files=files,
+        model=nowhere,
+        messages=(),
+        connections=(),
+        environment=(),
+        scenario=None,
+        requirements=(),
+        compose=(),
+        nodes=(),
+        policy=nowhere,
+        expected=None,
+        accepted=(),
+        plugins=(),
+        lints_off=(),
+    )
+
+
+class _Reader:
+    """Turns a well-shaped document into a `Plan`, noting what the schema cannot see."""
+
+    def __init__(self, path: Path, root: Piece) -> None:
+        self.path = path
+        self.root = root
+        self.faults: list[Diagnostic] = []
+
+    def fault(self, code: str, message: str, span: Span, hint: str | None = None) -> None:
+        self.faults.append(Diagnostic(code, message, span, hint=hint))
+
+    def plan(self) -> Plan:
+        folder = self.path.resolve().parent.name
+        name = self.text("system") or re.sub(r"[^A-Za-z0-9_-]", "_", folder) or "system"
+        located = {
+            key: (self.root.at(key) or Piece(self.root.span, value=None)).located() for key in ("model", "policy")
+        }
+        self.model_graph()
+        return Plan(
+            system=name,
+            title=self.text("title") or name,
+            path=self.path,
+            contract_files=self.contract_files(),
+            model=located["model"],
+            messages=tuple(path for piece, path in self.paths("messages") if self.present(piece, path)),
+            connections=tuple(self.connections()),
+            environment=tuple(self.environment()),
+            scenario=self.scenario(),
+            requirements=tuple(self.requirements()),
+            compose=tuple(self.goals()),
+            nodes=tuple(self.nodes()),
+            policy=located["policy"],
+            expected=tuple(self.findings("expected")) if self.root.at("expected") else None,
+            accepted=tuple(self.findings("accepted")),
+            plugins=tuple(_texts(self.root.at("plugins"))),
+            lints_off=tuple(_texts(self.root.at("lints_off"))),
+        )
+
+    def text(self, *keys: str) -> str | None:
+        piece = self.root.at(*keys)
+        return None if piece is None or piece.value is None else piece.text
+
+    def entries(self, *keys: str) -> Iterator[tuple[str, Piece]]:
+        piece = self.root.at(*keys)
+        if piece is not None and piece.entries is not None:
+            yield from piece.entries.items()
+
+    def items(self, *keys: str) -> list[Piece]:
+        piece = self.root.at(*keys)
+        return (piece.items or []) if piece is not None else []
+
+    def resolve(self, piece: Piece) -> Path | None:
+        path = inside(self.path.parent, piece.text)
+        if path is None:
+            self.fault("PLAN108", f"the path {piece.text!r} leads out of the system's folder", piece.span)
+        return path
+
+    def present(self, piece: Piece, path: Path) -> bool:
+        if path.exists():
+            return True
+        self.fault("PLAN107", f"there is no file {piece.text!r} in {self.path.parent}", piece.span)
+        return False
+
+    def paths(self, *keys: str) -> Iterator[tuple[Piece, Path]]:
+        piece = self.root.at(*keys)
+        if piece is None:
+            return
+        for item in piece.items if piece.items is not None else [piece]:
+            path = self.resolve(item)
+            if path is not None:
+                yield item, path
+
+    def contract_files(self) -> tuple[Path, ...]:
+        if self.root.at("contract") is not None:
+            return tuple(path for piece, path in self.paths("contract") if self.present(piece, path))
+        found = tuple(sorted(self.path.resolve().parent.glob("*.rcl")))
+        if not found:
+            self.fault("PLAN107", f"no contract: there is no .rcl file in {self.path.parent}", self.root.span)
+        return found
+
+    def model_graph(self) -> None:
+        for piece, path in self.paths("model", "graph"):
+            self.present(piece, path)
+
+    def connections(self) -> Iterator[Connection]:
+        for piece in self.items("connections"):
+            entries = piece.entries or {}
+            delayed, initial = entries.get("delayed"), entries.get("initial")
+            if initial is not None and not (delayed and delayed.value):
+                self.fault("PLAN110", "an initial value needs a delayed edge", initial.span, hint="add  delayed: true")
+            targets = entries["to"].items if entries["to"].items is not None else [entries["to"]]
+            for target in targets:
+                yield Connection(
+                    _endpoint(entries["from"].text),
+                    _endpoint(target.text),
+                    bool(delayed and delayed.value),
+                    _value(initial) if initial is not None else None,
+                    target.span,
+                )
+
+    def environment(self) -> Iterator[EnvironmentInput]:
+        for port, piece in self.entries("environment"):
+            assume = piece.at("assume")
+            because = piece.at("because")
+            yield EnvironmentInput(port, assume.text if assume else None, because.text if because else None, piece.span)
+
+    def scenario(self) -> Scenario | None:
+        if self.root.at("scenario") is None:
+            return None
+        tables: dict[str, Table] = {}
+        for name, piece in self.entries("scenario"):
+            if name not in RESERVED:
+                table = self.table(name, piece)
+                if table is not None:
+                    tables[name] = table
+        interpret: dict[str, tuple[str, tuple[str, ...]]] = {}
+        for port, piece in self.entries("scenario", "interpret"):
+            found = interpretation(piece.text, tables)
+            if isinstance(found, str):
+                self.fault("PLAN109", f"scenario.interpret.{port}: {found}", piece.span)
+            else:
+                interpret[port] = found
+        domains: dict[str, tuple[str, ...]] = {}
+        for name, piece in self.entries("scenario", "domains"):
+            values = domain(piece, tables)
+            if isinstance(values, str):
+                self.fault("PLAN109", f"scenario.domains.{name}: {values}", piece.span)
+            else:
+                domains[name] = values
+        steps = self.root.at("scenario", "steps")
+        parts = [
+            *(f"table {t.name!r} {t.columns!r} {t.rows!r}" for t in sorted(tables.values(), key=lambda t: t.name)),
+            *(f"interpret {port!r} {value!r}" for port, value in sorted(interpret.items())),
+            *(f"domain {name!r} {values!r}" for name, values in sorted(domains.items())),
+            f"steps {steps.value if steps else None!r}",
+        ]
+        return Scenario(
+            tuple(tables.values()), interpret, domains, steps.value if steps else None, digest("\n".join(parts))
+        )
+
+    def table(self, name: str, piece: Piece) -> Table | None:
+        if piece.items is not None:
+            table, faults = read_rows(name, piece)
+            self.faults += faults
+            return table
+        source = piece.at("file") or piece
+        path = self.resolve(source)
+        if path is None or not self.present(source, path):
+            return None
+        table, faults = read_csv(name, path, source.span)
+        self.faults += faults
+        return table
+
+    def requirements(self) -> Iterator[Requirement]:
+        for name, piece in self.entries("requirements"):
+            formula, temporal, text = piece.at("formula"), piece.at("temporal"), piece.at("text")
+            if formula is not None and temporal is not None:
+                self.fault("PLAN110", f"{name}: either formula or temporal, not both", temporal.span)
+            yield Requirement(
+                name,
+                text.text if text else "",
+                formula.text if formula else None,
+                temporal.text if temporal else None,
+                tuple(_texts(piece.at("supported_by"))),
+                piece.span,
+            )
+
+    def goals(self) -> Iterator[ComposeGoal]:
+        for name, piece in self.entries("compose"):
+            rule = piece.at("rule")
+            select = tuple(_texts(piece.at("select")))
+            for twice in [node for node, count in Counter(select).items() if count > 1]:
+                self.fault("PLAN110", f"compose.{name}.select: {twice!r} is named twice", piece.span)
+            yield ComposeGoal(name, select, rule.text if rule else None, piece.located(), piece.span)
+
+    def nodes(self) -> Iterator[NodePlan]:
+        for name, piece in self.entries("nodes"):
+            criticality = piece.at("criticality")
+            used: set[str] = set()
+            methods: list[Method] = []
+            methods_piece = piece.at("methods")
+            for item in (methods_piece.items or []) if methods_piece else []:
+                method = self.method(name, item, used)
+                if method is not None:
+                    methods.append(method)
+            yield NodePlan(name, criticality.text if criticality else "medium", tuple(methods), piece.span)
+
+    def method(self, node: str, item: Piece, used: set[str]) -> Method | None:
+        if item.entries is None:
+            backend, options = item.text, Piece(item.span, entries={})
+        else:
+            backend, options = next(iter(item.entries.items()))
+            if options.value is None and options.entries is None and options.items is None and not options.text:
+                options = Piece(options.span, entries={})
+        if options.entries is None:
+            self.fault("PLAN105", f"nodes.{node}: the options of {backend!r} must be a mapping", options.span)
+            return None
+        if not _METHOD_ID.match(backend):
+            self.fault("PLAN105", f"nodes.{node}: {backend!r} cannot be a backend's name", item.span)
+            return None
+        given = options.at("id")
+        name = given.text if given is not None else backend
+        if given is not None and (not _METHOD_ID.match(name) or name in used):
+            why = "is used twice" if name in used else "must be a word"
+            self.fault("PLAN110", f"nodes.{node}: the method's id {name!r} {why}", given.span)
+        number = 2
+        while name in used:
+            name = f"{backend}-{number}"
+            number += 1
+        used.add(name)
+        return Method(name, backend, options.located(), tuple(_texts(options.at("guarantees"))))
+
+    def findings(self, key: str) -> Iterator[Finding]:
+        for piece in self.items(key):
+            texts = {name: part.text for name, part in (piece.entries or {}).items()}
+            for field in ("date", "expires"):
+                part = piece.at(field)
+                if part is not None and not _is_date(part.text):
+                    self.fault("PLAN105", f"{key}: {part.text!r} is no date of the calendar", part.span)
+            yield Finding(
+                texts["obligation"],
+                texts["verdict"],
+                texts.get("reason"),
+                texts.get("who"),
+                texts.get("date"),
+                texts.get("expires"),
+                texts.get("method"),
+                piece.span,
+            )
+
+
+def fill_methods(plan: Plan, guarantees: Mapping[str, tuple[str, ...]]) -> Plan:
+    """A copy in which each method that names no guarantee takes on all of its node's."""
+    nodes = tuple(
+        replace(
+            entry,
+            methods=tuple(
+                method if method.guarantees else replace(method, guarantees=guarantees.get(entry.node, ()))
+                for method in entry.methods
+            ),
+        )
+        for entry in plan.nodes
+    )
+    return replace(plan, nodes=nodes)
+
+
+def _endpoint(text: str) -> Endpoint:
+    node, _, port = text.partition(".")
+    return Endpoint(node, port)
+
+
+def _value(piece: Piece) -> str:
+    return plain(piece.value) if isinstance(piece.value, bool) else piece.text
+
+
+def _texts(piece: Piece | None) -> list[str]:
+    if piece is None:
+        return []
+    if piece.items is not None:
+        return [item.text for item in piece.items]
+    return [piece.text]
+
+
+def _is_date(text: str) -> bool:
+    try:
+        date.fromisoformat(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,138 @@
+"""A plan held against its JSON schema, every fault told in words and at its place."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import re
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from avow.diagnostics import Diagnostic
+from avow.system.strict_yaml import Piece
+
+
+@cache
+def plan_schema() -> dict[str, Any]:
+    """The published schema of plan.yaml."""
+    text = resources.files("avow.system").joinpath("plan.schema.json").read_text(encoding="utf-8")
+    schema: dict[str, Any] = json.loads(text)
+    return schema
+
+
+def check_shape(piece: Piece) -> tuple[Diagnostic, ...]:
+    """Everything in which the plan departs from the schema, in the order of the file."""
+    from jsonschema import Draft202012Validator, validators  # slow to import
+
+    validator = validators.extend(Draft202012Validator, {"pattern": _pattern})(plan_schema())  # type: ignore[no-untyped-call]
+    found = [d for error in validator.iter_errors(piece.data) for d in _explain(error, piece)]
+    return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0)))
+
+
+def suggest(word: str, known: Iterable[str]) -> str | None:
+    """A hint: the nearest known name, else what is known."""
+    names = list(known)
+    near = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    if near:
+        return f"did you mean {near[0]!r}?"
+    if not names:
+        return None
+    shown = ", ".join(names[:12]) + (", …" if len(names) > 12 else "")
+    return f"known: {shown}"
+
+
+def key_path(path: Iterable[str | int]) -> str:
+    """``connections[0].to``, for messages."""
+    text = ""
+    for step in path:
+        text += f"[{step}]" if isinstance(step, int) else (f".{step}" if text else step)
+    return text or "the plan"
+
+
+def _pattern(validator: Any, pattern: str, instance: Any, schema: Any) -> Iterator[Any]:
+    """As JSON schema has it, but ``$`` means the very end, not the end but for a newline."""
+    from jsonschema.exceptions import ValidationError
+
+    if isinstance(instance, str) and (not re.search(pattern, instance) or instance.endswith("\n")):
+        yield ValidationError(f"{instance!r} does not match {pattern!r}")
+
+
+def _explain(error: Any, root: Piece) -> Iterator[Diagnostic]:
+    path: tuple[str | int, ...] = tuple(error.absolute_path)
+    piece = root.at(*path) or root
+    where = key_path(path)
+    about = error.schema.get("description") if isinstance(error.schema, dict) else None
+    wanted = f" (expected: {about})" if about else ""
+    if "propertyNames" in error.absolute_schema_path:
+        name = str(error.instance)
+        yield Diagnostic("PLAN103", f"{where}: the key {name!r} cannot be used here{wanted}", piece.key_span(name))
+        return
+    match error.validator:
+        case "additionalProperties":
+            known = list(error.schema.get("properties", {}))
+            for key in piece.entries or {}:
+                if key not in known:
+                    yield Diagnostic(
+                        "PLAN103", f"{where}: unknown key {key!r}", piece.key_span(key), hint=suggest(key, known)
+                    )
+        case "required":
+            missing = [key for key in error.validator_value if key not in (piece.entries or {})]
+            named = str(error.message).split("'")[1] if "'" in str(error.message) else ""
+            if named in missing:
+                yield Diagnostic("PLAN104", f"{where}: the key {named!r} is missing", piece.span)
+        case "enum":
+            allowed = [str(value) for value in error.validator_value]
+            yield Diagnostic(
+                "PLAN105",
+                f"{where}: {_show(error.instance)} is not one of {', '.join(allowed)}",
+                piece.span,
+                hint=suggest(str(error.instance), allowed) if isinstance(error.instance, str) else None,
+            )
+        case "type":
+            kinds = error.validator_value if isinstance(error.validator_value, list) else [error.validator_value]
+            names = " or ".join(str(_KINDS.get(kind, kind)) for kind in kinds)
+            hint = None
+            if isinstance(error.instance, str) and "boolean" in kinds:
+                hint = "write true or false (yes, no, on and off are plain words here)"
+            elif isinstance(error.instance, int | float | bool) and "string" in kinds:
+                hint = "put it in quotes"
+            yield Diagnostic(
+                "PLAN105", f"{where}: {names} is wanted, not {_show(error.instance)}{wanted}", piece.span, hint=hint
+            )
+        case "pattern":
+            yield Diagnostic("PLAN105", f"{where}: {_show(error.instance)} has not the right form{wanted}", piece.span)
+        case "minLength" | "minItems" | "minProperties":
+            yield Diagnostic("PLAN105", f"{where}: must not be empty{wanted}", piece.span)
+        case "maxProperties":
+            yield Diagnostic("PLAN105", f"{where}: exactly one key is wanted{wanted}", piece.span)
+        case _:
+            yield Diagnostic("PLAN105", f"{where}: {str(error.message)[:300]}{wanted}", piece.span)
+
+
+_KINDS = {
+    "object": "a mapping",
+    "array": "a list",
+    "string": "text",
+    "number": "a number",
+    "integer": "a whole number",
+    "boolean": "true or false",
+    "null": "nothing",
+}
+
+
+def _show(value: Any) -> str:
+    match value:
+        case None:
+            return "nothing"
+        case dict():
+            return "a mapping"
+        case list():
+            return "a list"
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return repr(value if len(value) <= 60 else value[:57] + "…")
+        case _:
+            return str(value)

@@ -1,0 +1,259 @@
+"""YAML as configuration should be: every piece keeps its place, nothing is guessed.
+
+`yaml.safe_load` takes duplicate keys in silence, reads ``off`` as False, ``1:30`` as 90 and ``010`` as 8, expands
+aliases without bound, and forgets where things stood. This reader works on PyYAML's parse events: scalars are null,
+true, false, JSON numbers or text; duplicate keys, tags and merge keys are errors; aliases may be used, within bounds.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.system.plan import Located
+
+MAX_BYTES = 8_000_000
+MAX_PIECES = 400_000
+"""Pieces of a document after its aliases are expanded."""
+MAX_DEPTH = 60
+
+_INTEGER = re.compile(r"-?(0|[1-9][0-9]*)\Z")
+_DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]{1,3})?\Z")
+_WORDS = {"": None, "~": None, "null": None, "true": True, "false": False}
+
+
+@dataclass(slots=True)
+class Piece:
+    """A scalar (`value`), a list (`items`) or a mapping (`entries`: key → piece), with its place.
+
+    `text` is a scalar exactly as written, for cells of tables, where ``2.30`` must not become another number.
+    """
+
+    span: Span
+    value: Any = None
+    text: str = ""
+    items: list[Piece] | None = None
+    entries: dict[str, Piece] | None = None
+    keys: dict[str, Span] = field(default_factory=dict)
+    size: int = 1
+    """Pieces in it, itself included, aliases expanded."""
+    depth: int = 0
+
+    @property
+    def data(self) -> Any:
+        """Plain data."""
+        if self.entries is not None:
+            return {key: piece.data for key, piece in self.entries.items()}
+        if self.items is not None:
+            return [piece.data for piece in self.items]
+        return self.value
+
+    def located(self) -> Located:
+        """The same as plain data with a map of places."""
+        return Located(self.data, self.span, dict(_places(self, ())))
+
+    def at(self, *path: str | int) -> Piece | None:
+        """The piece at a path, or None."""
+        piece: Piece | None = self
+        for step in path:
+            if piece is None:
+                return None
+            if isinstance(step, int):
+                items = piece.items
+                piece = items[step] if items is not None and 0 <= step < len(items) else None
+            else:
+                piece = piece.entries.get(step) if piece.entries is not None else None
+        return piece
+
+    def key_span(self, key: str) -> Span:
+        """The place of a key of this mapping."""
+        return self.keys.get(key, self.span)
+
+
+def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
+    """The document in `data`, and what is wrong in it without hindering its reading (duplicate keys, tags).
+
+    Raises Rejected, with the place, for anything that is not one YAML document.
+    """
+    if len(data) > MAX_BYTES:
+        raise Rejected(_error("PLAN101", f"the file has {len(data)} bytes; at most {MAX_BYTES} are read", file, 1, 1))
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = data[: error.start].decode("utf-8", errors="replace")
+        line, column = _position(before, len(before))
+        raise Rejected(_error("PLAN101", "not UTF-8 text", file, line, column)) from None
+    try:
+        builder = _Builder(file)
+        return builder.build(text), tuple(builder.problems)
+    except yaml.reader.ReaderError as error:
+        line, column = _position(text, int(error.position))
+        shown = f"character U+{ord(text[error.position]):04X}" if error.position < len(text) else "a character"
+        raise Rejected(_error("PLAN101", f"{shown} does not belong in YAML", file, line, column)) from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+        problem = error.problem or "not YAML"
+        hint = "indent with spaces: YAML allows no tab there" if "'\\t'" in problem else None
+        raise Rejected(_error("PLAN101", problem, file, line, column, hint)) from None
+    except yaml.YAMLError:
+        raise Rejected(_error("PLAN101", "not YAML", file, 1, 1)) from None
+
+
+def scalar(text: str) -> Any:
+    """What a plain (unquoted) scalar means: null, a truth value, a JSON number, else text."""
+    if text in _WORDS:
+        return _WORDS[text]
+    if len(text) <= 300:
+        if _INTEGER.match(text):
+            return int(text)
+        if _DECIMAL.match(text):
+            number = float(text)
+            return number if math.isfinite(number) else text
+    return text
+
+
+@dataclass(slots=True)
+class _Frame:
+    piece: Piece
+    anchor: str | None
+    key: str | None = None
+
+
+class _Builder:
+    """Builds pieces from events with a stack of its own: no nesting is too deep for Python, only for us."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.stack: list[_Frame] = []
+        self.anchors: dict[str, Piece] = {}
+        self.root: Piece | None = None
+        self.problems: list[Diagnostic] = []
+
+    def build(self, text: str) -> Piece:
+        documents = 0
+        for event in yaml.parse(text, Loader=yaml.SafeLoader):
+            match event:
+                case yaml.DocumentStartEvent():
+                    documents += 1
+                    if documents > 1:
+                        raise self.reject(event, "PLAN101", "a second document; one file holds one")
+                case yaml.ScalarEvent():
+                    self.refuse_tag(event)
+                    self.scalar(event)
+                case yaml.SequenceStartEvent() | yaml.MappingStartEvent():
+                    self.refuse_tag(event)
+                    self.open(event)
+                case yaml.SequenceEndEvent() | yaml.MappingEndEvent():
+                    self.close(event)
+                case yaml.AliasEvent():
+                    self.alias(event)
+        if self.root is None:
+            raise Rejected(_error("PLAN101", "the file is empty", self.file, 1, 1))
+        return self.root
+
+    def scalar(self, event: yaml.ScalarEvent) -> None:
+        text = str(event.value)
+        plain = event.style is None
+        if self.wants_key():
+            self.key(event, text)
+            return
+        piece = Piece(self.span(event), scalar(text) if plain else text, text)
+        self.remember(event.anchor, piece)
+        self.put(event, piece)
+
+    def open(self, event: Any) -> None:
+        if self.wants_key():
+            raise self.reject(event, "PLAN102", "a key must be plain text")
+        if len(self.stack) >= MAX_DEPTH:
+            raise self.reject(event, "PLAN101", f"nested deeper than {MAX_DEPTH} levels")
+        mapping = isinstance(event, yaml.MappingStartEvent)
+        piece = Piece(self.span(event), items=None if mapping else [], entries={} if mapping else None)
+        self.stack.append(_Frame(piece, event.anchor))
+
+    def close(self, event: Any) -> None:
+        frame = self.stack.pop()
+        end = self.span(event)
+        start = frame.piece.span
+        frame.piece.span = Span(self.file, start.line, start.column, end.end_line, end.end_column)
+        self.remember(frame.anchor, frame.piece)
+        self.put(event, frame.piece)
+
+    def alias(self, event: Any) -> None:
+        if self.wants_key():
+            raise self.reject(event, "PLAN102", "a key must be plain text")
+        piece = self.anchors.get(event.anchor)
+        if piece is None:
+            raise self.reject(event, "PLAN101", f"the alias *{event.anchor} is used before or without its anchor")
+        self.put(event, piece)
+
+    def remember(self, anchor: str | None, piece: Piece) -> None:
+        if anchor is not None:
+            self.anchors[anchor] = piece
+
+    def wants_key(self) -> bool:
+        return bool(self.stack) and self.stack[-1].piece.entries is not None and self.stack[-1].key is None
+
+    def key(self, event: Any, key: str) -> None:
+        frame = self.stack[-1]
+        frame.key = key
+        if key == "<<":
+            self.problem(event, "PLAN102", "merge keys (<<) are not read; write the keys out")
+        first = frame.piece.keys.setdefault(key, self.span(event))
+        if first != self.span(event):
+            self.problem(event, "PLAN102", f"the key {key!r} is given twice", ("first given here", first))
+
+    def put(self, event: Any, piece: Piece) -> None:
+        if len(self.stack) + piece.depth > MAX_DEPTH:
+            raise self.reject(event, "PLAN101", f"nested deeper than {MAX_DEPTH} levels")
+        if not self.stack:
+            self.root = piece
+            return
+        frame = self.stack[-1]
+        frame.piece.depth = max(frame.piece.depth, piece.depth + 1)
+        if frame.piece.items is not None:
+            frame.piece.items.append(piece)
+        elif frame.piece.entries is not None and frame.key is not None:
+            frame.piece.entries[frame.key] = piece
+            frame.key = None
+        frame.piece.size += piece.size
+        if frame.piece.size > MAX_PIECES:
+            raise self.reject(event, "PLAN101", f"more than {MAX_PIECES} pieces once its aliases are expanded")
+
+    def refuse_tag(self, event: Any) -> None:
+        if event.tag is not None:
+            self.problem(event, "PLAN101", f"the tag {event.tag} is not read; write plain values")
+
+    def span(self, event: Any) -> Span:
+        start, end = event.start_mark, event.end_mark
+        return Span(self.file, start.line + 1, start.column + 1, end.line + 1, end.column + 1)
+
+    def problem(self, event: Any, code: str, message: str, *notes: tuple[str, Span | None]) -> None:
+        self.problems.append(Diagnostic(code, message, self.span(event), notes=notes))
+
+    def reject(self, event: Any, code: str, message: str) -> Rejected:
+        return Rejected(Diagnostic(code, message, self.span(event)))
+
+
+def _places(piece: Piece, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Span]]:
+    yield path, piece.span
+    if piece.entries is not None:
+        for key, child in piece.entries.items():
+            yield from _places(child, (*path, key))
+    for index, child in enumerate(piece.items or ()):
+        yield from _places(child, (*path, index))
+
+
+def _position(text: str, offset: int) -> tuple[int, int]:
+    before = text[:offset]
+    return before.count("\n") + 1, offset - (before.rfind("\n") + 1) + 1
+
+
+def _error(code: str, message: str, file: str, line: int, column: int, hint: str | None = None) -> Diagnostic:
+    return Diagnostic(code, message, Span(file, line, column, line, column + 1), hint=hint)

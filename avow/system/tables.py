@@ -1,0 +1,129 @@
+"""The tables of a plan's scenario: CSV files or rows in place. Cells are kept as exact text."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from pathlib import Path
+from typing import Any
+
+from avow.diagnostics import Diagnostic, Span
+from avow.system.plan import Table
+from avow.system.schema import suggest
+from avow.system.strict_yaml import Piece
+
+MAX_CELLS = 1_000_000
+MAX_VALUES = 100_000
+
+_COLUMNS_OF = re.compile(r"\s*([^\s(),]+)\s*\(\s*([^()]*)\)\s*\Z")
+_RANGE = re.compile(r"\s*(-?[0-9]{1,9})\s*\.\.\s*(-?[0-9]{1,9})\s*\Z")
+
+
+def read_csv(name: str, path: Path, span: Span) -> tuple[Table | None, tuple[Diagnostic, ...]]:
+    """A CSV file whose first row names the columns; every row must have as many cells."""
+
+    def fault(message: str, line: int | None = None) -> tuple[None, tuple[Diagnostic, ...]]:
+        notes = ((f"in {path.name}", Span(str(path), line, 1, line, 2)),) if line else ()
+        return None, (Diagnostic("PLAN109", f"scenario.{name}: {message}", span, notes=notes),)
+
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        return fault(f"{path.name} is not UTF-8 text")
+    except OSError as error:
+        return fault(f"{path.name} cannot be read: {error.strerror}")
+    rows: list[tuple[str, ...]] = []
+    header: tuple[str, ...] | None = None
+    cells = 0
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        for row in reader:
+            if not row:
+                continue
+            found = tuple(cell.strip() for cell in row)
+            cells += len(found)
+            if cells > MAX_CELLS:
+                return fault(f"{path.name} has more than {MAX_CELLS} cells", reader.line_num)
+            if header is None:
+                header = found
+                if "" in header or len(set(header)) != len(header):
+                    return fault(f"{path.name}: the columns need names, all different", reader.line_num)
+            elif len(found) != len(header):
+                return fault(f"{path.name}: {len(found)} cells where {len(header)} are wanted", reader.line_num)
+            else:
+                rows.append(found)
+    except csv.Error as error:
+        return fault(f"{path.name}: {error}", reader.line_num or 1)
+    if header is None:
+        return fault(f"{path.name} is empty")
+    return Table(name, header, tuple(rows), path), ()
+
+
+def read_rows(name: str, piece: Piece) -> tuple[Table | None, tuple[Diagnostic, ...]]:
+    """Rows given in the plan: mappings with the same keys each."""
+    rows = piece.items or []
+    columns = tuple(rows[0].entries or {}) if rows else ()
+    faults: list[Diagnostic] = []
+    found: list[tuple[str, ...]] = []
+    for number, row in enumerate(rows):
+        entries = row.entries or {}
+        odd = set(columns) ^ set(entries)
+        if odd:
+            message = (
+                f"scenario.{name}[{number}]: the columns are {', '.join(columns)}; odd here: {', '.join(sorted(odd))}"
+            )
+            faults.append(Diagnostic("PLAN109", message, row.span))
+            continue
+        found.append(tuple(cell_text(entries[column]) for column in columns))
+    return (None, tuple(faults)) if faults else (Table(name, columns, tuple(found)), ())
+
+
+def cell_text(piece: Piece) -> str:
+    """A scalar as text, as written."""
+    return piece.text if piece.value is not None or piece.text else ""
+
+
+def interpretation(text: str, tables: dict[str, Table]) -> tuple[str, tuple[str, ...]] | str:
+    """``waypoints(x, y, id)`` → table and columns, or what is wrong with it."""
+    found = _COLUMNS_OF.match(text)
+    if not found:
+        return f"{text!r} has not the form table(column, …)"
+    name = found[1]
+    columns = tuple(column.strip() for column in found[2].split(",")) if found[2].strip() else ()
+    table = tables.get(name)
+    if table is None:
+        return f"there is no table {name!r}; {suggest(name, tables) or 'the scenario has none'}"
+    for column in columns:
+        if column not in table.columns:
+            return f"the table {name} has no column {column!r}; {suggest(column, table.columns)}"
+    return name, columns
+
+
+def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
+    """``table.column``, ``low..high``, a value or a list of values → the values as text, or what is wrong."""
+    if piece.items is not None:
+        return tuple(dict.fromkeys(cell_text(item) for item in piece.items))
+    text = cell_text(piece)
+    span = _RANGE.match(text)
+    if span:
+        low, high = int(span[1]), int(span[2])
+        if high < low:
+            return f"the range {text} is empty"
+        if high - low >= MAX_VALUES:
+            return f"the range {text} has more than {MAX_VALUES} values"
+        return tuple(str(number) for number in range(low, high + 1))
+    name, dot, column = text.partition(".")
+    if dot and name in tables:
+        table = tables[name]
+        if column not in table.columns:
+            return f"the table {name} has no column {column!r}; {suggest(column, table.columns)}"
+        return tuple(dict.fromkeys(table.column(column)))
+    return (text,)
+
+
+def plain(value: Any) -> str:
+    """A YAML scalar as RCL writes it."""
+    if isinstance(value, bool):
+        return "TRUE" if value else "FALSE"
+    return str(value)

@@ -1,0 +1,180 @@
+"""Strict YAML and the plan's shape: what is refused, and where it is said to be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.diagnostics import Diagnostic, Rejected
+from avow.system.plan_file import read_plan
+from avow.system.schema import plan_schema
+from avow.system.strict_yaml import read_yaml, scalar
+
+
+def faults(folder: Path, text: str | bytes) -> tuple[Diagnostic, ...]:
+    """What reading the plan complains of."""
+    path = folder / "plan.yaml"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    (folder / "a.rcl").write_text("node a { inputs() outputs() topics() guarantee(TRUE) }")
+    try:
+        return read_plan(path)[2]
+    except Rejected as rejected:
+        return rejected.diagnostics
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("off", "off"),
+        ("yes", "yes"),
+        ("1:30", "1:30"),
+        ("010", "010"),
+        ("0x1F", "0x1F"),
+        ("2026-11-21", "2026-11-21"),
+        ("1_000", "1_000"),
+        (".inf", ".inf"),
+        ("1e999", "1e999"),
+        ("true", True),
+        ("12", 12),
+        ("-0.5", -0.5),
+        ("~", None),
+    ],
+)
+def test_scalars_are_never_guessed(text: str, value: object) -> None:
+    found = scalar(text)
+    assert found == value
+    assert type(found) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "column", "words"),
+    [
+        ("system: a\nsystem: b\n", 2, 1, "given twice"),
+        ("system: a\n\ttitle: b\n", 2, 1, "cannot start any token"),
+        ("titel: x\n", 1, 1, "unknown key 'titel'"),
+        ("system: [a]\n", 1, 9, "text is wanted"),
+        ("system: 'a/../b'\n", 1, 9, "right form"),
+        ('system: "a\\n"\n', 1, 9, "right form"),
+        ("connections:\n  - {from: a.x, to: b.x, delayed: yes}\n", 2, 37, "true or false is wanted"),
+        ("connections:\n  - {from: a, to: b.x}\n", 2, 12, "node.port"),
+        ("connections:\n  - {to: b.x}\n", 2, 5, "'from' is missing"),
+        ("connections:\n  - {from: a.x, to: b.x, initial: 3}\n", 2, 35, "needs a delayed edge"),
+        ("compose: {D1: {rule: R7}}\n", 1, 22, "not one of R1, R2, R3, R4"),
+        ("nodes: {a: {criticality: hihg}}\n", 1, 26, "not one of low, medium, high"),
+        ("contract: ../x.rcl\n", 1, 11, "out of the system's folder"),
+        ("contract: /etc/passwd\n", 1, 11, "out of the system's folder"),
+        ("contract: nothere.rcl\n", 1, 11, "no file"),
+        ("policy: !!python/object:os.system {}\n", 1, 9, "tag"),
+        ("a: &x {b: 1}\n<<: *x\n", 2, 1, "merge keys"),
+        ("---\n{}\n---\n{}\n", 3, 1, "second document"),
+        ("title: *nowhere\n", 1, 8, "without its anchor"),
+        ("? [a]\n: b\n", 1, 3, "key must be plain text"),
+        ("", 1, 1, "empty"),
+        (b"title: \xff\n", 1, 8, "UTF-8"),
+        (b"title: a\x00b\n", 1, 9, "U+0000"),
+        ("accepted: [{obligation: a/b/c, verdict: unknown, reason: r, who: w, date: 2026-02-30}]", 1, 75, "calendar"),
+        ("scenario:\n  t: [{a: 1}, {b: 2}]\n", 2, 15, "odd here: a, b"),
+        ("scenario:\n  t: [{a: 1}]\n  interpret: {in.x: t(b)}\n", 3, 21, "no column 'b'"),
+        ("scenario:\n  interpret: {in.x: u(b)}\n", 2, 21, "no table 'u'"),
+        ("scenario:\n  domains: {REAL: 5..1}\n", 2, 19, "empty"),
+        ("scenario:\n  steps: 0\n", 2, 10, "minimum"),
+        ("requirements: {R1: {text: a, formula: b, temporal: c}}\n", 1, 52, "not both"),
+    ],
+)
+def test_faults_are_located(tmp_path: Path, text: str | bytes, line: int, column: int, words: str) -> None:
+    found = faults(tmp_path, text)
+    assert any(words in d.message or words in (d.hint or "") for d in found), found
+    fault = next(d for d in found if words in d.message)
+    assert fault.span is not None
+    assert (fault.span.line, fault.span.column) == (line, column), fault
+
+
+def test_did_you_mean(tmp_path: Path) -> None:
+    (fault,) = faults(tmp_path, "conections: []\n")
+    assert fault.hint == "did you mean 'connections'?"
+
+
+def test_all_faults_in_one_go(tmp_path: Path) -> None:
+    found = faults(tmp_path, "system: 5\nsystem: a b\ntitel: x\nnodes: {a: {criticality: x, methods: 5}}\n")
+    assert len(found) >= 5
+
+
+def test_billion_laughs_is_bounded() -> None:
+    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
+    lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 12)]
+    with pytest.raises(Rejected, match="pieces once its aliases"):
+        read_yaml("\n".join(lines).encode(), "plan.yaml")
+
+
+def test_depth_is_bounded_also_through_aliases() -> None:
+    with pytest.raises(Rejected, match="nested deeper"):
+        read_yaml(b"[" * 5000, "plan.yaml")
+    lines = ["a0: &a0 [x]"] + [f"a{n}: &a{n} [*a{n - 1}]" for n in range(1, 3000)]
+    with pytest.raises(Rejected, match="nested deeper"):
+        read_yaml("\n".join(lines).encode(), "plan.yaml")
+
+
+def test_aliases_work() -> None:
+    piece, problems = read_yaml(b"a: &x {n: 1}\nb: *x\n", "plan.yaml")
+    assert not problems
+    assert piece.data == {"a": {"n": 1}, "b": {"n": 1}}
+
+
+def test_every_place_is_known(tmp_path: Path) -> None:
+    piece, _ = read_yaml("nodes:\n  a:\n    methods:\n      - hoare: {v: [1, é, x]}\n".encode(), "plan.yaml")
+    located = piece.located()
+    assert located.at("nodes", "a", "methods", 0, "hoare", "v", 2).column == 27
+    assert located.at("nodes", "a", "nothing").line == 3
+
+
+def test_methods(tmp_path: Path) -> None:
+    path = tmp_path / "plan.yaml"
+    path.write_text("nodes: {a: {methods: [{hoare: {x: 1}}, {hoare: {}}, review, {ajpf: {id: edge, guarantees: G1}}]}}")
+    (tmp_path / "a.rcl").write_text("")
+    plan, _, problems = read_plan(path)
+    assert not problems
+    methods = plan.node("a").methods
+    assert [m.id for m in methods] == ["hoare", "hoare-2", "review", "edge"]
+    assert methods[3].guarantees == ("G1",)
+    assert methods[0].options.data == {"x": 1}
+
+
+def test_scenario_tables(tmp_path: Path) -> None:
+    (tmp_path / "a.rcl").write_text("")
+    (tmp_path / "w.csv").write_text("id,x\n0,2.30\n1,-4\n")
+    text = "scenario: {w: w.csv, v: [{r: 030}], domains: {NATURAL: w.id, REAL: [1.50], INTEGER: 2..4}, steps: 7}"
+    (tmp_path / "plan.yaml").write_text(text)
+    plan, _, problems = read_plan(tmp_path / "plan.yaml")
+    assert not problems
+    assert plan.scenario is not None
+    assert plan.scenario.table("w").column("x") == ("2.30", "-4")
+    assert plan.scenario.table("v").rows == (("030",),)
+    assert plan.scenario.domains == {"NATURAL": ("0", "1"), "REAL": ("1.50",), "INTEGER": ("2", "3", "4")}
+    digest = plan.scenario.digest
+    (tmp_path / "w.csv").write_text("id,x\n0,2.31\n1,-4\n")
+    again, _, _ = read_plan(tmp_path / "plan.yaml")
+    assert again.scenario is not None
+    assert again.scenario.digest != digest
+
+
+@pytest.mark.parametrize("text", ["id,x\n0\n", "id,id\n0,1\n", "", 'id\n"a\n'])
+def test_bad_csv_is_a_located_fault(tmp_path: Path, text: str) -> None:
+    (tmp_path / "w.csv").write_text(text)
+    found = faults(tmp_path, "scenario: {w: w.csv}\n")
+    assert [d.code for d in found] == ["PLAN109"]
+
+
+def test_a_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    (tmp_path / "secret.csv").write_text("a\n1\n")
+    (inner / "w.csv").symlink_to(tmp_path / "secret.csv")
+    assert [d.code for d in faults(inner, "scenario: {w: w.csv}\n")] == ["PLAN108"]
+
+
+def test_published_schema_is_the_one_in_use() -> None:
+    import json
+
+    published = Path(__file__).parents[2] / "docs/schemas/plan.schema.json"
+    assert json.loads(published.read_text()) == plan_schema()
