@@ -1,0 +1,276 @@
+"""Text of the imperative language to its syntax tree; every error with its place and, where one can guess, its cure."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from lark import Lark, Token, v_args
+from lark.exceptions import UnexpectedCharacters, UnexpectedToken, VisitError
+from lark.visitors import Transformer_NonRecursive
+
+from avow.backends.hoare.layout import Layout, span_of
+from avow.backends.hoare.syntax import (
+    AssignStatement,
+    Binary,
+    Call,
+    Chain,
+    Declaration,
+    Expression,
+    IfStatement,
+    MatchStatement,
+    Member,
+    Name,
+    Number,
+    Quantification,
+    SkipStatement,
+    Source,
+    Text,
+    Truth,
+    Unary,
+    WhileStatement,
+)
+from avow.diagnostics import Diagnostic, Rejected, Span
+
+DEEPEST = 120
+"""Nesting beyond which a program is refused: later passes recurse over it."""
+
+
+def parse_program(text: str, file: str) -> Source:
+    """Raises Rejected with code ``hoare-syntax``."""
+    source: Source = _parse(text, file, "program")
+    return source
+
+
+def parse_expression(text: str, place: Span) -> Expression:
+    """An expression from the plan, every part of which is reported at `place`. Raises Rejected."""
+    try:
+        expression: Expression = _parse(text, place.file, "expression")
+    except Rejected as rejected:
+        raise Rejected(
+            *(Diagnostic(d.code, f'in "{text}": {d.message}', place, hint=d.hint) for d in rejected.diagnostics)
+        ) from rejected
+    return expression
+
+
+def _parse(text: str, file: str, start: str) -> Any:
+    lark = _lark()
+    last: Token | None = None
+    try:
+        tokens: Iterator[Token] = lark.lex(text)
+        if start == "program":
+            tokens = Layout(file).process(tokens)
+        interactive = lark.parse_interactive(start=start)
+        for token in tokens:
+            interactive.feed_token(token)
+            last = token
+        result = _Build(file).transform(interactive.feed_eof(last))
+    except UnexpectedCharacters as error:
+        span = Span(file, error.line, error.column, error.line, error.column + 1)
+        raise Rejected(Diagnostic("hoare-syntax", f"this character has no meaning here: {error.char!r}", span)) from error
+    except UnexpectedToken as error:
+        raise Rejected(_explain(error, file, last)) from error
+    except VisitError as error:
+        raise error.orig_exc from None
+    deep = _too_deep(result)
+    if deep is not None:
+        raise Rejected(Diagnostic("hoare-syntax", f"nested more than {DEEPEST} levels deep", deep))
+    return result
+
+
+def _explain(error: UnexpectedToken, file: str, before: Token | None) -> Diagnostic:
+    token: Token = error.token
+    span = span_of(token, file)
+    expected = set(error.accepts or error.expected or ())
+    text = {"_SEP": "the end of the line", "_CLOSE": "the end of the block", "$END": "the end"}.get(token.type, f"`{token}`")
+    hint = None
+    if token.type == "EQUALS" and "ASSIGN" in expected:
+        return Diagnostic(
+            "hoare-syntax", "`=` compares; an assignment is written `:=`", span, hint="write `:=` in place of `=`"
+        )
+    if token.type == "ASSIGN" and "ASSIGN" not in expected:
+        hint = "`:=` assigns and stands only after a variable; to compare, write `==`"
+        if token.line is not None:
+            hint += " (a line indented further than the one above continues it)"
+    elif before is not None and before.type == "NAME" and before.upper() in _KEYWORDS:
+        hint = f"keywords are written in capitals: {before.upper()}"
+    elif "THEN" in expected:
+        hint = "the condition ends with THEN"
+    elif token.type == "NAME" and "_SEP" in expected:
+        hint = "start each statement on a line of its own, in the column of the one above, or separate them by `;`"
+    elif "INVARIANT" in expected and token.type == "DO":
+        hint = "a loop needs its invariant: WHILE … INVARIANT … DO …"
+    return Diagnostic("hoare-syntax", f"did not expect {text} here", span, hint=hint)
+
+
+_KEYWORDS = frozenset(
+    "VAR GIVEN SKIP IF THEN ELSE ENDIF MATCH WITH ENDMATCH WHILE INVARIANT VARIANT DO ENDWHILE".split()
+)
+
+
+@functools.cache
+def _lark() -> Lark:
+    grammar = (Path(__file__).parent / "imp.lark").read_text()
+    return Lark(
+        grammar,
+        parser="lalr",
+        lexer="basic",
+        start=["program", "expression"],
+        propagate_positions=True,
+        maybe_placeholders=True,
+    )
+
+
+def _too_deep(root: Any) -> Span | None:
+    """The place of a node too far below the root, found without recursion."""
+    stack: list[tuple[Any, int]] = [(root, 0)]
+    while stack:
+        node, depth = stack.pop()
+        if isinstance(node, tuple):
+            stack.extend((item, depth) for item in node)
+        elif is_dataclass(node) and not isinstance(node, Span):
+            if depth > DEEPEST:
+                return node.span  # type: ignore[attr-defined,no-any-return]
+            stack.extend((getattr(node, f.name), depth + 1) for f in fields(node))
+    return None
+
+
+@v_args(meta=True)
+class _Build(Transformer_NonRecursive[Token, Any]):
+    """Syntax tree from Lark's, without recursion."""
+
+    def __init__(self, file: str) -> None:
+        super().__init__()
+        self._file = file
+
+    def _span(self, meta: Any) -> Span:
+        if meta.empty:
+            return Span(self._file, 1, 1, 1, 1)
+        return Span(self._file, meta.line, meta.column, meta.end_line, meta.end_column)
+
+    def program(self, meta: Any, items: list[Any]) -> Source:
+        declarations = tuple(item for item in items if isinstance(item, Declaration))
+        return Source(declarations, items[-1], self._span(meta))
+
+    def body(self, meta: Any, items: list[Any]) -> tuple[Any, ...]:
+        return tuple(item for item in items if item is not None)
+
+    def block(self, meta: Any, items: list[Any]) -> tuple[Any, ...]:
+        return items[0]  # type: ignore[no-any-return]
+
+    def declaration(self, meta: Any, items: list[Any]) -> Declaration:
+        names = tuple(item for item in items if isinstance(item, Name))
+        *sorts, result = [item for item in items[1:] if item is None or isinstance(item, Token)]
+        words = [str(word) for word in sorts if word is not None]
+        span = self._span(meta)
+        if result is None:
+            if len(words) != 1:
+                raise Rejected(Diagnostic("hoare-syntax", "a type is one name, or A x B --> C", span))
+            return Declaration(names, (), words[0], items[0].type == "GIVEN", span)
+        if len(words) % 2 == 0 or any(word != "x" for word in words[1::2]):
+            raise Rejected(Diagnostic("hoare-syntax", "a function's parameters are separated by x: A x B --> C", span))
+        return Declaration(names, tuple(words[::2]), str(result), items[0].type == "GIVEN", span)
+
+    def skip(self, meta: Any, items: list[Any]) -> SkipStatement:
+        return SkipStatement(self._span(meta))
+
+    def assign(self, meta: Any, items: list[Any]) -> AssignStatement:
+        return AssignStatement(items[0], (), items[2], self._span(meta))
+
+    def update(self, meta: Any, items: list[Any]) -> AssignStatement:
+        return AssignStatement(items[0], items[1], items[3], self._span(meta))
+
+    def conditional(self, meta: Any, items: list[Any]) -> IfStatement:
+        blocks = [item for item in items if isinstance(item, tuple)]
+        return IfStatement(items[1], blocks[0], blocks[1] if len(blocks) > 1 else (), self._span(meta))
+
+    def match(self, meta: Any, items: list[Any]) -> MatchStatement:
+        blocks = [item for item in items if isinstance(item, tuple)]
+        constructor, *variables = [item for item in items[3:] if isinstance(item, Name)]
+        otherwise = blocks[1] if len(blocks) > 1 else ()
+        return MatchStatement(items[1], constructor, tuple(variables), blocks[0], otherwise, self._span(meta))
+
+    def loop(self, meta: Any, items: list[Any]) -> WhileStatement:
+        variant = items[5] if items[4] is not None else None
+        body = next(item for item in items if isinstance(item, tuple))
+        return WhileStatement(items[1], items[3], variant, body, self._span(meta))
+
+    def arguments(self, meta: Any, items: list[Any]) -> tuple[Any, ...]:
+        return tuple(items)
+
+    def comparator(self, meta: Any, items: list[Any]) -> str:
+        return "==" if items[0] == "=" else str(items[0])
+
+    def compare(self, meta: Any, items: list[Any]) -> Expression:
+        span = self._span(meta)
+        if len(items) == 3:
+            return Binary(items[1], items[0], items[2], span)
+        return Chain(tuple(items[::2]), tuple(items[1::2]), span)
+
+    def member(self, meta: Any, items: list[Any]) -> Member:
+        return Member(items[0], items[2], items[1].type == "NOT_IN", self._span(meta))
+
+    def _binary(self, operator: str, meta: Any, items: list[Any]) -> Binary:
+        return Binary(operator, items[0], items[-1], self._span(meta))
+
+    def iff(self, meta: Any, items: list[Any]) -> Binary:
+        return self._binary("<=>", meta, items)
+
+    def implies(self, meta: Any, items: list[Any]) -> Binary:
+        return self._binary("->", meta, items)
+
+    def disjoin(self, meta: Any, items: list[Any]) -> Binary:
+        return self._binary("or", meta, items)
+
+    def conjoin(self, meta: Any, items: list[Any]) -> Binary:
+        return self._binary("and", meta, items)
+
+    def add(self, meta: Any, items: list[Any]) -> Binary:
+        return self._binary("+", meta, items)
+
+    def subtract(self, meta: Any, items: list[Any]) -> Binary:
+        return self._binary("-", meta, items)
+
+    def multiply(self, meta: Any, items: list[Any]) -> Binary:
+        return self._binary("*", meta, items)
+
+    def divide(self, meta: Any, items: list[Any]) -> Binary:
+        return self._binary("/", meta, items)
+
+    def negate(self, meta: Any, items: list[Any]) -> Unary:
+        return Unary("not", items[1], self._span(meta))
+
+    def minus(self, meta: Any, items: list[Any]) -> Unary:
+        return Unary("-", items[0], self._span(meta))
+
+    def number(self, meta: Any, items: list[Any]) -> Number:
+        return Number(Fraction(str(items[0])), "." not in items[0], self._span(meta))
+
+    def string(self, meta: Any, items: list[Any]) -> Text:
+        inner = str(items[0])[1:-1]
+        return Text(inner.replace('\\"', '"').replace("\\\\", "\\"), self._span(meta))
+
+    def truth(self, meta: Any, items: list[Any]) -> Truth:
+        return Truth(items[0].type == "TRUE", self._span(meta))
+
+    def reference(self, meta: Any, items: list[Any]) -> Name:
+        prefix, _, name = str(items[0]).rpartition(".")
+        return Name(name, prefix or None, self._span(meta))
+
+    def name(self, meta: Any, items: list[Any]) -> Name:
+        return Name(str(items[0]), None, self._span(meta))
+
+    def call(self, meta: Any, items: list[Any]) -> Call:
+        return Call(items[0], items[1], self._span(meta))
+
+    def group(self, meta: Any, items: list[Any]) -> tuple[tuple[Name, ...], str]:
+        return tuple(item for item in items if isinstance(item, Name)), str(items[-1])
+
+    def quantified(self, meta: Any, items: list[Any]) -> Quantification:
+        groups = tuple(item for item in items[1:] if isinstance(item, tuple))
+        kind = "forall" if items[0].type == "FORALL" else "exists"
+        return Quantification(kind, groups, items[-1], self._span(meta))
