@@ -1,0 +1,346 @@
+"""Questions to the solver: satisfiable? entailed? Every answer is bounded in time, and none is taken on trust.
+
+`solve` asks whether some formulas hold together, `entails` whether some imply another. A model is shown, and a
+refutation reported, only after it has been replayed: its values put into the formulas, and the result proved true under
+every interpretation of what lies outside partial operations. What cannot be replayed is `unknown`.
+
+A total function over an infinite domain has no finite description in general; where the solver finds no model,
+functions with finitely many exceptions (a table and a default) are tried: what is found among them is a model.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Literal as OneOf
+
+import z3
+
+from avow.language.sorts import BOOL, FunctionSort
+from avow.language.terms import Term, Variable
+from avow.logic.counterexample import show_values
+from avow.logic.formula import free_variables, negation
+from avow.logic.models import Model
+from avow.logic.translation import Expr, Meaning, Translator, Unsupported
+from avow.logic.values import FunctionValue, Value
+from avow.verdict import Counterexample, Verdict
+
+__all__ = [
+    "Answer",
+    "Entailment",
+    "Model",
+    "Solution",
+    "Translator",
+    "Unsupported",
+    "check",
+    "entails",
+    "replay",
+    "solve",
+    "z3_version",
+]
+
+Status = OneOf["sat", "unsat", "unknown"]
+
+DEFAULT_TIMEOUT_MS = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Z3's answer to one question about expressions. `core` are the labels of tracked assertions that conflict."""
+
+    status: Status
+    model: Model | None = None
+    core: tuple[str, ...] = ()
+    reason: str = ""
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """The answer to one question about terms. `values`, with `sat`, have been replayed.
+
+    `core` (with `unsat`) are the labels of a minimal set of formulas that conflict.
+    """
+
+    status: Status
+    values: Mapping[Variable, Value] = field(default_factory=dict)
+    core: tuple[str, ...] = ()
+    reason: str = ""
+    engine: str = "z3"
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Entailment:
+    """Whether hypotheses imply a goal. `needed` are the labels of the hypotheses that a proof rests on: without any,
+    the goal is true by itself; `vacuous` says that the hypotheses contradict each other."""
+
+    verdict: Verdict
+    counterexample: Counterexample | None = None
+    values: Mapping[Variable, Value] = field(default_factory=dict)
+    needed: tuple[str, ...] = ()
+    vacuous: bool = False
+    reason: str = ""
+    engine: str = "z3"
+    seconds: float = 0.0
+
+
+def z3_version() -> str:
+    return str(z3.get_version_string())
+
+
+# -- expressions -------------------------------------------------------------------------------------------------------
+
+
+def check(
+    translator: Translator,
+    assertions: Iterable[Expr],
+    *,
+    timeout_ms: int = DEFAULT_TIMEOUT_MS,
+    seed: int = 0,
+    tracked: Iterable[tuple[str, Expr]] = (),
+) -> Answer:
+    """Are the assertions satisfiable together? With `unsat`, `core` is a minimal set of tracked labels (each is needed,
+    as far as the solver can tell in time). Crashes of the solver are `unknown`."""
+    start = time.monotonic()
+    assertions, tracked = list(assertions), list(tracked)
+    try:
+        status, model, core, reason = _ask(translator, assertions, tracked, timeout_ms, seed)
+        if status == "unsat" and len(core) > 1:
+            core = _minimal(translator, assertions, tracked, core, timeout_ms, seed)
+    except z3.Z3Exception as error:
+        status, model, core, reason = "unknown", None, (), f"Z3: {error}"
+    found = Model(translator, model) if model is not None else None
+    order = [label for label, _ in tracked if label in core]
+    return Answer(status, found, tuple(dict.fromkeys(order)), reason, time.monotonic() - start)
+
+
+def _ask(
+    translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]], timeout_ms: int, seed: int
+) -> tuple[Status, object | None, tuple[str, ...], str]:
+    solver = z3.Solver(ctx=translator.context)
+    solver.set("timeout", max(1, int(timeout_ms)))
+    solver.set("random_seed", seed)
+    solver.add(*assertions)
+    switches = {}
+    for number, (label, expr) in enumerate(tracked):
+        switch = z3.Bool(f"track!{number}", translator.context)
+        solver.add(z3.Implies(switch, expr))
+        switches[switch.get_id()] = (switch, label)
+    result = solver.check(*(switch for switch, _ in switches.values()))
+    if result == z3.sat:
+        return "sat", solver.model(), (), ""
+    if result == z3.unsat:
+        return "unsat", None, tuple(switches[s.get_id()][1] for s in solver.unsat_core()), ""
+    return "unknown", None, (), str(solver.reason_unknown())
+
+
+def _minimal(
+    translator: Translator,
+    assertions: Sequence[Expr],
+    tracked: Sequence[tuple[str, Expr]],
+    core: tuple[str, ...],
+    timeout_ms: int,
+    seed: int,
+) -> tuple[str, ...]:
+    """Drop what is not needed, one label at a time."""
+    kept = list(core)
+    for label in core:
+        rest = [(name, expr) for name, expr in tracked if name in kept and name != label]
+        status, _, smaller, _ = _ask(translator, assertions, rest, min(timeout_ms, 2_000), seed)
+        if status == "unsat":
+            kept = [name for name in kept if name in smaller]
+    return tuple(kept)
+
+
+# -- terms -------------------------------------------------------------------------------------------------------------
+
+
+def solve(
+    formulas: Mapping[str, Term] | Iterable[Term],
+    *,
+    timeout_ms: int = DEFAULT_TIMEOUT_MS,
+    seed: int = 0,
+    variables: Iterable[Variable] = (),
+) -> Solution:
+    """Can all formulas hold together? With labels, `unsat` names a minimal conflicting set of them.
+
+    `variables` are further variables whose values are wanted. Unsupported constructs, time-outs and models that cannot
+    be replayed are `unknown`, with the reason.
+    """
+    start = time.monotonic()
+    labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
+    free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
+    try:
+        solution = _solve(Translator(), labelled, free, timeout_ms, seed)
+    except Unsupported as error:
+        solution = Solution("unknown", reason=f"Avow cannot express {error.what} for the solver")
+    except z3.Z3Exception as error:
+        solution = Solution("unknown", reason=f"Z3: {error}")
+    if solution.status == "unknown":
+        solution = _second_opinion(labelled, timeout_ms) or solution
+    return Solution(
+        solution.status,
+        solution.values,
+        solution.core,
+        solution.reason,
+        solution.engine,
+        time.monotonic() - start,
+    )
+
+
+def entails(
+    hypotheses: Mapping[str, Term] | Iterable[Term],
+    goal: Term,
+    *,
+    timeout_ms: int = DEFAULT_TIMEOUT_MS,
+    seed: int = 0,
+    variables: Iterable[Variable] = (),
+) -> Entailment:
+    """Do the hypotheses imply the goal, for all values of the free variables?"""
+    labelled = (
+        dict(hypotheses) if isinstance(hypotheses, Mapping) else {f"H{k}": h for k, h in enumerate(hypotheses, start=1)}
+    )
+    denied = "the goal is false"
+    while denied in labelled:
+        denied += "!"
+    solution = solve({**labelled, denied: negation(goal)}, timeout_ms=timeout_ms, seed=seed, variables=variables)
+    reason, engine, seconds = solution.reason, solution.engine, solution.seconds
+    match solution.status:
+        case "unsat":
+            needed = tuple(label for label in solution.core if label != denied)
+            vacuous = bool(solution.core) and denied not in solution.core
+            return Entailment(Verdict.PROVED, needed=needed, vacuous=vacuous, engine=engine, seconds=seconds)
+        case "sat":
+            shown = Counterexample(show_values(solution.values))
+            return Entailment(Verdict.REFUTED, shown, solution.values, engine=engine, seconds=seconds)
+        case _:
+            return Entailment(Verdict.UNKNOWN, reason=reason, engine=engine, seconds=seconds)
+
+
+def replay(formulas: Iterable[Term], values: Mapping[Variable, Value], *, timeout_ms: int = 5_000) -> bool | None:
+    """Do the formulas hold of these values, whatever partial operations yield outside their domains?
+
+    True only if that is proved; False if some formula is proved false; None if neither could be shown.
+    """
+    translator = Translator()
+    try:
+        meanings = {variable: translator.value(value, variable.sort) for variable, value in values.items()}
+        facts = [*translator.background(values, meanings), *(translator.term(f, meanings) for f in formulas)]
+        known = translator.opaque_facts()
+        whole = z3.And(facts) if facts else translator.true()
+        if check(translator, [*known, z3.Not(whole)], timeout_ms=timeout_ms).status == "unsat":
+            return True
+        if check(translator, [*known, whole], timeout_ms=timeout_ms).status == "unsat":
+            return False
+    except (Unsupported, z3.Z3Exception):
+        pass
+    return None
+
+
+def _solve(
+    translator: Translator, labelled: Mapping[str, Term], free: frozenset[Variable], timeout_ms: int, seed: int
+) -> Solution:
+    deadline = time.monotonic() + timeout_ms / 1000
+    tracked = [(label, translator.term(formula)) for label, formula in labelled.items()]
+    background = translator.background(free)
+    answer = check(translator, background, timeout_ms=_share(deadline, 0.5), seed=seed, tracked=tracked)
+    if answer.status == "unsat":
+        return Solution("unsat", core=answer.core)
+    reason = answer.reason
+    ordinary = [v for v in free if not isinstance(v.sort, FunctionSort)]
+    functions = sorted((v for v in free if isinstance(v.sort, FunctionSort)), key=lambda v: v.qualified)
+    if answer.model is not None:
+        values = _read(answer.model, free)
+        simple = not functions or all(
+            len(v.table) <= 1 for v in (values or {}).values() if isinstance(v, FunctionValue)
+        )
+        if values is not None and simple and replay(labelled.values(), values):
+            return Solution("sat", values)
+    for size, sparse in ((0, True), (1, True), (2, True), (3, True), (1, False), (2, False)) if functions else ():
+        if time.monotonic() > deadline:
+            break
+        values = _with_tables(translator, labelled, ordinary, functions, size, sparse, _share(deadline, 0.25), seed)
+        if values is not None and replay(labelled.values(), values):
+            return Solution("sat", values, engine="z3, functions as tables")
+    if answer.model is not None:
+        values = _read(answer.model, free)
+        if values is not None and replay(labelled.values(), values):
+            return Solution("sat", values)
+        reason = "the solver's model could not be replayed"
+    return Solution("unknown", reason=reason or "no answer in time")
+
+
+def _share(deadline: float, part: float) -> int:
+    """A part of the time that is left, in milliseconds."""
+    return max(100, int((deadline - time.monotonic()) * 1000 * part))
+
+
+def _read(model: Model, free: Iterable[Variable]) -> dict[Variable, Value] | None:
+    try:
+        return model.values(free)
+    except Unsupported:
+        return None
+
+
+def _with_tables(
+    translator: Translator,
+    labelled: Mapping[str, Term],
+    ordinary: Sequence[Variable],
+    functions: Sequence[Variable],
+    size: int,
+    sparse: bool,
+    timeout_ms: int,
+    seed: int,
+) -> dict[Variable, Value] | None:
+    """A model in which every function has at most `size` exceptions; a `sparse` relation is false but at these."""
+    meanings: dict[Variable, Meaning] = {}
+    parts: dict[Variable, tuple[list[tuple[list[Expr], Expr]], Expr]] = {}
+    facts: list[Expr] = []
+    for variable in functions:
+        sort = variable.sort
+        assert isinstance(sort, FunctionSort)
+        points = []
+        for _ in range(size):
+            point = [translator.fresh("p", parameter) for parameter in sort.parameters]
+            value = translator.fresh("v", sort.result)
+            facts.extend(
+                m for p, s in zip(point, sort.parameters, strict=True) if (m := translator.member(s, p)) is not None
+            )
+            points.append((point, value))
+        falsity = sort.result == BOOL and sparse
+        default = z3.BoolVal(False, translator.context) if falsity else translator.fresh("d", sort.result)
+        results = [value for _, value in points] + ([] if falsity else [default])
+        facts.extend(m for r in results if (m := translator.member(sort.result, r)) is not None)
+        meanings[variable] = translator.table(points, default)
+        parts[variable] = (points, default)
+    facts.extend(translator.background(ordinary))
+    facts.extend(translator.term(formula, meanings) for formula in labelled.values())
+    answer = check(translator, facts, timeout_ms=timeout_ms, seed=seed)
+    if answer.model is None:
+        return None
+    model = answer.model
+    try:
+        values = model.values(ordinary)
+        for variable, (points, default) in parts.items():
+            sort = variable.sort
+            assert isinstance(sort, FunctionSort)
+            rest = model.read(default, sort.result)
+            table: dict[tuple[Value, ...], Value] = {}
+            for point, value in points:
+                at = tuple(model.read(p, s) for p, s in zip(point, sort.parameters, strict=True))
+                table.setdefault(at, model.read(value, sort.result))
+            values[variable] = FunctionValue({at: v for at, v in table.items() if v != rest}, rest)
+    except Unsupported:
+        return None
+    return values
+
+
+def _second_opinion(labelled: Mapping[str, Term], timeout_ms: int) -> Solution | None:
+    """cvc5, if it is installed: only its `unsat` counts, since its models are not read."""
+    from avow.logic import smtlib
+
+    answer = smtlib.ask_cvc5(smtlib.export(labelled), timeout_ms=timeout_ms)
+    return Solution("unsat", core=tuple(labelled), engine="cvc5") if answer == "unsat" else None
