@@ -1,0 +1,127 @@
+"""The experiment backend: measured runs, or the printed figures of an experiment, as evidence for a guarantee."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from avow.backend import Job, Limits, Report, Tool
+from avow.backends.experiment.figures import Figures, read_figures
+from avow.backends.experiment.judge import Judgement, judge_figures, judge_runs
+from avow.backends.experiment.options import SCHEMA, Experiment, read
+from avow.backends.experiment.quantity import show
+from avow.backends.experiment.runs import Runs, read_runs
+from avow.diagnostics import Diagnostic, Rejected
+from avow.system.paths import inside
+from avow.verdict import Link, Outcome, Verdict
+
+
+class ExperimentBackend:
+    """See `docs/backends/experiment.md`."""
+
+    name = "experiment"
+    title = "measured runs, judged by exact binomial statistics"
+    version = "1"
+    strength = Verdict.TESTED
+    link = Link.GUIDED
+    options_schema: Mapping[str, Any] = SCHEMA
+    green_means = (
+        "The runs in the data set stayed within the stated tolerance, often enough for the stated confidence. "
+        "It shows nothing of other conditions; that the measure is what the guarantee means is a person's judgement."
+    )
+
+    def tools(self) -> tuple[Tool, ...]:
+        return ()
+
+    def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        experiment, problems = read(job)
+        if experiment is None:
+            return problems
+        try:
+            material = _material(experiment)
+        except Rejected as error:
+            return error.diagnostics
+        return material.warnings if isinstance(material, Runs) else ()
+
+    def files(self, job: Job) -> tuple[Path, ...]:
+        """Whatever the options name, also where they are not in order."""
+        names = [value for key in ("data", "summary") if isinstance(value := job.options.get(key), str)]
+        return tuple(path for name in names if (path := inside(job.root, name)) is not None)
+
+    def export(self, job: Job) -> Mapping[str, str]:
+        """The claim as it will be judged, in exact numbers."""
+        experiment, problems = read(job)
+        if experiment is None:
+            raise Rejected(*problems)
+        source = experiment.data or experiment.summary
+        claim = {
+            "guarantees": {o.name: o.formula for o in job.obligations},
+            "source": source.relative_to(job.root.resolve()).as_posix() if source else "",
+            "measure": experiment.measure.text if experiment.measure else "",
+            "within": str(experiment.within),
+            "unit": experiment.unit,
+            "confidence": str(experiment.confidence),
+            "at_least": str(experiment.at_least) if experiment.at_least is not None else None,
+            "protocol": experiment.protocol,
+        }
+        return {"claim.json": json.dumps(claim, indent=2, ensure_ascii=False) + "\n"}
+
+    def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+        judgement, logs = _settle(job)
+        outcomes = tuple(
+            Outcome(
+                o.id,
+                judgement.verdict,
+                judgement.summary,
+                judgement.counterexample,
+                judgement.hypotheses,
+                dict(judgement.bound),
+                dict(judgement.details),
+                Link.GUIDED,
+            )
+            for o in job.obligations
+        )
+        return Report(outcomes, "avow experiment", self.version, logs=logs)
+
+
+def _settle(job: Job) -> tuple[Judgement, dict[str, str]]:
+    experiment, problems = read(job)
+    try:
+        if experiment is None:
+            raise Rejected(*problems)
+        material = _material(experiment)
+    except Rejected as error:
+        # One tolerant line each: the places are in the diagnostics that `check` returns.
+        said = "; ".join(_line(job, d) for d in error.diagnostics[:5])
+        more = f"; and {len(error.diagnostics) - 5} more" if len(error.diagnostics) > 5 else ""
+        return Judgement(Verdict.ERROR, f"the experiment cannot be judged: {said}{more}", {}, {}), {}
+    if isinstance(material, Figures):
+        return judge_figures(material, experiment), {}
+    judgement = judge_runs(material.runs, experiment)
+    if material.warnings:
+        judgement.details["warnings"] = [_line(job, d) for d in material.warnings[:20]]
+    lines = [
+        f"{run.name}\t{show(run.measure.low, 9)}\t{'failed' if run.measure.low > experiment.within else 'ok'}"
+        for run in material.runs
+    ]
+    return judgement, {"measures.tsv": "\n".join(["run\tmeasure\tverdict", *lines]) + "\n"}
+
+
+def _material(experiment: Experiment) -> Runs | Figures:
+    if experiment.data is not None and experiment.measure is not None:
+        return read_runs(experiment.data, experiment.measure, experiment.id_column)
+    assert experiment.summary is not None
+    return read_figures(experiment.summary, experiment.unit)
+
+
+def _line(job: Job, diagnostic: Diagnostic) -> str:
+    """A diagnostic in one line, with a place that is the same on every machine."""
+    span = diagnostic.span
+    if span is None:
+        return diagnostic.message
+    path = Path(span.file)
+    root = job.root.resolve()
+    name = path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name
+    return f"{name}:{span.line}: {diagnostic.message}"

@@ -1,0 +1,160 @@
+"""The runs of an experiment: a CSV file, read strictly, and the measure of each run."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from avow.backends.experiment.expression import Expression, Interval
+from avow.backends.experiment.options import ID_COLUMNS
+from avow.backends.experiment.quantity import decimal
+from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+
+MAX_RUNS = 100_000
+MAX_BYTES = 32_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One run: its name, its line in the file, the columns that the measure reads, and the measure."""
+
+    name: str
+    line: int
+    values: tuple[tuple[str, str], ...]
+    measure: Interval
+
+
+@dataclass(frozen=True, slots=True)
+class Runs:
+    runs: tuple[Run, ...]
+    warnings: tuple[Diagnostic, ...]
+
+
+def read_runs(path: Path, measure: Expression, id_column: str | None) -> Runs:
+    """Every run of the file. Raises Rejected, with the place of everything that is not as it should be."""
+    return _Reader(path, measure, id_column).read()
+
+
+class _Reader:
+    def __init__(self, path: Path, measure: Expression, id_column: str | None) -> None:
+        self.path = path
+        self.measure = measure
+        self.id_column = id_column
+        self.problems: list[Diagnostic] = []
+
+    def read(self) -> Runs:
+        rows = self.rows()
+        if not rows:
+            raise self.fail(1, "EXP111", "the file is empty: it needs a line with the names of the columns")
+        first, *others = rows
+        columns = self.header(*first)
+        if self.problems:
+            raise Rejected(*self.problems)
+        if not others:
+            raise self.fail(first[0], "EXP111", "the file has no runs, only the names of its columns")
+        names: dict[str, int] = {}
+        runs = [run for line, cells in others if (run := self.run(line, cells, columns, names)) is not None]
+        if self.problems:
+            raise Rejected(*self.problems)
+        return Runs(tuple(runs), tuple(self.copies(others, columns)))
+
+    def rows(self) -> list[tuple[int, list[str]]]:
+        try:
+            size = self.path.stat().st_size
+            data = self.path.read_bytes() if size <= MAX_BYTES else b""
+        except OSError as error:
+            raise self.fail(1, "EXP102", f"cannot be read: {error.strerror or error}") from None
+        if size > MAX_BYTES:
+            raise self.fail(1, "EXP111", f"the file has {size} bytes; at most {MAX_BYTES} are read")
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise self.fail(data[: error.start].count(b"\n") + 1, "EXP111", "not UTF-8 text") from None
+        if "\0" in text:
+            raise self.fail(text[: text.index("\0")].count("\n") + 1, "EXP111", "a NUL character in the data")
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+        rows = []
+        try:
+            for cells in reader:
+                if cells and not (len(cells) == 1 and not cells[0].strip()):
+                    rows.append((reader.line_num, [cell.strip() for cell in cells]))
+                if len(rows) > MAX_RUNS + 1:
+                    raise self.fail(reader.line_num, "EXP111", f"more than {MAX_RUNS} runs")
+        except csv.Error as error:
+            raise self.fail(reader.line_num, "EXP111", f"not CSV: {error}") from None
+        return rows
+
+    def header(self, line: int, columns: list[str]) -> list[str]:
+        for name in sorted({c for c in columns if columns.count(c) > 1}):
+            self.add(line, "EXP112", f"the column '{name}' is there twice")
+        wanted = [*self.measure.columns, *([self.id_column] if self.id_column else [])]
+        for name in wanted:
+            if name not in columns:
+                self.add(line, "EXP112", f"there is no column '{name}'", f"columns: {', '.join(columns)}")
+        if self.id_column is None:
+            self.id_column = next((name for name in ID_COLUMNS if name in columns), None)
+        return columns
+
+    def run(self, line: int, cells: list[str], columns: list[str], names: dict[str, int]) -> Run | None:
+        if len(cells) != len(columns):
+            self.add(line, "EXP113", f"{len(cells)} cells, but {len(columns)} columns")
+            return None
+        row = dict(zip(columns, cells, strict=True))
+        name = row[self.id_column] if self.id_column else str(len(names) + 1)
+        if not name:
+            self.add(line, "EXP113", "the run has no name")
+        if name in names:
+            self.add(line, "EXP113", f"a second run named '{name}'; the first is in line {names[name]}")
+        names.setdefault(name, line)
+        values = {column: self.cell(line, column, row[column]) for column in self.measure.columns}
+        numbers = {column: value for column, value in values.items() if value is not None}
+        if len(numbers) < len(values):
+            return None
+        try:
+            measured = self.measure.evaluate(numbers)
+        except ZeroDivisionError:
+            self.add(line, "EXP114", "the measure divides by zero in this run")
+            return None
+        except ValueError as error:
+            self.add(line, "EXP114", f"the measure cannot be computed for this run: {error}")
+            return None
+        if measured.low < 0:
+            hint = "a signed difference would count any overshoot as a success; use abs(…) or hypot(…)"
+            self.add(line, "EXP114", "the measure of this run is negative", hint)
+            return None
+        return Run(name, line, tuple((c, row[c]) for c in self.measure.columns), measured)
+
+    def cell(self, line: int, column: str, text: str) -> Fraction | None:
+        number = decimal(text)
+        if number is None:
+            shown = f"'{text}'" if text else "an empty cell"
+            hint = "cells hold plain finite decimal numbers, without units"
+            self.add(line, "EXP113", f"column '{column}': {shown} is not a number", hint)
+        return number
+
+    def copies(self, rows: list[tuple[int, list[str]]], columns: list[str]) -> list[Diagnostic]:
+        """Runs that agree in every cell but the name: measured runs rarely do, copied lines always."""
+        if len(columns) < 4:
+            return []
+        at = columns.index(self.id_column) if self.id_column else -1
+        seen: dict[tuple[str, ...], int] = {}
+        found = []
+        for line, cells in rows:
+            key = tuple(cell for i, cell in enumerate(cells) if i != at)
+            if key in seen:
+                message = f"this run agrees with the one in line {seen[key]} in every cell: is it a copy?"
+                found.append(Diagnostic("EXP115", message, self.place(line), Severity.WARNING))
+            seen.setdefault(key, line)
+        return found
+
+    def place(self, line: int) -> Span:
+        return Span(str(self.path), line, 1, line + 1, 1)
+
+    def add(self, line: int, code: str, message: str, hint: str | None = None) -> None:
+        self.problems.append(Diagnostic(code, message, self.place(line), hint=hint))
+
+    def fail(self, line: int, code: str, message: str) -> Rejected:
+        return Rejected(Diagnostic(code, message, self.place(line)))

@@ -1,0 +1,253 @@
+"""From plan to verdict, on good data, bad data, hostile data, and the published figures."""
+
+from __future__ import annotations
+
+import csv
+import io
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from avow.backend import Backend, Limits
+from avow.backends.experiment import BACKEND
+from avow.diagnostics import Rejected
+from avow.verdict import Link, Outcome, Verdict
+
+ROOT = Path(__file__).resolve().parents[2] / "contracts"
+GOOD: dict[str, Any] = {"data": "runs.csv", "measure": "d", "within": 0.25, "unit": "m"}
+
+
+def settle(job: Any) -> Outcome:
+    (outcome,) = BACKEND.discharge(job, job.root, Limits()).outcomes
+    return outcome
+
+
+def rows(*distances: str) -> str:
+    return "run,d\n" + "".join(f"{i},{d}\n" for i, d in enumerate(distances, 1))
+
+
+def test_it_is_a_backend() -> None:
+    assert isinstance(BACKEND, Backend)
+    assert BACKEND.tools() == ()
+
+
+def test_no_failure_in_47_runs_is_tested(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text(rows(*["0.25"] * 47))
+    outcome = settle(make_job(**GOOD))
+    assert outcome.verdict is Verdict.TESTED
+    assert outcome.link is Link.GUIDED
+    assert outcome.bound["runs"] == 47
+    assert outcome.bound["failures"] == 0
+    assert 0.0617 < float(str(outcome.bound["failure probability at most"])) < 0.0619
+    assert "6.2 %" in outcome.summary
+
+
+def test_the_tolerance_may_be_a_constant_or_have_a_unit(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text(rows(*["0.25"] * 47))
+    for within in ("Tolerance", "25 cm", "0.25", "250 mm"):
+        assert settle(make_job(**{**GOOD, "within": within})).verdict is Verdict.TESTED
+    assert settle(make_job(**{**GOOD, "within": "24 cm"})).verdict is Verdict.REFUTED
+
+
+def test_one_failing_run_refutes_and_is_named(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text(rows(*["0.2"] * 46, "0.2500000000000000000001"))
+    outcome = settle(make_job(**GOOD))
+    assert outcome.verdict is Verdict.REFUTED
+    assert outcome.counterexample is not None
+    assert dict(outcome.counterexample.values)["run"] == "47"
+    assert dict(outcome.counterexample.values)["d"].startswith("0.25")
+
+
+def test_a_claimed_rate_allows_failures_only_as_far_as_the_runs_show_it(
+    make_job: Callable[..., Any], tmp_path: Path
+) -> None:
+    (tmp_path / "runs.csv").write_text(rows(*["0.2"] * 46, "0.3"))
+    assert settle(make_job(**GOOD, at_least=0.9)).verdict is Verdict.TESTED
+    assert "statistically" in " ".join(settle(make_job(**GOOD, at_least=0.9)).hypotheses)
+    refuted = settle(make_job(**GOOD, at_least=0.95))
+    assert refuted.verdict is Verdict.REFUTED
+    assert refuted.counterexample is not None
+
+
+def test_too_few_runs_are_never_green(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text(rows("0.1", "0.1"))
+    few = settle(make_job(**GOOD))
+    assert few.verdict is Verdict.UNKNOWN
+    assert "5 are needed" in few.summary
+    (tmp_path / "runs.csv").write_text(rows(*["0.1"] * 28))
+    assert settle(make_job(**GOOD, at_least=0.9)).verdict is Verdict.UNKNOWN
+    (tmp_path / "runs.csv").write_text(rows(*["0.1"] * 29))
+    assert settle(make_job(**GOOD, at_least=0.9)).verdict is Verdict.TESTED
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        ("", 1, "empty"),
+        ("run,d\n", 1, "no runs"),
+        ("run,e\n1,0.1\n", 1, "no column 'd'"),
+        ("run,d,d\n1,0.1,0.1\n", 1, "twice"),
+        ("run,d\n1,nan\n", 2, "not a number"),
+        ("run,d\n1,0.1\n2,inf\n", 3, "not a number"),
+        ("run,d\n1,\n", 2, "empty cell"),
+        ("run,d\n1,21 cm\n", 2, "not a number"),
+        ("run,d\n1,-0.1\n", 2, "negative"),
+        ("run,d\n1,0.1\n1,0.2\n", 3, "second run named"),
+        ("run,d\n1\n", 2, "1 cells"),
+        ('run,d\n1,"0.1\n', 2, "not CSV"),
+        ("run,d\n1,0.1\n\n ,0.1\n", 4, "no name"),
+        ("run,d\n1,=0.1+0.1\n", 2, "not a number"),
+    ],
+)
+def test_bad_data_is_told_with_its_line_and_never_green(
+    make_job: Callable[..., Any], tmp_path: Path, text: str, line: int, word: str
+) -> None:
+    (tmp_path / "runs.csv").write_text(text)
+    job = make_job(**GOOD)
+    first = BACKEND.check(job)[0]
+    assert first.span is not None
+    assert first.span.line == line
+    assert word in first.message
+    outcome = settle(job)
+    assert outcome.verdict is Verdict.ERROR
+    assert word in outcome.summary
+    assert f"runs.csv:{line}" in outcome.summary
+
+
+def test_data_that_are_not_text(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    for data in (b"run,d\n1,\xff\n", b"run,d\n1,\0\n"):
+        (tmp_path / "runs.csv").write_bytes(data)
+        assert settle(make_job(**GOOD)).verdict is Verdict.ERROR
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({}, "'data'"),
+        ({"data": "runs.csv", "measure": "d"}, "within"),
+        ({"data": "runs.csv", "within": 1}, "measure"),
+        ({**GOOD, "data": "nowhere.csv"}, "no file"),
+        ({**GOOD, "data": "../runs.csv"}, "system's folder"),
+        ({**GOOD, "data": "/etc/passwd"}, "system's folder"),
+        ({**GOOD, "data": 7}, "name of a file"),
+        ({**GOOD, "data": "a\0b"}, "system's folder"),
+        ({**GOOD, "summary": "s.yaml"}, "either"),
+        ({**GOOD, "measure": "open('x')"}, "measure"),
+        ({**GOOD, "within": "Tolerence"}, "neither"),
+        ({**GOOD, "within": "Yes"}, "not a number"),
+        ({**GOOD, "within": "3 s"}, "compare"),
+        ({**GOOD, "within": -1}, "negative"),
+        ({**GOOD, "within": True}, "neither"),
+        ({**GOOD, "within": float("nan")}, "neither"),
+        ({**GOOD, "confidence": 1}, "confidence"),
+        ({**GOOD, "confidence": "high"}, "number"),
+        ({**GOOD, "at_least": 1}, "between"),
+        ({**GOOD, "mesure": "d"}, "no option"),
+        ({**GOOD, "run_column": "who"}, "no column 'who'"),
+        ({**GOOD, "protocol": ["x"]}, "text"),
+    ],
+)
+def test_bad_options_are_told(make_job: Callable[..., Any], tmp_path: Path, options: dict[str, Any], word: str) -> None:
+    (tmp_path / "runs.csv").write_text(rows(*["0.1"] * 47))
+    job = make_job(**options)
+    problems = BACKEND.check(job)
+    assert any(word in p.message for p in problems), problems
+    assert all(p.is_error for p in problems)
+    assert settle(job).verdict is Verdict.ERROR
+    BACKEND.files(job)
+
+
+def test_a_copied_run_is_noticed(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text(
+        "run,x,y,d\n1,1,2,0.1\n2,1,2,0.1\n" + "".join(f"{i},{i},0,0.1\n" for i in range(3, 50))
+    )
+    job = make_job(**GOOD)
+    (warning,) = BACKEND.check(job)
+    assert not warning.is_error
+    assert warning.span is not None
+    assert warning.span.line == 3
+    assert "warnings" in settle(job).details
+
+
+def test_export_is_pure(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text(rows("0.1"))
+    job = make_job(**GOOD, protocol='quotes " and */ {braces}')
+    assert BACKEND.export(job) == BACKEND.export(job)
+    assert '"within": "1/4"' in BACKEND.export(job)["claim.json"]
+    with pytest.raises(Rejected):
+        BACKEND.export(make_job())
+
+
+PUBLISHED = "n: 47\nmean: 21.4 cm\nsd: 4 mm\nmin: 8 cm\nmax: 43 cm\n"
+
+
+def test_the_published_figures_are_refuted_and_contradict_each_other(
+    make_job: Callable[..., Any], tmp_path: Path
+) -> None:
+    (tmp_path / "s.yaml").write_text(PUBLISHED)
+    outcome = settle(make_job(summary="s.yaml", within="25 cm", unit="cm"))
+    assert outcome.verdict is Verdict.REFUTED
+    assert outcome.counterexample is not None
+    assert "3.65 cm" in outcome.counterexample.explanation
+    assert "4 mm is printed" in outcome.counterexample.explanation
+    assert "43 cm" in outcome.summary
+    assert outcome.details["failures"] == {"at least": 1, "at most": 37}
+    assert 0.0969 < float(str(outcome.bound["failure probability at most"])) < 0.0971
+
+
+def test_contradictory_figures_alone_are_an_error(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "s.yaml").write_text(PUBLISHED)
+    assert settle(make_job(summary="s.yaml", within="50 cm", unit="m")).verdict is Verdict.ERROR
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "n: 3\nmean: 9\nmin: 1\nmax: 5\n",
+        "n: 3\nmin: 5\nmax: 1\n",
+        "n: 10\nmean: 4.90\nmin: 1.00\nmax: 5.00\n",
+        "n: 10\nmean: 3\nmin: 1\nmax: 5\nsd: 9.0\n",
+    ],
+)
+def test_impossible_figures(make_job: Callable[..., Any], tmp_path: Path, text: str) -> None:
+    (tmp_path / "s.yaml").write_text(text)
+    assert settle(make_job(summary="s.yaml", within=100)).verdict is Verdict.ERROR
+
+
+def test_possible_figures_rest_on_being_true(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "s.yaml").write_text("n: 47\nmean: 21.4\nmin: 8\nmax: 24\nsd: 3\nunit: cm\n")
+    outcome = settle(make_job(summary="s.yaml", within="25 cm", unit="cm"))
+    assert outcome.verdict is Verdict.TESTED
+    assert any("not examined" in h for h in outcome.hypotheses)
+    (tmp_path / "s.yaml").write_text("n: 47\nmean: 21.4\nmin: 8\nmax: 25\nsd: 3\nunit: cm\n")
+    outcome = settle(make_job(summary="s.yaml", within="25 cm", unit="cm"))
+    assert outcome.verdict is Verdict.UNKNOWN, "25 may be 25.4, rounded"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[1]", "n: many\nmean: 1", "n: 0\nmean: 1", "mean: 1", "n: 4", "n: 4\nmean: about 3", "n: 4\nmean: [3]",
+     "n: 4\nmean: 3 s", "n: 4\nmean: -3", "n: 4\nmean: .nan", "n: 4\nmean: 3\nmeen: 4", "n: 4\nmean: 3\nmean: 4",
+     "n: true\nmean: 3", "n: 4\nmean: 3\nunit: s", "{", "n: 4\nmean: !!float 3"],
+)  # fmt: skip
+def test_bad_summaries_are_told(make_job: Callable[..., Any], tmp_path: Path, text: str) -> None:
+    (tmp_path / "s.yaml").write_text(text)
+    job = make_job(summary="s.yaml", within=100, unit="cm")
+    problems = BACKEND.check(job)
+    assert problems
+    assert all(p.span is not None and p.span.file.endswith("s.yaml") for p in problems)
+    assert settle(job).verdict is Verdict.ERROR
+
+
+def test_the_simulation_reproduces_its_data_byte_for_byte() -> None:
+    program = ROOT / "remote_inspection/models/simulate_navigation.py"
+    made = subprocess.run([sys.executable, program], capture_output=True, check=True, timeout=60).stdout
+    kept = (ROOT / "remote_inspection/data/navigation_runs.csv").read_bytes()
+    assert made == kept
+    runs = list(csv.DictReader(io.StringIO(kept.decode())))
+    assert len(runs) == 47
+    assert len({(r["goal_x"], r["goal_y"]) for r in runs}) == 47
