@@ -1,0 +1,266 @@
+"""The dataflow graph: which output feeds which input, said by names and types, and by the plan where they do not suffice.
+
+An output feeds the inputs of *other* nodes that bear its name and type. A connection of the plan renames, chooses among
+several providers, delays, or lets a node feed itself; an input named by a connection takes that source and no other.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from avow.diagnostics import Diagnostic, Severity, Span
+from avow.language.contract import Node, Port
+from avow.language.sorts import INTEGER, NATURAL, Sort
+from avow.system.plan import Connection, Endpoint, System
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """An output that feeds an input. `declared`: by the plan, not by names."""
+
+    source: Endpoint
+    target: Endpoint
+    delayed: bool = False
+    initial: str | None = None
+    declared: bool = False
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.source} → {self.target}" + (" (delayed)" if self.delayed else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """`environment`: inputs that no node provides; `dangling`: outputs that feed nothing; `deadlocks`: cycles, each as
+    the nodes on it, that no delayed edge with an initial value starts."""
+
+    nodes: tuple[str, ...]
+    edges: tuple[Edge, ...]
+    environment: tuple[Endpoint, ...]
+    dangling: tuple[Endpoint, ...]
+    deadlocks: tuple[tuple[str, ...], ...]
+    findings: tuple[Diagnostic, ...]
+    by_target: Mapping[Endpoint, Edge] = field(compare=False, repr=False)
+    by_consumer: Mapping[str, tuple[Edge, ...]] = field(compare=False, repr=False)
+    by_provider: Mapping[str, tuple[Edge, ...]] = field(compare=False, repr=False)
+
+    def feeding(self, node: str) -> tuple[Edge, ...]:
+        """The edges into a node."""
+        return self.by_consumer.get(node, ())
+
+    def fed_by(self, node: str) -> tuple[Edge, ...]:
+        """The edges out of a node."""
+        return self.by_provider.get(node, ())
+
+    def providers(self, node: str, *, delayed: bool | None = None) -> tuple[str, ...]:
+        """The nodes that feed a node (with or without itself, as the edges have it), each once."""
+        found = (e.source.node for e in self.feeding(node) if delayed is None or e.delayed is delayed)
+        return tuple(dict.fromkeys(found))
+
+    def consumers(self, node: str, *, delayed: bool | None = None) -> tuple[str, ...]:
+        """The nodes that a node feeds, each once."""
+        found = (e.target.node for e in self.fed_by(node) if delayed is None or e.delayed is delayed)
+        return tuple(dict.fromkeys(found))
+
+
+def dataflow(system: System) -> Graph:
+    """The graph of a system. Never raises: what is wrong with it stands in `findings`."""
+    nodes = system.contract.nodes
+    faults: list[Diagnostic] = []
+    edges = _declared(system, faults)
+    taken = {edge.target for edge in edges}
+    edges += _by_names(nodes, taken, faults)
+    order = {node.name: k for k, node in enumerate(nodes)}
+    edges.sort(key=lambda e: (order[e.target.node], order[e.source.node], e.target.port, e.source.port))
+    fed = {edge.target for edge in edges}
+    feeding = {edge.source for edge in edges}
+    environment = tuple(
+        Endpoint(n.name, p.name) for n in nodes for p in n.inputs if Endpoint(n.name, p.name) not in fed
+    )
+    dangling = tuple(
+        Endpoint(n.name, p.name) for n in nodes for p in n.outputs if Endpoint(n.name, p.name) not in feeding
+    )
+    names = tuple(node.name for node in nodes)
+    started = [(e.source.node, e.target.node) for e in edges if not (e.delayed and e.initial is not None)]
+    selves = {source for source, target in started if source == target}
+    loops = [c for c in components(names, started) if len(c) > 1 or c[0] in selves]
+    deadlocks = tuple(cycle_in(component, started) for component in loops)
+    spans = {node.name: node.span for node in nodes}
+    faults += [_deadlock(cycle, edges, spans) for cycle in deadlocks]
+    by_consumer: dict[str, list[Edge]] = defaultdict(list)
+    by_provider: dict[str, list[Edge]] = defaultdict(list)
+    for edge in edges:
+        by_consumer[edge.target.node].append(edge)
+        by_provider[edge.source.node].append(edge)
+    return Graph(
+        names,
+        tuple(edges),
+        environment,
+        dangling,
+        deadlocks,
+        tuple(faults),
+        {edge.target: edge for edge in edges},
+        {name: tuple(found) for name, found in by_consumer.items()},
+        {name: tuple(found) for name, found in by_provider.items()},
+    )
+
+
+def fits(output: Sort, wanted: Sort) -> bool:
+    """Whether every value of an output's sort is one of the input's sort. INTEGER does not fit NATURAL."""
+    return output == wanted or (output == NATURAL and wanted == INTEGER)
+
+
+def _declared(system: System, faults: list[Diagnostic]) -> list[Edge]:
+    edges: dict[Endpoint, Edge] = {}
+    for connection in system.plan.connections:
+        source, target = connection.source, connection.target
+        ports = _ports(system, connection)
+        if ports is None:
+            continue
+        output, wanted = ports
+        if not fits(output.sort, wanted.sort):
+            message = f"{source} has type {output.type_name}, {target} wants {wanted.type_name}"
+            faults.append(Diagnostic("PLAN121", message, connection.span))
+            continue
+        if target in edges:
+            message = f"{target} is fed twice: by {edges[target].source} and by {source}"
+            notes = (("first connected here", edges[target].span),)
+            faults.append(Diagnostic("PLAN122", message, connection.span, notes=notes))
+            continue
+        edges[target] = Edge(source, target, connection.delayed, connection.initial, True, connection.span)
+    return list(edges.values())
+
+
+def _ports(system: System, connection: Connection) -> tuple[Port, Port] | None:
+    try:
+        source = system.contract.node(connection.source.node).output(connection.source.port)
+        return source, system.contract.node(connection.target.node).input(connection.target.port)
+    except KeyError:
+        return None  # told, with its place, by avow.system.names
+
+
+def _by_names(nodes: Sequence[Node], taken: set[Endpoint], faults: list[Diagnostic]) -> list[Edge]:
+    outputs: dict[str, list[tuple[str, Port]]] = defaultdict(list)
+    for node in nodes:
+        for port in node.outputs:
+            outputs[port.name].append((node.name, port))
+    edges: list[Edge] = []
+    for node in nodes:
+        for port in node.inputs:
+            target = Endpoint(node.name, port.name)
+            if target in taken or port.name not in outputs:
+                continue
+            others = [(name, output) for name, output in outputs[port.name] if name != node.name]
+            fitting = [(name, output) for name, output in others if fits(output.sort, port.sort)]
+            if len(fitting) == 1:
+                name, output = fitting[0]
+                edges.append(Edge(Endpoint(name, output.name), target, span=port.span))
+            elif fitting:
+                faults.append(_several(target, [name for name, _ in fitting], port))
+            elif others:
+                name, output = others[0]
+                message = (
+                    f"{name}.{output.name} ({output.type_name}) does not feed {target} ({port.type_name}): same name, "
+                    "other type; the input is left to the environment"
+                )
+                faults.append(Diagnostic("PLAN121", message, port.span, Severity.WARNING))
+            else:
+                message = (
+                    f"{node.name} has an input and an output {port.name!r}; a node feeds itself only by a connection"
+                )
+                hint = f"connections: {{from: {target}, to: {target}, delayed: true, initial: …}}"
+                faults.append(Diagnostic("PLAN124", message, port.span, Severity.WARNING, hint))
+    return edges
+
+
+def _several(target: Endpoint, names: list[str], port: Port) -> Diagnostic:
+    message = f"{target} has several providers: {', '.join(f'{name}.{port.name}' for name in names)}"
+    hint = f"say which is meant: connections: {{from: {names[0]}.{port.name}, to: {target}}}"
+    return Diagnostic("PLAN122", message, port.span, hint=hint)
+
+
+def _deadlock(cycle: tuple[str, ...], edges: Sequence[Edge], spans: Mapping[str, Span | None]) -> Diagnostic:
+    shown = " → ".join((*cycle, cycle[0]))
+    delayed = any(e.delayed and e.source.node in cycle and e.target.node in cycle for e in edges)
+    message = f"start-up deadlock: {shown} wait for one another and nothing comes first"
+    hint = (
+        "give the delayed edge an initial value" if delayed else "declare an edge of it delayed, with an initial value"
+    )
+    return Diagnostic("PLAN123", message, spans.get(cycle[0]), Severity.WARNING, hint)
+
+
+# -- loops -------------------------------------------------------------------------------------------------------------
+
+
+def components(nodes: Iterable[str], arcs: Iterable[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
+    """Strongly connected components, providers before consumers; nodes within one in the order given (Tarjan)."""
+    names = tuple(nodes)
+    successors: dict[str, list[str]] = {name: [] for name in names}
+    for source, target in arcs:
+        if source in successors and target in successors:
+            successors[source].append(target)
+    position = {name: k for k, name in enumerate(names)}
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    on_stack: set[str] = set()
+    stack: list[str] = []
+    found: list[tuple[str, ...]] = []
+    for root in names:
+        work = [] if root in index else [root]
+        pending: dict[str, Iterator[str]] = {}
+        while work:
+            name = work[-1]
+            if name not in index:
+                index[name] = low[name] = len(index)
+                stack.append(name)
+                on_stack.add(name)
+                pending[name] = iter(successors[name])
+            following = next((s for s in pending[name] if s not in index), None)
+            if following is not None:
+                work.append(following)
+                continue
+            work.pop()
+            low[name] = min([low[name], *(low[s] for s in successors[name] if s in on_stack)])
+            if low[name] == index[name]:
+                at = stack.index(name)
+                members = stack[at:]
+                del stack[at:]
+                on_stack.difference_update(members)
+                found.append(tuple(sorted(members, key=position.__getitem__)))
+    return tuple(reversed(found))
+
+
+def cycle_in(component: Sequence[str], arcs: Iterable[tuple[str, str]]) -> tuple[str, ...]:
+    """A shortest cycle within a component, or an empty tuple where there is none."""
+    inside = set(component)
+    successors: dict[str, list[str]] = {name: [] for name in component}
+    for source, target in arcs:
+        if source in inside and target in inside and target not in successors[source]:
+            successors[source].append(target)
+    best: tuple[str, ...] = ()
+    for start in component[:50]:
+        path = _shortest(start, successors)
+        if path and (not best or len(path) < len(best)):
+            best = path
+    return best
+
+
+def _shortest(start: str, successors: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
+    before: dict[str, str] = {}
+    frontier = [start]
+    while frontier:
+        following: list[str] = []
+        for name in frontier:
+            for successor in successors[name]:
+                if successor == start:
+                    path = [name]
+                    while path[-1] != start:
+                        path.append(before[path[-1]])
+                    return tuple(reversed(path))
+                if successor not in before:
+                    before[successor] = name
+                    following.append(successor)
+        frontier = following
+    return ()
