@@ -7,10 +7,12 @@ also when Avow itself is interrupted.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import resource
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -65,7 +67,7 @@ def run(
                 stderr=err,
                 env={**os.environ, **env} if env else None,
                 start_new_session=True,
-                preexec_fn=_limit(megabytes) if megabytes else None,
+                preexec_fn=_before_exec(megabytes),
             )
         except (FileNotFoundError, PermissionError, NotADirectoryError) as error:
             raise ToolMissing(f"{command[0]}: {error.strerror or error}") from error
@@ -77,7 +79,7 @@ def run(
         except subprocess.TimeoutExpired:
             code = None
         finally:
-            _kill_group(process.pid)
+            _kill_tree(process.pid)
             process.wait()
             with _lock:
                 _running.discard(process.pid)
@@ -89,19 +91,48 @@ def kill_all() -> None:
     with _lock:
         pids = tuple(_running)
     for pid in pids:
-        _kill_group(pid)
+        _kill_tree(pid)
 
 
-def _kill_group(pid: int) -> None:
+def _kill_tree(pid: int) -> None:
+    """Kill the process group, and descendants that moved to a group of their own (a tool run by a worker of ours)."""
+    family = _descendants(pid)
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(pid, signal.SIGKILL)
+    for member in family:
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.kill(member, signal.SIGKILL)
 
 
-def _limit(megabytes: int) -> Callable[[], None]:
-    size = megabytes * 1024 * 1024
+def _descendants(pid: int) -> list[int]:
+    """Read from /proc; empty where there is none."""
+    children: dict[int, list[int]] = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            # the name in parentheses may hold spaces and parentheses of its own
+            fields = stat.read_text(errors="replace").rpartition(")")[2].split()
+            children.setdefault(int(fields[1]), []).append(int(stat.parent.name))
+    found: list[int] = []
+    todo = [pid]
+    while todo:
+        for child in children.get(todo.pop(), ()):
+            found.append(child)
+            todo.append(child)
+    return found
+
+
+_PR_SET_PDEATHSIG = 1
+_libc = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
+
+
+def _before_exec(megabytes: int | None) -> Callable[[], None]:
+    size = megabytes * 1024 * 1024 if megabytes else None
 
     def apply() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (size, size))
+        if _libc is not None:  # the tool must not outlive us, however we die
+            _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if size is not None:
+            resource.setrlimit(resource.RLIMIT_AS, (size, size))
 
     return apply
 

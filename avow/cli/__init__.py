@@ -1,0 +1,96 @@
+"""The command line: a module a command, imported when it is called.
+
+Exit codes, the same for all: 0 all is well; 1 a gate or a check fails; 2 bad input or usage; 3 a needed tool failed.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from typing import Any
+
+import click
+
+from avow import __version__
+
+COMMANDS = {
+    "audit": "re-digest everything that the ledger refers to",
+    "check": "diagnostics for .rcl files, in milliseconds",
+    "compose": "the derivation and its side conditions",
+    "diff": "what changed between two ledgers or two revisions",
+    "doctor": "which tools are here, and the command that installs a missing one",
+    "explain": "one obligation: formula, status, evidence, counterexample, how to re-run it",
+    "fmt": "the canonical layout of .rcl files",
+    "init": "a new workspace with a contract that verifies",
+    "lsp": "the language server",
+    "monitor": "judge a recorded trace against assumptions and guarantees",
+    "refines": "weaker assumptions, stronger guarantees?",
+    "report": "render the reports, or check one against the ledger",
+    "review": "fill in the digests of a review record",
+    "sanity": "is the contract worth verifying?",
+    "simulate": "run the composed contracts over the plan's scenario",
+    "translate": "a contract as LaTeX, text, JSON, SMT-LIB, …",
+    "verify": "everything for every system: the main job",
+}
+"""Name → one line of help. The module of that name in this package holds the click command `command`."""
+
+
+class _Lazy(click.Group):
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command = importlib.import_module(f"avow.cli.{cmd_name}").command
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        # from the table, so that `avow --help` imports no command
+        with formatter.section("Commands"):
+            formatter.write_dl(sorted(COMMANDS.items()))
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        import difflib
+
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            near = difflib.get_close_matches(args[0], COMMANDS, n=1)
+            ctx.fail(f"no such command '{args[0]}'" + (f"; did you mean '{near[0]}'?" if near else ""))
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=_Lazy, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(__version__, prog_name="avow")
+def _avow() -> None:
+    """Contracts in, evidence out: robot contracts turned into verification evidence and an assurance report."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The entry point. Bad input ends with located messages and code 2, never with a traceback."""
+    from avow.diagnostics import Rejected
+
+    try:
+        result: Any = _avow.main(arguments, standalone_mode=False)
+        code = result if isinstance(result, int) else 0
+    except Rejected as rejected:
+        from avow.rendering import render
+
+        print(render(rejected.diagnostics), file=sys.stderr)
+        code = 2
+    except click.exceptions.Exit as leave:
+        code = leave.exit_code
+    except click.ClickException as wrong:
+        wrong.show()
+        code = 2
+    except (KeyboardInterrupt, click.Abort):
+        from avow.process import kill_all
+
+        kill_all()
+        print("interrupted", file=sys.stderr)
+        code = 130
+    except BrokenPipeError:  # the reader of our output has left: `avow … | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
+    sys.exit(code)

@@ -1,0 +1,5 @@
+"""``python -m avow.cli``."""
+
+from avow.cli import main
+
+main()

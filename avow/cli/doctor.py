@@ -1,0 +1,28 @@
+"""``avow doctor``: which tools are here."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+
+@click.command()
+@click.option("--json", "as_json", is_flag=True, help="For machines.")
+def command(as_json: bool) -> int:
+    """Which backends' tools are here, which versions, and the one command that installs a missing one."""
+    from avow.pipeline.doctor import findings
+
+    found = findings()
+    if as_json:
+        click.echo(json.dumps({"tools": [f.json() for f in found]}, indent=1))
+    else:
+        from rich.console import Console
+        from rich.table import Table
+
+        table = Table("for", "tool", "version", "where, or how to get it", box=None, header_style="bold")
+        for f in found:
+            state = f"[green]{f.tool.version}[/]" if f.tool.present else "[yellow]missing[/]"
+            table.add_row(f.used_by, f.tool.name, state, f.tool.path or "" if f.tool.present else f.tool.install)
+        Console(highlight=False).print(table)
+    return 3 if any(not f.tool.present and not f.tool.optional for f in found) else 0

@@ -1,0 +1,46 @@
+"""``avow init``: a new workspace."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+_DODO = '''"""The pipeline as doit tasks: `doit verify` does everything for every system under contracts/."""
+
+from pathlib import Path
+
+from avow.pipeline.tasks import config, pipeline
+
+DOIT_CONFIG = config(Path(__file__).parent)
+
+
+def task_avow():
+    """check, sanity, compose, obligations, export, discharge, report and verify, for each system, node and method"""
+    yield from pipeline(Path(__file__).parent)
+'''
+
+
+@click.command()
+@click.argument("directory", type=click.Path(file_okay=False, path_type=Path))
+def command(directory: Path) -> int:
+    """Make DIRECTORY a workspace with one system that verifies. Nothing that exists is overwritten."""
+    from importlib import resources
+
+    from avow.diagnostics import Diagnostic, Rejected
+    from avow.files import write
+
+    if directory.exists() and any(directory.iterdir()):
+        raise Rejected(
+            Diagnostic("CLI003", f"{directory} is not empty", hint="give the name of a new folder, or of an empty one")
+        )
+    template = Path(str(resources.files("avow.cli") / "template"))
+    for source in sorted(template.rglob("*")):
+        if source.is_file() and "__pycache__" not in source.parts:
+            name = source.relative_to(template)
+            write(directory / (".gitignore" if name.name == "gitignore.txt" else name), source.read_bytes())
+    write(directory / "dodo.py", _DODO)
+    for folder in ("artifacts", "reports"):
+        write(directory / folder / "README.md", f"Made by `doit verify`: see Avow's documentation of {folder}/.\n")
+    click.echo(f"{directory}: a workspace with one system, contracts/thermostat\n\nnext:\n  cd {directory}\n  doit verify")
+    return 0

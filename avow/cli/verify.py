@@ -1,0 +1,39 @@
+"""``avow verify``: the same as ``doit verify``, and what doit's command line cannot say."""
+
+from __future__ import annotations
+
+import os
+
+import click
+
+
+@click.command()
+@click.argument("systems", nargs=-1)
+@click.option("--fresh", is_flag=True, help="Believe no earlier run: settle every obligation anew.")
+@click.option("-n", "jobs", default=2, show_default=True, help="How many tasks at once.")
+@click.option("--explain", is_flag=True, help="Say what each failing gate lacks, and the cheapest method that would close it.")
+def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool) -> int:
+    """Verify every system under contracts/, or only SYSTEMS (their names)."""
+    from avow.cli.workspace import workspace
+    from avow.diagnostics import Diagnostic, Rejected
+    from avow.pipeline.run_info import EXPLAIN, FRESH
+
+    place = workspace()
+    known = [p.name for p in place.systems()]
+    for name in systems:
+        if name not in known:
+            raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=f"known: {', '.join(known)}"))
+    if fresh:
+        os.environ[FRESH] = "1"
+    if explain:
+        os.environ[EXPLAIN] = "1"
+    os.chdir(place.root)
+    from doit.cmd_base import ModuleTaskLoader
+    from doit.doit_cmd import DoitMain
+
+    from avow.pipeline.tasks import config, pipeline
+
+    tasks = {"DOIT_CONFIG": config(place.root), "task_avow": lambda: pipeline(place.root)}
+    wanted = [f"verify:{name}" for name in systems] or ["verify"]
+    code = DoitMain(ModuleTaskLoader(tasks)).run(["run", "-n", str(jobs), *wanted])
+    return int(code or 0)

@@ -1,0 +1,244 @@
+"""The last stages: build the assurance case from the ledger, render it, and hold it against the policy's gates."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, date, datetime
+from pathlib import Path
+from typing import Any
+
+from doit.exceptions import TaskError, TaskFailed
+
+from avow import __version__
+from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
+from avow.diagnostics import Rejected
+from avow.files import digest, digest_file, write
+from avow.pipeline import check as checking
+from avow.pipeline.discharge import ledger_of
+from avow.pipeline.run_info import EXPLAIN, Run, seconds_so_far
+from avow.pipeline.survey import Survey
+from avow.registry import backend, names
+from avow.workspace import Workspace
+
+
+@dataclass(frozen=True, slots=True)
+class Assessment:
+    """What is needed to assess one system."""
+
+    workspace: Workspace
+    surveyed: Survey
+    run: Run
+
+    @property
+    def system(self) -> str:
+        return self.surveyed.system.name
+
+    @property
+    def stamp(self) -> Path:
+        return self.workspace.artifacts / self.system / "report.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What the terminal shows of one assessed system."""
+
+    system: str
+    exit_code: int
+    counts: Mapping[str, int]
+    """Status → how many obligations have it."""
+    grade: str
+    report: str
+    gates: tuple[tuple[str, bool, str], ...]
+    """(title, passed, reason and what would close it)."""
+    left_out: tuple[tuple[str, str], ...] = ()
+
+
+_known: list[Assessment] = []
+_finished: list[Result] = []
+_changed: list[str] = []
+
+
+def register(assessment: Assessment) -> Assessment:
+    """Note a system that the page over all systems must show."""
+    _known.append(assessment)
+    return assessment
+
+
+def known() -> tuple[Assessment, ...]:
+    """Every system that could be read in this process."""
+    return tuple(_known)
+
+
+def finished() -> tuple[Result, ...]:
+    """The systems assessed in this process so far."""
+    return tuple(_finished)
+
+
+def index_is_due() -> bool:
+    """Whether the page over all systems no longer shows what its systems' reports show."""
+    return bool(_changed) or any(not (a.workspace.reports / "index.html").is_file() for a in _known if _finished)
+
+
+def render(assessment: Assessment) -> Result:
+    """Build the case and write every format, unless what stands in reports/ already says the same."""
+    key = _key(assessment)
+    known = _read(assessment)
+    if known is not None and known["key"] == key and _is_intact(assessment, known["files"]):
+        result = _result(known)
+    else:
+        from avow.report import render_all
+
+        case = build(assessment)
+        rendered = render_all(case, assessment.workspace.report(assessment.system))
+        result = _summarise(assessment, case, rendered.left_out)
+        files = {assessment.workspace.relative(p): digest_file(p) for p in rendered.written}
+        write(assessment.stamp, json.dumps({"key": key, "files": files, **_result_json(result)}, indent=1))
+        _changed.append(assessment.system)
+    _finished.append(result)
+    return result
+
+
+def gate(assessment: Assessment) -> TaskFailed | TaskError | bool:
+    """Render, and fail where a gate of the policy does."""
+    try:
+        result = render(assessment)
+    except Rejected as rejected:
+        return checking.refuse(rejected)
+    except OSError as error:
+        return TaskError(f"the report cannot be written: {error}")
+    if result.exit_code:
+        return TaskFailed(f"{result.system}: a gate of the policy fails; see {result.report}")
+    return True
+
+
+def build(assessment: Assessment) -> Case:
+    """The case, from contract, plan and ledger. Raises Rejected for a policy that cannot be used."""
+    from avow.assurance.case import build_case
+    from avow.evidence.audit import audit
+    from avow.pipeline.derivations import derivation_views, graph_svg
+
+    system, workspace = assessment.surveyed.system, assessment.workspace
+    ledger = ledger_of(workspace.ledger(system.name))
+    plan = system.plan
+    texts = (plan.path, *plan.contract_files)
+    return build_case(
+        system,
+        assessment.surveyed.catalogue.obligations,
+        ledger.records(),
+        keys=assessment.surveyed.keys,
+        today=_today(),
+        run=RunInfo(
+            assessment.run.id,
+            datetime.now(UTC).isoformat(timespec="seconds"),
+            round(seconds_so_far(), 1),
+            __version__,
+            assessment.run.fresh,
+            f"doit verify:{system.name}",
+            _revision(workspace),
+            {"seconds for each tool": "60, unless the plan says otherwise", "seed": "0, unless the plan says otherwise"},
+        ),
+        derivations=derivation_views(system),
+        methods=_methods(assessment),
+        tools=_tools(assessment),
+        discrepancies=audit(ledger, workspace.root),
+        digests={workspace.relative(path): digest_file(path) for path in texts},
+        ledger_head=ledger.head,
+        graph_svg=graph_svg(system),
+    )
+
+
+def _methods(assessment: Assessment) -> tuple[MethodInfo, ...]:
+    plugins = assessment.surveyed.system.plan.plugins
+    found = []
+    for name in names():
+        tool = backend(name, plugins)
+        missing = [t for t in tool.tools() if not t.present and not t.optional]
+        install = missing[0].install if missing else ""
+        found.append(
+            MethodInfo(tool.name, tool.title, tool.strength, tool.link, tool.green_means, not missing, install)
+        )
+    return tuple(found)
+
+
+def _tools(assessment: Assessment) -> tuple[ToolInfo, ...]:
+    from avow.pipeline.doctor import findings
+
+    return tuple({f.tool.name: ToolInfo(f.tool.name, f.tool.version, f.tool.install) for f in findings()}.values())
+
+
+def _today() -> date:
+    return datetime.now().astimezone().date()
+
+
+def _revision(workspace: Workspace) -> str:
+    command = ["git", "-C", str(workspace.root), "rev-parse", "--short=12", "HEAD"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=5, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def _key(assessment: Assessment) -> str:
+    """The report depends on the texts, on what is planned, on all evidence, and on the day (reviews and risks expire)."""
+    surveyed, ledger = assessment.surveyed, ledger_of(assessment.workspace.ledger(assessment.system))
+    keys = sorted((*pair, key) for pair, key in surveyed.keys.items())
+    damage = [str(d) for d in ledger.damage]
+    explain = os.environ.get(EXPLAIN, "")
+    return digest(json.dumps([surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]))
+
+
+def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, str], ...]) -> Result:
+    explain = bool(os.environ.get(EXPLAIN))
+    gates = []
+    for g in case.gates:
+        closes = [s.text for s in g.suggestions[:3]] if explain or not g.passed else []
+        gates.append((g.title, g.passed, "; ".join([g.reason, *closes])))
+    index = assessment.workspace.relative(assessment.workspace.report(assessment.system) / "index.html")
+    counts = Counter(view.status.value for view in case.obligations)
+    return Result(case.system, case.exit_code, dict(counts), case.grade.value, index, tuple(gates), left_out)
+
+
+def _result_json(result: Result) -> dict[str, Any]:
+    return {
+        "system": result.system,
+        "exit_code": result.exit_code,
+        "counts": dict(result.counts),
+        "grade": result.grade,
+        "report": result.report,
+        "gates": [list(g) for g in result.gates],
+        "left_out": [list(pair) for pair in result.left_out],
+    }
+
+
+def _result(data: dict[str, Any]) -> Result:
+    return Result(
+        data["system"],
+        data["exit_code"],
+        data["counts"],
+        data["grade"],
+        data["report"],
+        tuple((title, passed, reason) for title, passed, reason in data["gates"]),
+        tuple((name, why) for name, why in data["left_out"]),
+    )
+
+
+def _read(assessment: Assessment) -> dict[str, Any] | None:
+    try:
+        data = json.loads(assessment.stamp.read_text())
+        _result(data)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return data if isinstance(data, dict) and isinstance(data.get("files"), dict) else None
+
+
+def _is_intact(assessment: Assessment, files: dict[str, str]) -> bool:
+    try:
+        return all(digest_file(assessment.workspace.root / name) == sha for name, sha in files.items())
+    except OSError:
+        return False

@@ -1,0 +1,94 @@
+"""The check stage: what is wrong with contract and plan, before any solver is asked."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from doit.exceptions import TaskError
+
+from avow.diagnostics import Diagnostic, Rejected
+from avow.files import write
+from avow.pipeline.survey import Survey
+from avow.pipeline.work import COMMON_OPTIONS, ENGINES, method_backend, method_job
+from avow.system.plan import Located, Method, System
+from avow.workspace import Workspace
+
+
+def is_current(workspace: Workspace, surveyed: Survey) -> bool:
+    try:
+        return bool(json.loads(_stamp(workspace, surveyed).read_text())["key"] == _key(surveyed))
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def check(workspace: Workspace, surveyed: Survey) -> None:
+    """Raises Rejected with all errors; warnings go to the terminal and into the report."""
+    found = diagnostics(surveyed.system)
+    errors = tuple(d for d in found if d.is_error)
+    if errors:
+        raise Rejected(*found)
+    show(found)
+    write(
+        _stamp(workspace, surveyed),
+        json.dumps({"key": _key(surveyed), "warnings": [f"{d.span}: {d.message} [{d.code}]" for d in found]}, indent=1),
+    )
+
+
+def diagnostics(system: System) -> tuple[Diagnostic, ...]:
+    """Lints of the contract, and what each backend says of its options."""
+    from avow.language.lints import lint_contract
+
+    found = [d for d in lint_contract(system.contract, system.plan.contract_files) if d.code not in system.plan.lints_off]
+    for plan in system.plan.nodes:
+        for method in plan.methods:
+            found += _method(system, plan.node, method)
+    return tuple(found)
+
+
+def _method(system: System, node: str, method: Method) -> Iterable[Diagnostic]:
+    if method.id in ENGINES:
+        yield Diagnostic("PLAN090", f"'{method.id}' is the name of an engine of Avow's own", method.options.span)
+        return
+    tool = method_backend(system, method)
+    wrong = tuple(_schema(tool.options_schema, method.options))
+    yield from wrong
+    if not any(d.is_error for d in wrong):
+        yield from tool.check(method_job(system, system.contract.node(node), method))
+
+
+def _schema(schema: Mapping[str, Any], options: Located) -> Iterable[Diagnostic]:
+    from avow.system.schema import violations
+
+    data = options.data
+    if isinstance(data, Mapping):
+        own = {k: v for k, v in data.items() if k not in COMMON_OPTIONS}
+        options = Located(own, options.span, options.spans)
+    yield from violations(options, schema)
+
+
+def show(found: Iterable[Diagnostic]) -> None:
+    from avow.rendering import render
+
+    text = render(tuple(found))
+    if text:
+        print(text, file=sys.stderr)
+
+
+def refuse(rejected: Rejected) -> TaskError:
+    show(rejected.diagnostics)
+    return TaskError(f"{len(rejected.diagnostics)} error(s) in the input")
+
+
+def refuse_quietly(name: str) -> TaskError:
+    return TaskError(f"{name} cannot be read; see check:{name}")
+
+
+def _stamp(workspace: Workspace, surveyed: Survey) -> Any:
+    return workspace.artifacts / surveyed.system.name / "check.json"
+
+
+def _key(surveyed: Survey) -> str:
+    return json.dumps([surveyed.digest, sorted(key for work in surveyed.catalogue.works for key in work.keys.values())])

@@ -1,0 +1,138 @@
+"""The discharge stage: run what is not settled yet, and record every answer. The only stage that runs a tool."""
+
+from __future__ import annotations
+
+import functools
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+
+from avow import __version__
+from avow.backend import Report
+from avow.evidence.ledger import Ledger
+from avow.evidence.obligation import Obligation
+from avow.evidence.record import Evidence
+from avow.files import digest, digest_file, write
+from avow.pipeline import worker
+from avow.pipeline.export import folder
+from avow.pipeline.run_info import Run
+from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job
+from avow.verdict import Link, Outcome, Verdict
+from avow.workspace import Workspace
+
+
+RETRY = "retry"
+"""Set in the details of a record that a later run must not be content with: the engine itself broke."""
+
+
+@functools.cache
+def ledger_of(path: Path) -> Ledger:
+    """One reader for each file and process: it reads what was added since, not all again."""
+    return Ledger(path)
+
+
+def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obligation, ...]:
+    """Those without a current record that still can be believed; in a fresh run, those without one of this run."""
+    ledger = ledger_of(workspace.ledger(work.system.name))
+    return tuple(o for o in work.obligations if not _is_settled(workspace, ledger, work, o, run))
+
+
+def _is_settled(workspace: Workspace, ledger: Ledger, work: Work, obligation: Obligation, run: Run) -> bool:
+    records = [e.evidence for e in ledger.current(obligation.id, work.keys[obligation.id])]
+    if not records or (run.fresh and records[-1].run != run.id):
+        return False
+    last = records[-1]
+    if last.details.get(RETRY) and last.run != run.id:
+        return False
+    return all(_is_intact(workspace.root / path, sha) for path, sha in last.outputs.items())
+
+
+def _is_intact(path: Path, sha: str) -> bool:
+    try:
+        return digest_file(path) == sha
+    except OSError:
+        return False
+
+
+def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]:
+    """Settle what is open, append the evidence, and say what was found."""
+    todo = open_obligations(workspace, work, run)
+    if not todo:
+        return ()
+    place = folder(workspace, work)
+    place.mkdir(parents=True, exist_ok=True)
+    started = datetime.now(UTC).isoformat(timespec="milliseconds")
+    clock = time.monotonic()
+    report = _language(todo) if work.engine == LANGUAGE else worker.run(workspace, work, todo, place)
+    seconds = time.monotonic() - clock
+    outputs = _keep_logs(workspace, work, todo, report)
+    strength, link = _promise(work)
+    inputs = _inputs(workspace, work)
+    by_id = {o.id: o for o in todo}
+    records = []
+    for outcome in report.outcomes:
+        obligation = by_id[outcome.obligation]
+        records.append(
+            Evidence(
+                obligation=obligation.id,
+                obligation_digest=obligation.digest,
+                key=work.keys[obligation.id],
+                method=work.method,
+                backend=work.engine,
+                tool=report.tool,
+                tool_version=report.tool_version,
+                command=report.command,
+                verdict=outcome.verdict,
+                strength=strength,
+                link=outcome.link or link,
+                summary=outcome.summary,
+                started=started,
+                seconds=round(seconds, 3),
+                inputs=inputs,
+                outputs=outputs,
+                counterexample=outcome.counterexample,
+                hypotheses=outcome.hypotheses,
+                bound=outcome.bound,
+                details=outcome.details,
+                vacuous=outcome.vacuous,
+                run=run.id,
+            )
+        )
+    ledger_of(workspace.ledger(work.system.name)).append_all(records)
+    return report.outcomes
+
+
+def _language(obligations: tuple[Obligation, ...]) -> Report:
+    outcomes = tuple(Outcome(o.id, Verdict.PROVED, "parsed and type-checked") for o in obligations)
+    return Report(outcomes, "avow", __version__)
+
+
+def _promise(work: Work) -> tuple[Verdict, Link]:
+    if work.is_engine:
+        return Verdict.PROVED, Link.GENERATED
+    method = next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
+    tool = method_backend(work.system, method)
+    return tool.strength, tool.link
+
+
+def _inputs(workspace: Workspace, work: Work) -> dict[str, str]:
+    """The files that a person wrote and the answer rests on. The contract itself enters by the obligation's digest."""
+    if work.is_engine:
+        return {}
+    system = work.system
+    method = next(m for m in system.plan.node(work.node).methods if m.id == work.method)
+    files = method_backend(system, method).files(method_job(system, system.contract.node(work.node), method))
+    return {workspace.relative(path): digest_file(path) for path in files if path.is_file()}
+
+
+def _keep_logs(workspace: Workspace, work: Work, todo: tuple[Obligation, ...], report: Report) -> dict[str, str]:
+    """Logs stand under a name of their own for every attempt, so that later attempts leave older evidence intact."""
+    if not report.logs:
+        return {}
+    stamp = digest("".join(sorted(work.keys[o.id] for o in todo)) + "".join(report.logs.values()))[:12]
+    kept = {}
+    for name, text in report.logs.items():
+        path = folder(workspace, work) / "logs" / stamp / name.replace("/", "_")
+        write(path, text)
+        kept[workspace.relative(path)] = digest(text)
+    return kept

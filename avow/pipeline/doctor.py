@@ -1,0 +1,56 @@
+"""What is installed on this machine that Avow can use."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from dataclasses import dataclass
+from importlib import metadata
+from typing import Any
+
+from avow.backend import Tool
+from avow.registry import backend, names
+
+_PACKAGES = (
+    ("logic", "z3-solver", "pip install z3-solver", False),
+    ("second opinion", "cvc5", "pip install 'avow[cvc5]'", True),
+    ("PDF report", "typst", "pip install 'avow[pdf]'", True),
+    ("bag files", "rosbags", "pip install 'avow[bags]'", True),
+    ("live monitoring", "websockets", "pip install 'avow[monitor]'", True),
+    ("language server", "pygls", "pip install 'avow[lsp]'", True),
+    ("signatures", "cryptography", "pip install 'avow[signing]'", True),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    used_by: str
+    tool: Tool
+
+    def json(self) -> dict[str, Any]:
+        tool = self.tool
+        return {
+            "used_by": self.used_by,
+            "tool": tool.name,
+            "version": tool.version,
+            "path": tool.path,
+            "install": tool.install,
+            "optional": tool.optional,
+        }
+
+
+def findings() -> tuple[Finding, ...]:
+    python = Tool("python", sys.version.split()[0], sys.executable, "", optional=False)
+    found = [Finding("everything", python)]
+    found += [Finding(use, _package(name, install, optional)) for use, name, install, optional in _PACKAGES]
+    for name in names():
+        found += [Finding(name, tool) for tool in backend(name).tools()]
+    return tuple(found)
+
+
+def _package(name: str, install: str, optional: bool) -> Tool:
+    try:
+        version = metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return Tool(name, None, None, install, optional)
+    return Tool(name, version, shutil.which(name), install, optional)

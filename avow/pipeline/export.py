@@ -1,0 +1,68 @@
+"""The export stage: what each method generates, written so that it can be told whether it is still what was generated."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path, PurePosixPath
+
+from avow.diagnostics import Diagnostic, Rejected
+from avow.files import digest, digest_file, write
+from avow.pipeline.work import Work, method_backend, method_job
+from avow.workspace import Workspace
+
+STAMP = ".export.json"
+
+
+def folder(workspace: Workspace, work: Work) -> Path:
+    return workspace.node(work.system.name, work.node, work.method)
+
+
+def is_current(workspace: Workspace, work: Work, key: str) -> bool:
+    """Whether the files on disk are what this key generated: an edited or missing artifact is not."""
+    place = folder(workspace, work)
+    stamp = read_stamp(place)
+    if stamp is None or stamp.get("key") != key:
+        return False
+    try:
+        return all(digest_file(place / name) == sha for name, sha in stamp["files"].items())
+    except OSError:
+        return False
+
+
+def key(work: Work, contract: str) -> str:
+    """An artifact may show more than its obligations' meaning (names, sentences): it depends on contract and plan whole."""
+    return digest(json.dumps([contract, sorted(work.keys.items())]))
+
+
+def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:
+    """Write what the backend generates and remove what it generated before and no more; the files' names."""
+    method = next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
+    files = method_backend(work.system, method).export(
+        method_job(work.system, work.system.contract.node(work.node), method)
+    )
+    place = folder(workspace, work)
+    for name in files:
+        _inside(name, work)
+    old = read_stamp(place)
+    for name in (old or {}).get("files", {}):
+        if name not in files:
+            (place / name).unlink(missing_ok=True)
+    for name, text in files.items():
+        write(place / name, text)
+    digests = {name: digest(text) for name, text in sorted(files.items())}
+    write(place / STAMP, json.dumps({"key": key, "files": digests}, indent=1))
+    return tuple(sorted(files))
+
+
+def read_stamp(place: Path) -> dict[str, dict[str, str]] | None:
+    try:
+        stamp = json.loads((place / STAMP).read_text())
+    except (OSError, ValueError):
+        return None
+    return stamp if isinstance(stamp, dict) and isinstance(stamp.get("files"), dict) else None
+
+
+def _inside(name: str, work: Work) -> None:
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts:
+        raise Rejected(Diagnostic("BACKEND004", f"the backend '{work.engine}' wants to write outside its folder: {name}"))

@@ -1,0 +1,131 @@
+"""What a run prints: each stage as it ends, then one short table over all systems."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import IO, Any
+
+from doit.reporter import ConsoleReporter
+
+from avow import process
+
+_SILENT = ("verify",)
+"""Stages whose result is the final table, not a line of its own."""
+
+
+class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
+    """doit's reporter interface; `-r avow` is not needed, DOIT_CONFIG names it."""
+
+    desc = "progress, then what was proved, checked, tested, refuted and not run"
+
+    def __init__(self, outstream: IO[str], options: dict[str, Any]) -> None:
+        super().__init__(outstream, options)
+        self._running: dict[str, float] = {}
+        self._lock = threading.Lock()
+        self._live = outstream.isatty()
+        self._start = time.monotonic()
+        self._done = 0
+        self._selected: list[str] = []
+        self._run_lock: IO[str] | None = None
+
+    def initialize(self, tasks: dict[str, Any], selected_tasks: list[str]) -> None:
+        self._selected = list(selected_tasks)
+        self._run_lock = _lock_run(self.outstream)
+
+    def execute_task(self, task: Any) -> None:
+        with self._lock:
+            if task.actions:
+                self._running[task.name] = time.monotonic()
+            self._status()
+
+    def add_success(self, task: Any) -> None:
+        with self._lock:
+            start = self._running.pop(task.name, None)
+            if start is None:
+                return
+            stage, _, subject = task.name.partition(":")
+            if stage not in _SILENT:
+                self._done += 1
+                seconds = time.monotonic() - start
+                took = f"{seconds:6.1f} s" if seconds >= 0.05 else " " * 8
+                self._line(f"  {stage:<11} {subject:<56} {took}")
+            self._status()
+
+    def add_failure(self, task: Any, fail: Any) -> None:
+        with self._lock:
+            self._running.pop(task.name, None)
+            if not getattr(fail, "report", True):
+                return
+            stage, _, subject = task.name.partition(":")
+            message = fail.get_msg().strip().splitlines()
+            if type(fail).__name__ != "UnmetDependency" and message and stage not in _SILENT:
+                self._line(f"  {stage:<11} {subject:<40} {message[-1]}")
+            self.failures.append({"task": task, "exception": fail})
+            self._status()
+
+    def skip_uptodate(self, task: Any) -> None:
+        pass
+
+    def runtime_error(self, msg: str) -> None:
+        self.runtime_errors.append(msg)
+
+    def complete_run(self) -> None:
+        from avow.pipeline.assess import finished, index_is_due, known
+        from avow.pipeline.overview import write_overview
+        from avow.pipeline.summary import print_obligations, print_summary
+
+        process.kill_all()  # nothing of ours may outlive the run, also when it was interrupted
+        with self._lock:
+            self._clear()
+        if index_is_due():
+            write_overview(known())
+        if any(name.split(":")[0] == "obligations" for name in self._selected):
+            print_obligations(self._selected, self.outstream)
+        broken = sorted({f["task"].name.partition(":")[2] for f in self.failures} - {g.system for g in finished()})
+        print_summary(finished(), broken, self._done, time.monotonic() - self._start, self.outstream)
+        for message in self.runtime_errors:
+            self.outstream.write(message + "\n")
+        if self._run_lock is not None:
+            self._run_lock.close()
+
+    def _line(self, text: str) -> None:
+        self._clear()
+        self.outstream.write(text.rstrip() + "\n")
+        self.outstream.flush()
+
+    def _status(self) -> None:
+        if self._live and self._running:
+            width = shutil.get_terminal_size().columns - 1
+            text = "… " + ", ".join(self._running)
+            self.outstream.write("\r" + text[:width].ljust(width))
+            self.outstream.flush()
+
+    def _clear(self) -> None:
+        if self._live:
+            self.outstream.write("\r" + " " * (shutil.get_terminal_size().columns - 1) + "\r")
+
+
+def _lock_run(out: IO[str]) -> IO[str]:
+    """One run at a time in a workspace: a second waits for the first and then finds its work done."""
+    path = Path("artifacts") / ".lock"
+    path.parent.mkdir(exist_ok=True)
+    file = path.open("w")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        out.write("another run is under way here; waiting for it\n")
+        out.flush()
+        fcntl.flock(file, fcntl.LOCK_EX)
+    file.write(str(os.getpid()))
+    file.flush()
+    return file
+
+
+if sys.platform == "win32":  # pragma: no cover - flock and process groups are POSIX
+    raise ImportError("Avow's pipeline needs a POSIX system")

@@ -1,0 +1,69 @@
+"""What a run says on the terminal when it is over."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import IO
+
+from avow.pipeline.assess import Result
+
+GOOD = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
+BAD = ("refuted", "contradictory", "error", "missing", "stale", "vacuous", "unknown", "not-run", "unsupported")
+
+
+def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, seconds: float, out: IO[str]) -> None:
+    """A row a system: what was proved, checked, tested, reviewed, refuted, not run; then failing gates and the reports."""
+    if not results and not broken:
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(file=out, highlight=False, soft_wrap=True)
+    shown = [word for word in (*GOOD, *BAD) if any(r.counts.get(word) for r in results)]
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    table.add_column("system")
+    for word in shown:
+        table.add_column(word, justify="right", style="red" if word in ("refuted", "contradictory", "error") else None)
+    table.add_column("verdict")
+    for r in sorted(results, key=lambda r: r.system):
+        verdict = "[green]every gate passes[/]" if r.exit_code == 0 else "[red]a gate fails[/]"
+        table.add_row(r.system, *(str(r.counts.get(word, "")) or "" for word in shown), verdict)
+    for name in broken:
+        table.add_row(name, *("" for _ in shown), "[red]not read: see above[/]")
+    console.print()
+    console.print(table)
+    for r in results:
+        for title, passed, reason in r.gates:
+            if not passed:
+                console.print(f"[red]✗[/] {r.system}: ", end="")
+                console.print(f"{title}: {reason}", markup=False)
+    console.print()
+    if results:
+        index = str(Path(results[0].report).parent.parent / "index.html")
+        console.print(f"{index if len(results) > 1 else results[0].report}   ", markup=False, end="")
+    console.print(f"({done} stages run, {seconds:.1f} s)" if done else f"(nothing to do, {seconds:.1f} s)")
+
+
+def print_obligations(selected: Sequence[str], out: IO[str]) -> None:
+    """The proof obligations of the selected systems, as a table (`doit obligations`)."""
+    from rich.console import Console
+    from rich.table import Table
+
+    wanted = {name.partition(":")[2] for name in selected if name.startswith("obligations")} - {""}
+    console = Console(file=out, highlight=False)
+    for path in sorted(Path("artifacts").glob("*/obligations.json")):
+        if wanted and path.parent.name not in wanted:
+            continue
+        table = Table("obligation", "claim", "settled by", box=None, header_style="bold", title=path.parent.name)
+        for o in json.loads(path.read_text())["obligations"]:
+            name = o["id"].partition("/")[2]
+            table.add_row(_plain(name), _plain(o["claim"]), _plain(", ".join(o["methods"]) or "no method"))
+        console.print(table)
+
+
+def _plain(text: str) -> str:
+    from rich.markup import escape
+
+    return escape(text)

@@ -1,0 +1,209 @@
+"""What there is to do for a system: every obligation, who settles it, and on what the answer depends.
+
+The core's own engines (language, sanity, calculus) and the backends look alike from here: a `Work` is one method applied
+to the obligations that it takes on, with a key for each. A record of the ledger is current while its key is unchanged.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+
+from avow import __version__
+from avow.backend import Backend, Job, Limits
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
+from avow.files import digest, digest_file
+from avow.language.contract import Node
+from avow.language.printer import show_term
+from avow.logic.formula import clause_digest, contract_digest
+from avow.registry import backend
+from avow.system.plan import Method, System
+
+LANGUAGE = "language"
+SANITY = "sanity"
+COMPOSE = "compose"
+ENGINES = (LANGUAGE, SANITY, COMPOSE)
+"""The core's own engines; the plan cannot name a method so."""
+
+COMMON_OPTIONS = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
+"""Options of every method, whatever its backend: they are the pipeline's, not the backend's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """One method and the obligations that it takes on; `keys` maps an obligation's id to what its answer depends on."""
+
+    system: System
+    node: str
+    method: str
+    engine: str
+    """A backend's name, or one of `ENGINES`."""
+    obligations: tuple[Obligation, ...]
+    keys: Mapping[str, str]
+    limits: Limits = field(default_factory=Limits)
+
+    @property
+    def name(self) -> str:
+        return f"{self.system.name}:{self.node}:{self.method}"
+
+    @property
+    def is_engine(self) -> bool:
+        return self.engine in ENGINES
+
+
+def language_work(system: System) -> Work:
+    """The contract parses and types: settled by having been loaded."""
+    contract = system.contract
+    files = ", ".join(path.name for path in system.plan.contract_files)
+    obligation = Obligation(
+        system.name,
+        SYSTEM_LEVEL,
+        Kind.WELL_FORMED,
+        "contract",
+        f"{files} parses, and every formula in it is well-typed",
+        "",
+        contract_digest(contract),
+    )
+    return _work(system, SYSTEM_LEVEL, LANGUAGE, (obligation,), __version__)
+
+
+def sanity_work(system: System, node: Node) -> Work:
+    """Is this node's contract worth verifying? (design: page "Obligations…", kind sanity)"""
+    from avow.logic.sanity import claims, node_key
+
+    meaning = node_key(node)
+    obligations = tuple(
+        Obligation(
+            system.name, node.name, Kind.SANITY, claim.name, claim.sentence, claim.formula, meaning, claim.clauses, node.span
+        )
+        for claim in claims(node)
+    )
+    return _work(system, node.name, SANITY, obligations, _z3_version(), _scenario(system))
+
+
+def compose_work(system: System) -> Work:
+    """The calculus' side conditions, start-up and persistence, and the requirements that have a formula."""
+    from avow.calculus.obligations import composition_obligations, requirement_obligations
+
+    obligations = (*composition_obligations(system), *requirement_obligations(system))
+    return _work(system, SYSTEM_LEVEL, COMPOSE, obligations, _z3_version(), _scenario(system))
+
+
+def method_works(system: System) -> tuple[Work, ...]:
+    """One for each method of each node of the plan. Raises Rejected for an unknown backend."""
+    return tuple(
+        method_work(system, system.contract.node(plan.node), method) for plan in system.plan.nodes for method in plan.methods
+    )
+
+
+def method_work(system: System, node: Node, method: Method) -> Work:
+    tool = method_backend(system, method)
+    job = method_job(system, node, method)
+    options = method.options.data if isinstance(method.options.data, Mapping) else {}
+    parts = (
+        tool.name,
+        tool.version,
+        json.dumps([(t.name, t.version) for t in tool.tools()]),
+        json.dumps({k: v for k, v in options.items() if k not in {"id", "guarantees"}}, sort_keys=True, default=str),
+        _files(tool, job),
+        _scenario(system),
+    )
+    limits = Limits(
+        seconds=float(options.get("seconds", Limits().seconds)),
+        megabytes=int(options.get("megabytes", Limits().megabytes)),
+        seed=int(options.get("seed", Limits().seed)),
+    )
+    return _work(system, node.name, method.id, job.obligations, *parts, engine=tool.name, limits=limits)
+
+
+def method_backend(system: System, method: Method) -> Backend:
+    return backend(method.backend, system.plan.plugins)
+
+
+def method_job(system: System, node: Node, method: Method) -> Job:
+    return Job(system, node, method, tuple(guarantee(system, node, name) for name in method.guarantees))
+
+
+def guarantee(system: System, node: Node, name: str) -> Obligation:
+    """This node's implementation or model meets this guarantee, whenever its assumptions hold."""
+    clause = node.clause(name)
+    sentence = clause.sentence or f"{node.name} meets guarantee {name}"
+    return Obligation(
+        system.name,
+        node.name,
+        Kind.GUARANTEE,
+        name,
+        sentence,
+        show_term(clause.formula, "unicode"),
+        clause_digest(node, clause),
+        (f"{node.name}.{name}",),
+        clause.span,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Catalogue:
+    """All obligations of a system, each once, and all works."""
+
+    system: System
+    obligations: tuple[Obligation, ...]
+    works: tuple[Work, ...]
+
+    def work(self, node: str, method: str) -> Work:
+        """Raises KeyError."""
+        for work in self.works:
+            if (work.node, work.method) == (node, method):
+                return work
+        raise KeyError((node, method))
+
+
+def catalogue(system: System) -> Catalogue:
+    """Raises Rejected for an unknown backend."""
+    works = (
+        language_work(system),
+        *(sanity_work(system, node) for node in system.contract.nodes),
+        compose_work(system),
+        *method_works(system),
+    )
+    guarantees = (guarantee(system, node, c.name) for node in system.contract.nodes for c in node.guarantees)
+    every = {o.id: o for work in works if work.is_engine for o in work.obligations}
+    every |= {o.id: o for o in guarantees}
+    return Catalogue(system, tuple(every.values()), works)
+
+
+def _work(
+    system: System,
+    node: str,
+    method: str,
+    obligations: tuple[Obligation, ...],
+    *parts: str,
+    engine: str | None = None,
+    limits: Limits | None = None,
+) -> Work:
+    keys = {o.id: digest(json.dumps([o.id, o.digest, method, *parts])) for o in obligations}
+    return Work(system, node, method, engine or method, obligations, keys, limits or Limits())
+
+
+def _files(tool: Backend, job: Job) -> str:
+    return json.dumps([[path.name, _digest(path)] for path in tool.files(job)])
+
+
+def _digest(path: Path) -> str:
+    try:
+        return digest_file(path)
+    except OSError:
+        return "missing"
+
+
+def _scenario(system: System) -> str:
+    return system.plan.scenario.digest if system.plan.scenario else ""
+
+
+@functools.cache
+def _z3_version() -> str:
+    # importing z3 to ask it would cost more than all the rest of a run with nothing to do
+    return f"z3 {metadata.version('z3-solver')}"

@@ -1,0 +1,142 @@
+"""One unit of work in a process of its own: ``python -m avow.pipeline.worker REQUEST RESPONSE``.
+
+A solver that crashes, eats the memory or never returns takes this process with it and nothing else: the pipeline turns
+that into a verdict. Two workers use two cores, whatever Python's lock says.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import traceback
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from avow import __version__, process
+from avow.backend import Limits, Report
+from avow.diagnostics import Rejected
+from avow.evidence.obligation import Obligation
+from avow.files import write
+from avow.pipeline.wire import report_from_json, report_to_json
+from avow.pipeline.work import COMPOSE, SANITY, Work
+from avow.verdict import Outcome, Verdict
+from avow.workspace import Workspace
+
+GRACE = 90.0
+"""Seconds above the tool's own limits that a worker gets to load, translate and write."""
+
+
+def run(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...], folder: Path) -> Report:
+    """Settle the obligations in a process of their own. Never raises for what that process does."""
+    request, response = folder / ".request.json", folder / ".response.json"
+    response.unlink(missing_ok=True)
+    write(
+        request,
+        json.dumps(
+            {
+                "system": str(work.system.plan.root),
+                "node": work.node,
+                "method": work.method,
+                "engine": work.engine,
+                "obligations": [o.id for o in obligations],
+                "folder": str(folder),
+                "limits": asdict(work.limits),
+            }
+        ),
+    )
+    limit = work.limits.seconds * max(2, len(obligations)) + GRACE
+    done = process.run(
+        [sys.executable, "-m", "avow.pipeline.worker", str(request), str(response)], cwd=workspace.root, seconds=limit
+    )
+    log = {"worker.log": done.stderr} if done.stderr.strip() else {}
+    try:
+        if done.timed_out:
+            return _failed(obligations, work, Verdict.UNKNOWN, f"no answer within {limit:.0f} s", log)
+        if done.code != 0 or not response.is_file():
+            last = done.stderr.strip().splitlines()[-1:] or [f"the worker ended with code {done.code}"]
+            return _failed(obligations, work, Verdict.ERROR, f"the engine crashed: {last[0][:300]}", log)
+        report = report_from_json(json.loads(response.read_text()))
+    finally:
+        request.unlink(missing_ok=True)
+        response.unlink(missing_ok=True)
+    return _complete(report, obligations)
+
+
+def _complete(report: Report, obligations: tuple[Obligation, ...]) -> Report:
+    """An obligation without an outcome, or with two, must not pass for settled."""
+    answers: dict[str, list[Outcome]] = {}
+    for outcome in report.outcomes:
+        answers.setdefault(outcome.obligation, []).append(outcome)
+    outcomes = []
+    for obligation in obligations:
+        match answers.get(obligation.id, []):
+            case [outcome]:
+                outcomes.append(outcome)
+            case []:
+                outcomes.append(Outcome(obligation.id, Verdict.ERROR, "the engine gave no answer for this obligation"))
+            case _:
+                outcomes.append(Outcome(obligation.id, Verdict.ERROR, "the engine gave several answers for this obligation"))
+    return Report(tuple(outcomes), report.tool, report.tool_version, report.command, report.logs)
+
+
+def _failed(
+    obligations: tuple[Obligation, ...], work: Work, verdict: Verdict, why: str, logs: dict[str, str]
+) -> Report:
+    outcomes = tuple(Outcome(o.id, verdict, why, details={"retry": True}) for o in obligations)
+    return Report(outcomes, work.engine, __version__, logs=logs)
+
+
+def main(arguments: list[str]) -> int:
+    request = json.loads(Path(arguments[0]).read_text())
+    report = _execute(request)
+    write(Path(arguments[1]), json.dumps(report_to_json(report), default=str))
+    return 0
+
+
+def _execute(request: dict[str, Any]) -> Report:
+    from avow.system.load import load_system
+
+    system = load_system(Path(request["system"]))
+    limits = Limits(**request["limits"])
+    folder = Path(request["folder"])
+    wanted = set(request["obligations"])
+    match request["engine"]:
+        case "sanity":
+            from avow.logic.sanity import discharge as discharge_sanity
+            from avow.pipeline.work import sanity_work
+
+            node = system.contract.node(request["node"])
+            work = sanity_work(system, node)
+            claims = tuple(o for o in work.obligations if o.id in wanted)
+            return discharge_sanity(system, node, claims, limits)
+        case "compose":
+            from avow.calculus.obligations import discharge as discharge_composition
+            from avow.pipeline.work import compose_work
+
+            claims = tuple(o for o in compose_work(system).obligations if o.id in wanted)
+            return discharge_composition(system, claims, limits)
+        case _:
+            from dataclasses import replace
+
+            from avow.pipeline.work import method_backend, method_job
+
+            node = system.contract.node(request["node"])
+            method = next(m for m in system.plan.node(node.name).methods if m.id == request["method"])
+            job = method_job(system, node, method)
+            job = replace(job, obligations=tuple(o for o in job.obligations if o.id in wanted))
+            return method_backend(system, method).discharge(job, folder, limits)
+
+
+if __name__ == "__main__":
+    try:
+        code = main(sys.argv[1:])
+    except Rejected as rejected:  # the input changed under us since the pipeline read it
+        print(rejected, file=sys.stderr)
+        code = 2
+    except Exception:
+        traceback.print_exc()
+        code = 1
+    sys.exit(code)
+
+__all__ = ["COMPOSE", "SANITY", "run"]

@@ -1,0 +1,43 @@
+"""Fixtures and the rule for tests that need an outside tool."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+_NEEDS = {
+    "needs_ajpf": lambda: "AJPF_HOME" in os.environ,
+    "needs_cvc5": lambda: importlib.util.find_spec("cvc5") is not None,
+    "needs_dafny": lambda: shutil.which("dafny") is not None,
+    "needs_dot": lambda: shutil.which("dot") is not None,
+    "needs_latex": lambda: shutil.which("pdflatex") is not None,
+    "needs_spin": lambda: shutil.which("spin") is not None and shutil.which("gcc") is not None,
+}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A test whose tool is missing is skipped, visibly."""
+    for item in items:
+        for name, present in _NEEDS.items():
+            if item.get_closest_marker(name) and not present():
+                item.add_marker(pytest.mark.skip(reason=f"{name}: not on this machine"))
+
+
+@pytest.fixture
+def root() -> Path:
+    """The repository."""
+    return ROOT
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    """An empty workspace with the repository's dodo.py."""
+    (tmp_path / "contracts").mkdir()
+    shutil.copy(ROOT / "dodo.py", tmp_path)
+    return tmp_path

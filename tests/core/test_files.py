@@ -1,0 +1,45 @@
+"""Files are written whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow import files
+
+
+def test_write_says_whether_it_changed_anything(tmp_path: Path) -> None:
+    path = tmp_path / "a" / "b.txt"
+    assert files.write(path, "one")
+    assert not files.write(path, "one")
+    assert files.write(path, b"two")
+    assert path.read_text() == "two"
+    assert [p.name for p in path.parent.iterdir()] == ["b.txt"]
+
+
+def test_an_unchanged_file_keeps_its_time(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    files.write(path, "x")
+    before = path.stat().st_mtime_ns
+    files.write(path, "x")
+    assert path.stat().st_mtime_ns == before
+
+
+def test_a_failed_write_leaves_the_old_content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a"
+    files.write(path, "old")
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(files.os, "replace", full)
+    with pytest.raises(OSError, match="No space"):
+        files.write(path, "new")
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a"]
+
+
+def test_digest_of_text_and_file_agree(tmp_path: Path) -> None:
+    (tmp_path / "a").write_text("grün", encoding="utf-8")
+    assert files.digest("grün") == files.digest_file(tmp_path / "a") == files.digest("grün".encode())

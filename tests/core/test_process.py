@@ -1,0 +1,81 @@
+"""Outside tools are bounded, and nothing that they start outlives them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from avow import process
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_output_and_code_are_the_tools() -> None:
+    done = process.run([sys.executable, "-c", "import sys; print('out'); print('err', file=sys.stderr); sys.exit(7)"])
+    assert (done.code, done.stdout, done.stderr) == (7, "out\n", "err\n")
+
+
+def test_a_missing_tool_is_named() -> None:
+    with pytest.raises(process.ToolMissing, match="no-such-tool"):
+        process.run(["no-such-tool"])
+
+
+def test_no_shell_sees_the_arguments() -> None:
+    assert process.run(["echo", "$(id); `id` && x"]).stdout == "$(id); `id` && x\n"
+
+
+def test_a_hanging_tool_is_killed_with_all_that_it_started(tmp_path: Path) -> None:
+    pids = tmp_path / "pids"
+    script = f"sleep 60 & echo $! > {pids}; setsid sleep 60 & echo $! >> {pids}; sleep 60"
+    start = time.monotonic()
+    done = process.run(["bash", "-c", script], seconds=0.5)
+    assert done.timed_out
+    assert time.monotonic() - start < 5
+    time.sleep(0.1)
+    assert [pid for pid in map(int, pids.read_text().split()) if _alive(pid)] == []
+
+
+def test_a_tool_does_not_outlive_a_killed_avow(tmp_path: Path) -> None:
+    pid_file = tmp_path / "pid"
+    code = f"from avow import process; process.run(['bash', '-c', 'echo $$ > {pid_file}; exec sleep 60'])"
+    avow = subprocess.Popen([sys.executable, "-c", code])
+    deadline = time.monotonic() + 20
+    while not (pid_file.is_file() and pid_file.read_text().strip()) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    pid = int(pid_file.read_text())
+    avow.kill()
+    avow.wait()
+    while _alive(pid) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not _alive(pid)
+
+
+def test_memory_is_bounded() -> None:
+    done = process.run([sys.executable, "-c", "x = bytearray(2_000_000_000)"], megabytes=500, seconds=20)
+    assert done.code not in (0, None)
+    assert "MemoryError" in done.stderr
+
+
+def test_endless_output_is_cut() -> None:
+    done = process.run(["bash", "-c", "yes | head -c 9000000"], seconds=20)
+    assert len(done.stdout) == process._KEEP
+
+
+def test_standard_input_is_closed_unless_given() -> None:
+    assert process.run(["cat"], seconds=5).stdout == ""
+    assert process.run(["cat"], seconds=5, stdin="héllo").stdout == "héllo"
+
+
+def test_environment_is_added_to() -> None:
+    done = process.run(["bash", "-c", "echo $AVOW_X$HOME"], env={"AVOW_X": "1"})
+    assert done.stdout.strip() == "1" + os.environ.get("HOME", "")
