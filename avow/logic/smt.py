@@ -11,7 +11,7 @@ functions with finitely many exceptions (a table and a default) are tried: what 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Literal as OneOf
@@ -37,6 +37,7 @@ __all__ = [
     "check",
     "entails",
     "replay",
+    "search_tables",
     "solve",
     "z3_version",
 ]
@@ -240,42 +241,77 @@ def replay(formulas: Iterable[Term], values: Mapping[Variable, Value], *, timeou
     return None
 
 
+_STAGES = (0.05, 0.25, 1.0)
+"""Parts of the time allowed: a question is asked in short rounds of different methods before any gets long."""
+
+
 def _solve(
     translator: Translator, labelled: Mapping[str, Term], free: frozenset[Variable], timeout_ms: int, seed: int
 ) -> Solution:
-    deadline = time.monotonic() + timeout_ms / 1000
     tracked = [(label, translator.term(formula)) for label, formula in labelled.items()]
     background = translator.background(free)
-    answer = check(translator, background, timeout_ms=_share(deadline, 0.5), seed=seed, tracked=tracked)
-    if answer.status == "unsat":
-        return Solution("unsat", core=answer.core)
-    reason = answer.reason
     ordinary = [v for v in free if not isinstance(v.sort, FunctionSort)]
-    functions = sorted((v for v in free if isinstance(v.sort, FunctionSort)), key=lambda v: v.qualified)
-    if answer.model is not None:
-        values = _read(answer.model, free)
-        simple = not functions or all(
-            len(v.table) <= 1 for v in (values or {}).values() if isinstance(v, FunctionValue)
-        )
-        if values is not None and simple and replay(labelled.values(), values):
-            return Solution("sat", values)
-    for size, sparse in ((0, True), (1, True), (2, True), (3, True), (1, False), (2, False)) if functions else ():
-        if time.monotonic() > deadline:
-            break
-        values = _with_tables(translator, labelled, ordinary, functions, size, sparse, _share(deadline, 0.25), seed)
-        if values is not None and replay(labelled.values(), values):
-            return Solution("sat", values, engine="z3, functions as tables")
-    if answer.model is not None:
-        values = _read(answer.model, free)
-        if values is not None and replay(labelled.values(), values):
-            return Solution("sat", values)
-        reason = "the solver's model could not be replayed"
+    functions = [v for v in free if isinstance(v.sort, FunctionSort)]
+
+    def build(meanings: Mapping[Variable, Meaning]) -> list[Expr]:
+        return [translator.term(formula, meanings) for formula in labelled.values()]
+
+    reason = ""
+    spent = 0.0
+    for stage in _STAGES:
+        limit = int(timeout_ms * (stage - spent) / (2 if functions else 1))
+        spent = stage
+        answer = check(translator, background, timeout_ms=limit, seed=seed, tracked=tracked)
+        if answer.status == "unsat":
+            return Solution("unsat", core=answer.core)
+        if answer.model is not None:
+            values = _read(answer.model, free)
+            simple = values is not None and all(_is_simple(value) for value in values.values())
+            if values is not None and simple and replay(labelled.values(), values):
+                return Solution("sat", values)
+        reason = answer.reason
+        if functions:
+            found = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=seed)
+            if found is not None and replay(labelled.values(), found):
+                return Solution("sat", found, engine="z3, functions as tables")
+        if answer.model is not None:
+            values = _read(answer.model, free)
+            if values is not None and replay(labelled.values(), values):
+                return Solution("sat", values)
+            return Solution("unknown", reason="the solver's model could not be replayed")
     return Solution("unknown", reason=reason or "no answer in time")
 
 
-def _share(deadline: float, part: float) -> int:
-    """A part of the time that is left, in milliseconds."""
-    return max(100, int((deadline - time.monotonic()) * 1000 * part))
+def _is_simple(value: Value) -> bool:
+    return not isinstance(value, FunctionValue) or len(value.table) <= 1
+
+
+_TABLES = ((0, True), (1, True), (2, True), (3, True), (1, False), (2, False))
+"""How many exceptions the functions may have, and whether relations are false elsewhere: the simplest first."""
+
+
+def search_tables(
+    translator: Translator,
+    build: Callable[[Mapping[Variable, Meaning]], list[Expr]],
+    ordinary: Iterable[Variable],
+    functions: Iterable[Variable],
+    *,
+    timeout_ms: int,
+    seed: int = 0,
+) -> dict[Variable, Value] | None:
+    """Values of the variables for which what `build` makes of the functions' meanings is satisfiable, with functions
+    that are tables of few entries. A best effort: None proves nothing, and what is found wants replaying."""
+    ordinary, functions = tuple(ordinary), sorted(functions, key=lambda v: v.qualified)
+    deadline = time.monotonic() + timeout_ms / 1000
+    for tried, (size, sparse) in enumerate(_TABLES if functions else _TABLES[:1]):
+        left = (deadline - time.monotonic()) * 1000
+        if left < 1:
+            return None
+        limit = max(50, int(left / min(3, len(_TABLES) - tried)))
+        values = _with_tables(translator, build, ordinary, functions, size, sparse, limit, seed)
+        if values is not None:
+            return values
+    return None
 
 
 def _read(model: Model, free: Iterable[Variable]) -> dict[Variable, Value] | None:
@@ -287,7 +323,7 @@ def _read(model: Model, free: Iterable[Variable]) -> dict[Variable, Value] | Non
 
 def _with_tables(
     translator: Translator,
-    labelled: Mapping[str, Term],
+    build: Callable[[Mapping[Variable, Meaning]], list[Expr]],
     ordinary: Sequence[Variable],
     functions: Sequence[Variable],
     size: int,
@@ -317,7 +353,7 @@ def _with_tables(
         meanings[variable] = translator.table(points, default)
         parts[variable] = (points, default)
     facts.extend(translator.background(ordinary))
-    facts.extend(translator.term(formula, meanings) for formula in labelled.values())
+    facts.extend(build(meanings))
     answer = check(translator, facts, timeout_ms=timeout_ms, seed=seed)
     if answer.model is None:
         return None

@@ -47,8 +47,8 @@ def ask_cvc5(script: str, *, timeout_ms: int = 10_000) -> str | None:
             if command.isNull():
                 return answer
             said = command.invoke(solver, symbols).strip()
-            if said in {"sat", "unsat", "unknown"}:
-                answer = said
+            if said.split(" ")[0] in {"sat", "unsat", "unknown"}:
+                answer = said.split(" ")[0]  # "unknown (INCOMPLETE)"
             elif said and said != "success":
                 return None
     except (RuntimeError, Unsupported):
