@@ -57,12 +57,15 @@ def leftover_steps(
     compiler: Compiler, parts: Sequence[Part], variables: Sequence[Variable], *, unique: bool
 ) -> list[Callable[[Env], Iterable[object]]]:
     """A step for each variable; one that cannot be treated raises NotEvaluable when (and if) it is reached."""
+    from avow.logic.linear_search import linear_step  # inner quantifiers are searches again
+
     steps: list[Callable[[Env], Iterable[object]]] = []
     names = {v.name for v in variables}
     for variable in variables:
         found = _generic(compiler, parts, variable, frozenset(names), 2 if unique else 1)
         if found is None:
-            return [_refusal(variables)]
+            solved = None if unique else linear_step(compiler, parts, variables)
+            return [solved or _refusal(variables)]
         steps.append(found)
         names.discard(variable.name)
     return steps

@@ -91,15 +91,15 @@ class Search:
                 compiler.bind(variable)
         self._relations = tuple(sorted({compiler.slot(v) for v in _relations(body)}))
         self._plans: dict[tuple[bool, ...], tuple[Plan, ...]] = {}
-        self._prepared = self._plan(tuple(False for _ in self._relations))
+        self._fallbacks: dict[int, Plan] = {}
+        self._plan(tuple(False for _ in self._relations))
 
     def exists(self, env: Env) -> bool:
         doubt: Doubt = None
-        for plan in self._plan(tuple([env[s].default is True for s in self._relations])):
-            for reason in plan.solutions(env):
-                if reason is None:
-                    return True
-                doubt = doubt or reason
+        for reason in self._solutions(env):
+            if reason is None:
+                return True
+            doubt = doubt or reason
         if doubt is not None:
             raise doubt
         return False
@@ -107,24 +107,42 @@ class Search:
     def exactly_one(self, env: Env) -> bool:
         doubt: Doubt = None
         found: set[tuple[Any, ...]] = set()
-        for plan in self._plan(tuple([env[s].default is True for s in self._relations])):
-            for reason in plan.solutions(env):
-                if reason is None:
-                    found.add(tuple([env[s] for s in self._slots]))
-                    if len(found) > 1:
-                        return False
-                else:
-                    doubt = doubt or reason
+        for reason in self._solutions(env):
+            if reason is None:
+                found.add(tuple([env[s] for s in self._slots]))
+                if len(found) > 1:
+                    return False
+            else:
+                doubt = doubt or reason
         if doubt is not None:
             raise doubt
         return len(found) == 1
 
     def witnesses(self, env: Env) -> Iterator[tuple[Any, ...]]:
         """Values of `variables` that surely satisfy the body (perhaps not all of them, and perhaps repeated)."""
-        for plan in self._plan(tuple([env[s].default is True for s in self._relations])):
+        for reason in self._solutions(env):
+            if reason is None:
+                yield tuple([env[s] for s in self._slots])
+
+    def _solutions(self, env: Env) -> Iterator[Doubt]:
+        for at, plan in enumerate(self._plan(tuple([env[s].default is True for s in self._relations]))):
+            unrestricted = False
             for reason in plan.solutions(env):
-                if reason is None:
-                    yield tuple([env[s] for s in self._slots])
+                if isinstance(reason, Unrestricted):
+                    unrestricted = True
+                else:
+                    yield reason
+            if unrestricted:
+                yield from self._without_tables(at).solutions(env)
+
+    def _without_tables(self, at: int) -> Plan:
+        """For values of functions under which no table restricts anything."""
+        if at not in self._fallbacks:
+            parts, variables = self._branches[at]
+            self._fallbacks[at] = Plan(
+                self._compiler, parts, variables, frozenset(), complete=True, unique=self._unique, restrict=False
+            )
+        return self._fallbacks[at]
 
     def _plan(self, defaults: tuple[bool, ...]) -> tuple[Plan, ...]:
         """Which parts restrict depends on the relations' defaults, nearly always FALSE: one plan for each case met."""
@@ -151,10 +169,14 @@ class Plan:
         *,
         complete: bool,
         unique: bool = False,
+        restrict: bool = True,
         depth: int = 0,
     ) -> None:
+        """`complete`: bind every variable, else only those that parts restrict. `unique`: bind also variables that no
+        part mentions, since it matters how many values they have. `restrict`: look for parts that do."""
         self._compiler = compiler
         self._depth = depth
+        self._restricts = restrict
         self._true = true_defaults
         by_name = {v.name: v for v in variables}
         mentioned = frozenset[str]().union(*(p.names for p in parts))
@@ -217,7 +239,7 @@ class Plan:
 
     def _restriction(self, pending: Sequence[Part], unbound: set[str], by_name: dict[str, Variable]) -> Step | None:
         found: list[Step] = []
-        for part in pending:
+        for part in pending if self._restricts else ():
             step = self._restrict(part, unbound)
             if step is not None:
                 if step.rank == 0:
@@ -262,7 +284,7 @@ class Plan:
         plans: list[Plan] = []
         common = frozenset(unbound)
         for option, positive in options:
-            parts, inner = _flatten(option, positive)
+            parts, inner = conjunction(option, positive)
             for variable in (*variables, *inner):
                 self._compiler.bind(variable)
             wanted = [Variable(v.role, v.name, v.sort) for v in (*variables, *inner)]
@@ -459,7 +481,7 @@ def _truth(compiler: Compiler, part: Part) -> Code:
 def _branches(
     term: Term, positive: bool, variables: tuple[Variable, ...]
 ) -> Iterator[tuple[list[Part], tuple[Variable, ...]]]:
-    parts, inner = _flatten(term, positive)
+    parts, inner = conjunction(term, positive)
     variables = (*variables, *inner)
     options = _alternatives(parts[0].term, parts[0].positive) if len(parts) == 1 else None
     if options is None:
@@ -469,7 +491,7 @@ def _branches(
             yield from _branches(option, truth, variables)
 
 
-def _flatten(term: Term, positive: bool) -> tuple[list[Part], list[Variable]]:
+def conjunction(term: Term, positive: bool) -> tuple[list[Part], list[Variable]]:
     """The conjunction that a formula is, and the variables of the existential quantifiers on the way to its parts."""
     parts: list[Part] = []
     variables: list[Variable] = []

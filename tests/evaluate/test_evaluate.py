@@ -1,0 +1,452 @@
+"""Exact evaluation: known answers, refusals, and agreement with Z3 on random formulas over tables."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+from fractions import Fraction
+
+import pytest
+
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    NATURAL,
+    REAL,
+    STRING,
+    Constructor,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    OpaqueSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+)
+from avow.language.terms import (
+    And,
+    Apply,
+    Arithmetic,
+    Compare,
+    Construct,
+    EnumValue,
+    Iff,
+    Implies,
+    In,
+    Index,
+    Length,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    Role,
+    SequenceRange,
+    SequenceTerm,
+    SetTerm,
+    Term,
+    Variable,
+    Widen,
+)
+from avow.logic.evaluate import NotEvaluable, compile_term, evaluate
+from avow.logic.judge import judge
+from avow.logic.values import Data, Element, FunctionValue, Sequence, Value
+
+COMMAND = DataSort("Command", (Constructor("move", (REAL, REAL)), Constructor("inspect", (NATURAL,))))
+COLOUR = EnumSort("Colour", ("red", "orange", "green"))
+PLACE = FunctionSort((REAL, REAL), BOOL)
+MAP = FunctionSort((REAL, REAL, NATURAL), BOOL)
+NUMBERS = FunctionSort((NATURAL,), BOOL)
+HEIGHT = FunctionSort((REAL,), REAL)
+
+
+def bound(name: str, sort: Sort = REAL) -> Variable:
+    return Variable(Role.BOUND, name, sort)
+
+
+def given(name: str, sort: Sort) -> Variable:
+    return Variable(Role.INPUT, name, sort)
+
+
+X, Y, A, B, N, M = bound("x"), bound("y"), bound("a"), bound("b"), bound("n", NATURAL), bound("m", NATURAL)
+P, Q = given("p", PLACE), given("q", PLACE)
+H, K = given("h", HEIGHT), given("k", NUMBERS)
+C = given("c", COMMAND)
+
+
+def real(value: int | str) -> Literal:
+    return Literal(Fraction(value), REAL)
+
+
+def nat(value: int) -> Literal:
+    return Literal(value, NATURAL)
+
+
+def forall(variables: tuple[Variable, ...], body: Term) -> Quantified:
+    return Quantified(Quantifier.FORALL, variables, body)
+
+
+def exists(variables: tuple[Variable, ...], body: Term) -> Quantified:
+    return Quantified(Quantifier.EXISTS, variables, body)
+
+
+def unique(variables: tuple[Variable, ...], body: Term) -> Quantified:
+    return Quantified(Quantifier.UNIQUE, variables, body)
+
+
+def holds(function: Variable, *arguments: Term) -> Apply:
+    assert isinstance(function.sort, FunctionSort)
+    return Apply(function, arguments, function.sort.result)
+
+
+def points(*tuples: tuple[int, ...], default: bool = False) -> FunctionValue:
+    return FunctionValue({tuple(map(Fraction, t)): not default for t in tuples}, default)
+
+
+def eq(left: Term, right: Term) -> Compare:
+    return Compare("==", left, right)
+
+
+def plus(left: Term, right: Term) -> Arithmetic:
+    return Arithmetic("+", left, right, left.sort)
+
+
+# -- known answers -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("table", "expected"),
+    [
+        (points(), False),
+        (points((1, 2)), True),
+        (points((1, 2), (1, 3)), False),
+        (points(default=True), False),
+        (points((1, 2), default=True), False),
+    ],
+)
+def test_exists_unique(table: FunctionValue, expected: bool) -> None:
+    assert evaluate(unique((X, Y), holds(P, X, Y)), {"in.p": table}) is expected
+
+
+def test_unique_counts_whole_tuples_and_unmentioned_variables() -> None:
+    assert evaluate(unique((X,), eq(X, real(3))), {}) is True
+    assert evaluate(unique((X, Y), eq(X, real(3))), {}) is False
+    flag = bound("f", BOOL)
+    assert evaluate(unique((X, flag), eq(X, real(3))), {}) is False
+    assert evaluate(unique((X, flag), And((eq(X, real(3)), flag))), {}) is True
+
+
+def test_unique_over_a_disjunction_counts_a_solution_once() -> None:
+    body = Or((eq(X, real(1)), And((eq(X, real(1)), holds(P, X, X)))))
+    assert evaluate(unique((X,), body), {"in.p": points((1, 1))}) is True
+    assert evaluate(unique((X,), Or((eq(X, real(1)), eq(X, real(2))))), {}) is False
+
+
+@pytest.mark.parametrize("one", [False, True])
+@pytest.mark.parametrize("other", [False, True])
+@pytest.mark.parametrize("extra", [(), ((1, 2),)])
+def test_relations_agree_everywhere(one: bool, other: bool, extra: tuple[tuple[int, ...], ...]) -> None:
+    """Not only at the points of the tables: the defaults count too."""
+    formula = forall((X, Y), Iff(holds(P, X, Y), holds(Q, X, Y)))
+    values: dict[str, Value] = {"in.p": points(*extra, default=one), "in.q": points(default=other)}
+    assert evaluate(formula, values) is (one == other and not extra)
+    assert evaluate(eq(P, Q), values) is (one == other and not extra)
+
+
+def test_a_function_without_a_value_somewhere() -> None:
+    """`forall(x | h(x) != 5)` looks at the default as well as at the points."""
+    formula = forall((X,), Compare("!=", holds(H, X), real(5)))
+    seven = {(Fraction(1),): Fraction(7)}
+    assert evaluate(formula, {"in.h": FunctionValue(seven, Fraction(0))}) is True
+    assert evaluate(formula, {"in.h": FunctionValue(seven, Fraction(5))}) is False
+    assert evaluate(formula, {"in.h": FunctionValue({(Fraction(1),): Fraction(5)}, Fraction(0))}) is False
+
+
+def test_order_on_reals_looks_between_the_named_values() -> None:
+    between = exists((X,), And((Compare("<", real(1), X), Compare("<", X, real(2)))))
+    assert evaluate(between, {}) is True
+    nothing = exists((X,), And((Compare("<", real(2), X), Compare("<", X, real(2)))))
+    assert evaluate(nothing, {}) is False
+    one = unique((X,), And((Compare("<=", real(2), X), Compare("<=", X, real(2)))))
+    assert evaluate(one, {}) is True
+    assert evaluate(unique((X,), And((Compare("<", real(1), X), Compare("<", X, real(2))))), {}) is False
+
+
+def test_integers_between_bounds() -> None:
+    small = And((Compare("<=", nat(0), N), Compare("<", N, nat(3))))
+    assert (
+        evaluate(
+            forall((N,), Implies(small, holds(K, N))), {"in.k": FunctionValue({(i,): True for i in range(3)}, False)}
+        )
+        is True
+    )
+    assert evaluate(forall((N,), Implies(small, holds(K, N))), {"in.k": FunctionValue({(0,): True}, False)}) is False
+    i = bound("i", INTEGER)
+    square = Arithmetic("*", i, i, INTEGER)
+    open_below = exists((i,), And((Compare("<", i, Literal(3, INTEGER)), eq(square, Literal(4, INTEGER)))))
+    with pytest.raises(NotEvaluable, match="nothing restricts i"):
+        evaluate(open_below, {})
+
+
+def test_fractional_bounds_of_an_integer() -> None:
+    formula = exists((N,), And((Compare("<", Widen(N, REAL), real("1/2")), holds(K, N))))
+    assert evaluate(formula, {"in.k": FunctionValue({(0,): True}, False)}) is True
+    count = forall((N,), Implies(Compare("<=", Widen(N, REAL), real("5/2")), Compare("<=", N, nat(1))))
+    assert evaluate(count, {}) is False
+
+
+def test_naturals_are_not_negative() -> None:
+    """n + 1 == 0 fixes n to -1, which is no natural number."""
+    assert evaluate(exists((N,), eq(plus(N, nat(1)), nat(0))), {}) is False
+    i = bound("i", INTEGER)
+    assert evaluate(exists((i,), eq(plus(i, Literal(1, INTEGER)), Literal(0, INTEGER))), {}) is True
+
+
+def test_patterns_are_solved_for_their_variables() -> None:
+    valuation: dict[str, Value] = {"in.c": Data("move", (Fraction(3), Fraction(4))), "in.p": points((3, 5))}
+    moved = exists((X, Y), And((eq(C, Construct("move", (X, plus(Y, real(1))), COMMAND)), eq(Y, real(3)))))
+    assert evaluate(moved, valuation) is True
+    assert evaluate(exists((N,), eq(C, Construct("inspect", (N,), COMMAND))), valuation) is False
+    order = exists((X, Y), holds(P, Arithmetic("-", X, Y, REAL), Arithmetic("+", X, X, REAL)))
+    assert (
+        evaluate(exists((Y,), exists((X,), And((eq(Y, real(5)), eq(Arithmetic("*", real(2), X, REAL), Y))))), {})
+        is True
+    )
+    with pytest.raises(NotEvaluable):
+        evaluate(order, valuation)
+
+
+def test_a_table_found_by_a_nested_existential() -> None:
+    """The inner variable of a disjunct must not leak into the outer search."""
+    inner = Or((exists((Y,), And((holds(P, X, Y), holds(Q, Y, X)))), eq(X, real(9))))
+    formula = exists((X,), And((inner, holds(Q, X, X))))
+    values: dict[str, Value] = {"in.p": points((1, 2), (3, 4)), "in.q": points((2, 1), (4, 3), (3, 3))}
+    assert evaluate(formula, values) is True
+    values["in.q"] = points((2, 1), (4, 3))
+    assert evaluate(formula, values) is False
+
+
+def test_same_names_in_sibling_quantifiers() -> None:
+    formula = And((exists((X,), holds(P, X, X)), Not(exists((X,), holds(Q, X, X)))))
+    assert evaluate(formula, {"in.p": points((1, 1)), "in.q": points()}) is True
+    both = exists((Y,), And((exists((X,), holds(P, X, Y)), exists((X,), holds(Q, X, Y)))))
+    assert evaluate(both, {"in.p": points((1, 5)), "in.q": points((2, 5))}) is True
+
+
+@pytest.mark.parametrize(("spread", "expected"), [("1/2", True), ("51/100", False)])
+def test_linear_existential_over_a_tables_points(spread: str, expected: bool) -> None:
+    quarter = real("1/4")
+    within = And(
+        tuple(
+            Compare("<=", low, high)
+            for c, v in ((A, X), (B, Y))
+            for low, high in ((Arithmetic("-", c, quarter, REAL), v), (v, Arithmetic("+", c, quarter, REAL)))
+        )
+    )
+    formula = exists((A, B), forall((X, Y), Implies(holds(P, X, Y), within)))
+    table = FunctionValue({(Fraction(0), Fraction(0)): True, (Fraction(spread), Fraction(0)): True}, False)
+    assert evaluate(formula, {"in.p": table}) is expected
+    assert evaluate(formula, {"in.p": points()}) is True
+    assert judge(formula, {"in.p": FunctionValue({}, True)}) is False
+
+
+def test_linear_never_guesses_an_unrestricted_inner_variable() -> None:
+    """forall(x | a <= x) has no solution; trying a few x would find one."""
+    formula = exists((A,), forall((X,), Compare("<=", A, X)))
+    with contextlib.suppress(NotEvaluable):
+        assert evaluate(formula, {}) is False
+    shifted = exists((A,), forall((X,), Compare("<=", plus(A, real(1)), plus(X, real(2)))))
+    with pytest.raises(NotEvaluable):
+        evaluate(shifted, {})
+    assert judge(shifted, {}) is False
+
+
+def test_sequences_and_sets() -> None:
+    s = given("s", SequenceSort(INTEGER))
+    values: dict[str, Value] = {"in.s": Sequence((3, 5))}
+    assert evaluate(Index(s, nat(1), INTEGER), values) == 5
+    assert evaluate(Length(s, NATURAL), values) == 2
+    with pytest.raises(NotEvaluable, match="outside a sequence"):
+        evaluate(Index(s, nat(2), INTEGER), values)
+    i = bound("i", INTEGER)
+    assert evaluate(forall((i,), Implies(In(i, s), Compare(">", i, Literal(2, INTEGER)))), values) is True
+    assert (
+        evaluate(
+            eq(
+                SequenceRange(nat(2), nat(4), SequenceSort(NATURAL)),
+                SequenceTerm((nat(2), nat(3), nat(4)), SequenceSort(NATURAL)),
+            ),
+            {},
+        )
+        is True
+    )
+    assert evaluate(SequenceRange(nat(2), nat(1), SequenceSort(NATURAL)), {}) == Sequence(())
+    colour = given("r", COLOUR)
+    dangerous = SetTerm((EnumValue("red", COLOUR), EnumValue("orange", COLOUR)), SetSort(COLOUR))
+    assert evaluate(In(colour, dangerous), {"in.r": Element("red")}) is True
+    assert evaluate(In(colour, dangerous), {"in.r": Element("green")}) is False
+    assert (
+        evaluate(
+            exists((N,), And((In(N, SequenceRange(nat(4), nat(6), SequenceSort(NATURAL))), holds(K, N)))),
+            {"in.k": FunctionValue({(6,): True}, False)},
+        )
+        is True
+    )
+
+
+def test_undefined_parts_matter_only_where_they_decide() -> None:
+    broken = Compare(">", Arithmetic("/", real(1), real(0), REAL), real(0))
+    with pytest.raises(NotEvaluable, match="division by zero"):
+        evaluate(broken, {})
+    false, true = eq(real(0), real(1)), eq(real(1), real(1))
+    assert evaluate(And((broken, false)), {}) is False
+    assert evaluate(Or((broken, true)), {}) is True
+    assert evaluate(Implies(broken, true), {}) is True
+    with pytest.raises(NotEvaluable):
+        evaluate(And((broken, true)), {})
+    found = exists((X,), And((holds(P, X, X), Compare("==", Arithmetic("/", real(6), X, REAL), real(2)))))
+    assert evaluate(found, {"in.p": points((0, 0), (3, 3))}) is True
+    with pytest.raises(NotEvaluable):
+        evaluate(found, {"in.p": points((0, 0))})
+
+
+def test_missing_values_and_unspecified_sorts_are_refused() -> None:
+    with pytest.raises(NotEvaluable, match=r"in\.p has no value"):
+        evaluate(exists((X,), holds(P, X, X)), {})
+    z = bound("z", OpaqueSort("Sensors"))
+    with pytest.raises(NotEvaluable):
+        evaluate(forall((z,), eq(z, z)), {})
+    with pytest.raises(NotEvaluable, match="nothing restricts"):
+        evaluate(forall((X,), Compare(">", Arithmetic("*", X, X, REAL), real(-1))), {})
+
+
+def test_domains_bound_the_quantifiers() -> None:
+    formula = forall((N,), holds(K, N))
+    table: dict[str, Value] = {"in.k": FunctionValue({(0,): True, (1,): True}, False)}
+    assert evaluate(formula, table) is False
+    assert evaluate(formula, table, domains={NATURAL: (0, 1)}) is True
+    inside = exists((N,), holds(K, N))
+    assert evaluate(inside, table, domains={NATURAL: (2, 3)}) is False
+
+
+def test_strings_have_more_values_than_are_named() -> None:
+    s = bound("s", STRING)
+    named = given("t", STRING)
+    assert evaluate(exists((s,), Compare("!=", s, named)), {"in.t": "x"}) is True
+    assert evaluate(forall((s,), eq(s, named)), {"in.t": "x"}) is False
+
+
+def test_deep_nesting_is_an_answer_not_a_crash() -> None:
+    term: Term = eq(real(1), real(1))
+    for _ in range(200_000):
+        term = Not(term)
+    with pytest.raises(NotEvaluable, match="too deeply"):
+        compile_term(term)
+
+
+def test_negative_and_widen() -> None:
+    i = given("i", INTEGER)
+    assert evaluate(Negative(i, INTEGER), {"in.i": 3}) == -3
+    assert evaluate(Arithmetic("/", Widen(i, REAL), real(2), REAL), {"in.i": 3}) == Fraction(3, 2)
+
+
+# -- agreement with Z3 -------------------------------------------------------------------------------------------------
+
+
+def _random_formula(rng: random.Random, depth: int, scope: tuple[Variable, ...]) -> Term:
+    numbers = [v for v in scope if v.sort == REAL]
+    naturals = [v for v in scope if v.sort == NATURAL]
+
+    def number() -> Term:
+        choice = rng.random()
+        if numbers and choice < 0.7:
+            return rng.choice(numbers)
+        if choice < 0.8:
+            return holds(H, rng.choice(numbers) if numbers else real(rng.randrange(3)))
+        if numbers and choice < 0.87:
+            return Arithmetic(rng.choice("+-"), rng.choice(numbers), real(rng.randrange(1, 3)), REAL)
+        return real(rng.randrange(3))
+
+    def natural() -> Term:
+        if naturals and rng.random() < 0.7:
+            return rng.choice(naturals)
+        if naturals and rng.random() < 0.4:
+            return plus(rng.choice(naturals), nat(1))
+        return nat(rng.randrange(3))
+
+    if depth == 0:
+        match rng.randrange(7):
+            case 0 | 1:
+                return holds(rng.choice((P, Q)), number(), number())
+            case 2:
+                return holds(K, natural())
+            case 3:
+                return Compare(rng.choice(("==", "!=")), number(), number())
+            case 4:
+                return Compare(rng.choice(("<", "<=", ">", ">=")), number(), number())
+            case 5:
+                return eq(C, Construct("move", (number(), number()), COMMAND))
+            case _:
+                return eq(C, Construct("inspect", (natural(),), COMMAND))
+    match rng.randrange(8):
+        case 0 | 1:
+            return And(tuple(_random_formula(rng, depth - 1, scope) for _ in range(rng.randrange(2, 4))))
+        case 2:
+            return Or(tuple(_random_formula(rng, depth - 1, scope) for _ in range(2)))
+        case 3:
+            return Implies(_random_formula(rng, depth - 1, scope), _random_formula(rng, depth - 1, scope))
+        case 4:
+            return Iff(_random_formula(rng, depth - 1, scope), _random_formula(rng, depth - 1, scope))
+        case 5:
+            return Not(_random_formula(rng, depth - 1, scope))
+        case _:
+            fresh = tuple(
+                bound(f"v{len(scope) + k}", rng.choice((REAL, REAL, NATURAL))) for k in range(rng.randrange(1, 3))
+            )
+            body = _random_formula(rng, depth - 1, scope + fresh)
+            return Quantified(rng.choice(list(Quantifier)), fresh, body)
+
+
+def _random_values(rng: random.Random) -> dict[str, Value]:
+    def relation() -> FunctionValue:
+        default = rng.random() < 0.2
+        table = {
+            (Fraction(rng.randrange(3)), Fraction(rng.randrange(3))): rng.random() < 0.8
+            for _ in range(rng.randrange(4))
+        }
+        return FunctionValue(table, default)
+
+    move = Data("move", (Fraction(rng.randrange(3)), Fraction(rng.randrange(3))))
+    return {
+        "in.p": relation(),
+        "in.q": relation(),
+        "in.h": FunctionValue({(Fraction(rng.randrange(3)),): Fraction(rng.randrange(3))}, Fraction(rng.randrange(3))),
+        "in.k": FunctionValue({(rng.randrange(3),): rng.random() < 0.7}, rng.random() < 0.2),
+        "in.c": rng.choice((move, Data("inspect", (rng.randrange(3),)))),
+    }
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_agrees_with_z3_on_random_formulas(seed: int) -> None:
+    from avow.logic.smt import replay
+
+    rng = random.Random(seed)
+    variables = {"in.p": P, "in.q": Q, "in.h": H, "in.k": K, "in.c": C}
+    evaluated = compared = true = 0
+    for _ in range(60):
+        formula = _random_formula(rng, 3, ())
+        values = _random_values(rng)
+        try:
+            mine = evaluate(formula, values)
+        except NotEvaluable:
+            continue
+        evaluated += 1
+        theirs = replay([formula], {v: values[n] for n, v in variables.items()}, timeout_ms=1000)
+        if theirs is not None:
+            compared += 1
+            true += bool(mine)
+            assert mine is theirs, (seed, formula, values)
+    assert evaluated > 35
+    assert compared > 30
+    assert 0 < true < compared
