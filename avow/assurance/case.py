@@ -14,7 +14,8 @@ The pipeline calls, once a system:
         derivations=(Derivation(...), …),  # what the calculus derived (view dataclass in avow.assurance.model)
         methods=(MethodInfo(...), …),      # the backends known: for suggestions and for "what green means"
         tools=(ToolInfo(...), …),
-        discrepancies=audit(...),          # avow.evidence.audit.audit(ledger, root, …)
+        discrepancies=audit(ledger.records(), ledger.damage, root, system=…, obligations=…, keys=…),
+                                           # avow.evidence.audit; None: not audited (then never CERTIFIED)
         digests={"contracts/x/plan.yaml": sha256, …},
         ledger_head=ledger.head,
         graph_svg="<svg…>",
@@ -29,12 +30,44 @@ is loaded, so that this comes early).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import date
 
-from avow.assurance.model import Case, Derivation, Discrepancy, MethodInfo, RunInfo, ToolInfo
+from avow.assurance.demand import independent
+from avow.assurance.facts import Facts, facts_of_case, facts_of_system
+from avow.assurance.findings import handle
+from avow.assurance.gates import exit_code, gates, suggestion_for
+from avow.assurance.model import (
+    Case,
+    Currency,
+    Derivation,
+    DerivationView,
+    EvidenceView,
+    Grade,
+    HypothesisView,
+    MethodInfo,
+    ObligationView,
+    RequirementView,
+    RunInfo,
+    ToolInfo,
+)
+from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.assurance.summary import limits, not_shown, open_items
+from avow.assurance.support import (
+    Names,
+    criticality,
+    derivation_claims,
+    obligation_claim,
+    requirement_claim_of,
+    requirement_support,
+)
+from avow.evidence.audit import Discrepancy
+from avow.evidence.claims import Standing, judge
 from avow.evidence.ledger import GENESIS, Entry
-from avow.evidence.obligation import Obligation
-from avow.system.plan import System
+from avow.evidence.obligation import Kind, Obligation
+from avow.evidence.status import Status, best_link, effective, hypotheses, roll_up, weigh
+from avow.system.plan import Requirement, System
+from avow.verdict import Link
 
 
 def build_case(
@@ -48,10 +81,270 @@ def build_case(
     derivations: Sequence[Derivation] = (),
     methods: Sequence[MethodInfo] = (),
     tools: Sequence[ToolInfo] = (),
-    discrepancies: Sequence[Discrepancy] = (),
+    discrepancies: Sequence[Discrepancy] | None = None,
     digests: Mapping[str, str] | None = None,
     ledger_head: str = GENESIS,
     graph_svg: str = "",
 ) -> Case:
     """The case. Pure: same arguments, same case. Raises Rejected for an unusable policy."""
-    raise NotImplementedError
+    return conclude(
+        facts_of_system(
+            system,
+            obligations,
+            records,
+            keys,
+            today,
+            run,
+            derivations,
+            methods,
+            tools,
+            discrepancies,
+            digests or {},
+            ledger_head,
+            graph_svg,
+        )
+    )
+
+
+def conclude_again(case: Case) -> Case:
+    """The case that follows from what a case holds: equal to it, unless somebody changed its conclusions."""
+    return conclude(facts_of_case(case))
+
+
+def conclude(facts: Facts) -> Case:
+    """Everything that follows from the facts."""
+    evidence, orphans = _evidence(facts)
+    counting = {name: tuple(v.entry for v in views if v.counts) for name, views in evidence.items()}
+    statuses = {
+        o.id: roll_up((e.evidence for e in counting[o.id]), outdated=bool(evidence[o.id])) for o in facts.obligations
+    }
+    findings = (
+        *handle("expected", facts.expected or (), facts.obligations, statuses, counting, facts.today),
+        *handle("accepted", facts.accepted, facts.obligations, statuses, counting, facts.today),
+    )
+    names = Names(facts)
+    claims = [
+        obligation_claim(o, statuses[o.id], _hypotheses(counting[o.id]), _link(counting[o.id]), names)
+        for o in facts.obligations
+    ]
+    claims += [requirement_claim_of(r, names) for r in facts.requirements]
+    claims += derivation_claims(facts, names)
+    standings = judge(claims)
+    rests = {claim.id: claim.rests_on for claim in claims}
+    handled = {name: f.how for f in findings if not f.expired for name in f.obligations}
+    views = tuple(
+        _obligation(o, facts, evidence[o.id], statuses[o.id], standings[o.id], rests[o.id], handled.get(o.id, ""))
+        for o in facts.obligations
+    )
+    requirements = tuple(_requirement(r, names, standings, statuses) for r in facts.requirements)
+    derived = tuple(_derivation(d, standings, rests) for d in facts.derivations)
+    grade, reason = _grade(facts, views)
+    found = gates(facts, views, requirements, derived, findings, grade)
+    return Case(
+        system=facts.system,
+        title=facts.title,
+        today=facts.today.isoformat(),
+        run=facts.run,
+        grade=grade,
+        grade_reason=reason,
+        policy=facts.policy,
+        exit_code=exit_code(found),
+        ledger_head=facts.ledger_head,
+        digests=facts.digests,
+        requirements=requirements,
+        open_items=open_items(facts, views, requirements, derived, findings),
+        nodes=facts.nodes,
+        obligations=views,
+        derivations=derived,
+        hypotheses=_assumed(views, derived),
+        environment=facts.environment,
+        findings=findings,
+        gates=found,
+        single_method=_single(views),
+        limits=limits(facts, views),
+        not_shown=not_shown(facts, views, requirements),
+        tools=facts.tools,
+        methods=facts.methods,
+        discrepancies=facts.discrepancies or (),
+        audited=facts.discrepancies is not None,
+        strict=facts.expected is not None,
+        orphans=orphans,
+        graph_svg=facts.graph_svg,
+    )
+
+
+def _evidence(facts: Facts) -> tuple[dict[str, tuple[EvidenceView, ...]], tuple[Entry, ...]]:
+    """Each obligation's records with where they stand in time, and the records that belong to no obligation."""
+    grouped: dict[str, list[Entry]] = {o.id: [] for o in facts.obligations}
+    orphans = []
+    for entry in facts.entries:
+        if entry.evidence.obligation in grouped:
+            grouped[entry.evidence.obligation].append(entry)
+        else:
+            orphans.append(entry)
+    digests = {o.id: o.digest for o in facts.obligations}
+    result = {
+        name: tuple(_views(entries, digests[name], dict(facts.planned.get(name, ())), facts.run))
+        for name, entries in grouped.items()
+    }
+    return result, tuple(orphans)
+
+
+def _views(entries: list[Entry], digest: str, planned: Mapping[str, str], run: RunInfo) -> list[EvidenceView]:
+    views: list[EvidenceView] = []
+    newest: set[str] = set()
+    for entry in reversed(entries):
+        record = entry.evidence
+        if record.method not in planned:
+            currency = Currency.WITHDRAWN
+        elif planned[record.method] != record.key or record.obligation_digest != digest:
+            currency = Currency.STALE
+        else:
+            currency = Currency.REPEATED if record.method in newest else Currency.CURRENT
+            newest.add(record.method)
+        # the same question was answered more than once: all answers count, so that none can hide a refutation; but a
+        # fresh run believes no support that it did not see itself
+        counts = currency in (Currency.CURRENT, Currency.REPEATED)
+        if run.fresh and record.run != run.id and not weigh(record).refuted:
+            counts = False
+        cut = effective(record)
+        views.append(EvidenceView(entry, currency, counts, cut if cut is not record.verdict else None))
+    return views[::-1]
+
+
+def _hypotheses(entries: tuple[Entry, ...]) -> tuple[str, ...]:
+    return hypotheses(e.evidence for e in entries)
+
+
+def _link(entries: tuple[Entry, ...]) -> Link | None:
+    """The most mechanical link among the records that give the status."""
+    weights = [(weigh(e.evidence).support, e.evidence.link) for e in entries]
+    best = max((s for s, _ in weights if s is not None), key=lambda s: s.rank, default=None)
+    return best_link(link for support, link in weights if support is best and best is not None)
+
+
+def _obligation(
+    obligation: Obligation,
+    facts: Facts,
+    evidence: tuple[EvidenceView, ...],
+    status: Status,
+    standing: Standing,
+    rests_on: tuple[str, ...],
+    handled: str,
+) -> ObligationView:
+    view = ObligationView(
+        obligation=obligation,
+        criticality=criticality(obligation, facts),
+        status=status,
+        standing=standing.status,
+        evidence=evidence,
+        planned=facts.planned.get(obligation.id, ()),
+        rests_on=rests_on,
+        below=standing.below,
+        hypotheses=standing.hypotheses,
+        link=standing.link,
+        handled=handled,
+    )
+    return replace(view, suggestion=suggestion_for(view, facts, facts.today))
+
+
+def _requirement(
+    requirement: Requirement, names: Names, standings: Mapping[str, Standing], statuses: Mapping[str, Status]
+) -> RequirementView:
+    standing = standings[requirement_claim(requirement.id)]
+    rests, unknown = requirement_support(requirement, names)
+    weakest, weakest_status = standing.weakest
+    return RequirementView(
+        id=requirement.id,
+        text=requirement.text,
+        formula=requirement.formula or "",
+        temporal=requirement.temporal or "",
+        supported_by=requirement.supported_by,
+        rests_on=rests,
+        unknown_names=unknown,
+        status=standing.status,
+        weakest=weakest,
+        weakest_status=weakest_status,
+        below=standing.below,
+        hypotheses=standing.hypotheses,
+        link=standing.link,
+        obligations=tuple(names.own.get(requirement.id, ())),
+        answer=_answer(requirement, standing, unknown, statuses),
+        span=requirement.span,
+    )
+
+
+def _answer(
+    requirement: Requirement, standing: Standing, unknown: tuple[str, ...], statuses: Mapping[str, Status]
+) -> str:
+    if unknown:
+        return f"Not shown: {', '.join(unknown)} under supported_by stands for nothing."
+    if standing.circle:
+        return f"Refused: it would support itself ({' → '.join(short(name) for name in standing.circle)})."
+    if standing.status.supports:
+        name, status = standing.weakest
+        how = "Linked in prose" if standing.status is Status.LINKED else standing.status.value.capitalize()
+        hypotheses = len(standing.hypotheses)
+        rest = f", on {hypotheses} hypothes{'is' if hypotheses == 1 else 'es'}" if hypotheses else ""
+        return f"{how}{rest}; the weakest link is {short(name)}, {status}."
+    if standing.below:
+        causes = [f"{short(name)} is {statuses.get(name, 'not shown')}" for name in standing.below]
+        more = f" and {len(causes) - 3} more" if len(causes) > 3 else ""
+        return f"Not shown: {', '.join(causes[:3])}{more}."
+    if not standing.direct:
+        return "Not shown."
+    formal = requirement.formula or requirement.temporal
+    return "Not shown: nobody has tried." if formal else "Not shown: nothing is named that would support it."
+
+
+def _derivation(
+    derivation: Derivation, standings: Mapping[str, Standing], rests: Mapping[str, tuple[str, ...]]
+) -> DerivationView:
+    claim = derivation_claim(derivation.name)
+    standing = standings[claim]
+    return DerivationView(derivation, standing.status, *standing.weakest, standing.below, rests[claim])
+
+
+def _assumed(views: Sequence[ObligationView], derived: Sequence[DerivationView]) -> tuple[HypothesisView, ...]:
+    found: dict[str, list[str]] = {}
+    for view in views:
+        for text in dict.fromkeys(h for v in view.counting for h in v.entry.evidence.hypotheses):
+            found.setdefault(text, []).append(view.id)
+    for d in derived:
+        for text in d.derivation.conditional:
+            found.setdefault(text, []).append(derivation_claim(d.derivation.name))
+    return tuple(HypothesisView(text, tuple(claims)) for text, claims in sorted(found.items()))
+
+
+def _single(views: Sequence[ObligationView]) -> tuple[str, ...]:
+    return tuple(
+        view.id
+        for view in views
+        if view.obligation.kind is Kind.GUARANTEE
+        and view.status.supports
+        and independent(v.entry.evidence for v in view.counting if weigh(v.entry.evidence).support) == 1
+    )
+
+
+def _grade(facts: Facts, views: Sequence[ObligationView]) -> tuple[Grade, str]:
+    """CERTIFIED only if nothing was believed that this run did not compute, and every digest was verified."""
+    if facts.discrepancies is None:
+        return Grade.CHECKED, "digests were not verified in this run"
+    serious = sum(d.serious for d in facts.discrepancies)
+    if serious:
+        return Grade.CHECKED, f"the audit found {serious} discrepanc{'y' if serious == 1 else 'ies'}"
+    if not facts.run.fresh:
+        cached = sum(1 for view in views for v in view.counting if v.entry.evidence.run != facts.run.id)
+        return Grade.CHECKED, f"{cached} answer{'' if cached == 1 else 's'} from earlier runs, with unchanged inputs"
+    unanswered = sum(
+        1
+        for view in views
+        for method, _ in view.planned
+        if not any(
+            v.counts and v.entry.evidence.method == method and v.entry.evidence.run == facts.run.id
+            for v in view.evidence
+        )
+    )
+    if unanswered:
+        return Grade.CHECKED, f"{unanswered} planned attempt{'' if unanswered == 1 else 's'} not made in this run"
+    return Grade.CERTIFIED, "every answer was computed in this run, and every digest verified"

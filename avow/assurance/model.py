@@ -1,7 +1,7 @@
 """The assurance case as data: what every report format is rendered from, and nothing else.
 
 One frozen object holds it all, so that two formats cannot disagree. The first part is what the pipeline hands in
-(`RunInfo`, `ToolInfo`, `MethodInfo`, `Derivation`, `Discrepancy`); the second is what `build_case` makes of it.
+(`RunInfo`, `ToolInfo`, `MethodInfo`, `Derivation`; `Discrepancy` is the audit's), the second what `build_case` makes.
 Times and dates are texts in ISO 8601; paths are relative to the workspace; every text is data, never markup.
 """
 
@@ -11,7 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from avow.assurance.policy import Policy
 from avow.diagnostics import Span
+from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.evidence.status import Status
@@ -86,35 +88,6 @@ class Derivation:
     conditional: tuple[str, ...] = ()
 
 
-class Fault(StrEnum):
-    """The kinds of discrepancy between the ledger and the world."""
-
-    LEDGER = "ledger"
-    """A line of the ledger was edited, removed, inserted or cannot be read."""
-    CHANGED = "changed"
-    """A file behind a record is not the file that it was."""
-    GONE = "gone"
-    """A file behind a record is no longer there."""
-    MISPLACED = "misplaced"
-    """A record points at another obligation, method or system than its key belongs to."""
-    IMPOSSIBLE = "impossible"
-    """A record says what its method cannot say."""
-    OUTDATED = "outdated"
-    """An input has changed since: not tampering, but the evidence is stale."""
-    SIGNATURE = "signature"
-
-
-@dataclass(frozen=True, slots=True)
-class Discrepancy:
-    """One thing that `avow audit` found. `serious` ones fail the integrity gate."""
-
-    fault: Fault
-    subject: str
-    """The path, ledger line or obligation that it is about."""
-    text: str
-    serious: bool = True
-
-
 # -- made by build_case ---------------------------------------------------------------------------------------------
 
 
@@ -171,7 +144,6 @@ class ObligationView:
     """One obligation with all that is known of it."""
 
     obligation: Obligation
-    span: Span | None
     criticality: str
     status: Status
     standing: Status
@@ -270,6 +242,8 @@ class OpenItem:
     text: str
     suggestion: str = ""
     handled: str = ""
+    advice: bool = False
+    """Worth knowing, but nothing fails for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,7 +280,7 @@ class Case:
     run: RunInfo
     grade: Grade
     grade_reason: str
-    policy: str
+    policy: Policy
     exit_code: int
     ledger_head: str
     digests: tuple[tuple[str, str], ...]
@@ -326,6 +300,12 @@ class Case:
     tools: tuple[ToolInfo, ...]
     methods: tuple[MethodInfo, ...]
     discrepancies: tuple[Discrepancy, ...]
+    audited: bool
+    """Whether every digest was computed again for this case; without it no discrepancy can be known of."""
+    strict: bool
+    """Whether the plan lists the expected findings (strictly: all of these and no others)."""
+    orphans: tuple[Entry, ...] = ()
+    """Evidence for claims that no longer exist."""
     graph_svg: str = ""
     """The dataflow picture; shown as an image, never as markup."""
 

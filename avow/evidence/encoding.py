@@ -72,7 +72,7 @@ def encode(evidence: Evidence) -> dict[str, Any]:
 
 
 def decode(data: object) -> Evidence:
-    """The record that plain JSON data stands for. Raises Unreadable: a missing, extra or ill-typed field is no record."""
+    """The record that plain JSON data stands for. Raises Unreadable where a field is missing, unknown or ill-typed."""
     fields = _mapping(data, "a record")
     missing, extra = _FIELDS - fields.keys(), fields.keys() - _FIELDS
     if missing or extra:

@@ -1,0 +1,179 @@
+"""One demand of the policy against one guarantee: is it met, what is lacking, what would close the gap most cheaply."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from datetime import date
+
+from avow.assurance.facts import Facts
+from avow.assurance.model import MethodInfo, ObligationView, Suggestion
+from avow.assurance.policy import Demand, Policy, costs
+from avow.evidence.obligation import Kind
+from avow.evidence.record import Evidence
+from avow.evidence.status import Status, effective, join, weigh
+from avow.verdict import Verdict
+
+
+def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date) -> str | None:
+    """What a guarantee lacks, in words; None where the demand is met."""
+    if not demand.one_of:
+        return None
+    evidence = [v.entry.evidence for v in view.counting]
+    kept, dropped = [], []
+    for item in evidence:
+        reason = _disregarded(item, demand, policy, today)
+        if reason is None:
+            kept.append(item)
+        elif weigh(item).support is not None:
+            dropped.append(f"{item.method}: {reason}")
+    status = join(map(weigh, kept)).status if kept else view.status
+    because = f" ({'; '.join(dropped)})" if dropped else ""
+    if kept == [] and dropped:
+        return f"nothing counts{because}"
+    if status not in demand.one_of:
+        return f"{status}, but {' or '.join(demand.one_of)} is asked{because}"
+    speaking = [item for item in kept if weigh(item).support is not None]
+    number = independent(speaking) if demand.independent else len({item.method for item in speaking})
+    if number < demand.methods:
+        kind = "independent method" if demand.independent else "method"
+        return f"{number} {kind}{'' if number == 1 else 's'}, but {demand.methods} are asked{because}"
+    return None
+
+
+def independent(evidence: Iterable[Evidence]) -> int:
+    """How many items can be chosen that differ pairwise in backend AND in tool: two wrappings of one solver are one.
+
+    This is a maximum matching between backends and tools, with an item for an edge.
+    """
+    edges: dict[str, set[str]] = {}
+    for item in evidence:
+        edges.setdefault(item.backend, set()).add(item.tool)
+    partner: dict[str, str] = {}
+
+    def place(backend: str, tried: set[str]) -> bool:
+        for tool in sorted(edges[backend] - tried):
+            tried.add(tool)
+            if tool not in partner or place(partner[tool], tried):
+                partner[tool] = backend
+                return True
+        return False
+
+    return sum(place(backend, set()) for backend in sorted(edges))
+
+
+def reviewers(evidence: Evidence) -> tuple[str, ...]:
+    """The persons behind a review, as its details name them (``reviewers``, ``reviewer`` or ``who``)."""
+    for key in ("reviewers", "reviewer", "who"):
+        match evidence.details.get(key):
+            case str(name):
+                return (name,)
+            case list() | tuple() as names:
+                return tuple(str(name) for name in names)
+    return ()
+
+
+def age_days(evidence: Evidence, today: date) -> int | None:
+    """Days since the evidence came about: a person's date where the details give one, else the attempt's start."""
+    for text in (evidence.details.get("date"), evidence.started):
+        if isinstance(text, str):
+            try:
+                return (today - date.fromisoformat(text[:10])).days
+            except ValueError:
+                continue
+    return None
+
+
+def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) -> str | None:
+    """Why a supporting item does not count; refutations and failures are never disregarded."""
+    support = weigh(item).support
+    if support is None:
+        return None
+    limit = demand.max_age(support)
+    if limit is not None:
+        age = age_days(item, today)
+        if age is None or age > limit:
+            return f"{'of unknown age' if age is None else f'{age} days old'}, at most {limit} are allowed"
+        if age < 0:
+            return "dated in the future"
+    if effective(item) is Verdict.REVIEWED:
+        people = set(reviewers(item))
+        strangers = people - set(policy.reviewers) if policy.reviewers else set()
+        if strangers:
+            return f"{', '.join(sorted(strangers))} may not review under this policy"
+        if len(people) < demand.reviewers and demand.reviewers > 1:
+            return f"reviewed by {len(people)}, {demand.reviewers} reviewers are asked"
+    elif demand.links and support is not Status.JUSTIFIED and item.link not in demand.links:
+        return f"the link is {item.link}, {' or '.join(demand.links)} is asked"
+    if demand.unconditional and item.hypotheses:
+        return "rests on hypotheses"
+    return None
+
+
+def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Suggestion:
+    """The cheapest step: repair what is wrong, run or install what is planned, else add a method that fits."""
+    match view.status:
+        case Status.REFUTED:
+            return Suggestion(
+                "repair what the counterexample shows, or accept the finding with a dated reason", cost=100
+            )
+        case Status.CONTRADICTORY:
+            return Suggestion("find out which tool is wrong: one proves the claim and another refutes it", cost=100)
+        case Status.VACUOUS:
+            return Suggestion("give a scenario in which the claim's trigger is met", cost=50)
+        case Status.STALE:
+            return Suggestion(
+                f"run `avow verify {facts.system}`: the plan's methods have not answered the claim as it is now"
+            )
+    used = _planned(view, facts)
+    by_name = {method.name: method for method in facts.methods}
+    tried = {v.entry.evidence.method for v in view.counting}
+    for method, backend in used.items():
+        info = by_name.get(backend)
+        if info is not None and not info.available:
+            return Suggestion(f"install what `{method}` needs: {info.install}", method)
+        if method not in tried:
+            return Suggestion(f"run `avow verify {facts.system}`: `{method}` has not answered yet", method)
+    if demand is None:
+        if view.obligation.kind is Kind.REQUIREMENT:
+            return Suggestion("add what it rests on under `supported_by`, or state it as a formula", cost=20)
+        return Suggestion(
+            "narrow the question (a scenario in the plan), raise the time limit, or accept it with a reason", cost=20
+        )
+    return _new_method(view, demand, used, facts)
+
+
+def _planned(view: ObligationView, facts: Facts) -> Mapping[str, str]:
+    backends = {
+        method: backend for node in facts.nodes if node.name == view.obligation.node for method, backend in node.methods
+    }
+    return {method: backends.get(method, method) for method, _ in view.planned}
+
+
+def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], facts: Facts) -> Suggestion:
+    strong_enough = view.status in demand.one_of
+    order = costs()
+
+    def fits(info: MethodInfo) -> bool:
+        if info.name in used.values() or (
+            demand.links and info.link not in demand.links and info.strength is not Verdict.REVIEWED
+        ):
+            return False
+        return strong_enough or Status(info.strength) in demand.one_of
+
+    fitting = sorted(
+        (info for info in facts.methods if fits(info)),
+        key=lambda info: (order.get(info.strength, 9) + (0 if info.available else 5), info.name),
+    )
+    node = view.obligation.node
+    if not fitting:
+        wanted = (
+            "a second, independent method" if strong_enough else f"a method that can give {' or '.join(demand.one_of)}"
+        )
+        return Suggestion(f"add {wanted} under nodes.{node}.methods", cost=60)
+    best = fitting[0]
+    install = "" if best.available else f" (first: {best.install})"
+    return Suggestion(
+        f"add `{best.name}` under nodes.{node}.methods: {best.title}{install}",
+        best.name,
+        10 + order.get(best.strength, 9),
+    )

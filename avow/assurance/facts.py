@@ -1,0 +1,147 @@
+"""What a case is made of, before anything is concluded from it: plain data, taken from a System or from a Case.
+
+That it can be taken from a finished case as well is what lets ``avow report --check`` conclude everything again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+
+from avow.assurance.model import Case, Derivation, EnvironmentView, MethodInfo, NodeView, RunInfo, ToolInfo
+from avow.assurance.policy import Policy, read_policy
+from avow.evidence.audit import Discrepancy
+from avow.evidence.ledger import Entry
+from avow.evidence.obligation import Obligation
+from avow.language.contract import Clause
+from avow.system.plan import Finding, Requirement, System
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    system: str
+    title: str
+    today: date
+    run: RunInfo
+    policy: Policy
+    ledger_head: str
+    digests: tuple[tuple[str, str], ...]
+    requirements: tuple[Requirement, ...]
+    nodes: tuple[NodeView, ...]
+    environment: tuple[EnvironmentView, ...]
+    expected: tuple[Finding, ...] | None
+    accepted: tuple[Finding, ...]
+    obligations: tuple[Obligation, ...]
+    planned: Mapping[str, tuple[tuple[str, str], ...]]
+    """Obligation id → (method, key) of every attempt that the plan asks for."""
+    entries: tuple[Entry, ...]
+    derivations: tuple[Derivation, ...]
+    methods: tuple[MethodInfo, ...]
+    tools: tuple[ToolInfo, ...]
+    discrepancies: tuple[Discrepancy, ...] | None
+    graph_svg: str
+
+
+def facts_of_system(
+    system: System,
+    obligations: Sequence[Obligation],
+    records: Sequence[Entry],
+    keys: Mapping[tuple[str, str], str],
+    today: date,
+    run: RunInfo,
+    derivations: Sequence[Derivation],
+    methods: Sequence[MethodInfo],
+    tools: Sequence[ToolInfo],
+    discrepancies: Sequence[Discrepancy] | None,
+    digests: Mapping[str, str],
+    ledger_head: str,
+    graph_svg: str,
+) -> Facts:
+    """Raises Rejected for an unusable policy."""
+    plan = system.plan
+    planned: dict[str, tuple[tuple[str, str], ...]] = {}
+    for (obligation, method), key in sorted(keys.items()):
+        planned[obligation] = (*planned.get(obligation, ()), (method, key))
+    nodes = tuple(
+        NodeView(
+            node.name,
+            plan.node(node.name).criticality,
+            tuple((m.id, m.backend) for m in plan.node(node.name).methods),
+            tuple((clause.name, _say(clause)) for clause in node.guarantees),
+            tuple((clause.name, _say(clause)) for clause in node.assumptions),
+        )
+        for node in system.contract.nodes
+    )
+    return Facts(
+        system=plan.system,
+        title=plan.title,
+        today=today,
+        run=run,
+        policy=read_policy(plan.policy),
+        ledger_head=ledger_head,
+        digests=tuple(sorted(digests.items())),
+        requirements=plan.requirements,
+        nodes=nodes,
+        environment=tuple(EnvironmentView(e.port, e.assume or "", e.because or "") for e in plan.environment),
+        expected=plan.expected,
+        accepted=plan.accepted,
+        obligations=tuple({o.id: o for o in obligations}.values()),
+        planned=planned,
+        entries=tuple(sorted(records, key=lambda e: (e.number, e.hash))),
+        derivations=tuple(derivations),
+        methods=tuple(sorted(methods, key=lambda m: m.name)),
+        tools=tuple(sorted(tools, key=lambda t: (t.name, t.version or ""))),
+        discrepancies=None if discrepancies is None else tuple(discrepancies),
+        graph_svg=graph_svg,
+    )
+
+
+def facts_of_case(case: Case) -> Facts:
+    """What the case was made of. Raises ValueError where `case.today` is no date."""
+    entries = [*case.orphans, *(view.entry for o in case.obligations for view in o.evidence)]
+    findings = [
+        (
+            f.how,
+            Finding(
+                f.pattern,
+                f.verdict,
+                f.reason or None,
+                f.who or None,
+                f.date or None,
+                f.expires or None,
+                f.method or None,
+            ),
+        )
+        for f in case.findings
+    ]
+    expected = tuple(finding for how, finding in findings if how == "expected")
+    return Facts(
+        system=case.system,
+        title=case.title,
+        today=date.fromisoformat(case.today),
+        run=case.run,
+        policy=case.policy,
+        ledger_head=case.ledger_head,
+        digests=case.digests,
+        requirements=tuple(
+            Requirement(r.id, r.text, r.formula or None, r.temporal or None, r.supported_by, r.span)
+            for r in case.requirements
+        ),
+        nodes=case.nodes,
+        environment=case.environment,
+        expected=expected if case.strict else None,
+        accepted=tuple(finding for how, finding in findings if how == "accepted"),
+        obligations=tuple(view.obligation for view in case.obligations),
+        planned={view.id: view.planned for view in case.obligations},
+        entries=tuple(sorted(entries, key=lambda e: (e.number, e.hash))),
+        derivations=tuple(view.derivation for view in case.derivations),
+        methods=case.methods,
+        tools=case.tools,
+        discrepancies=case.discrepancies if case.audited else None,
+        graph_svg=case.graph_svg,
+    )
+
+
+def _say(clause: Clause) -> str:
+    return clause.sentence or clause.text or clause.name

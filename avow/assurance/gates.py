@@ -1,0 +1,265 @@
+"""The gates: what the policy asks, held against the case. They, and nothing else, decide the exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from datetime import date
+
+from avow.assurance.demand import shortfall, suggest
+from avow.assurance.facts import Facts
+from avow.assurance.findings import FINDINGS
+from avow.assurance.model import DerivationView, Gate, Grade, Handled, ObligationView, RequirementView, Suggestion
+from avow.assurance.naming import derivation_claim, is_advice, requirement_claim, short
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
+
+_TOOL = frozenset({Status.ERROR, Status.NOT_RUN})
+
+
+def gates(
+    facts: Facts,
+    obligations: Sequence[ObligationView],
+    requirements: Sequence[RequirementView],
+    derivations: Sequence[DerivationView],
+    findings: Sequence[Handled],
+    grade: Grade,
+) -> tuple[Gate, ...]:
+    """Every gate, in the order in which a reader should look at them."""
+    views = {view.id: view for view in obligations}
+    excused = {name for f in findings if not f.expired for name in f.obligations}
+    return (
+        _integrity(facts),
+        *_findings(facts, findings, obligations),
+        _nothing_wrong(facts, obligations, excused),
+        _kind(facts, obligations, excused, Kind.WELL_FORMED, "Contracts parse and are well-typed", (Status.PROVED,)),
+        _kind(facts, obligations, excused, Kind.SANITY, "Contracts are worth verifying", facts.policy.sanity),
+        _kind(facts, obligations, excused, Kind.COMPOSITION, "The composition is justified", facts.policy.composition),
+        *_guarantees(facts, obligations, excused),
+        _derivations(facts, derivations, views, excused),
+        _requirements(facts, requirements, views, excused),
+        *_certified(facts, grade),
+    )
+
+
+def exit_code(found: Iterable[Gate]) -> int:
+    """0: all pass; 3: some fail, and each of them only for want of a tool; 1: else."""
+    failed = [gate for gate in found if not gate.passed]
+    if not failed:
+        return 0
+    return 3 if all(gate.tool_failure for gate in failed) else 1
+
+
+def _integrity(facts: Facts) -> Gate:
+    title = "The ledger says what was found"
+    if facts.discrepancies is None:
+        return Gate("integrity", title, True, "not audited in this run (`avow audit` does)")
+    serious = [d for d in facts.discrepancies if d.serious]
+    if not serious:
+        return Gate("integrity", title, True, "every digest was computed again and agrees")
+    reason = f"{_count(len(serious), 'discrepancy', 'discrepancies')}; first: {serious[0].text}"
+    return Gate("integrity", title, False, reason, tuple(d.subject for d in serious))
+
+
+def _findings(facts: Facts, findings: Sequence[Handled], obligations: Sequence[ObligationView]) -> Iterable[Gate]:
+    if facts.expected is not None:
+        absent = [f for f in findings if f.how == "expected" and not f.obligations]
+        listed = {name for f in findings for name in f.obligations}
+        extra = [
+            v.id for v in obligations if v.status in FINDINGS and v.id not in listed and not is_advice(v.obligation)
+        ]
+        reasons = [
+            f"expected but not there: {f.pattern} {f.verdict}{f' by {f.method}' if f.method else ''}" for f in absent
+        ]
+        reasons += [f"there but not expected: {short(name)}" for name in extra]
+        good = f"exactly the {_count(sum(f.how == 'expected' for f in findings), 'expected finding')}"
+        yield Gate(
+            "expected",
+            "The findings are the expected ones, all of them and no others",
+            not reasons,
+            "; ".join(reasons) or good,
+            (*(f.pattern for f in absent), *extra),
+        )
+    accepted = [f for f in findings if f.how == "accepted"]
+    expired = [f for f in accepted if f.expired]
+    if accepted:
+        reason = "; ".join(f"{f.pattern} ({f.verdict}) was accepted by {f.who} until {_until(f)}" for f in expired)
+        title = "Accepted risks have not expired"
+        names = tuple(name for f in expired for name in f.obligations)
+        yield Gate("accepted", title, not expired, reason or _count(len(accepted), "accepted risk"), names)
+
+
+def _until(finding: Handled) -> str:
+    return finding.expires or f"a year after {finding.date or 'no date'}"
+
+
+def _nothing_wrong(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Gate:
+    wrong = [v for v in obligations if v.status in FINDINGS and not is_advice(v.obligation)]
+    return _gate(
+        facts,
+        "refuted",
+        "Nothing is refuted, contradictory or vacuous",
+        wrong,
+        excused,
+        lambda view: view.status.value,
+        "no claim is refuted, contradicted or held up by a vacuous pass",
+    )
+
+
+def _kind(
+    facts: Facts,
+    obligations: Sequence[ObligationView],
+    excused: set[str],
+    kind: Kind,
+    title: str,
+    good: Sequence[Status],
+) -> Gate:
+    of_kind = [v for v in obligations if v.obligation.kind is kind and not is_advice(v.obligation)]
+    failing = [v for v in of_kind if good and v.status not in good]
+    return _gate(
+        facts,
+        kind.value,
+        title,
+        failing,
+        excused,
+        lambda view: view.status.value,
+        f"{len(of_kind)} of {len(of_kind)} hold",
+    )
+
+
+def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Iterable[Gate]:
+    for criticality, demand in facts.policy.guarantees:
+        of_kind = [
+            v for v in obligations if v.obligation.kind is Kind.GUARANTEE and _criticality(v, facts) == criticality
+        ]
+        if not of_kind:
+            continue
+        lacking = {v.id: shortfall(v, demand, facts.policy, facts.today) for v in of_kind}
+        failing = [v for v in of_kind if lacking[v.id]]
+        yield _gate(
+            facts,
+            f"guarantees-{criticality}",
+            f"Guarantees of {criticality} criticality: {demand.text()}",
+            failing,
+            excused,
+            lambda view, lacking=lacking: lacking[view.id] or "",  # type: ignore[misc]
+            f"{len(of_kind)} of {len(of_kind)} meet it",
+        )
+
+
+def _criticality(view: ObligationView, facts: Facts) -> str:
+    known = dict(facts.policy.guarantees)
+    return view.criticality if view.criticality in known else "high"
+
+
+def _derivations(
+    facts: Facts, derivations: Sequence[DerivationView], views: Mapping[str, ObligationView], excused: set[str]
+) -> Gate:
+    wanted = bool(facts.policy.composition)
+    failing = [d for d in derivations if wanted and not d.status.supports]
+    bad = [d for d in failing if not _all_excused(d.below, excused)]
+    names = tuple(derivation_claim(d.derivation.name) for d in bad)
+    let_off = tuple(derivation_claim(d.derivation.name) for d in failing if d not in bad)
+    reason = "; ".join(f"{d.derivation.name} is {d.status}: {_because(d.below)}" for d in bad[:5])
+    return Gate(
+        "derivations",
+        "Derivations rest on what is shown",
+        not bad,
+        reason or f"{len(derivations)} of {len(derivations)} do" + (f" ({len(let_off)} excused)" if let_off else ""),
+        names,
+        (),
+        let_off,
+        bool(bad) and all(_tool_only(d.below, views) for d in bad),
+    )
+
+
+def _requirements(
+    facts: Facts, requirements: Sequence[RequirementView], views: Mapping[str, ObligationView], excused: set[str]
+) -> Gate:
+    good = facts.policy.requirements
+    failing = [r for r in requirements if good and r.status not in good]
+    bad = [r for r in failing if not _all_excused(r.below, excused)]
+    let_off = tuple(requirement_claim(r.id) for r in failing if r not in bad)
+    reason = "; ".join(f"{r.id} is {r.status}{f': {_because(r.below)}' if r.below else ''}" for r in bad[:5])
+    suggestions = {s.text: s for r in bad for name in r.below if name in views for s in _suggestion(views[name])}
+    return Gate(
+        "requirements",
+        "Every requirement is answered",
+        not bad,
+        reason or f"{len(requirements)} of {len(requirements)} are" + (f" ({len(let_off)} excused)" if let_off else ""),
+        tuple(requirement_claim(r.id) for r in bad),
+        tuple(suggestions.values())[:10],
+        let_off,
+        bool(bad) and all(_tool_only(r.below, views) for r in bad),
+    )
+
+
+def _certified(facts: Facts, grade: Grade) -> Iterable[Gate]:
+    if facts.policy.certified:
+        done = grade is Grade.CERTIFIED
+        reason = "every answer is of this run, every digest verified" if done else "run `avow verify --fresh`"
+        yield Gate("certified", "Every answer is fresh and every digest verified", done, reason)
+
+
+def _gate(
+    facts: Facts,
+    name: str,
+    title: str,
+    failing: Sequence[ObligationView],
+    excused: set[str],
+    why: Callable[[ObligationView], str],
+    good: str,
+) -> Gate:
+    bad = [view for view in failing if view.id not in excused]
+    let_off = tuple(view.id for view in failing if view.id in excused)
+    shown = "; ".join(f"{short(view.id)}: {why(view)}" for view in bad[:5])
+    more = f"; and {len(bad) - 5} more" if len(bad) > 5 else ""
+    if bad:
+        reason = shown + more
+    elif let_off:
+        reason = f"{_count(len(let_off), 'finding')} excused by the plan; nothing else"
+    else:
+        reason = good
+    suggestions = {s.text: s for view in bad for s in _suggestion(view)}
+    return Gate(
+        name,
+        title,
+        not bad,
+        reason,
+        tuple(view.id for view in bad),
+        tuple(sorted(suggestions.values(), key=lambda s: (s.cost, s.text)))[:10],
+        let_off,
+        bool(bad) and all(view.status in _TOOL for view in bad),
+    )
+
+
+def _suggestion(view: ObligationView) -> tuple[Suggestion, ...]:
+    return (view.suggestion,) if view.suggestion else ()
+
+
+def suggestion_for(view: ObligationView, facts: Facts, today: date) -> Suggestion | None:
+    """The cheapest step that would close an obligation's gap; None where there is no gap."""
+    lacking: str | None
+    if view.obligation.kind is Kind.GUARANTEE:
+        demand = facts.policy.demand(view.criticality)
+        lacking = shortfall(view, demand, facts.policy, today)
+    else:
+        demand = None
+        lacking = None if view.status.supports or is_advice(view.obligation) else view.status.value
+    return suggest(view, demand, facts) if lacking else None
+
+
+def _all_excused(below: Sequence[str], excused: set[str]) -> bool:
+    return bool(below) and all(name in excused for name in below)
+
+
+def _tool_only(below: Sequence[str], views: Mapping[str, ObligationView]) -> bool:
+    return bool(below) and all(name in views and views[name].status in _TOOL for name in below)
+
+
+def _because(below: Sequence[str]) -> str:
+    names = ", ".join(short(name) for name in below[:4]) + (f" and {len(below) - 4} more" if len(below) > 4 else "")
+    return f"it rests on {names}" if below else "its own evidence is lacking"
+
+
+def _count(number: int, one: str, many: str | None = None) -> str:
+    return f"{number} {one if number == 1 else many or one + 's'}"

@@ -1,0 +1,295 @@
+"""The policy: what each kind of claim needs before it may be relied upon (plan.yaml, section ``policy``).
+
+    policy: sil3                                            a profile's name
+    policy:
+      profile: default                                      where to start from (``default`` if left out)
+      guarantees: {high: {one_of: [proved], methods: 2, independent: true}}        replaces that criticality's demand
+      sanity: [proved]        composition: […]        requirements: […]
+      reviewers: [A. Person]  who may review; without it, anybody
+      certified: true         every answer must be of this run, every digest verified
+
+Profiles are data (`profiles.yaml`, beside this module). Errors are located diagnostics with codes POLICY001 to 005.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import yaml
+
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.evidence.status import Status
+from avow.system.plan import Located
+from avow.verdict import Link
+
+CRITICALITIES = ("high", "medium", "low")
+_GIVEN = tuple(s.value for s in Status if s.supports)
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """What a guarantee of one criticality needs. Empty `one_of`: any status, even none at all."""
+
+    one_of: tuple[Status, ...] = ()
+    methods: int = 1
+    independent: bool = False
+    max_age_days: tuple[tuple[str, int], ...] = ()
+    """(status word or ``all``, days)."""
+    reviewers: int = 1
+    links: tuple[Link, ...] = ()
+    """Empty: any."""
+    unconditional: bool = False
+
+    def max_age(self, status: Status) -> int | None:
+        ages = dict(self.max_age_days)
+        return ages.get(status.value, ages.get("all"))
+
+    def text(self) -> str:
+        """The demand as a phrase: ``proved or checked, by 2 independent methods``."""
+        if not self.one_of:
+            return "nothing is asked"
+        parts = [" or ".join(self.one_of)]
+        if self.methods > 1:
+            parts.append(f"by {self.methods} {'independent ' if self.independent else ''}methods")
+        if self.links:
+            parts.append(f"link {' or '.join(self.links)}")
+        if self.unconditional:
+            parts.append("without hypotheses")
+        if self.reviewers > 1:
+            parts.append(f"reviews by {self.reviewers} persons")
+        parts += [f"{word} not older than {days} days" for word, days in self.max_age_days]
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Policy:
+    """A whole policy. The tuples of statuses name what is good enough; an empty one asks for nothing."""
+
+    name: str
+    title: str
+    about: str
+    guarantees: tuple[tuple[str, Demand], ...]
+    sanity: tuple[Status, ...]
+    composition: tuple[Status, ...]
+    requirements: tuple[Status, ...]
+    reviewers: tuple[str, ...] = ()
+    certified: bool = False
+
+    def demand(self, criticality: str) -> Demand:
+        """The demand for a criticality; an unknown one is treated as the highest."""
+        demands = dict(self.guarantees)
+        return demands.get(criticality, demands[CRITICALITIES[0]])
+
+
+@dataclass(frozen=True, slots=True)
+class Technique:
+    """A row of the guidance table: a technique, how it shows here, and (profile, recommendation) pairs."""
+
+    name: str
+    verdict: str
+    levels: tuple[tuple[str, str], ...]
+
+
+def profile(name: str) -> Policy:
+    """A ready policy. Raises KeyError."""
+    return _data()[0][name]
+
+
+def profile_names() -> tuple[str, ...]:
+    return tuple(_data()[0])
+
+
+def costs() -> Mapping[str, int]:
+    """How dear a method is by the verdict that it can give: an order, not an amount."""
+    return _data()[1]
+
+
+def techniques() -> tuple[Technique, ...]:
+    """The guidance table: techniques recommended by level."""
+    return _data()[2]
+
+
+def read_policy(located: Located) -> Policy:
+    """The policy that a plan's ``policy:`` section means; none means ``default``. Raises Rejected with all faults."""
+    match located.data:
+        case None | {} if not located.data:
+            return profile("default")
+        case str(name):
+            found, faults = _profile(name, located.at())
+        case Mapping():
+            found, faults = _rules(located)
+        case _:
+            fault = "policy is a profile's name or a mapping of rules"
+            found, faults = profile("default"), [Diagnostic("POLICY002", fault, located.at())]
+    if faults:
+        raise Rejected(*faults)
+    return found
+
+
+def _profile(name: str, span: Span) -> tuple[Policy, list[Diagnostic]]:
+    if name in _data()[0]:
+        return profile(name), []
+    fault = Diagnostic("POLICY001", f"there is no policy profile '{name}'", span, hint=_near(name, profile_names()))
+    return profile("default"), [fault]
+
+
+_KEYS = ("profile", "guarantees", "sanity", "composition", "requirements", "reviewers", "certified")
+_DEMAND_KEYS = ("one_of", "methods", "independent", "max_age_days", "reviewers", "links", "unconditional")
+
+
+def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
+    data: Mapping[str, Any] = located.data
+    faults = _unknown(data, _KEYS, located, ())
+    base, wrong = (
+        _profile(str(data["profile"]), located.at("profile")) if "profile" in data else (profile("default"), [])
+    )
+    faults += wrong
+    reader = _Reader(located, faults)
+    policy = replace(base, name=f"{base.name}, with the plan's own rules" if set(data) - {"profile"} else base.name)
+    for key in data:
+        if key in ("sanity", "composition", "requirements"):
+            good = reader.statuses(data[key], (key,))
+            match key:
+                case "sanity":
+                    policy = replace(policy, sanity=good)
+                case "composition":
+                    policy = replace(policy, composition=good)
+                case "requirements":
+                    policy = replace(policy, requirements=good)
+    if "reviewers" in data:
+        policy = replace(policy, reviewers=reader.texts(data["reviewers"], ("reviewers",)))
+    if "certified" in data:
+        policy = replace(policy, certified=reader.flag(data["certified"], ("certified",)))
+    if "guarantees" in data:
+        policy = replace(policy, guarantees=_demands(policy, data["guarantees"], reader))
+    return policy, faults
+
+
+def _demands(base: Policy, data: object, reader: _Reader) -> tuple[tuple[str, Demand], ...]:
+    demands = dict(base.guarantees)
+    if not isinstance(data, Mapping):
+        reader.fault("guarantees maps a criticality to what it needs", ("guarantees",))
+        return base.guarantees
+    reader.faults += _unknown(data, CRITICALITIES, reader.located, ("guarantees",))
+    for criticality in CRITICALITIES:
+        if criticality in data:
+            demands[criticality] = reader.demand(data[criticality], ("guarantees", criticality))
+    return tuple(demands.items())
+
+
+class _Reader:
+    """Reads plain data, collecting located faults."""
+
+    def __init__(self, located: Located, faults: list[Diagnostic]) -> None:
+        self.located = located
+        self.faults = faults
+
+    def fault(self, message: str, path: tuple[str | int, ...], hint: str | None = None) -> None:
+        where = ".".join(map(str, ("policy", *path)))
+        self.faults.append(Diagnostic("POLICY002", f"{where}: {message}", self.located.at(*path), hint=hint))
+
+    def demand(self, data: object, path: tuple[str | int, ...]) -> Demand:
+        if not isinstance(data, Mapping):
+            self.fault(f"a demand is a mapping with keys out of {', '.join(_DEMAND_KEYS)}", path)
+            return Demand()
+        self.faults += _unknown(data, _DEMAND_KEYS, self.located, path)
+        return Demand(
+            one_of=self.statuses(data.get("one_of", ()), (*path, "one_of")),
+            methods=self.count(data.get("methods", 1), (*path, "methods")),
+            independent=self.flag(data.get("independent", False), (*path, "independent")),
+            max_age_days=self.ages(data.get("max_age_days", {}), (*path, "max_age_days")),
+            reviewers=self.count(data.get("reviewers", 1), (*path, "reviewers")),
+            links=tuple(Link(word) for word in self.words(data.get("links", ()), tuple(Link), (*path, "links"))),
+            unconditional=self.flag(data.get("unconditional", False), (*path, "unconditional")),
+        )
+
+    def statuses(self, data: object, path: tuple[str | int, ...]) -> tuple[Status, ...]:
+        return tuple(Status(word) for word in self.words(data, _GIVEN, path))
+
+    def words(self, data: object, allowed: tuple[str, ...], path: tuple[str | int, ...]) -> tuple[str, ...]:
+        good = []
+        for at, word in enumerate(self.texts(data, path)):
+            if word in allowed:
+                good.append(word)
+            else:
+                self.fault(f"'{word}' is none of {', '.join(allowed)}", (*path, at), _near(word, allowed))
+        return tuple(good)
+
+    def texts(self, data: object, path: tuple[str | int, ...]) -> tuple[str, ...]:
+        items = [data] if isinstance(data, str) else data
+        if not isinstance(items, list | tuple) or not all(isinstance(item, str) for item in items):
+            self.fault("a list of words is wanted", path)
+            return ()
+        return tuple(items)
+
+    def count(self, data: object, path: tuple[str | int, ...]) -> int:
+        if isinstance(data, bool) or not isinstance(data, int) or not 0 <= data <= 100_000:
+            self.fault("a whole number, 0 or more, is wanted", path)
+            return 1
+        return data
+
+    def flag(self, data: object, path: tuple[str | int, ...]) -> bool:
+        if not isinstance(data, bool):
+            self.fault("true or false is wanted", path)
+            return False
+        return data
+
+    def ages(self, data: object, path: tuple[str | int, ...]) -> tuple[tuple[str, int], ...]:
+        if not isinstance(data, Mapping):
+            return (("all", self.count(data, path)),)
+        self.faults += _unknown(data, (*_GIVEN, "all"), self.located, path)
+        return tuple((str(word), self.count(days, (*path, word))) for word, days in data.items())
+
+
+def _unknown(
+    data: Mapping[Any, Any], allowed: Iterable[str], located: Located, path: tuple[str | int, ...]
+) -> list[Diagnostic]:
+    known = tuple(allowed)
+    return [
+        Diagnostic(
+            "POLICY003",
+            f"{'.'.join(map(str, ('policy', *path)))}: unknown key '{key}'; known: {', '.join(known)}",
+            located.at(*path, key),
+            hint=_near(str(key), known),
+        )
+        for key in data
+        if key not in known
+    ]
+
+
+def _near(word: str, known: Iterable[str]) -> str | None:
+    found = difflib.get_close_matches(word, list(known), n=1)
+    return f"did you mean '{found[0]}'?" if found else f"known: {', '.join(known)}"
+
+
+@cache
+def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
+    text = resources.files("avow.assurance").joinpath("profiles.yaml").read_text(encoding="utf-8")
+    data = yaml.safe_load(text)
+    faults: list[Diagnostic] = []
+    policies = {}
+    for name, raw in data["profiles"].items():
+        reader = _Reader(Located(raw, Span("profiles.yaml", 1, 1, 1, 1)), faults)
+        policies[name] = Policy(
+            name=name,
+            title=raw["title"],
+            about=raw["about"].strip(),
+            guarantees=tuple((c, reader.demand(raw["guarantees"][c], ("guarantees", c))) for c in CRITICALITIES),
+            sanity=reader.statuses(raw["sanity"], ("sanity",)),
+            composition=reader.statuses(raw["composition"], ("composition",)),
+            requirements=reader.statuses(raw["requirements"], ("requirements",)),
+            certified=raw.get("certified", False),
+        )
+    if faults:
+        raise Rejected(*faults)
+    levels = ("sil1", "sil2", "sil3", "sil4")
+    table = tuple(
+        Technique(row["name"], row["verdict"], tuple((level, row[level]) for level in levels))
+        for row in data["techniques"]
+    )
+    return policies, data["cost"], table

@@ -1,0 +1,171 @@
+"""The parts of a case that warn the reader: open items, limits, and what is not shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from avow.assurance.facts import Facts
+from avow.assurance.model import DerivationView, Handled, ObligationView, OpenItem, RequirementView
+from avow.assurance.naming import derivation_claim, is_advice, requirement_claim, short
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status, weigh
+from avow.verdict import Link, Verdict
+
+_WORST_FIRST = (
+    Status.CONTRADICTORY,
+    Status.REFUTED,
+    Status.CIRCULAR,
+    Status.VACUOUS,
+    Status.ERROR,
+    Status.UNKNOWN,
+    Status.NOT_RUN,
+    Status.STALE,
+    Status.MISSING,
+)
+
+
+def open_items(
+    facts: Facts,
+    views: Sequence[ObligationView],
+    requirements: Sequence[RequirementView],
+    derivations: Sequence[DerivationView],
+    findings: Sequence[Handled],
+) -> tuple[OpenItem, ...]:
+    """Everything that a reader must know before believing the rest, worst first."""
+    items = [OpenItem("discrepancy", d.subject, d.text, advice=not d.serious) for d in facts.discrepancies or ()]
+    for status in _WORST_FIRST:
+        items += [_open(view) for view in views if view.status is status and not is_advice(view.obligation)]
+    items += [_vacuous(view) for view in views if view.status is not Status.VACUOUS and _has_vacuous(view)]
+    for d in derivations:
+        if not d.status.supports and not d.below:
+            text = f"the derivation is {d.status}: a premise or a side condition stands for nothing"
+            items.append(OpenItem(d.status.value, derivation_claim(d.derivation.name), text))
+    for r in requirements:
+        if not r.status.supports and not r.below:
+            items.append(OpenItem(r.status.value, requirement_claim(r.id), r.answer))
+    for f in findings:
+        if f.expired:
+            until = f.expires or f"a year after {f.date or 'no date'}"
+            items.append(OpenItem("expired", f.pattern, f"accepted by {f.who} until {until}: {f.reason}"))
+        elif f.how == "accepted" and not f.obligations:
+            items.append(
+                OpenItem("unused", f.pattern, f"accepted as {f.verdict}, but nothing is so: remove it", advice=True)
+            )
+    items += [
+        OpenItem("advice", view.id, f"{view.obligation.claim}: {_summary(view)}", advice=True, handled=view.handled)
+        for view in views
+        if is_advice(view.obligation) and view.status is Status.REFUTED
+    ]
+    return tuple(items)
+
+
+def _open(view: ObligationView) -> OpenItem:
+    suggestion = view.suggestion.text if view.suggestion else ""
+    return OpenItem(view.status.value, view.id, _summary(view) or view.obligation.claim, suggestion, view.handled)
+
+
+def _summary(view: ObligationView) -> str:
+    """The most telling evidence in a line: a refutation's counterexample, else the last attempt's summary."""
+    refuting = [v.entry.evidence for v in view.counting if weigh(v.entry.evidence).refuted]
+    if refuting:
+        record = refuting[-1]
+        example = record.counterexample.text() if record.counterexample else ""
+        return f"{record.method}: {example or record.summary}"
+    if view.counting:
+        record = view.counting[-1].entry.evidence
+        return f"{record.method}: {record.summary}"
+    if view.evidence:
+        record = view.evidence[-1].entry.evidence
+        return f"was {record.verdict} by {record.method} on {record.started[:10]}; what it rests on has changed since"
+    return "no method is planned for it" if not view.planned else "its methods have not run"
+
+
+def _has_vacuous(view: ObligationView) -> bool:
+    return any(v.entry.evidence.vacuous and v.entry.evidence.verdict.supports for v in view.counting)
+
+
+def _vacuous(view: ObligationView) -> OpenItem:
+    methods = ", ".join(v.entry.evidence.method for v in view.counting if v.entry.evidence.vacuous)
+    return OpenItem(
+        "vacuous", view.id, f"{methods} passed without its trigger ever being met: that supports nothing", advice=True
+    )
+
+
+def limits(facts: Facts, views: Sequence[ObligationView]) -> tuple[tuple[str, str], ...]:
+    """What bounds the answers: for reproduction, and for judging what a bounded answer is worth."""
+    found = list(facts.run.limits.items())
+    for view in views:
+        for v in view.counting:
+            record = v.entry.evidence
+            if record.bound:
+                text = ", ".join(f"{name} = {value}" for name, value in record.bound.items())
+                found.append((f"{view.obligation.node}: {record.method}", text))
+    return tuple(dict.fromkeys(found))
+
+
+def not_shown(
+    facts: Facts, views: Sequence[ObligationView], requirements: Sequence[RequirementView]
+) -> tuple[str, ...]:
+    """What nobody should read into this case."""
+    lines = []
+    prose = [r.id for r in requirements if not r.formula and not r.temporal]
+    if prose:
+        lines.append(
+            f"{_list(prose)}: stated in prose. That the guarantees named amount to the requirement is a person's "
+            "judgement; no tool has checked it."
+        )
+    bounded = [short(v.id) for v in views if v.obligation.kind is Kind.GUARANTEE and v.status is Status.CHECKED]
+    if bounded:
+        lines.append(
+            f"{_list(bounded)}: checked exhaustively, but only within the finite scenario; nothing is said outside it."
+        )
+    sampled = [
+        short(v.id)
+        for v in views
+        if v.obligation.kind is Kind.GUARANTEE and v.status in (Status.TESTED, Status.MONITORED)
+    ]
+    if sampled:
+        lines.append(f"{_list(sampled)}: observed on samples; other inputs and other runs may behave otherwise.")
+    person = [
+        short(v.id)
+        for v in views
+        if v.obligation.kind is Kind.GUARANTEE and v.status in (Status.REVIEWED, Status.JUSTIFIED)
+    ]
+    if person:
+        lines.append(f"{_list(person)}: rests on a person's word alone.")
+    linked = [
+        short(v.id)
+        for v in views
+        if v.obligation.kind is Kind.GUARANTEE and v.status.supports and v.link in (Link.MAPPED, Link.GUIDED)
+    ]
+    if linked:
+        lines.append(
+            f"{_list(linked)}: what was verified is tied to the formula by a table or a judgement of a person, "
+            "not by translation; that the tie is right is not shown."
+        )
+    trusted = [e.port for e in facts.environment if e.assume]
+    if trusted:
+        lines.append(
+            f"{_list(trusted)}: what is assumed of these environment inputs is believed for a reason, not shown."
+        )
+    models = sorted(
+        {m.title for m in facts.methods if m.strength in (Verdict.PROVED, Verdict.CHECKED) and _used(m.name, views)}
+    )
+    if models:
+        lines.append(
+            "A proof or check is about the program or model that it was given; that the deployed software is that "
+            "program, on that hardware, is not shown."
+        )
+    lines.append("Timing, lost or reordered messages, and failures of hardware are outside of contracts over one step.")
+    lines.append(
+        "That the contracts say what was meant, and that the requirements are the right ones, is for people to judge."
+    )
+    return tuple(lines)
+
+
+def _used(backend: str, views: Sequence[ObligationView]) -> bool:
+    return any(v.entry.evidence.backend == backend for view in views for v in view.counting)
+
+
+def _list(names: Sequence[str]) -> str:
+    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")

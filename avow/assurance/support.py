@@ -1,0 +1,137 @@
+"""Who rests on whom: the claims of a case as `Claim`s, from names in the plan and premises of the calculus."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from avow.assurance.facts import Facts
+from avow.assurance.naming import derivation_claim, is_foundation, requirement_claim, sanity_property
+from avow.evidence.claims import Claim
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
+from avow.evidence.status import Status
+from avow.system.plan import Requirement
+from avow.verdict import Link
+
+
+class Names:
+    """What the names that a plan or a backend uses stand for."""
+
+    def __init__(self, facts: Facts) -> None:
+        self.obligations = {o.id: o for o in facts.obligations}
+        self.local = {o.local_id: o.id for o in facts.obligations}
+        self.guarantees: dict[str, list[str]] = {node.name: [] for node in facts.nodes}
+        self.foundation: dict[str, list[str]] = {node.name: [] for node in facts.nodes}
+        self.vacuity: dict[str, list[str]] = {}
+        self.clause: dict[str, str] = {}
+        self.own: dict[str, list[str]] = {}
+        for o in facts.obligations:
+            if o.kind is Kind.GUARANTEE:
+                self.guarantees.setdefault(o.node, []).append(o.id)
+                self.clause[f"{o.node}.{o.name}"] = o.id
+            elif is_foundation(o):
+                self.foundation.setdefault(o.node, []).append(o.id)
+            elif o.kind is Kind.SANITY and sanity_property(o) == "vacuous":
+                for clause in o.clauses:
+                    self.vacuity.setdefault(clause, []).append(o.id)
+        self.requirements = {r.id for r in facts.requirements}
+        for o in facts.obligations:
+            if o.kind is Kind.REQUIREMENT:
+                for name in (r for r in self.requirements if _belongs(o.name, r)):
+                    self.own.setdefault(name, []).append(o.id)
+        self.derivations = {d.name for d in facts.derivations}
+
+    def claims(self, name: str) -> tuple[str, ...] | None:
+        """The claims that a name of the plan stands for; None where it stands for nothing."""
+        if name in self.derivations:
+            return (derivation_claim(name),)
+        if name in self.requirements:
+            return (requirement_claim(name),)
+        if name in self.clause:
+            return (self.clause[name],)
+        if name in self.guarantees:
+            return tuple(self.guarantees[name])
+        known = self.obligations.get(name)
+        if known is not None:
+            return (known.id,)
+        return (self.local[name],) if name in self.local else None
+
+    def every_guarantee(self) -> tuple[str, ...]:
+        return tuple(name for names in self.guarantees.values() for name in names)
+
+
+def _belongs(obligation: str, requirement: str) -> bool:
+    rest = obligation.removeprefix(requirement)
+    return obligation == requirement or (rest != obligation and not (rest[0].isalnum() or rest[0] == "_"))
+
+
+def obligation_claim(
+    obligation: Obligation, status: Status, hypotheses: Sequence[str], link: Link | None, names: Names
+) -> Claim:
+    """An obligation stands on its evidence; a guarantee also on its node's contract being worth verifying; and either
+    on those claims that its evidence names as hypotheses."""
+    rests: list[str] = []
+    if obligation.kind is Kind.GUARANTEE:
+        rests += names.foundation.get(obligation.node, [])
+        rests += names.vacuity.get(f"{obligation.node}.{obligation.name}", [])
+    elif obligation.kind is Kind.REQUIREMENT:
+        rests += [names.clause[clause] for clause in obligation.clauses if clause in names.clause]
+    open_hypotheses = []
+    for text in hypotheses:
+        claim = text if text in names.obligations else names.local.get(text)
+        if claim is None:
+            open_hypotheses.append(text)
+        else:
+            rests.append(claim)
+    return Claim(obligation.id, status, tuple(dict.fromkeys(rests)), tuple(open_hypotheses), link)
+
+
+def requirement_support(requirement: Requirement, names: Names) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The claims that a requirement rests on, and the names under `supported_by` that stand for nothing."""
+    rests: list[str] = list(names.own.get(requirement.id, ()))
+    unknown = []
+    for name in requirement.supported_by:
+        found = names.claims(name)
+        if found is None:
+            unknown.append(name)
+        else:
+            rests += found
+    formal = requirement.formula or requirement.temporal
+    if (
+        formal
+        and not requirement.supported_by
+        and not any(names.obligations[o].clauses for o in names.own.get(requirement.id, ()))
+    ):
+        # it was settled on the contracts; which of them, nobody said: then it rests on all
+        rests += names.every_guarantee()
+    return tuple(dict.fromkeys(rests)), tuple(unknown)
+
+
+def requirement_claim_of(requirement: Requirement, names: Names) -> Claim:
+    rests, unknown = requirement_support(requirement, names)
+    formal = bool(requirement.formula or requirement.temporal)
+    nothing = (formal and not names.own.get(requirement.id)) or unknown or not rests
+    return Claim(requirement_claim(requirement.id), Status.MISSING if nothing else None, rests, prose=not formal)
+
+
+def derivation_claims(facts: Facts, names: Names) -> Iterable[Claim]:
+    """A derivation rests on its side conditions, and on the guarantees of the nodes (or derivations) it combines."""
+    for derivation in facts.derivations:
+        rests: list[str] = [condition.obligation for condition in derivation.side_conditions if condition.obligation]
+        lost = False
+        for premise in derivation.premises:
+            found = names.claims(premise)
+            rests += found or ()
+            lost = lost or found is None
+        own = Status.MISSING if lost or not rests else None
+        yield Claim(derivation_claim(derivation.name), own, tuple(dict.fromkeys(rests)), derivation.conditional)
+
+
+def criticality(obligation: Obligation, facts: Facts) -> str:
+    """The node's; what belongs to no single node is as critical as the most critical of them."""
+    known: Mapping[str, str] = {node.name: node.criticality for node in facts.nodes}
+    if obligation.node in known:
+        return known[obligation.node]
+    order = ("high", "medium", "low")
+    present = set(known.values())
+    highest = next((level for level in order if level in present), "medium")
+    return highest if obligation.node == SYSTEM_LEVEL else "medium"

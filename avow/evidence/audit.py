@@ -1,0 +1,148 @@
+"""The audit: everything that the ledger refers to is digested again, and each discrepancy is named.
+
+A file is compared with what the *newest* record that left or read it says: an older run's file at the same path has
+been replaced by rights, and its record is history. Whether an answer would come out the same is not asked here (that
+is ``avow verify --fresh``); whether it is the answer that was given, to the question that is said, is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from avow.evidence.ledger import Damage, Entry
+from avow.evidence.status import effective
+from avow.files import digest_file
+from avow.verdict import Verdict
+
+
+class Fault(StrEnum):
+    """The kinds of discrepancy between the ledger and the world."""
+
+    LEDGER = "ledger"
+    """A line of the ledger was edited, removed, inserted or cannot be read."""
+    CHANGED = "changed"
+    """A file that an attempt left behind is not the file that it was."""
+    GONE = "gone"
+    """A file that an attempt left behind is no longer there."""
+    MISPLACED = "misplaced"
+    """A record points at another obligation, method or system than its key belongs to."""
+    IMPOSSIBLE = "impossible"
+    """A record says what its method cannot say."""
+    OUTDATED = "outdated"
+    """An input has changed since: not tampering, but the evidence is stale."""
+    SIGNATURE = "signature"
+    """The ledger does not match its signature."""
+
+
+@dataclass(frozen=True, slots=True)
+class Discrepancy:
+    """One thing that the audit found. `serious` ones fail the integrity gate."""
+
+    fault: Fault
+    subject: str
+    """The path, ledger line or obligation that it is about."""
+    text: str
+    serious: bool = True
+
+
+def audit(
+    records: Iterable[Entry],
+    damage: Iterable[Damage],
+    root: Path,
+    *,
+    system: str | None = None,
+    obligations: Mapping[str, str] | None = None,
+    keys: Mapping[tuple[str, str], str] | None = None,
+) -> tuple[Discrepancy, ...]:
+    """Every discrepancy, the ledger's own first. `root` is the workspace; `obligations` maps ids to digests as computed
+    now, and `keys` (obligation id, method) to the key as of now, where the caller knows them."""
+    entries = tuple(records)
+    found = [Discrepancy(Fault.LEDGER, f"line {d.line}", f"ledger line {d.line} {d.reason}") for d in damage]
+    found += _misplaced(entries, system, obligations or {}, keys or {})
+    found += _impossible(entries)
+    found += _files(entries, root, keys)
+    return tuple(dict.fromkeys(found))
+
+
+def _misplaced(
+    entries: tuple[Entry, ...],
+    system: str | None,
+    obligations: Mapping[str, str],
+    keys: Mapping[tuple[str, str], str],
+) -> Iterable[Discrepancy]:
+    owners: dict[str, tuple[str, str, str]] = {}
+    for entry in entries:
+        record = entry.evidence
+        where = f"record {entry.number + 1} ({record.obligation}, {record.method})"
+        if system is not None and record.obligation.partition("/")[0] != system:
+            yield Discrepancy(Fault.MISPLACED, record.obligation, f"{where} is of another system than {system}")
+        owner = (record.obligation, record.obligation_digest, record.method)
+        other = owners.setdefault(record.key, owner)
+        if other != owner:
+            text = f"{where} carries the key of {other[0]}, {other[2]}: it answers another question than it says"
+            yield Discrepancy(Fault.MISPLACED, record.obligation, text)
+        now = obligations.get(record.obligation)
+        is_current = keys.get((record.obligation, record.method)) == record.key
+        if is_current and now is not None and now != record.obligation_digest:
+            text = f"{where} has the key of today's claim but the digest of another claim"
+            yield Discrepancy(Fault.MISPLACED, record.obligation, text)
+
+
+def _impossible(entries: tuple[Entry, ...]) -> Iterable[Discrepancy]:
+    for entry in entries:
+        record = entry.evidence
+        counts_as = effective(record)
+        if counts_as is not record.verdict:
+            text = (
+                f"record {entry.number + 1} says '{record.verdict}', but its method ({record.method}) can show no more "
+                f"than '{record.strength}': it counts as '{counts_as}'"
+            )
+            yield Discrepancy(Fault.IMPOSSIBLE, record.obligation, text)
+        if record.verdict is Verdict.PROVED and record.vacuous:
+            text = f"record {entry.number + 1} is a proof whose trigger is never met: it supports nothing"
+            yield Discrepancy(Fault.IMPOSSIBLE, record.obligation, text, serious=False)
+
+
+def _files(entries: tuple[Entry, ...], root: Path, keys: Mapping[tuple[str, str], str] | None) -> Iterable[Discrepancy]:
+    left: dict[str, tuple[str, Entry]] = {}
+    read: dict[str, tuple[str, Entry]] = {}
+    newest: dict[tuple[str, str], str] = {}
+    for entry in entries:  # oldest first: the newest record has the last word
+        record = entry.evidence
+        newest[record.obligation, record.method] = record.key
+        for path, mark in record.outputs.items():
+            left[path] = (mark, entry)
+        for path, mark in record.inputs.items():
+            read[path] = (mark, entry)
+    relied_upon = newest if keys is None else keys
+
+    def serious(entry: Entry) -> bool:
+        """Only what a status rests on today can be undermined: files of past attempts may be cleaned away."""
+        return relied_upon.get((entry.evidence.obligation, entry.evidence.method)) == entry.evidence.key
+
+    for path, (mark, entry) in left.items():
+        yield from _compare(root, path, mark, entry, made=True, serious=serious(entry))
+    for path, (mark, entry) in read.items():
+        if path not in left:
+            yield from _compare(root, path, mark, entry, made=False, serious=False)
+
+
+def _compare(root: Path, path: str, mark: str, entry: Entry, *, made: bool, serious: bool) -> Iterable[Discrepancy]:
+    behind = f"{path} (record {entry.number + 1}: {entry.evidence.obligation}, {entry.evidence.method})"
+    try:
+        now = digest_file(root / path)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        yield Discrepancy(Fault.GONE if made else Fault.OUTDATED, path, f"{behind} cannot be read: {reason}", serious)
+        return
+    if now == mark:
+        return
+    if made:
+        text = f"{behind} was changed after the record was written: SHA-256 {now[:12]}…, recorded {mark[:12]}…"
+        yield Discrepancy(Fault.CHANGED, path, text, serious)
+    else:
+        text = f"{behind} has changed since: the evidence is stale"
+        yield Discrepancy(Fault.OUTDATED, path, text, serious)
