@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from avow.language.sorts import (
     DataSort,
@@ -43,11 +43,9 @@ from avow.language.terms import (
     children,
 )
 from avow.logic import values
+from avow.logic.clausal import Part
 from avow.logic.evaluate import Code, Compiler, Env, NotEvaluable
 from avow.logic.values import Data, FunctionValue
-
-if TYPE_CHECKING:
-    from avow.logic.saferange import Part
 
 _LIMIT = 2_000
 """More representatives than this for one variable are refused: the search would be too slow to be of use."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import product
-from typing import TYPE_CHECKING
 
 from avow.language.sorts import RealSort
 from avow.language.terms import (
@@ -25,12 +24,10 @@ from avow.language.terms import (
     Term,
     Variable,
 )
+from avow.logic.clausal import Part, conjunction
 from avow.logic.evaluate import Code, Compiler, Env, NotEvaluable
 from avow.logic.linear import Constraint, Linear, TooMany, satisfy
 from avow.logic.renaming import bound_names
-
-if TYPE_CHECKING:
-    from avow.logic.saferange import Part
 
 Alternatives = Callable[[Env], list[tuple[Constraint, ...]]]
 """The formula as a disjunction of systems, given the other variables' values."""
@@ -88,7 +85,7 @@ def _formula(compiler: Compiler, term: Term, positive: bool, unknown: frozenset[
 
 def _for_all(compiler: Compiler, term: Quantified, positive: bool, unknown: frozenset[str]) -> Alternatives | None:
     """No assignment makes the body `positive`: the parts without unknowns say which assignments could."""
-    from avow.logic.saferange import Plan, conjunction
+    from avow.logic.saferange import Plan
 
     parts, inner = conjunction(term.body, positive)
     variables = (*term.variables, *inner)

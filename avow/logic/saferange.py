@@ -14,17 +14,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from avow.language.sorts import BOOL, BoolSort, FunctionSort, IntegerSort, NaturalSort
+from avow.language.sorts import BoolSort, IntegerSort, NaturalSort
 from avow.language.terms import (
-    And,
     Apply,
     Compare,
-    Iff,
-    Implies,
     In,
-    Literal,
     Not,
-    Or,
     Quantified,
     Quantifier,
     SequenceRange,
@@ -33,8 +28,8 @@ from avow.language.terms import (
     Term,
     Variable,
     Widen,
-    children,
 )
+from avow.logic.clausal import Part, alternatives, branches, conjunction, occurring, relations
 from avow.logic.evaluate import (
     ENUMERATION_LIMIT,
     Code,
@@ -59,15 +54,6 @@ class Unrestricted(NotEvaluable):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """A formula that has to be true, or false."""
-
-    term: Term
-    positive: bool
-    names: frozenset[str]
-
-
-@dataclass(frozen=True, slots=True)
 class Step:
     """Binds `binds` to each value that can satisfy one part; lower ranks yield fewer candidates."""
 
@@ -85,11 +71,11 @@ class Search:
         self._compiler = compiler
         self._unique = unique
         self._slots = tuple(compiler.bind(v) for v in variables)
-        self._branches = tuple(_branches(body, positive, tuple(variables)))
+        self._branches = tuple(branches(body, positive, tuple(variables)))
         for _, inner in self._branches:
             for variable in inner:
                 compiler.bind(variable)
-        self._relations = tuple(sorted({compiler.slot(v) for v in _relations(body)}))
+        self._relations = tuple(sorted({compiler.slot(v) for v in relations(body)}))
         self._plans: dict[tuple[bool, ...], tuple[Plan, ...]] = {}
         self._fallbacks: dict[int, Plan] = {}
         self._plan(tuple(False for _ in self._relations))
@@ -260,7 +246,7 @@ class Plan:
 
     def _restrict(self, part: Part, unbound: set[str]) -> Step | None:
         term, positive = part.term, part.positive
-        options = _alternatives(term, positive)
+        options = alternatives(term, positive)
         if options is not None:
             return self._cover(options, unbound)
         match term:
@@ -288,7 +274,7 @@ class Plan:
             for variable in (*variables, *inner):
                 self._compiler.bind(variable)
             wanted = [Variable(v.role, v.name, v.sort) for v in (*variables, *inner)]
-            wanted += _occurring(parts, unbound)
+            wanted += occurring(parts, unbound)
             plan = Plan(self._compiler, parts, wanted, self._true, complete=False, depth=self._depth + 1)
             common &= plan.bound
             plans.append(plan)
@@ -476,87 +462,3 @@ def _is(term: Term, name: str) -> bool:
 
 def _truth(compiler: Compiler, part: Part) -> Code:
     return compiler.code(part.term if part.positive else Not(part.term))
-
-
-def _branches(
-    term: Term, positive: bool, variables: tuple[Variable, ...]
-) -> Iterator[tuple[list[Part], tuple[Variable, ...]]]:
-    parts, inner = conjunction(term, positive)
-    variables = (*variables, *inner)
-    options = _alternatives(parts[0].term, parts[0].positive) if len(parts) == 1 else None
-    if options is None:
-        yield parts, variables
-    else:
-        for option, truth in options:
-            yield from _branches(option, truth, variables)
-
-
-def conjunction(term: Term, positive: bool) -> tuple[list[Part], list[Variable]]:
-    """The conjunction that a formula is, and the variables of the existential quantifiers on the way to its parts."""
-    parts: list[Part] = []
-    variables: list[Variable] = []
-    stack = [(term, positive)]
-    while stack:
-        term, positive = stack.pop()
-        match term:
-            case Not(body=body):
-                stack.append((body, not positive))
-            case And(items=items) if positive:
-                stack.extend((item, True) for item in reversed(items))
-            case Or(items=items) if not positive:
-                stack.extend((item, False) for item in reversed(items))
-            case Implies(left=left, right=right) if not positive:
-                stack.extend(((right, False), (left, True)))
-            case Quantified(quantifier=Quantifier.EXISTS) if positive:
-                variables.extend(term.variables)
-                stack.append((term.body, True))
-            case Quantified(quantifier=Quantifier.FORALL) if not positive:
-                variables.extend(term.variables)
-                stack.append((term.body, False))
-            case Compare(operator="==" | "!=" as operator, left=left, right=Literal(value=bool() as value)):
-                stack.append((left, positive is ((operator == "==") is value)))
-            case Compare(operator="==" | "!=" as operator, left=Literal(value=bool() as value), right=right):
-                stack.append((right, positive is ((operator == "==") is value)))
-            case _:
-                parts.append(Part(term, positive, bound_names(term)))
-    return parts, variables
-
-
-def _alternatives(term: Term, positive: bool) -> tuple[tuple[Term, bool], ...] | None:
-    """The sides of a formula that is a disjunction."""
-    match term:
-        case Or(items=items) if positive:
-            return tuple((item, True) for item in items)
-        case And(items=items) if not positive:
-            return tuple((item, False) for item in items)
-        case Implies(left=left, right=right) if positive:
-            return ((left, False), (right, True))
-        case Compare(operator="==" | "!=" as operator) if term.left.sort == BOOL:
-            return _alternatives(Iff(term.left, term.right), positive is (operator == "=="))
-        case Iff(left=left, right=right):
-            if positive:
-                return ((And((left, right)), True), (And((Not(left), Not(right))), True))
-            return ((And((left, Not(right))), True), (And((Not(left), right)), True))
-        case _:
-            return None
-
-
-def _occurring(parts: Sequence[Part], unbound: set[str]) -> list[Variable]:
-    """The unbound variables that the parts mention."""
-    found: dict[str, Variable] = {}
-    stack: list[Term] = [part.term for part in parts]
-    while stack:
-        term = stack.pop()
-        if isinstance(term, Variable) and term.qualified in unbound:
-            found[term.name] = term
-        stack.extend(children(term))
-    return [found[name] for name in sorted(found)]
-
-
-def _relations(term: Term) -> Iterator[Variable]:
-    stack = [term]
-    while stack:
-        term = stack.pop()
-        if isinstance(term, Variable) and isinstance(term.sort, FunctionSort) and term.sort.result == BOOL:
-            yield term
-        stack.extend(children(term))
