@@ -165,22 +165,23 @@ def solve(
     timeout_ms: int = DEFAULT_TIMEOUT_MS,
     seed: int = 0,
     variables: Iterable[Variable] = (),
+    given: Mapping[Variable, Value] | None = None,
 ) -> Solution:
     """Can all formulas hold together? With labels, `unsat` names a minimal conflicting set of them.
 
-    `variables` are further variables whose values are wanted. Unsupported constructs, time-outs and models that cannot
-    be replayed are `unknown`, with the reason.
+    `variables` are further variables whose values are wanted; `given` fixes the values of some. Unsupported constructs,
+    time-outs and models that cannot be replayed are `unknown`, with the reason.
     """
     start = time.monotonic()
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
     free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
     try:
-        solution = _solve(Translator(), labelled, free, timeout_ms, seed)
+        solution = _solve(Translator(), labelled, free, given or {}, timeout_ms, seed)
     except Unsupported as error:
         solution = Solution("unknown", reason=f"Avow cannot express {error.what} for the solver")
     except z3.Z3Exception as error:
         solution = Solution("unknown", reason=f"Z3: {error}")
-    if solution.status == "unknown":
+    if solution.status == "unknown" and not given and timeout_ms >= _PATIENT_MS:
         solution = _second_opinion(labelled, timeout_ms) or solution
     return Solution(
         solution.status,
@@ -199,6 +200,7 @@ def entails(
     timeout_ms: int = DEFAULT_TIMEOUT_MS,
     seed: int = 0,
     variables: Iterable[Variable] = (),
+    given: Mapping[Variable, Value] | None = None,
 ) -> Entailment:
     """Do the hypotheses imply the goal, for all values of the free variables?"""
     labelled = (
@@ -207,7 +209,8 @@ def entails(
     denied = "the goal is false"
     while denied in labelled:
         denied += "!"
-    solution = solve({**labelled, denied: negation(goal)}, timeout_ms=timeout_ms, seed=seed, variables=variables)
+    asked = {**labelled, denied: negation(goal)}
+    solution = solve(asked, timeout_ms=timeout_ms, seed=seed, variables=variables, given=given)
     reason, engine, seconds = solution.reason, solution.engine, solution.seconds
     match solution.status:
         case "unsat":
@@ -245,16 +248,28 @@ _STAGES = (0.05, 0.25, 1.0)
 """Parts of the time allowed: a question is asked in short rounds of different methods before any gets long."""
 
 
+_PATIENT_MS = 5_000
+"""From this much time on, another solver is worth its start."""
+
+
 def _solve(
-    translator: Translator, labelled: Mapping[str, Term], free: frozenset[Variable], timeout_ms: int, seed: int
+    translator: Translator,
+    labelled: Mapping[str, Term],
+    free: frozenset[Variable],
+    given: Mapping[Variable, Value],
+    timeout_ms: int,
+    seed: int,
 ) -> Solution:
-    tracked = [(label, translator.term(formula)) for label, formula in labelled.items()]
-    background = translator.background(free)
+    fixed = {variable: translator.value(value, variable.sort) for variable, value in given.items()}
+    free = free - set(fixed)
+    tracked = [(label, translator.term(formula, fixed)) for label, formula in labelled.items()]
+    background = [*translator.background(free), *translator.opaque_facts()]
     ordinary = [v for v in free if not isinstance(v.sort, FunctionSort)]
     functions = [v for v in free if isinstance(v.sort, FunctionSort)]
 
     def build(meanings: Mapping[Variable, Meaning]) -> list[Expr]:
-        return [translator.term(formula, meanings) for formula in labelled.values()]
+        parts = [translator.term(formula, {**fixed, **meanings}) for formula in labelled.values()]
+        return [*translator.opaque_facts(), *parts]
 
     reason = ""
     spent = 0.0
@@ -267,16 +282,16 @@ def _solve(
         if answer.model is not None:
             values = _read(answer.model, free)
             simple = values is not None and all(_is_simple(value) for value in values.values())
-            if values is not None and simple and replay(labelled.values(), values):
+            if values is not None and simple and replay(labelled.values(), {**values, **given}):
                 return Solution("sat", values)
         reason = answer.reason
         if functions:
             found = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=seed)
-            if found is not None and replay(labelled.values(), found):
+            if found is not None and replay(labelled.values(), {**found, **given}):
                 return Solution("sat", found, engine="z3, functions as tables")
         if answer.model is not None:
             values = _read(answer.model, free)
-            if values is not None and replay(labelled.values(), values):
+            if values is not None and replay(labelled.values(), {**values, **given}):
                 return Solution("sat", values)
             return Solution("unknown", reason="the solver's model could not be replayed")
     return Solution("unknown", reason=reason or "no answer in time")

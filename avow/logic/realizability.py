@@ -1,0 +1,312 @@
+"""Is a contract realizable: for all inputs that it allows, is there an output that meets every guarantee?
+
+Three ways are tried, in short rounds first, and each answer is sound by itself:
+- the question as it stands, given to the solver (where no output is a function);
+- witnesses (`avow.logic.witness`): if no allowed input defeats them all, the contract is realizable;
+- a search for an input that defeats them all, which counts only when the solver shows, with the input's values put in,
+  that *no* output meets the guarantees there; an output found instead becomes another witness, and the search goes on.
+
+Guarantees that share no output are asked about apart: each group is realizable or the contract is not.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import z3
+
+from avow.language.sorts import REAL, FunctionSort
+from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
+from avow.logic.formula import conjunction, free_variables, negation, substitute
+from avow.logic.smt import Translator, Unsupported, check, entails, replay, search_tables, solve
+from avow.logic.translation import Expr, Meaning
+from avow.logic.values import Value
+from avow.logic.witness import Cases, Definition, Fixed, Witness, candidates, instantiate, witnesses
+from avow.verdict import Verdict
+
+Formulas = Mapping[str, Term]
+Given = Mapping[Variable, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class Realizability:
+    """The answer. `inputs`, if refuted, leave no output; `needed` labels the assumptions that a proof used."""
+
+    verdict: Verdict
+    inputs: Mapping[Variable, Value] = field(default_factory=dict)
+    group: tuple[str, ...] = ()
+    """The guarantees among which the conflict is."""
+    needed: tuple[str, ...] = ()
+    reason: str = ""
+    engine: str = "z3"
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Guarantees that hang together by the outputs that they share."""
+
+    guarantees: Formulas
+    outputs: tuple[Variable, ...]
+
+
+def groups(guarantees: Formulas, outputs: Sequence[Variable]) -> list[Group]:
+    """Guarantees that share outputs, together; each guarantee without outputs by itself."""
+    found: list[tuple[dict[str, Term], set[Variable]]] = []
+    for label, formula in guarantees.items():
+        mentioned = free_variables(formula) & set(outputs)
+        touching = [g for g in found if g[1] & mentioned]
+        merged = {name: f for g in touching for name, f in g[0].items()} | {label: formula}
+        found = [g for g in found if g not in touching]
+        found.append((merged, set(mentioned).union(*(g[1] for g in touching))))
+    return [
+        Group(
+            {label: formula for label, formula in guarantees.items() if label in members}, _ordered(mentioned, outputs)
+        )
+        for members, mentioned in found
+    ]
+
+
+def _ordered(some: set[Variable] | frozenset[Variable], outputs: Sequence[Variable]) -> tuple[Variable, ...]:
+    return tuple(output for output in outputs if output in some)
+
+
+def realizable(
+    inputs: Sequence[Variable],
+    outputs: Sequence[Variable],
+    assumptions: Formulas,
+    guarantees: Formulas,
+    *,
+    given: Given | None = None,
+    timeout_ms: int = 10_000,
+    seed: int = 0,
+) -> Realizability:
+    """Decide it. `given` fixes some inputs (a scenario): the answer is then about these only."""
+    needed: set[str] = set()
+    engines: list[str] = []
+    open_question: Realizability | None = None
+    for group in groups(guarantees, outputs):
+        answer = _Search(inputs, group, assumptions, given or {}, timeout_ms, seed).decide()
+        if answer.verdict is Verdict.REFUTED:
+            return answer
+        if answer.verdict is not Verdict.PROVED:
+            open_question = open_question or answer
+        needed |= set(answer.needed)
+        engines.append(answer.engine)
+    if open_question is not None:
+        return open_question
+    ordered = tuple(label for label in assumptions if label in needed)
+    return Realizability(Verdict.PROVED, needed=ordered, engine=", ".join(dict.fromkeys(engines)) or "z3")
+
+
+class _Search:
+    """One group's question, with the witnesses found so far."""
+
+    def __init__(
+        self, inputs: Sequence[Variable], group: Group, assumptions: Formulas, given: Given, timeout_ms: int, seed: int
+    ) -> None:
+        self.group = group
+        self.assumptions = assumptions
+        self.given = given
+        self.inputs = tuple(v for v in inputs if v not in given)
+        self.deadline = time.monotonic() + timeout_ms / 1000
+        self.seed = seed
+        self.found = candidates(group.outputs, assumptions.values(), group.guarantees.values())
+        self.witnesses: list[Witness] = witnesses(self.found)
+        self.reason = ""
+
+    def left(self) -> int:
+        return int((self.deadline - time.monotonic()) * 1000)
+
+    def decide(self) -> Realizability:
+        try:
+            return self._decide()
+        except Unsupported as error:
+            return Realizability(Verdict.UNKNOWN, reason=f"Avow cannot express {error.what} for the solver")
+        except z3.Z3Exception as error:
+            return Realizability(Verdict.UNKNOWN, reason=f"Z3: {error}")
+
+    def _decide(self) -> Realizability:
+        if not self.group.outputs:
+            return self._without_outputs()
+        rounds: list[Callable[[int], Realizability | None]] = [
+            self._direct,
+            self._witnessed,
+            self._strengthened,
+            self._refute,
+        ]
+        for limit in (300, 1_500, 10_000):
+            for method in rounds:
+                answer = method(max(50, min(limit, self.left())))
+                if answer is not None:
+                    return answer
+                if self.left() <= 0:
+                    return Realizability(Verdict.UNKNOWN, reason=self.reason or "no answer in time")
+        return Realizability(Verdict.UNKNOWN, reason=self.reason or "no answer in time")
+
+    def _without_outputs(self) -> Realizability:
+        goal = conjunction(self.group.guarantees.values())
+        answer = entails(
+            self.assumptions, goal, timeout_ms=self.left(), seed=self.seed, given=self.given, variables=self.inputs
+        )
+        return Realizability(
+            answer.verdict, answer.values, tuple(self.group.guarantees), answer.needed, answer.reason, answer.engine
+        )
+
+    def _direct(self, limit: int) -> Realizability | None:
+        if any(isinstance(output.sort, FunctionSort) for output in self.group.outputs):
+            return None
+        bound = {v: Variable(Role.BOUND, f"any {v.name}", v.sort) for v in self.group.outputs}
+        goal = conjunction(self.group.guarantees.values())
+        never = Quantified(Quantifier.FORALL, tuple(bound.values()), negation(substitute(goal, bound)))
+        label = _unused("no output", self.assumptions)
+        answer = solve(
+            {**self.assumptions, label: never},
+            timeout_ms=limit,
+            seed=self.seed,
+            given=self.given,
+            variables=self.inputs,
+        )
+        if answer.status == "unsat":
+            return Realizability(Verdict.PROVED, needed=tuple(c for c in answer.core if c != label), engine="z3")
+        if answer.status == "sat":
+            return self._judge({**answer.values, **self.given}, limit)
+        self.reason = answer.reason
+        return None
+
+    # -- witnesses -----------------------------------------------------------------------------------------------------
+
+    def _witnessed(self, limit: int) -> Realizability | None:
+        return self._prove(list(self.group.guarantees.values()), limit)
+
+    def _strengthened(self, limit: int) -> Realizability | None:
+        stronger = [instantiate(self.found, guarantee) for guarantee in self.group.guarantees.values()]
+        return self._prove(stronger, limit) if stronger != list(self.group.guarantees.values()) else None
+
+    def _prove(self, guarantees: Sequence[Term], limit: int) -> Realizability | None:
+        translator = Translator()
+        fixed = self._fixed(translator)
+        facts = self._defeated(translator, guarantees, fixed)
+        facts += translator.background([*self.inputs, *self.found.constants])
+        tracked = [(label, translator.term(formula, fixed)) for label, formula in self.assumptions.items()]
+        answer = check(translator, facts, tracked=tracked, timeout_ms=limit, seed=self.seed)
+        if answer.status == "unsat":
+            return Realizability(Verdict.PROVED, needed=answer.core, engine="z3, by witnesses")
+        self.reason = answer.reason or self.reason
+        return None
+
+    def _defeated(
+        self, translator: Translator, guarantees: Iterable[Term], meanings: Mapping[Variable, Meaning]
+    ) -> list[Expr]:
+        """That the constants are as chosen, and no witness meets the guarantees."""
+        guarantees = list(guarantees)
+        facts = [translator.term(axiom, meanings) for axiom in self.found.axioms]
+        for witness in self.witnesses:
+            whole = {**meanings, **meanings_of(translator, witness, meanings)}
+            met = [*translator.background(witness, whole), *(translator.term(g, whole) for g in guarantees)]
+            facts.append(z3.Not(z3.And(met)))
+        return [*facts, *translator.opaque_facts()]
+
+    def _fixed(self, translator: Translator) -> dict[Variable, Meaning]:
+        return {variable: translator.value(value, variable.sort) for variable, value in self.given.items()}
+
+    # -- refutation ----------------------------------------------------------------------------------------------------
+
+    def _refute(self, limit: int) -> Realizability | None:
+        end = time.monotonic() + limit / 1000
+        while time.monotonic() < end:
+            inputs = self.defeat(self.group.guarantees, (), int((end - time.monotonic()) * 1000))
+            if inputs is None:
+                return None
+            before = len(self.witnesses)
+            answer = self._judge(inputs, max(100, limit // 2))
+            if answer is not None or len(self.witnesses) == before:
+                return answer
+        return None
+
+    def defeat(self, guarantees: Formulas, possible: Sequence[Formulas], limit: int) -> dict[Variable, Value] | None:
+        """Allowed inputs at which no known witness meets the guarantees, though each of the `possible` sets of
+        guarantees can be met; not judged yet."""
+        translator = Translator()
+        fixed = self._fixed(translator)
+        copies = [
+            {v: Variable(Role.OUTPUT, f"{v.name} ({k})", v.sort) for v in self.group.outputs}
+            for k in range(len(possible))
+        ]
+        constants = [*self.inputs, *self.found.constants, *(v for copy in copies for v in copy.values())]
+        ordinary = [v for v in constants if not isinstance(v.sort, FunctionSort)]
+        functions = [v for v in constants if isinstance(v.sort, FunctionSort)]
+
+        def build(meanings: Mapping[Variable, Meaning]) -> list[Expr]:
+            whole = {**fixed, **meanings}
+            facts = [translator.term(formula, whole) for formula in self.assumptions.values()]
+            for copy, formulas in zip(copies, possible, strict=True):
+                facts += [translator.term(substitute(formula, copy), whole) for formula in formulas.values()]
+            return facts + self._defeated(translator, guarantees.values(), whole)
+
+        values = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=self.seed)
+        if values is None:
+            return None
+        return {**{v: values[v] for v in self.inputs}, **self.given}
+
+    def _judge(self, inputs: Mapping[Variable, Value], limit: int) -> Realizability | None:
+        """Is there no output at these inputs? If there is one, it becomes a witness."""
+        inputs = {v: value for v, value in inputs.items() if v in self.inputs or v in self.given}
+        if not replay(self.assumptions.values(), inputs, timeout_ms=limit):
+            return None
+        answer = solve(
+            self.group.guarantees,
+            timeout_ms=max(limit, 200),
+            seed=self.seed,
+            given=inputs,
+            variables=self.group.outputs,
+        )
+        if answer.status == "unsat":
+            return Realizability(Verdict.REFUTED, inputs, tuple(self.group.guarantees), engine=answer.engine)
+        if answer.status == "sat":
+            witness = {output: Fixed(answer.values[output]) for output in self.group.outputs}
+            if witness not in self.witnesses:
+                self.witnesses.append(witness)
+        return None
+
+
+def meanings_of(
+    translator: Translator, witness: Witness, inputs: Mapping[Variable, Meaning]
+) -> dict[Variable, Meaning]:
+    """The outputs' meanings under a witness."""
+    meanings: dict[Variable, Meaning] = {}
+    for output, value in witness.items():
+        match value:
+            case Fixed():
+                meanings[output] = translator.value(value.value, output.sort)
+            case Definition():
+                continue
+            case _:
+                term = translator.term(value, inputs)
+                meanings[output] = z3.ToReal(term) if output.sort == REAL and z3.is_int(term) else term
+    for output, value in witness.items():
+        if isinstance(value, Definition):
+            meanings[output] = _function(translator, value, {**inputs, **meanings})
+    return meanings
+
+
+def _function(
+    translator: Translator, definition: Definition, meanings: Mapping[Variable, Meaning]
+) -> Callable[..., Expr]:
+    def function(*arguments: Expr) -> Expr:
+        bound = dict(zip(definition.parameters, arguments, strict=True))
+        if not isinstance(definition, Cases):
+            return translator.term(definition.body, meanings, bound)
+        result = translator.term(definition.default, meanings, bound)
+        for condition, value in reversed(definition.cases):
+            result = z3.If(translator.term(condition, meanings, bound), translator.term(value, meanings, bound), result)
+        return result
+
+    return function
+
+
+def _unused(label: str, taken: Mapping[str, object]) -> str:
+    while label in taken:
+        label += "!"
+    return label
