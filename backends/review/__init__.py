@@ -1,0 +1,5 @@
+"""The review backend (see `docs/backends/review.md`)."""
+
+from avow.backends.review.backend import ReviewBackend
+
+BACKEND = ReviewBackend()

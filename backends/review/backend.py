@@ -1,0 +1,210 @@
+"""The review backend: a person's recorded review as evidence, for as long as nothing that was reviewed has changed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from avow.backend import Job, Limits, Report, Tool
+from avow.backends.review.freshness import current_meaning, stale_clause, stale_files
+from avow.backends.review.record import CONCLUSIONS, Judged, Record, read_record
+from avow.diagnostics import Diagnostic, Rejected
+from avow.evidence.obligation import Obligation
+from avow.system.paths import inside
+from avow.system.schema import suggest
+from avow.verdict import Counterexample, Link, Outcome, Verdict
+
+SCHEMA: dict[str, Any] = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    "description": "the record's path, or the record's path under the key 'record'",
+    "type": ["object", "string"],
+    "properties": {
+        "record": {"type": "string", "description": "YAML record of the review, relative to the system's folder"},
+        "id": {"type": "string", "description": "tells several methods of one node apart"},
+        "guarantees": {
+            "type": ["array", "string"],
+            "items": {"type": "string"},
+            "description": "the guarantees that were reviewed (default: all of the node's)",
+        },
+    },
+    "required": ["record"],
+    "additionalProperties": False,
+}
+
+
+class ReviewBackend:
+    """See `docs/backends/review.md`."""
+
+    name = "review"
+    title = "a person's recorded review, stale as soon as what was read changes"
+    version = "1"
+    strength = Verdict.REVIEWED
+    link = Link.GUIDED
+    options_schema: Mapping[str, Any] = SCHEMA
+    green_means = (
+        "A named person read exactly these files, answered every question of the checklist and accepted this "
+        "guarantee in exactly this meaning. It shows what that person saw, no more."
+    )
+
+    def tools(self) -> tuple[Tool, ...]:
+        return ()
+
+    def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        try:
+            _read(job)
+        except Rejected as error:
+            return error.diagnostics
+        return ()
+
+    def files(self, job: Job) -> tuple[Path, ...]:
+        """The record and everything that was read."""
+        name = record_name(job)
+        path = inside(job.root, name) if name else None
+        if path is None:
+            return ()
+        try:
+            read = read_record(path).read
+        except Rejected:
+            return (path,)
+        others = (inside(job.root, r.file) for r in read if r.file)
+        return tuple(dict.fromkeys((path, *(p for p in others if p is not None))))
+
+    def export(self, job: Job) -> Mapping[str, str]:
+        """What a reviewer is to judge: every guarantee with the digest of its meaning."""
+        claims = {
+            o.name: {"claim": o.claim, "formula": o.formula, "meaning": current_meaning(job.node, o.name)}
+            for o in job.obligations
+        }
+        return {"to-review.json": json.dumps({"clauses": claims}, indent=2, ensure_ascii=False) + "\n"}
+
+    def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+        try:
+            record = _read(job)
+        except Rejected as error:
+            said = "; ".join(_line(job, d) for d in error.diagnostics[:5])
+            outcomes = [
+                Outcome(o.id, Verdict.ERROR, f"the review cannot be used: {said}", link=Link.GUIDED)
+                for o in job.obligations
+            ]
+            return Report(tuple(outcomes), "avow review", self.version)
+        return Report(tuple(_settle(job, record, o) for o in job.obligations), "avow review", self.version)
+
+
+def record_name(job: Job) -> str | None:
+    """The record that the plan names, in either spelling of the options."""
+    data = job.method.options.data
+    name = data.get("record") if isinstance(data, Mapping) else data
+    return name if isinstance(name, str) and name else None
+
+
+def _read(job: Job) -> Record:
+    """The record, held against plan and contract. Raises Rejected."""
+    options = job.method.options
+    problems = []
+    for key in job.options:
+        if key not in SCHEMA["properties"]:
+            message = f"'{key}' is no option of a review"
+            problems.append(
+                Diagnostic("REV101", message, options.at(key), hint=suggest(str(key), SCHEMA["properties"]))
+            )
+    name = record_name(job)
+    place = options.at("record")
+    if name is None:
+        raise Rejected(*problems, Diagnostic("REV101", "a review needs 'record': the file that records it", place))
+    path = inside(job.root, name)
+    if path is None:
+        raise Rejected(*problems, Diagnostic("REV101", f"'{name}' is not a file in the system's folder", place))
+    if not path.is_file():
+        raise Rejected(*problems, Diagnostic("REV102", f"there is no file '{name}' in {job.root.name}/", place))
+    record = read_record(path)
+    if record.node and record.node != job.node.name:
+        message = f"this is a review of node '{record.node}', not of '{job.node.name}'"
+        problems.append(Diagnostic("REV103", message, record.span))
+    if record.system and record.system != job.system.name:
+        message = f"this is a review for system '{record.system}', not for '{job.system.name}'"
+        problems.append(Diagnostic("REV103", message, record.span))
+    known = [clause.name for clause in job.node.guarantees]
+    for judged in record.clauses:
+        if judged.clause not in known:
+            message = f"node '{job.node.name}' has no guarantee '{judged.clause}'"
+            problems.append(Diagnostic("REV103", message, judged.span, hint=suggest(judged.clause, known)))
+    for reading in record.read:
+        if reading.file is not None and inside(job.root, reading.file) is None:
+            problems.append(
+                Diagnostic("REV114", f"'{reading.file}' is not a file in the system's folder", reading.span)
+            )
+    if problems:
+        raise Rejected(*problems)
+    return record
+
+
+def _settle(job: Job, record: Record, obligation: Obligation) -> Outcome:
+    judged = next((j for j in record.clauses if j.clause == obligation.name), None)
+    # A guarantee's own conclusion can only be worse than the review's: a rejected review accepts nothing.
+    own = judged.conclusion if judged and judged.conclusion else record.conclusion
+    conclusion = max(own, record.conclusion, key=CONCLUSIONS.index)
+    stale = list(stale_files(record, job.root))
+    moved = stale_clause(record, job.node, obligation.name)
+    if moved is not None:
+        stale.append(moved)
+    details = _details(record, judged)
+    who = f"{record.reviewer} ({record.role}), {record.date}"
+    elsewhere = tuple(
+        f"'{r.material}' was read and is not kept here: no change in it would be noticed"
+        for r in record.read
+        if r.material
+    )
+    verdict, summary = Verdict.REVIEWED, f"accepted by {who}"
+    hypotheses = elsewhere
+    example = None
+    if stale:
+        verdict, summary = Verdict.UNKNOWN, f"stale: {'; '.join(stale)}"
+        if conclusion == "rejected":
+            summary += " (it had been rejected)"
+        details["stale"] = stale
+        hypotheses = ()
+    elif conclusion == "rejected":
+        why = (judged.remark if judged else "") or record.remarks or _against(record)
+        verdict, summary = Verdict.REFUTED, f"rejected by {who}"
+        example = Counterexample((), why or "the reviewer gives no reason")
+    elif conclusion == "conditional":
+        summary = f"accepted on conditions by {who}"
+        hypotheses = record.conditions + elsewhere
+    return Outcome(obligation.id, verdict, summary, example, hypotheses, {}, details, Link.GUIDED)
+
+
+def _details(record: Record, judged: Judged | None) -> dict[str, object]:
+    details: dict[str, object] = {
+        "reviewer": record.reviewer,
+        "role": record.role,
+        "date": record.date,
+        "read": [{"file": r.file, "sha256": r.sha256} if r.file else {"material": r.material} for r in record.read],
+        "checklist": [
+            {"question": q.question, "answer": q.answer} | ({"note": q.note} if q.note else {})
+            for q in record.checklist
+        ],
+        "conclusion": record.conclusion,
+    }
+    optional = {
+        "valid_until": record.valid_until,
+        "conditions": list(record.conditions),
+        "remarks": record.remarks,
+        "remark": judged.remark if judged else "",
+    }
+    return details | {key: value for key, value in optional.items() if value}
+
+
+def _against(record: Record) -> str:
+    return "; ".join(f"{q.question} {q.answer}: {q.note}" for q in record.checklist if not q.good)
+
+
+def _line(job: Job, diagnostic: Diagnostic) -> str:
+    """A diagnostic in one line, with a place that is the same on every machine."""
+    span = diagnostic.span
+    if span is None:
+        return diagnostic.message
+    path, root = Path(span.file), job.root.resolve()
+    name = path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name
+    return f"{name}:{span.line}: {diagnostic.message}"

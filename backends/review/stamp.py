@@ -1,0 +1,205 @@
+"""Fills the digests of a review in, where they belong in the reviewer's own file; all else stays as it was written.
+
+A digest that is already there and no longer right is replaced only with the date of the renewed review: a stamp says
+"I have read this", so it must not be refreshed by habit.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from avow.backends.review.backend import record_name
+from avow.backends.review.freshness import current_file, current_meaning
+from avow.backends.review.record import load, read_record
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.files import write
+from avow.language.contract import Node
+from avow.system.load import load_system
+from avow.system.paths import inside
+from avow.system.plan import Method
+from avow.system.strict_yaml import Piece
+
+_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
+_PLAIN = re.compile(r"[\w./-]+", re.ASCII)
+
+
+def stamp(folder: Path, node: str, *, method: str | None = None, renewed: str | None = None) -> tuple[str, ...]:
+    """Stamp the review of a node of the system in `folder`; says what was filled in, one line for each digest.
+
+    `method` tells several reviews of one node apart. `renewed` is the date (ISO) of a renewed review: without it, a
+    digest that is there already is never replaced. Raises Rejected.
+    """
+    from avow.backend import Job
+
+    system = load_system(folder)
+    if node not in [n.name for n in system.contract.nodes]:
+        known = ", ".join(n.name for n in system.contract.nodes)
+        raise Rejected(Diagnostic("REV120", f"system '{system.name}' has no node '{node}'", hint=f"known: {known}"))
+    methods = [m for m in system.plan.node(node).methods if m.backend == "review" and method in (None, m.id)]
+    if len(methods) != 1:
+        what = "no review" if not methods else f"{len(methods)} reviews ({', '.join(m.id for m in methods)})"
+        hint = "say which one" if methods else "add one to plan.yaml: review: {record: reviews/….yaml}"
+        raise Rejected(Diagnostic("REV120", f"the plan has {what} of node '{node}'", hint=hint))
+    chosen: Method = methods[0]
+    job = Job(system, system.contract.node(node), chosen, ())
+    name = record_name(job)
+    path = inside(job.root, name) if name else None
+    if path is None:
+        place = chosen.options.span
+        raise Rejected(Diagnostic("REV101", "the review names no record in the system's folder", place))
+    return stamp_record(path, job.root, job.node, chosen.guarantees, renewed=renewed)
+
+
+def stamp_record(
+    path: Path, root: Path, node: Node, guarantees: Iterable[str], *, renewed: str | None = None
+) -> tuple[str, ...]:
+    """The same for one record. Raises Rejected, and then leaves the file as it was."""
+    piece, problems = load(path)
+    if problems or piece.entries is None:
+        raise Rejected(*(problems or [Diagnostic("REV111", "expected keys and values", piece.span)]))
+    editor = _Editor(path.read_bytes().decode("utf-8-sig"))
+    said: list[str] = []
+    changed: list[tuple[str, Span]] = []
+    for item in (piece.entries.get("read") or piece).items or ():
+        _stamp_file(item, root, editor, said, changed)
+    _stamp_clauses(piece, node, tuple(guarantees), editor, said, changed)
+    if changed and renewed is None:
+        raise Rejected(
+            *(
+                Diagnostic(
+                    "REV121",
+                    f"{what} has changed since it was reviewed",
+                    span,
+                    hint="read it again, then stamp with the date of the renewed review",
+                )
+                for what, span in changed
+            )
+        )
+    date = piece.entries.get("date")
+    if changed and renewed is not None and date is not None:
+        editor.replace(date.span, renewed)
+        said.append(f"date: {renewed}")
+    if not said:
+        return ()
+    before = path.read_bytes()
+    write(path, editor.result())
+    try:
+        read_record(path)
+    except Rejected:
+        write(path, before)
+        raise
+    return tuple(said)
+
+
+def _stamp_file(item: Piece, root: Path, editor: _Editor, said: list[str], changed: list[tuple[str, Span]]) -> None:
+    entry = item if item.entries is None else item.entries.get("file")
+    if entry is None or entry.items is not None or entry.entries is not None:
+        return
+    now = current_file(root, entry.text)
+    if now is None:
+        raise Rejected(Diagnostic("REV102", f"there is no file '{entry.text}' in the system's folder", entry.span))
+    line = f"{entry.text}: {now}"
+    if item.entries is None:
+        editor.replace(item.span, f"{{file: {_quoted(entry.text)}, sha256: {now}}}")
+        said.append(line)
+        return
+    _fill(item, "sha256", now, entry.text, editor, said, changed)
+
+
+def _stamp_clauses(
+    piece: Piece,
+    node: Node,
+    guarantees: tuple[str, ...],
+    editor: _Editor,
+    said: list[str],
+    changed: list[tuple[str, Span]],
+) -> None:
+    assert piece.entries is not None
+    clauses = piece.entries.get("clauses")
+    fresh = {name: current_meaning(node, name) for name in guarantees}
+    if clauses is None or not clauses.entries:
+        lines = [f"  {_quoted(name)}: {meaning}" for name, meaning in fresh.items()]
+        if clauses is None:
+            editor.append("\n".join(["clauses:", *lines]))
+        elif clauses.entries is not None or (clauses.items is None and clauses.value is None):
+            editor.replace(clauses.span, "\n" + "\n".join(lines))
+        else:
+            raise Rejected(Diagnostic("REV115", "'clauses' must be keys and values", clauses.span))
+        said.extend(f"{name}: {meaning}" for name, meaning in fresh.items())
+        return
+    for name, meaning in fresh.items():
+        entry = clauses.entries.get(name)
+        if entry is not None and entry.entries is not None:
+            _fill(entry, "meaning", meaning, name, editor, said, changed)
+        else:
+            _fill(clauses, name, meaning, name, editor, said, changed)
+
+
+def _fill(
+    mapping: Piece, key: str, value: str, what: str, editor: _Editor, said: list[str], changed: list[tuple[str, Span]]
+) -> None:
+    assert mapping.entries is not None
+    entry = mapping.entries.get(key)
+    if entry is not None and entry.text == value:
+        return
+    said.append(f"{what}: {value}")
+    if entry is None:
+        editor.insert(mapping, f"{_quoted(key)}: {value}")
+        return
+    if entry.text.strip() not in ("", "?", "~"):
+        changed.append((what, entry.span))
+    editor.replace(entry.span, value)
+
+
+def _quoted(text: str) -> str:
+    return text if _PLAIN.fullmatch(text) else json.dumps(text, ensure_ascii=False)
+
+
+@dataclass(frozen=True, slots=True)
+class _Edit:
+    start: int
+    end: int
+    text: str
+
+
+class _Editor:
+    """Changes stretches of a text; places are those of the text before any change."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.starts = [0, *(match.end() for match in _BREAK.finditer(text))]
+        self.edits: list[_Edit] = []
+
+    def replace(self, span: Span, text: str) -> None:
+        start, end = self.offset(span.line, span.column), self.offset(span.end_line, span.end_column)
+        gap = " " if start == end and start and not self.text[start - 1].isspace() and text[:1] != "\n" else ""
+        self.edits.append(_Edit(start, end, gap + text))
+
+    def insert(self, mapping: Piece, entry: str) -> None:
+        """A new entry before the first one of a mapping."""
+        start = self.offset(mapping.span.line, mapping.span.column)
+        if self.text[start : start + 1] == "{":
+            gap = ", " if mapping.entries else ""
+            self.edits.append(_Edit(start + 1, start + 1, entry + gap))
+            return
+        self.edits.append(_Edit(start, start, f"{entry}\n{' ' * (mapping.span.column - 1)}"))
+
+    def append(self, text: str) -> None:
+        end = len(self.text)
+        gap = "" if not self.text or self.text.endswith("\n") else "\n"
+        self.edits.append(_Edit(end, end, f"{gap}{text}\n"))
+
+    def offset(self, line: int, column: int) -> int:
+        return self.starts[min(line, len(self.starts)) - 1] + column - 1
+
+    def result(self) -> str:
+        text = self.text
+        # Insertions at one place keep their order: later ones are made first.
+        ordered = sorted(enumerate(self.edits), key=lambda pair: (pair[1].start, pair[1].end, pair[0]), reverse=True)
+        for _, edit in ordered:
+            text = text[: edit.start] + edit.text + text[edit.end :]
+        return text
