@@ -1,0 +1,124 @@
+"""What an agent believes: belief bases, and derivation with its reasoning rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+
+from avow.backends.ajpf.syntax import Bindings, Condition, Rule, Struct, Term, Var, apply, unify, variables
+
+MAX_RULE_DEPTH = 60
+
+
+class TooDeep(Exception):  # noqa: N818 - it names what happened
+    """Reasoning rules call each other without end, or nearly so."""
+
+
+@dataclass(frozen=True, slots=True)
+class Beliefs:
+    """`own` were added by the agent (or stood in the program), `perceived` by perception."""
+
+    own: frozenset[Struct]
+    perceived: frozenset[Struct]
+    index: Mapping[tuple[str, int], tuple[Struct, ...]] = field(compare=False, repr=False)
+
+    @staticmethod
+    def of(own: frozenset[Struct], perceived: frozenset[Struct]) -> Beliefs:
+        index: dict[tuple[str, int], list[Struct]] = {}
+        for belief in sorted(own | perceived, key=repr):
+            index.setdefault((belief.functor, len(belief.args)), []).append(belief)
+        return Beliefs(own, perceived, {key: tuple(found) for key, found in index.items()})
+
+    def __contains__(self, belief: Struct) -> bool:
+        return belief in self.own or belief in self.perceived
+
+    def matching(self, pattern: Struct) -> tuple[Struct, ...]:
+        """The beliefs that unify with the pattern."""
+        found = self.index.get((pattern.functor, len(pattern.args)), ())
+        return tuple(b for b in found if unify(pattern, b, {}) is not None)
+
+
+@dataclass(slots=True)
+class Reasoner:
+    """Derives literals from beliefs by backward chaining; negation is failure to derive."""
+
+    rules: Mapping[tuple[str, int], Sequence[Rule]]
+    fresh: Iterator[int] = field(default_factory=count)
+
+    @staticmethod
+    def of(rules: Sequence[Rule]) -> Reasoner:
+        index: dict[tuple[str, int], list[Rule]] = {}
+        for rule in rules:
+            index.setdefault((rule.head.functor, len(rule.head.args)), []).append(rule)
+        return Reasoner(index)
+
+    def believes(self, beliefs: Beliefs, term: Term, bindings: Bindings, depth: int = 0) -> Iterator[Bindings]:
+        """Every way to bind the term's variables so that it is believed or derivable. Raises TooDeep."""
+        goal = apply(term, bindings)
+        if isinstance(goal, Var):
+            return
+        key = (goal.functor, len(goal.args))
+        for belief in beliefs.index.get(key, ()):
+            found = unify(goal, belief, bindings)
+            if found is not None:
+                yield found
+        for rule in self.rules.get(key, ()):
+            if depth >= MAX_RULE_DEPTH:
+                raise TooDeep
+            renamed = rename(rule, f"'{next(self.fresh)}")
+            found = unify(goal, renamed.head, bindings)
+            if found is not None:
+                yield from self.holds(beliefs, renamed.body, found, (), depth + 1)
+
+    def holds(
+        self,
+        beliefs: Beliefs,
+        conditions: Sequence[Condition],
+        bindings: Bindings,
+        goals: Sequence[Term],
+        depth: int = 0,
+    ) -> Iterator[Bindings]:
+        """Every way to meet all conditions. They come with the negated ones last."""
+        if not conditions:
+            yield bindings
+            return
+        first, rest = conditions[0], conditions[1:]
+        for found in self._one(beliefs, first, bindings, goals, depth):
+            yield from self.holds(beliefs, rest, found, goals, depth)
+
+    def _one(
+        self, beliefs: Beliefs, condition: Condition, bindings: Bindings, goals: Sequence[Term], depth: int
+    ) -> Iterator[Bindings]:
+        if condition.term is None:
+            yield bindings
+            return
+        if condition.is_goal:
+            ways = (u for g in goals if (u := unify(condition.term, g, bindings)) is not None)
+        else:
+            ways = self.believes(beliefs, condition.term, bindings, depth)
+        if condition.positive:
+            yield from ways
+        elif next(ways, None) is None:
+            yield bindings
+
+
+def rename(rule: Rule, suffix: str) -> Rule:
+    """The rule with variables of its own."""
+    terms = [rule.head, *(c.term for c in rule.body if c.term is not None)]
+    own: Bindings = {name: Var(name + suffix) for term in terms for name in variables(term)}
+    body = tuple(
+        c if c.term is None else Condition(_apply_once(c.term, own), c.positive, c.is_goal) for c in rule.body
+    )
+    head = _apply_once(rule.head, own)
+    assert isinstance(head, Struct)
+    return Rule(head, body, rule.span)
+
+
+def _apply_once(term: Term, bindings: Mapping[str, Term]) -> Term:
+    if isinstance(term, Var):
+        return bindings.get(term.name, term)
+    return Struct(term.functor, tuple(_apply_once(arg, bindings) for arg in term.args))
+
+
+rename_term = _apply_once

@@ -1,0 +1,228 @@
+"""Model checking of properties on an explored state graph; vacuity; counterexamples in words."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from avow.backends.ajpf.automaton import Automaton, build, evaluate
+from avow.backends.ajpf.explore import Graph
+from avow.backends.ajpf.interpreter import NONE, State
+from avow.backends.ajpf.psl import Atom, Formula, Modality, Not, atoms, conjunction
+from avow.backends.ajpf.structure import Fair, Kripke, Lasso, find_lasso, reduce
+from avow.backends.ajpf.syntax import DeedKind, Sign, Struct, Term, Var, show, unify
+from avow.verdict import Counterexample
+
+
+class OutOfTime(Exception):  # noqa: N818 - it names a state, not a fault
+    """The time for checking is over."""
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """A formula to check. Of the shape ``[] (trigger -> consequent)`` it knows its trigger, for vacuity."""
+
+    key: str
+    """Names it in a .psl file: ASCII letters, digits and ``_``."""
+    formula: Formula
+    trigger: Formula | None = None
+    goal: Formula | None = None
+    """What must follow the trigger, without its "eventually"."""
+    about: str = ""
+    """The instance in words: ``i = 3``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    key: str
+    holds: bool
+    vacuous: bool
+    """The trigger is never met."""
+    immediate: bool
+    """Wherever the trigger is met, so is the goal, at once: nothing had to happen."""
+
+
+@dataclass(slots=True)
+class Checker:
+    """Checks many properties on one graph; the graph is labelled and reduced once."""
+
+    graph: Graph
+    properties: Sequence[Property]
+    atoms: tuple[Atom, ...] = ()
+    labels: list[int] = field(default_factory=list)
+    """For each state: the bits of `atoms`, above them two bits for each fairness assumption (drawn; granted)."""
+    reduced: Kripke = field(init=False)
+
+    def __post_init__(self) -> None:
+        found = {atom: None for p in self.properties for f in (p.formula, p.trigger, p.goal) if f for atom in atoms(f)}
+        self.atoms = tuple(found)
+        self.labels = _labels(self.graph, self.atoms)
+        self.reduced = reduce(self.whole(self.labels))
+
+    def whole(self, labels: Sequence[int]) -> Kripke:
+        offsets, targets = self.graph.offsets, self.graph.targets
+        successors = [targets[offsets[s] : offsets[s + 1]] for s in range(len(self.graph))]
+        return Kripke(self.graph.initial, successors, labels)
+
+    def check(self, wanted: Property, deadline: float | None = None) -> Result:
+        """Raises OutOfTime, automaton.TooLarge."""
+        if deadline is not None and time.monotonic() > deadline:
+            raise OutOfTime
+        automaton, fair, labels = self._projected(wanted, self.reduced.labels)
+        small = reduce(Kripke(self.reduced.initial, self.reduced.successors, labels))
+        holds = find_lasso(small, automaton, fair) is None
+        vacuous = immediate = False
+        if wanted.trigger is not None:
+            met = self._where(wanted.trigger)
+            vacuous = not met
+            if wanted.goal is not None and met:
+                unmet = conjunction((wanted.trigger, Not(wanted.goal)))
+                immediate = not self._where(unmet)
+        return Result(wanted.key, holds, vacuous, immediate)
+
+    def lasso(self, refuted: Property) -> Lasso | None:
+        """A run of the agent itself on which the property fails."""
+        automaton, fair, labels = self._projected(refuted, self.labels)
+        return find_lasso(self.whole(labels), automaton, fair)
+
+    def _where(self, formula: Formula) -> frozenset[int]:
+        """The labels of reachable states at which the formula holds."""
+        return frozenset(label for label in set(self.reduced.labels) if self._holds(formula, label))
+
+    def _holds(self, formula: Formula, label: int) -> bool:
+        truth = {atom: bool(label >> at & 1) for at, atom in enumerate(self.atoms)}
+        return evaluate(formula, truth)
+
+    def _projected(self, wanted: Property, labels: Sequence[int]) -> tuple[Automaton, list[Fair], list[int]]:
+        automaton = build(Not(wanted.formula))
+        low, base = len(automaton.leaves), len(self.atoms)
+        new: dict[int, int] = {}
+        for label in set(labels):
+            bits = (label >> base) << low
+            for at, leaf in enumerate(automaton.leaves):
+                if self._holds(leaf, label):
+                    bits |= 1 << at
+            new[label] = bits
+        fair = [
+            Fair(1 << (low + 2 * at), 1 << (low + 2 * at + 1)) for at in range(len(self.graph.agent.environment.fair))
+        ]
+        return automaton, fair, [new[label] for label in labels]
+
+
+def _labels(graph: Graph, wanted: Sequence[Atom]) -> list[int]:
+    agent = graph.agent
+    by_beliefs: dict[int, int] = {}
+    by_last: dict[int, int] = {NONE: 0}
+    by_choice: dict[int, int] = {}
+    by_intention: dict[int, int] = {NONE: 0}
+    numbered = [(1 << at, atom) for at, atom in enumerate(wanted)]
+    believed = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.BELIEVES]
+    done = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.DID]
+    perceived = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.PERCEPT]
+    mental = (Modality.WANTS, Modality.INTENDS, Modality.INTENDS_TO_DO)
+    intended = [(bit, a.modality, _own(a.term)) for bit, a in numbered if a.modality in mental]
+    fair = [(1 << (len(wanted) + 2 * at), f.percept) for at, f in enumerate(agent.environment.fair)]
+
+    def of_beliefs(number: int) -> int:
+        beliefs = agent.beliefs.items[number]
+        return sum(bit for bit, term in believed if next(agent.reasoner.believes(beliefs, term, {}), None) is not None)
+
+    def of_last(number: int) -> int:
+        return sum(bit for bit, term in done if unify(term, agent.actions.items[number], {}) is not None)
+
+    def of_choice(number: int) -> int:
+        offered = agent.environment.percepts(agent.choices.items[number])
+        return sum(bit for bit, term in perceived if any(unify(term, p, {}) is not None for p in offered))
+
+    def of_draw(number: int) -> int:
+        offered = agent.environment.percepts(agent.choices.items[number])
+        return sum(bit | (bit << 1 if percept in offered else 0) for bit, percept in fair)
+
+    by_draw: dict[int, int] = {}
+    result = []
+    for state in graph.states:
+        bits = _memo(by_beliefs, state.beliefs, of_beliefs)
+        if done:
+            bits |= _memo(by_last, state.last, of_last)
+        if perceived:
+            bits |= _memo(by_choice, state.choice, of_choice)
+        if fair and state.drawn:
+            bits |= _memo(by_draw, state.choice, of_draw)
+        if intended:
+            for number in (*state.active, *state.suspended, state.running):
+                bits |= _memo(by_intention, number, lambda n: _mental(agent.intentions.items[n].frames, intended))
+        result.append(bits)
+    return result
+
+
+def _memo(known: dict[int, int], key: int, compute: object) -> int:
+    found = known.get(key)
+    if found is None:
+        found = known[key] = compute(key)  # type: ignore[operator]
+    return found
+
+
+def _mental(frames: Iterable[object], wanted: Sequence[tuple[int, Modality, Term]]) -> int:
+    from avow.backends.ajpf.interpreter import Frame
+
+    bits = 0
+    for frame in frames:
+        assert isinstance(frame, Frame)
+        is_goal = frame.event.is_goal and frame.event.sign is Sign.ADD
+        for bit, modality, term in wanted:
+            if modality is Modality.INTENDS_TO_DO:
+                hits = any(d.kind is DeedKind.ACTION and unify(term, d.term, {}) is not None for d in frame.deeds or ())
+            else:
+                hits = is_goal and unify(term, frame.event.term, {}) is not None
+                hits = hits and (modality is Modality.WANTS or frame.deeds is not None)
+            if hits:
+                bits |= bit
+    return bits
+
+
+def _own(term: Term, names: list[int] | None = None) -> Term:
+    """Each ``_`` gets a name of its own, as it stands for anything."""
+    names = [] if names is None else names
+    if isinstance(term, Var):
+        names.append(0)
+        return Var(f"?{len(names)}")
+    return Struct(term.functor, tuple(_own(arg, names) for arg in term.args))
+
+
+def needs_fine_steps(properties: Iterable[Property]) -> bool:
+    """Whether a property looks at intentions, which change between a plan's choice and its first deed."""
+    fine = (Modality.INTENDS, Modality.INTENDS_TO_DO)
+    return any(atom.modality in fine for p in properties for atom in atoms(p.formula))
+
+
+def explain(graph: Graph, lasso: Lasso, values: Mapping[str, str], explanation: str) -> Counterexample:
+    """The run in words: what the agent did last, what it believes beyond what it always does, what is new to perceive."""
+    always = frozenset(graph.agent.program.beliefs)
+    trace: list[tuple[tuple[str, str], ...]] = []
+    loop: int | None = None
+    for at, number in enumerate(lasso.path):
+        shown = _words(graph, graph.states[number], always)
+        if at == lasso.loop:
+            loop = len(trace)
+        elif trace and trace[-1] == shown and (loop is None or loop < len(trace)):
+            continue
+        trace.append(shown)
+    return Counterexample(tuple(values.items()), explanation, tuple(trace), loop)
+
+
+def _words(graph: Graph, state: State, always: frozenset[Struct]) -> tuple[tuple[str, str], ...]:
+    agent = graph.agent
+    beliefs = agent.beliefs.items[state.beliefs]
+    believed = sorted(show(b) for b in (beliefs.own | beliefs.perceived) - always)
+    words = [
+        ("last action", "none" if state.last == NONE else show(agent.actions.items[state.last])),
+        ("believes", ", ".join(believed) or "nothing new"),
+    ]
+    missing = sorted(show(b) for b in always if b not in beliefs)
+    if missing:
+        words.append(("no longer believes", ", ".join(missing)))
+    if state.drawn:
+        offered = agent.environment.percepts(agent.choices.items[state.choice])
+        words.append(("is about to perceive", ", ".join(map(show, offered)) or "nothing"))
+    return tuple(words)

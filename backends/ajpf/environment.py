@@ -1,0 +1,225 @@
+"""The agent's environment as data: when percepts are drawn, from what, and what is assumed of the draws.
+
+    draws: {at_start: true, at_quiescence: once, quiet: [print]}     # every action but the quiet ones draws
+    percepts:                                                        # one alternative of each group is drawn
+      result: ["arrived(0, 3)", nothing]
+      light: [red, amber, nothing]
+    start: {light: [nothing]}                                        # narrower alternatives for the first draw
+    after: {look: {result: [keep]}}                                  # and for the draw after an action
+    fair: [{percept: "arrived(0, 3)", because: "the motion planner always ends"}]
+
+`nothing` is no percept of the group; `keep` leaves the group as it is. A fairness assumption says: if percepts are
+drawn for ever, then draws that contain the percept never cease. Nothing is fair that is not stated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+
+from avow.backends.ajpf.parser import parse_fact
+from avow.backends.ajpf.syntax import Struct, show
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.system.plan import Located
+from avow.system.strict_yaml import read_yaml
+
+NOTHING = "nothing"
+KEEP = "keep"
+MAX_DRAWS = 4096
+
+_WORDS = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+_NARROWED = {"type": "object", "additionalProperties": _WORDS}
+SCHEMA: dict[str, Any] = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    "type": "object",
+    "properties": {
+        "about": {"type": "string"},
+        "draws": {
+            "type": "object",
+            "properties": {
+                "at_start": {"type": "boolean"},
+                "at_quiescence": {"enum": ["once", "repeatedly", "never"]},
+                "quiet": {"type": "array", "items": {"type": "string"}},
+            },
+            "additionalProperties": False,
+        },
+        "percepts": {"type": "object", "additionalProperties": _WORDS},
+        "start": _NARROWED,
+        "after": {"type": "object", "additionalProperties": _NARROWED},
+        "fair": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "properties": {"percept": {"type": "string"}, "because": {"type": "string"}},
+                "required": ["percept", "because"],
+                "additionalProperties": False,
+            },
+        },
+    },
+    "required": ["percepts"],
+    "additionalProperties": False,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Fairness:
+    percept: Struct
+    because: str
+
+
+Choice = tuple[int, ...]
+"""The alternative drawn last of each group, by its place; -1 before the first draw."""
+
+
+@dataclass(frozen=True, slots=True)
+class Environment:
+    groups: tuple[tuple[str, tuple[Struct | None, ...]], ...]
+    start: Mapping[str, tuple[int, ...]]
+    after: Mapping[str, Mapping[str, tuple[int, ...]]]
+    """Action's name → group → places of the alternatives; KEEP is -1."""
+    quiet: frozenset[str]
+    at_start: bool
+    at_quiescence: str
+    fair: tuple[Fairness, ...]
+
+    @property
+    def before(self) -> Choice:
+        return (-1,) * len(self.groups)
+
+    def percepts(self, choice: Choice) -> tuple[Struct, ...]:
+        """What is perceived, in the order of the groups."""
+        found = (group[at] for (_, group), at in zip(self.groups, choice, strict=True) if at >= 0)
+        return tuple(p for p in found if p is not None)
+
+    def draws(self, choice: Choice, narrowed: Mapping[str, tuple[int, ...]]) -> tuple[Choice, ...]:
+        """Everything that can be drawn after `choice`."""
+        options = [
+            tuple(dict.fromkeys(now if at < 0 else at for at in narrowed.get(name, range(len(group)))))
+            for (name, group), now in zip(self.groups, choice, strict=True)
+        ]
+        return tuple(product(*options))
+
+    def describe(self) -> tuple[str, ...]:
+        """What the environment may do, in sentences."""
+        groups = "; ".join(
+            f"{name}: {' or '.join(NOTHING if p is None else show(p) for p in group)}" for name, group in self.groups
+        )
+        when = ["at the start"] if self.at_start else []
+        quiet = ", ".join(sorted(self.quiet))
+        when.append(f"at every action except {quiet}" if quiet else "at every action")
+        if self.at_quiescence != "never":
+            often = "once" if self.at_quiescence == "once" else "again and again"
+            when.append(f"{often} when the agent has nothing to do")
+        said = [f"percepts are drawn {', '.join(when)}, one of each group: {groups}"]
+        said += [
+            f"after {action}, {name} is " + " or ".join("as before" if i < 0 else self._said(name, i) for i in places)
+            for action, narrowed in (*self.after.items(), *([("the start", self.start)] if self.start else []))
+            for name, places in narrowed.items()
+        ]
+        said += [f"fairness: draws with {show(f.percept)} never cease ({f.because})" for f in self.fair]
+        return tuple(said)
+
+    def _said(self, name: str, place: int) -> str:
+        percept = dict(self.groups)[name][place]
+        return NOTHING if percept is None else show(percept)
+
+
+def read_environment(path: Path, shown: str | None = None) -> Environment:
+    """Raises Rejected with every problem, located."""
+    name = shown or str(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        span = Span(name, 1, 1, 1, 2)
+        raise Rejected(Diagnostic("AJPF110", f"cannot be read: {error.strerror or error}", span)) from None
+    piece, problems = read_yaml(data, name)
+    if problems:
+        raise Rejected(*problems)
+    located = piece.located()
+    faults = [
+        Diagnostic("AJPF110", f"{'.'.join(map(str, e.absolute_path)) or 'environment'}: {_short(e)}", _span(located, e))
+        for e in jsonschema.Draft202012Validator(SCHEMA).iter_errors(located.data)
+    ]
+    if faults:
+        raise Rejected(*faults)
+    return _read(located)
+
+
+def _short(error: jsonschema.ValidationError) -> str:
+    return error.message if len(error.message) <= 200 else error.message[:200] + "…"
+
+
+def _span(located: Located, error: jsonschema.ValidationError) -> Span:
+    return located.at(*error.absolute_path)
+
+
+def _read(located: Located) -> Environment:
+    data = located.data
+    faults: list[Diagnostic] = []
+    groups: dict[str, tuple[Struct | None, ...]] = {}
+    for name, words in data["percepts"].items():
+        alternatives: list[Struct | None] = []
+        for at, word in enumerate(words):
+            percept = None if word == NOTHING else parse_fact(word)
+            if percept is None and word != NOTHING:
+                message = f"{word!r} is no percept such as 'danger' or 'result(0, 3)'"
+                faults.append(Diagnostic("AJPF111", message, located.at("percepts", name, at)))
+            alternatives.append(percept)
+        groups[name] = tuple(alternatives)
+    size = 1
+    for group in groups.values():
+        size *= len(group)
+    if size > MAX_DRAWS:
+        faults.append(Diagnostic("AJPF111", f"{size} possible draws; at most {MAX_DRAWS}", located.at("percepts")))
+
+    def narrow(given: Mapping[str, list[str]], *path: str) -> dict[str, tuple[int, ...]]:
+        result = {}
+        for name, words in given.items():
+            places = []
+            for at, word in enumerate(words):
+                if name not in groups:
+                    faults.append(Diagnostic("AJPF111", f"there is no group '{name}'", located.at(*path, name)))
+                    break
+                percept = None if word == NOTHING else parse_fact(word)
+                if word == KEEP and path[0] == "after":
+                    places.append(-1)
+                elif percept in groups[name] and (percept is not None or word == NOTHING):
+                    places.append(groups[name].index(percept))
+                else:
+                    message = f"{word!r} is no alternative of '{name}'"
+                    faults.append(Diagnostic("AJPF111", message, located.at(*path, name, at)))
+            result[name] = tuple(places)
+        return result
+
+    start = narrow(data.get("start", {}), "start")
+    after = {action: narrow(given, "after", action) for action, given in data.get("after", {}).items()}
+    fair: list[Fairness] = []
+    known = {p for group in groups.values() for p in group if p is not None}
+    for at, entry in enumerate(data.get("fair", ())):
+        percept = parse_fact(entry["percept"])
+        if percept is None or percept not in known:
+            message = f"{entry['percept']!r} is in no group, so that no draw has it"
+            faults.append(Diagnostic("AJPF111", message, located.at("fair", at, "percept")))
+        else:
+            fair.append(Fairness(percept, entry["because"]))
+    if faults:
+        raise Rejected(*faults)
+    draws = data.get("draws", {})
+    return Environment(
+        tuple(groups.items()),
+        start,
+        after,
+        frozenset(draws.get("quiet", ("print",))),
+        draws.get("at_start", True),
+        draws.get("at_quiescence", "once"),
+        tuple(fair),
+    )
+
+
+def all_percepts(environment: Environment) -> Iterable[Struct]:
+    return (p for _, group in environment.groups for p in group if p is not None)

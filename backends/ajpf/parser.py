@@ -1,0 +1,295 @@
+"""Reads Gwendolen programs. Whatever the text is, the answer is a `Program` or located diagnostics."""
+
+from __future__ import annotations
+
+import functools
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken, v_args
+from lark.exceptions import VisitError
+
+from avow.backends.ajpf.syntax import (
+    MAX_DEPTH,
+    Condition,
+    Deed,
+    DeedKind,
+    Event,
+    Goal,
+    GoalKind,
+    Plan,
+    Program,
+    Rule,
+    Sign,
+    Struct,
+    Term,
+    Var,
+    is_ground,
+    show,
+)
+from avow.diagnostics import Diagnostic, Rejected, Span
+
+MAX_BYTES = 2_000_000
+
+_SAID = {
+    "ATOM": "a name",
+    "VARIABLE": "a variable",
+    "NUMBER": "a number",
+    "STRING": "a text",
+    "SIGN_ADD": "'+'",
+    "SIGN_DROP": "'-'",
+    "KIND": "'perform' or 'achieve'",
+    "$END": "the end",
+}
+
+
+def read_program(path: Path, shown: str | None = None) -> Program:
+    """The program in a file; `shown` is how messages call the file. Raises Rejected."""
+    name = shown or str(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise Rejected(Diagnostic("AJPF101", f"cannot be read: {error.strerror or error}", _at(name, 1, 1))) from None
+    if len(data) > MAX_BYTES:
+        raise Rejected(Diagnostic("AJPF101", f"{len(data)} bytes; at most {MAX_BYTES} are read", _at(name, 1, 1)))
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise Rejected(Diagnostic("AJPF101", "not UTF-8 text", _at(name, line, 1))) from None
+    return parse_program(text, name)
+
+
+def parse_fact(text: str) -> Struct | None:
+    """One ground literal, such as a percept ``danger`` or ``result(0, 3)``, or None."""
+    builder = _Builder("")
+    try:
+        made = builder.transform(_grammar().parse(text, start="struct")) if len(text) <= 1000 else None
+    except (UnexpectedInput, VisitError, RecursionError):
+        return None
+    return made if isinstance(made, Struct) and is_ground(made) else None
+
+
+def parse_program(text: str, file: str) -> Program:
+    """Raises Rejected with the place of the first thing that does not belong."""
+    builder = _Builder(file)
+    try:
+        tree = _grammar().parse(text, start="start")
+        program: Program = builder.transform(tree)
+    except UnexpectedInput as error:
+        raise Rejected(_unexpected(error, text, file)) from None
+    except RecursionError:
+        raise Rejected(Diagnostic("AJPF102", "nested too deeply", _at(file, 1, 1))) from None
+    except VisitError as error:
+        if isinstance(error.orig_exc, Rejected):
+            raise error.orig_exc from None
+        if isinstance(error.orig_exc, RecursionError):
+            raise Rejected(Diagnostic("AJPF102", "nested too deeply", _at(file, 1, 1))) from None
+        raise
+    if builder.problems:
+        raise Rejected(*builder.problems)
+    return program
+
+
+@functools.cache
+def _grammar() -> Lark:
+    text = Path(__file__).with_name("gwendolen.lark").read_text(encoding="utf-8")
+    return Lark(text, start=["start", "struct"], parser="lalr", lexer="contextual", propagate_positions=True, maybe_placeholders=True)
+
+
+def _at(file: str, line: int, column: int, width: int = 1) -> Span:
+    return Span(file, line, column, line, column + width)
+
+
+def _unexpected(error: UnexpectedInput, text: str, file: str) -> Diagnostic:
+    if isinstance(error, UnexpectedToken) and error.token.type != "$END":
+        wanted = _wanted(error.accepts or error.expected)
+        token = error.token
+        span = _at(file, token.line or 1, token.column or 1, max(1, len(token)))
+        return Diagnostic("AJPF102", f"unexpected {_quote(str(token))}", span, hint=wanted)
+    if isinstance(error, UnexpectedCharacters):
+        character = text[error.pos_in_stream] if error.pos_in_stream < len(text) else ""
+        wanted = _wanted(error.allowed or set())
+        return Diagnostic("AJPF102", f"unexpected {_quote(character)}", _at(file, error.line, error.column), hint=wanted)
+    lines = text.split("\n")
+    expected = error.expected if isinstance(error, UnexpectedEOF | UnexpectedToken) else set()
+    span = _at(file, len(lines), len(lines[-1]) + 1)
+    return Diagnostic("AJPF102", "the program ends too early", span, hint=_wanted(expected))
+
+
+def _wanted(names: Any) -> str | None:
+    terminals = {t.name: t for t in _grammar().terminals}
+    said = sorted({_SAID.get(n) or (f"'{terminals[n].pattern.value}'" if n in terminals else n) for n in names})
+    return "expected " + " or ".join(said) if 0 < len(said) <= 8 else None
+
+
+def _quote(text: str) -> str:
+    return repr(text if len(text) <= 40 else text[:40] + "…")
+
+
+def _build(method: Any) -> Any:
+    return v_args(meta=True)(method)
+
+
+class _Builder(Transformer[Token, Any]):
+    """Parse tree to data. Its recursion is bounded: only terms nest, and `struct` measures how deep."""
+
+    def __init__(self, file: str) -> None:
+        super().__init__()
+        self.file = file
+        self.problems: list[Diagnostic] = []
+        self.fresh = count(1)
+        self.depths: dict[int, tuple[int, Struct]] = {}
+
+    def span(self, meta: Any) -> Span:
+        if meta.empty:
+            return _at(self.file, 1, 1)
+        return Span(self.file, meta.line, meta.column, meta.end_line, meta.end_column)
+
+    # Terms
+
+    @_build
+    def struct(self, meta: Any, parts: list[Any]) -> Struct:
+        args = tuple(p for p in parts[1:] if p is not None)
+        depth = 1 + max((self.depths[id(a)][0] if id(a) in self.depths else 1 for a in args), default=0)
+        if depth > MAX_DEPTH:
+            raise Rejected(Diagnostic("AJPF102", f"a term nested more than {MAX_DEPTH} deep", self.span(meta)))
+        made = Struct(str(parts[0]), args)
+        self.depths[id(made)] = (depth, made)  # the reference keeps the id from being used again
+        return made
+
+    def variable(self, parts: list[Token]) -> Var:
+        return Var(str(parts[0]))
+
+    def anonymous(self, parts: list[Token]) -> Var:
+        return Var(f"_{next(self.fresh)}")
+
+    def number(self, parts: list[Token]) -> Struct:
+        return Struct(_number(str(parts[0])))
+
+    def string(self, parts: list[Token]) -> Struct:
+        return Struct(str(parts[0]))
+
+    # Sections
+
+    def name(self, parts: list[Token]) -> Token:
+        return parts[0]
+
+    @_build
+    def belief(self, meta: Any, parts: list[Struct]) -> Struct:
+        if not is_ground(parts[0]):
+            self.problems.append(
+                Diagnostic("AJPF103", f"the initial belief {show(parts[0])} has a variable", self.span(meta))
+            )
+        return parts[0]
+
+    def beliefs(self, parts: list[Struct]) -> tuple[Struct, ...]:
+        return tuple(parts)
+
+    def positive(self, parts: list[Struct]) -> Condition:
+        return Condition(parts[0])
+
+    def negative(self, parts: list[Struct]) -> Condition:
+        return Condition(parts[0], positive=False)
+
+    @_build
+    def rule(self, meta: Any, parts: list[Any]) -> Rule:
+        return Rule(parts[0], _negated_last(parts[1:]), self.span(meta))
+
+    def rules(self, parts: list[Any]) -> tuple[Rule, ...]:
+        return tuple(p for p in parts if p is not None)
+
+    def kind(self, parts: list[Token]) -> GoalKind:
+        return GoalKind(str(parts[0]))
+
+    @_build
+    def goal(self, meta: Any, parts: list[Any]) -> Goal:
+        if not is_ground(parts[0]):
+            self.problems.append(
+                Diagnostic("AJPF103", f"the initial goal {show(parts[0])} has a variable", self.span(meta))
+            )
+        return Goal(parts[0], parts[1] or GoalKind.PERFORM)
+
+    def goals(self, parts: list[Goal]) -> tuple[Goal, ...]:
+        return tuple(parts)
+
+    # Plans
+
+    def belief_added(self, parts: list[Any]) -> Event:
+        return Event(Sign.ADD, parts[1])
+
+    def belief_dropped(self, parts: list[Any]) -> Event:
+        return Event(Sign.DROP, parts[1])
+
+    def goal_added(self, parts: list[Any]) -> Event:
+        return Event(Sign.ADD, parts[1], parts[2], is_goal=True)
+
+    def goal_dropped(self, parts: list[Any]) -> Event:
+        return Event(Sign.DROP, parts[1], parts[2], is_goal=True)
+
+    def believed(self, parts: list[Any]) -> Condition:
+        return Condition(parts[0])
+
+    def not_believed(self, parts: list[Any]) -> Condition:
+        return Condition(parts[0], positive=False)
+
+    def wanted(self, parts: list[Any]) -> Condition:
+        return Condition(parts[0], is_goal=True)
+
+    def not_wanted(self, parts: list[Any]) -> Condition:
+        return Condition(parts[0], positive=False, is_goal=True)
+
+    def anything(self, parts: list[Any]) -> Condition:
+        return Condition(None)
+
+    def guard(self, parts: list[Condition]) -> tuple[Condition, ...]:
+        return _negated_last(parts)
+
+    def add_belief(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind.ADD_BELIEF, parts[1])
+
+    def drop_belief(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind.DROP_BELIEF, parts[1])
+
+    def add_goal(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind.ADD_GOAL, parts[1], parts[2] or GoalKind.PERFORM)
+
+    def drop_goal(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind.DROP_GOAL, parts[1], parts[2] or GoalKind.PERFORM)
+
+    def wait(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind.WAIT, parts[0])
+
+    def action(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind.ACTION, parts[0])
+
+    def deeds(self, parts: list[Deed]) -> tuple[Deed, ...]:
+        return tuple(parts)
+
+    @_build
+    def plan(self, meta: Any, parts: list[Any]) -> Plan:
+        event, guard, deeds = parts
+        return Plan(event, guard, deeds or (), self.span(meta))
+
+    def plans(self, parts: list[Plan]) -> tuple[Plan, ...]:
+        return tuple(parts)
+
+    def start(self, parts: list[Any]) -> Program:
+        name, beliefs, rules, goals, plans = parts
+        span = _at(self.file, name.line or 1, name.column or 1, len(name))
+        return Program(str(name), beliefs, rules, goals, plans, span)
+
+
+def _number(text: str) -> str:
+    """3, 3.0 and 03 are one number to the agent, so they are one text here."""
+    sign, digits = ("-", text[1:]) if text.startswith("-") else ("", text)
+    whole, _, fraction = digits.partition(".")
+    whole, fraction = whole.lstrip("0") or "0", fraction.rstrip("0")
+    shown = f"{whole}.{fraction}" if fraction else whole
+    return shown if shown == "0" else sign + shown
+
+
+def _negated_last(conditions: list[Condition]) -> tuple[Condition, ...]:
+    """Negated conjuncts are evaluated after the positive ones (page "AJPF and Gwendolen"), which bind the variables."""
+    return tuple(sorted(conditions, key=lambda c: not c.positive))

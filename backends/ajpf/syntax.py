@@ -1,0 +1,196 @@
+"""Gwendolen programs and the terms in them, as data (design: page "AJPF and Gwendolen", section "the subset")."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from avow.diagnostics import Span
+
+MAX_DEPTH = 40
+"""Terms nested deeper are refused by the parsers, so that every walk over a term may recurse."""
+
+
+@dataclass(frozen=True, slots=True)
+class Var:
+    """``Location``; an anonymous ``_`` gets a name of its own when it is read."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Struct:
+    """``going(1)``, ``door``, ``-8.18``, ``"text"``: numbers and texts are constants that keep how they were written."""
+
+    functor: str
+    args: tuple[Term, ...] = ()
+
+
+Term = Var | Struct
+Bindings = dict[str, Term]
+
+
+class Sign(StrEnum):
+    ADD = "+"
+    DROP = "-"
+
+
+class GoalKind(StrEnum):
+    PERFORM = "perform"
+    ACHIEVE = "achieve"
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """``inspect(1) [perform]``; without a kind it is performed."""
+
+    term: Term
+    kind: GoalKind = GoalKind.PERFORM
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What triggers a plan: ``+danger``, ``-danger``, ``+!inspect(1)``, ``-!inspect(1)``."""
+
+    sign: Sign
+    term: Term
+    goal: GoalKind | None = None
+    """None for a belief; in a plan's trigger a goal without a written kind matches both."""
+    is_goal: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """One conjunct of a guard or of a reasoning rule: ``~B danger``, ``G inspect(1)``; ``True`` has no term."""
+
+    term: Term | None
+    positive: bool = True
+    is_goal: bool = False
+
+
+class DeedKind(StrEnum):
+    ADD_BELIEF = "+"
+    DROP_BELIEF = "-"
+    ADD_GOAL = "+!"
+    DROP_GOAL = "-!"
+    WAIT = "*"
+    ACTION = "action"
+
+
+@dataclass(frozen=True, slots=True)
+class Deed:
+    kind: DeedKind
+    term: Term
+    goal: GoalKind = GoalKind.PERFORM
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """``event : { guard } <- deeds ;``"""
+
+    event: Event
+    guard: tuple[Condition, ...]
+    deeds: tuple[Deed, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A reasoning rule: ``safe :- ~danger_red, ~danger_orange;``"""
+
+    head: Struct
+    body: tuple[Condition, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """One agent."""
+
+    name: str
+    beliefs: tuple[Struct, ...]
+    rules: tuple[Rule, ...]
+    goals: tuple[Goal, ...]
+    plans: tuple[Plan, ...]
+    name_span: Span | None = field(default=None, compare=False, repr=False)
+
+
+def show(term: Term) -> str:
+    """A term as Gwendolen writes it."""
+    if isinstance(term, Var):
+        return "_" if term.name.startswith("_") else term.name
+    return f"{term.functor}({', '.join(map(show, term.args))})" if term.args else term.functor
+
+
+def show_goal(goal: Goal) -> str:
+    return f"{show(goal.term)} [{goal.kind}]"
+
+
+def show_event(event: Event) -> str:
+    return f"{event.sign}{'!' if event.is_goal else ''}{show(event.term)}{f' [{event.goal}]' if event.goal else ''}"
+
+
+def show_deed(deed: Deed) -> str:
+    match deed.kind:
+        case DeedKind.ACTION:
+            return show(deed.term)
+        case DeedKind.ADD_GOAL | DeedKind.DROP_GOAL:
+            return f"{deed.kind}{show(deed.term)} [{deed.goal}]"
+        case _:
+            return f"{deed.kind}{show(deed.term)}"
+
+
+def variables(term: Term) -> Iterator[str]:
+    if isinstance(term, Var):
+        yield term.name
+        return
+    for arg in term.args:
+        yield from variables(arg)
+
+
+def is_ground(term: Term) -> bool:
+    return isinstance(term, Struct) and all(map(is_ground, term.args))
+
+
+def apply(term: Term, bindings: Mapping[str, Term]) -> Term:
+    """The term with its bound variables replaced, through chains of bindings."""
+    if isinstance(term, Var):
+        found = bindings.get(term.name)
+        return term if found is None else apply(found, bindings)
+    if not term.args:
+        return term
+    return Struct(term.functor, tuple(apply(arg, bindings) for arg in term.args))
+
+
+def unify(left: Term, right: Term, bindings: Bindings) -> Bindings | None:
+    """The most general extension of `bindings` that makes both equal, or None. No occurs check is needed: one side is
+    always a belief, goal, event or deed of a running agent, whose variables are renamed apart."""
+    stack = [(left, right)]
+    result = bindings
+    copied = False
+    while stack:
+        a, b = stack.pop()
+        a, b = _resolve(a, result), _resolve(b, result)
+        if a == b:
+            continue
+        if isinstance(b, Var) and not isinstance(a, Var):
+            a, b = b, a
+        if isinstance(a, Var):
+            if not copied:
+                result, copied = dict(result), True
+            result[a.name] = b
+            continue
+        if not isinstance(b, Struct) or a.functor != b.functor or len(a.args) != len(b.args):
+            return None
+        stack.extend(zip(a.args, b.args, strict=True))
+    return result
+
+
+def _resolve(term: Term, bindings: Mapping[str, Term]) -> Term:
+    while isinstance(term, Var):
+        found = bindings.get(term.name)
+        if found is None:
+            return term
+        term = found
+    return term
