@@ -127,7 +127,7 @@ def conclude(facts: Facts) -> Case:
         obligation_claim(o, statuses[o.id], _hypotheses(counting[o.id]), _link(counting[o.id]), names)
         for o in facts.obligations
     ]
-    claims += [requirement_claim_of(r, names) for r in facts.requirements]
+    claims += [requirement_claim_of(r, names, statuses) for r in facts.requirements]
     claims += derivation_claims(facts, names)
     standings = judge(claims)
     rests = {claim.id: claim.rests_on for claim in claims}
@@ -287,6 +287,8 @@ def _answer(
         hypotheses = len(standing.hypotheses)
         rest = f", on {hypotheses} hypothes{'is' if hypotheses == 1 else 'es'}" if hypotheses else ""
         return f"{how}{rest}; the weakest link is {short(name)}, {status}."
+    if standing.direct and standing.status is not Status.MISSING:
+        return f"{standing.status.value.capitalize()}: see {', '.join(short(n) for n in standing.below) or 'its evidence'}."
     if standing.below:
         causes = [f"{short(name)} is {statuses.get(name, 'not shown')}" for name in standing.below]
         more = f" and {len(causes) - 3} more" if len(causes) > 3 else ""

@@ -1,8 +1,8 @@
 """Expected and accepted findings: what the plan says of results that are not good.
 
 *Expected* (reproducing known-bad material) is strict both ways: a finding that is not listed fails, and so does a
-listed one that is not there. *Accepted* is a risk that a named person takes, for a reason, until a date; without a date of
-expiry it lasts a year. An accepted finding that has expired excuses nothing.
+listed one that is not there. *Accepted* is a risk that a named person takes, for a reason, until a date; without one
+it lasts a year. An accepted finding that has expired excuses nothing.
 """
 
 from __future__ import annotations

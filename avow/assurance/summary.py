@@ -71,8 +71,9 @@ def _summary(view: ObligationView) -> str:
         record = refuting[-1]
         example = record.counterexample.text() if record.counterexample else ""
         return f"{record.method}: {example or record.summary}"
-    if view.counting:
-        record = view.counting[-1].entry.evidence
+    telling = [v.entry.evidence for v in view.counting if weigh(v.entry.evidence).status is view.status]
+    if telling:
+        record = telling[-1]
         return f"{record.method}: {record.summary}"
     if view.evidence:
         record = view.evidence[-1].entry.evidence

@@ -8,7 +8,7 @@ from avow.assurance.facts import Facts
 from avow.assurance.naming import derivation_claim, is_foundation, requirement_claim, sanity_property
 from avow.evidence.claims import Claim
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
-from avow.evidence.status import Status
+from avow.evidence.status import Status, weakest
 from avow.system.plan import Requirement
 from avow.verdict import Link
 
@@ -106,11 +106,14 @@ def requirement_support(requirement: Requirement, names: Names) -> tuple[tuple[s
     return tuple(dict.fromkeys(rests)), tuple(unknown)
 
 
-def requirement_claim_of(requirement: Requirement, names: Names) -> Claim:
+def requirement_claim_of(requirement: Requirement, names: Names, statuses: Mapping[str, Status]) -> Claim:
+    """Its own obligations are the requirement itself (a refutation of one refutes it); the rest is what it rests on."""
     rests, unknown = requirement_support(requirement, names)
     formal = bool(requirement.formula or requirement.temporal)
-    nothing = (formal and not names.own.get(requirement.id)) or unknown or not rests
-    return Claim(requirement_claim(requirement.id), Status.MISSING if nothing else None, rests, prose=not formal)
+    own = weakest(statuses[name] for name in names.own.get(requirement.id, ()))
+    if (formal and own is None) or unknown or not rests:
+        own = weakest((Status.MISSING, *([own] if own else ())))
+    return Claim(requirement_claim(requirement.id), own, rests, prose=not formal)
 
 
 def derivation_claims(facts: Facts, names: Names) -> Iterable[Claim]:
