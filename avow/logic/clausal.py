@@ -1,4 +1,4 @@
-"""A formula as a disjunction of conjunctions: one level of it at a time, since quantifiers search one conjunction each."""
+"""A formula as a disjunction of conjunctions, one level at a time: a quantifier searches one conjunction after another."""
 
 from __future__ import annotations
 
