@@ -87,7 +87,7 @@ def realizable(
     engines: list[str] = []
     open_question: Realizability | None = None
     for group in groups(guarantees, outputs):
-        answer = _Search(inputs, group, assumptions, given or {}, timeout_ms, seed).decide()
+        answer = Search(inputs, group, assumptions, given or {}, timeout_ms, seed).decide()
         if answer.verdict is Verdict.REFUTED:
             return answer
         if answer.verdict is not Verdict.PROVED:
@@ -100,7 +100,7 @@ def realizable(
     return Realizability(Verdict.PROVED, needed=ordered, engine=", ".join(dict.fromkeys(engines)) or "z3")
 
 
-class _Search:
+class Search:
     """One group's question, with the witnesses found so far."""
 
     def __init__(
@@ -214,9 +214,14 @@ class _Search:
     # -- refutation ----------------------------------------------------------------------------------------------------
 
     def _refute(self, limit: int) -> Realizability | None:
+        return self.refute((), limit)
+
+    def refute(self, possible: Sequence[Formulas], limit: int) -> Realizability | None:
+        """Inputs without an output, at which each of the `possible` sets of guarantees could be met by itself; None
+        if none are found in `limit` ms."""
         end = time.monotonic() + limit / 1000
         while time.monotonic() < end:
-            inputs = self.defeat(self.group.guarantees, (), int((end - time.monotonic()) * 1000))
+            inputs = self._defeat(self.group.guarantees, possible, int((end - time.monotonic()) * 1000))
             if inputs is None:
                 return None
             before = len(self.witnesses)
@@ -225,7 +230,7 @@ class _Search:
                 return answer
         return None
 
-    def defeat(self, guarantees: Formulas, possible: Sequence[Formulas], limit: int) -> dict[Variable, Value] | None:
+    def _defeat(self, guarantees: Formulas, possible: Sequence[Formulas], limit: int) -> dict[Variable, Value] | None:
         """Allowed inputs at which no known witness meets the guarantees, though each of the `possible` sets of
         guarantees can be met; not judged yet."""
         translator = Translator()
