@@ -17,9 +17,9 @@ from avow import __version__
 from avow.backend import Backend, Job, Limits
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.files import digest, digest_file
-from avow.language.contract import Node
+from avow.language.contract import Contract, Node
 from avow.language.printer import show_term
-from avow.logic.formula import clause_digest, contract_digest
+from avow.logic.formula import node_digest, sort_digest
 from avow.registry import backend
 from avow.system.plan import Method, System
 
@@ -66,7 +66,7 @@ def language_work(system: System) -> Work:
         "contract",
         f"{files} parses, and every formula in it is well-typed",
         "",
-        contract_digest(contract),
+        _contract_digest(contract),
     )
     return _work(system, SYSTEM_LEVEL, LANGUAGE, (obligation,), __version__)
 
@@ -139,7 +139,7 @@ def guarantee(system: System, node: Node, name: str) -> Obligation:
         name,
         sentence,
         show_term(clause.formula, "unicode"),
-        clause_digest(node, clause),
+        node_digest(node, clause),
         (f"{node.name}.{name}",),
         clause.span,
     )
@@ -190,6 +190,14 @@ def _work(
 
 def _files(tool: Backend, job: Job) -> str:
     return json.dumps([[path.name, _digest(path)] for path in tool.files(job)])
+
+
+def _contract_digest(contract: Contract) -> str:
+    parts: list[list[str]] = [[name, sort_digest(sort)] for name, sort in contract.types]
+    for node in contract.nodes:
+        parts.append([node.name, *(f"{p.role}.{p.name}:{sort_digest(p.sort)}" for p in node.inputs + node.outputs)])
+        parts += [[c.kind, c.name, node_digest(node, c)] for c in node.clauses]
+    return digest(json.dumps(parts))
 
 
 def _digest(path: Path) -> str:

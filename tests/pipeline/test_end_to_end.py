@@ -1,0 +1,270 @@
+"""The main job through the real command line and doit, on the workspace that `avow init` makes."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+
+def run(folder: Path, *command: str, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", *command],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env={**os.environ, **(env or {})},
+        check=False,
+    )
+
+
+def verify(folder: Path, *more: str) -> subprocess.CompletedProcess[str]:
+    return run(folder, "doit", *(more or ("verify",)))
+
+
+def case(folder: Path, system: str = "thermostat") -> dict[str, object]:
+    loaded: dict[str, object] = json.loads((folder / "reports" / system / "report.json").read_text())
+    return loaded
+
+
+def ledger(folder: Path, system: str = "thermostat") -> list[dict[str, object]]:
+    lines = (folder / "artifacts" / "ledger" / f"{system}.jsonl").read_text().splitlines()
+    return [json.loads(line)["evidence"] for line in lines]
+
+
+def ran(done: subprocess.CompletedProcess[str]) -> set[str]:
+    """The stages that were executed, as ``stage subject``."""
+    found = re.findall(r"^  (check|sanity|compose|obligations|export|discharge) +(\S+)", done.stdout, re.MULTILINE)
+    return {f"{stage} {subject}" for stage, subject in found}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace from `avow init`, verified once. Tests that change it work on a copy."""
+    folder = tmp_path_factory.mktemp("made") / "robot"
+    done = run(folder.parent, "avow", "init", "robot")
+    assert done.returncode == 0, done.stderr
+    done = verify(folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.fixture
+def robot(made: Path, tmp_path: Path) -> Path:
+    import shutil
+
+    shutil.copytree(made, tmp_path / "robot")
+    return tmp_path / "robot"
+
+
+def edit(folder: Path, old: str, new: str, name: str = "system.rcl") -> None:
+    path = folder / "contracts" / "thermostat" / name
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def test_the_new_workspace_verifies(made: Path) -> None:
+    verdicts = {(e["obligation"], e["method"]): e["verdict"] for e in ledger(made)}
+    assert verdicts["thermostat/thermostat/guarantee/warms", "hoare"] == "proved"
+    assert verdicts["thermostat/thermostat/guarantee/warms", "hypothesis"] == "tested"
+    assert verdicts["thermostat/thermometer/guarantee/calibrated", "hypothesis"] == "tested"
+    for name in ("index.html", "report.json", "report.md"):
+        assert (made / "reports" / "thermostat" / name).stat().st_size > 500
+    assert (made / "reports" / "index.html").is_file()
+
+
+def test_again_nothing_is_run(robot: Path) -> None:
+    before = (robot / "reports" / "thermostat" / "index.html").stat().st_mtime_ns
+    done = verify(robot)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert ran(done) == set()
+    assert "nothing to do" in done.stdout
+    assert (robot / "reports" / "thermostat" / "index.html").stat().st_mtime_ns == before
+
+
+def test_a_comment_reruns_nothing_below_the_check(robot: Path) -> None:
+    edit(robot, "Low = 18;", "Low = 18; // a cold room\n")
+    records = len(ledger(robot))
+    done = verify(robot)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert {stage.split()[0] for stage in ran(done)} <= {"check", "export", "obligations"}
+    assert len(ledger(robot)) == records
+
+
+def test_a_threshold_breaks_what_depends_on_it_and_nothing_else(robot: Path) -> None:
+    edit(robot, "Low = 18;", "Low = 20;")
+    records = len(ledger(robot))
+    done = verify(robot)
+    assert done.returncode == 1, done.stdout + done.stderr
+    new = ledger(robot)[records:]
+    guarantees = {
+        (e["obligation"].rsplit("/", 1)[1], e["method"], e["verdict"]) for e in new if "/guarantee/" in e["obligation"]
+    }
+    assert ("warms", "hoare", "refuted") in guarantees
+    assert ("warms", "hypothesis", "refuted") in guarantees
+    assert not any(name in ("cools", "calibrated") for name, _, _ in guarantees)
+    reading = next(e for e in new if e["verdict"] == "refuted" and e["method"] == "hoare")["counterexample"]
+    value = dict(reading["values"])["in.temperature"]
+    assert 18 <= float(value) < 20
+
+
+def test_a_changed_program_reruns_its_method_only(robot: Path) -> None:
+    edit(robot, "// the control law", "// the law of control", "models/thermostat.imp")
+    assert {s for s in ran(verify(robot)) if s.startswith("discharge")} == {"discharge thermostat:thermostat:hoare"}
+
+
+def test_a_wrong_program_is_refuted(robot: Path) -> None:
+    edit(robot, "temperature < 18", "temperature <= 18", "models/thermostat.imp")
+    done = verify(robot)
+    assert done.returncode == 1
+    assert "refuted" in done.stdout
+    verdicts = {(e["obligation"].rsplit("/", 1)[1], e["method"]): e for e in ledger(robot)}
+    assert verdicts["rests", "hoare"]["verdict"] == "refuted"
+    assert dict(verdicts["rests", "hoare"]["counterexample"]["values"])["in.temperature"] == "18"
+
+
+def test_deleted_outputs_come_back(robot: Path) -> None:
+    import shutil
+
+    shutil.rmtree(robot / "artifacts")
+    shutil.rmtree(robot / "reports")
+    done = verify(robot)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (robot / "reports" / "thermostat" / "index.html").is_file()
+    assert ledger(robot)
+
+
+def test_a_killed_run_is_taken_up(made: Path, tmp_path: Path) -> None:
+    import shutil
+
+    folder = tmp_path / "killed"
+    shutil.copytree(made / "contracts", folder / "contracts")
+    shutil.copy(made / "dodo.py", folder)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "doit", "verify"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    path = folder / "artifacts" / "ledger" / "thermostat.jsonl"
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and not (path.is_file() and path.stat().st_size):
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    kept = len(ledger(folder))
+    done = verify(folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    every = [(e["obligation"], e["method"], e["key"]) for e in ledger(folder)]
+    assert kept > 0
+    assert len(every) == len(set(every)), "an answer that the killed run had recorded was made again"
+
+
+def test_two_runs_at_once_do_the_work_once(made: Path, tmp_path: Path) -> None:
+    import shutil
+
+    folder = tmp_path / "twice"
+    shutil.copytree(made / "contracts", folder / "contracts")
+    shutil.copy(made / "dodo.py", folder)
+    runs = [
+        subprocess.Popen([sys.executable, "-m", "doit", "verify"], cwd=folder, stdout=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    assert [r.wait(timeout=200) for r in runs] == [0, 0]
+    every = [(e["obligation"], e["method"], e["key"]) for e in ledger(folder)]
+    assert len(every) == len(set(every))
+
+
+def test_fresh_settles_everything_anew(robot: Path) -> None:
+    before = len(ledger(robot))
+    done = run(robot, "avow", "verify", "--fresh")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert len(ledger(robot)) == 2 * before
+    assert case(robot)["grade"] == "CERTIFIED"
+
+
+def test_a_swapped_artifact_is_made_again(robot: Path) -> None:
+    stamp = next(robot.glob("artifacts/thermostat/*/hoare/.export.json"))
+    name = next(iter(json.loads(stamp.read_text())["files"]))
+    good = (stamp.parent / name).read_text()
+    (stamp.parent / name).write_text("tampered")
+    assert verify(robot).returncode == 0
+    assert (stamp.parent / name).read_text() == good
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "where", "what"),
+    [
+        ("system.rcl", "out.mode == heat", "out.mode = heat", r"system\.rcl:\d+:\d+", "=="),
+        ("system.rcl", "mode : Mode", "mode : Mood", r"system\.rcl:\d+:\d+", "Mode"),
+        ("system.rcl", "in.temperature < Low", "in.temprature < Low", r"system\.rcl:\d+:\d+", "temperature"),
+        ("plan.yaml", "thermostat.warms", "thermostat.warmz", r"plan\.yaml:\d+:\d+", "warms"),
+        ("plan.yaml", "models/thermostat.imp", "models/thermostatt.imp", r"plan\.yaml:\d+:\d+", "thermostatt.imp"),
+        ("plan.yaml", "hoare:", "hoar:", r"", "hoare"),
+        ("plan.yaml", "criticality: high", "criticality: hihg", r"plan\.yaml:\d+:\d+", "high"),
+        ("models/thermostat.imp", "mode := heat", "mode := hot", r"thermostat\.imp:\d+:\d+", "hot"),
+    ],
+)
+def test_bad_input_is_located_and_ends_with_2(
+    robot: Path, name: str, old: str, new: str, where: str, what: str
+) -> None:
+    edit(robot, old, new, name)
+    done = verify(robot)
+    text = done.stdout + done.stderr
+    assert done.returncode == 2, text
+    assert "Traceback" not in text
+    assert re.search(where, text), text
+    assert what in text, text
+
+
+def test_a_broken_system_does_not_stop_the_others(robot: Path) -> None:
+    (robot / "contracts" / "broken").mkdir()
+    (robot / "contracts" / "broken" / "plan.yaml").write_bytes(b"\x00\xff\xfe: [")
+    edit(robot, "// the control law", "// the law of control", "models/thermostat.imp")
+    done = verify(robot)
+    text = done.stdout + done.stderr
+    assert done.returncode == 2, text
+    assert "Traceback" not in text
+    assert "discharge thermostat:thermostat:hoare" in ran(done)
+    assert case(robot)["exit_code"] == 0
+
+
+def test_one_system_by_name(robot: Path) -> None:
+    assert verify(robot, "verify:thermostat").returncode == 0
+    assert verify(robot, "verify:nothere").returncode != 0
+
+
+def test_the_stages_are_listed(made: Path) -> None:
+    done = verify(made, "list", "--all")
+    for stage in ("check", "sanity", "compose", "obligations", "export", "discharge", "report", "verify"):
+        assert f"{stage}:thermostat" in done.stdout, stage
+
+
+def test_obligations_are_shown_as_a_table(robot: Path) -> None:
+    done = verify(robot, "obligations")
+    assert done.returncode == 0, done.stderr
+    assert "thermostat/guarantee/warms" in done.stdout
+
+
+def test_doctor_names_every_backends_tools(made: Path) -> None:
+    done = run(made, "avow", "doctor", "--json")
+    used = {t["used_by"] for t in json.loads(done.stdout)["tools"]}
+    assert {"dafny", "ajpf", "logic"} <= used
+
+
+def test_init_overwrites_nothing(made: Path) -> None:
+    done = run(made.parent, "avow", "init", "robot")
+    assert done.returncode == 2
+    assert "not empty" in done.stderr
+
+
+def test_outside_a_workspace_the_message_says_what_to_do(tmp_path: Path) -> None:
+    done = run(tmp_path, "avow", "verify")
+    assert done.returncode == 2
+    assert "avow init" in done.stderr
