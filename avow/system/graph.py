@@ -1,4 +1,4 @@
-"""The dataflow graph: which output feeds which input, said by names and types, and by the plan where they do not suffice.
+"""The dataflow graph: which output feeds which input, by names and types, and by the plan where they do not suffice.
 
 An output feeds the inputs of *other* nodes that bear its name and type. A connection of the plan renames, chooses among
 several providers, delays, or lets a node feed itself; an input named by a connection takes that source and no other.

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from avow.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Contract
+from avow.system.formulas import check_formulas
+from avow.system.graph import dataflow
 from avow.system.names import check_names
 from avow.system.plan import System
 from avow.system.plan_file import bare_plan, fill_methods, read_plan
@@ -36,7 +38,12 @@ def load_system(folder: Path) -> System:
     if any(fault.is_error for fault in faults):
         raise Rejected(*faults)
     guarantees = {node.name: tuple(clause.name for clause in node.guarantees) for node in contract.nodes}
-    return System(fill_methods(plan, guarantees), contract)
+    system = System(fill_methods(plan, guarantees), contract)
+    graph = dataflow(system)
+    faults += tuple(fault for fault in graph.findings if fault.is_error) + check_formulas(system, graph)
+    if any(fault.is_error for fault in faults):
+        raise Rejected(*faults)
+    return system
 
 
 def load_bare(files: Sequence[Path], name: str | None = None) -> System:

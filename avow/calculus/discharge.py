@@ -1,0 +1,229 @@
+"""Side conditions, put to the solver: proved, refuted with a counterexample in the contract's words, or unknown.
+
+A consumer's assumption has to follow from what its providers guarantee (and assume: the conclusion is under that) at
+the same step, from the plan's environment assumptions, and, for a value that comes over a delayed edge, from its
+initial value at the first step and from what held one step earlier at every later one. This is induction over steps
+and, within a step, over the order in which values flow; it is sound as long as no assumption is used, at one step, to
+prove itself. Where proofs would do that, others are looked for; where there are none, the rule is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+from avow.calculus.derivation import Case, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
+from avow.calculus.variables import Frame
+from avow.language.terms import Term
+from avow.logic.smt import entails
+from avow.system.graph import components, cycle_in
+from avow.verdict import Verdict
+
+Hypotheses = dict[str, Term]
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Bounds on one question to the solver."""
+
+    milliseconds: int = 10_000
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """A loop of the derivation, and the form in which R4's missing premise is met."""
+
+    members: tuple[str, ...]
+    form: LoopForm
+    cycle: tuple[str, ...]
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """All side conditions of a goal, settled."""
+
+    goal: Goal
+    settled: Mapping[SideCondition, Settled]
+    loops: tuple[Loop, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether the whole derivation stands (up to its hypotheses)."""
+        verdicts = {answer.verdict for answer in self.settled.values()}
+        if Verdict.REFUTED in verdicts or any(loop.form is LoopForm.CIRCULAR for loop in self.loops):
+            return Verdict.REFUTED
+        return Verdict.UNKNOWN if verdicts - {Verdict.PROVED} else Verdict.PROVED
+
+
+def settle(frame: Frame, goal: Goal, bounds: Bounds | None = None) -> Answers:
+    """Discharge every side condition of a derivation, and judge its loops."""
+    solver = _Solver(frame, frozenset(goal.nodes), bounds or Bounds())
+    settled = {condition: solver.condition(condition) for condition in goal.conditions}
+    settled = _break_circles(solver, settled)
+    loops = tuple(_loop(frame, goal, part, settled) for part in goal.root.walk() if part.rule is Rule.R4)
+    return Answers(goal, settled, loops)
+
+
+@dataclass(slots=True)
+class _Solver:
+    frame: Frame
+    selected: frozenset[str]
+    bounds: Bounds
+
+    def condition(self, condition: SideCondition, allowed: frozenset[str] | None = None) -> Settled:
+        """Settle one side condition; `allowed`: the nodes whose contracts may be used at the same step.
+
+        The nearest hypotheses are tried first: they make the proof that a reader expects, and the question small.
+        """
+        allowed = self.selected if allowed is None else allowed
+        direct = [p for p in condition.providers if p in allowed]
+        last: Settled | None = None
+        for same, before in self.attempts(condition, direct, allowed):
+            split = bool(before) or condition.delayed
+            phases = (Phase.INITIAL, Phase.LATER) if split else (Phase.SAME_STEP,)
+            cases = tuple(self.case(condition, phase, same, before) for phase in phases)
+            answer = _settled(condition, cases)
+            if answer.verdict is Verdict.PROVED:
+                return answer
+            last = answer  # only the widest hypotheses refute: narrower ones may just have left something out
+        assert last is not None
+        return last
+
+    def attempts(
+        self, condition: SideCondition, direct: list[str], allowed: frozenset[str]
+    ) -> Iterable[tuple[tuple[str, ...], tuple[str, ...]]]:
+        """Ever wider sets of nodes whose contracts serve as hypotheses: at the same step, and one step earlier."""
+        consumer = condition.consumer
+        near = tuple(p for p in direct if p != consumer and self.feeds(p, consumer, delayed=False))
+        before = tuple(p for p in condition.providers if self.feeds(p, consumer, delayed=True))
+        tried: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
+        ancestors = self.ancestors(consumer, allowed)
+        # What holds one step earlier holds of every selected node: each step's assumptions come before the next's.
+        earlier = tuple(
+            dict.fromkeys(
+                edge.source.node
+                for node in (*ancestors, consumer)
+                for edge in self.frame.graph.feeding(node)
+                if edge.delayed and edge.source.node in self.selected
+            )
+        )
+        everything = tuple(dict.fromkeys((*earlier, *ancestors, consumer))) if earlier else ()
+        first = before if condition.delayed else ()
+        for attempt in ((near, first), (ancestors, first), (ancestors, earlier), (ancestors, everything)):
+            if attempt not in tried:
+                tried.add(attempt)
+                yield attempt
+
+    def feeds(self, provider: str, consumer: str, *, delayed: bool) -> bool:
+        return any(e.source.node == provider and e.delayed is delayed for e in self.frame.graph.feeding(consumer))
+
+    def ancestors(self, node: str, allowed: frozenset[str]) -> tuple[str, ...]:
+        """The allowed nodes from which values flow to a node within one step."""
+        found: dict[str, None] = {}
+        stack = [node]
+        while stack:
+            for provider in reversed(self.frame.graph.providers(stack.pop(), delayed=False)):
+                if provider in allowed and provider != node and provider not in found:
+                    found[provider] = None
+                    stack.append(provider)
+        return tuple(found)
+
+    def case(self, condition: SideCondition, phase: Phase, same: tuple[str, ...], before: tuple[str, ...]) -> Case:
+        hypotheses = self.contracts(same, 0)
+        hypotheses |= self.frame.environment(0)
+        if phase is Phase.LATER:
+            hypotheses |= self.contracts(before, 1)
+            hypotheses |= self.frame.environment(1)
+        elif phase is Phase.INITIAL:
+            hypotheses |= self.frame.initials(frozenset(self.selected))
+        goal = self.frame.clause(condition.consumer, condition.clause)
+        answer = entails(hypotheses, goal, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed)
+        return Case(
+            phase,
+            answer.verdict,
+            answer.needed,
+            answer.counterexample,
+            answer.vacuous,
+            answer.reason,
+            answer.engine,
+        )
+
+    def contracts(self, nodes: Iterable[str], earlier: int) -> Hypotheses:
+        """Assumptions and guarantees of some nodes, labelled ``navigation.somewhere``."""
+        suffix = " one step before" if earlier else ""
+        return {
+            f"{node}.{clause.name}{suffix}": self.frame.clause(node, clause.name, earlier)
+            for node in nodes
+            for clause in self.frame.node(node).clauses
+        }
+
+
+def _settled(condition: SideCondition, cases: tuple[Case, ...]) -> Settled:
+    verdicts = [case.verdict for case in cases]
+    if Verdict.REFUTED in verdicts:
+        verdict = Verdict.REFUTED
+    elif all(v is Verdict.PROVED for v in verdicts):
+        verdict = Verdict.PROVED
+    else:
+        verdict = Verdict.UNKNOWN
+    used: dict[str, None] = {}
+    used_before: dict[str, None] = {}
+    for case in cases:
+        for label in case.needed:
+            owner = label.split(".")[0]
+            if label.startswith(("environment ", "initial ")):
+                continue
+            (used_before if label.endswith(" one step before") else used)[owner] = None
+    return Settled(condition, verdict, cases, tuple(used), tuple(used_before))
+
+
+def _break_circles(solver: _Solver, settled: dict[SideCondition, Settled]) -> dict[SideCondition, Settled]:
+    """Where proofs use, at one step, the contract of a node whose assumption they serve to prove: find others.
+
+    Nodes are established one after the other, each from those before it. What can be established in no order is
+    circular: its proofs do not count.
+    """
+    consumers = tuple(dict.fromkeys(condition.consumer for condition in settled))
+    arcs = [(used, answer.condition.consumer) for answer in settled.values() for used in answer.used]
+    found = dict(settled)
+    for group in components(consumers, arcs):
+        if len(group) < 2:
+            continue
+        waiting = list(group)
+        established = solver.selected - set(group)
+        progress = True
+        while waiting and progress:
+            progress = False
+            for node in list(waiting):
+                mine = [condition for condition in settled if condition.consumer == node]
+                answers = {condition: solver.condition(condition, established) for condition in mine}
+                if all(answer.verdict is Verdict.PROVED for answer in answers.values()):
+                    found |= answers
+                    established |= {node}
+                    waiting.remove(node)
+                    progress = True
+        circle = cycle_in(waiting, arcs) or tuple(waiting)
+        for condition, answer in settled.items():
+            if condition.consumer in waiting and answer.verdict is Verdict.PROVED and set(answer.used) & set(waiting):
+                found[condition] = replace(answer, verdict=Verdict.REFUTED, circle=circle)
+    return found
+
+
+def _loop(frame: Frame, goal: Goal, part: Derivation, settled: Mapping[SideCondition, Settled]) -> Loop:
+    members = set(part.nodes)
+    answers = [settled[condition] for condition in part.side_conditions]
+    arcs = [(e.source.node, e.target.node) for e in part.linking if e.source.node in members]
+    cycle = cycle_in(part.nodes, arcs)
+    circles = [answer.circle for answer in answers if answer.circle]
+    if circles:
+        shown = " → ".join((*circles[0], circles[0][0]))
+        return Loop(part.nodes, LoopForm.CIRCULAR, circles[0], f"each assumption is proved from the next: {shown}")
+    if all(answer.verdict is Verdict.PROVED for answer in answers):
+        if not any(answer.used_before for answer in answers) and all(len(answer.cases) == 1 for answer in answers):
+            note = "no member's assumption depends on what comes round the loop"
+            return Loop(part.nodes, LoopForm.BOOTSTRAP, cycle, note)
+        note = "the initial values satisfy the assumptions, and each round of the loop keeps them"
+        return Loop(part.nodes, LoopForm.INITIAL, cycle, note)
+    return Loop(part.nodes, LoopForm.OPEN, cycle, "some assumption of a member is not shown")

@@ -1,0 +1,293 @@
+"""Finds the rule instances of a selection of nodes (or of the whole system) in the graph and nests them. Pure.
+
+Strongly connected components are loops (R4); between them the graph has no circle and is walked from providers to
+consumers: one provider makes a sequence (R1), several make a union (R3), one provider of several consumers that have
+no other makes a branching (R2). Shared parts are shared in the tree, so that its size stays that of the graph.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
+from avow.calculus.variables import Frame
+from avow.diagnostics import Diagnostic
+from avow.language.contract import Clause
+from avow.system.formulas import ports_of
+from avow.system.graph import Edge, components
+from avow.system.plan import ComposeGoal, Endpoint
+
+WHOLE = "whole"
+"""The name of the derivation over every node."""
+
+PERSISTENCE = "the outputs of {} persist once generated, until they are used together"
+ONE_OUTPUT = "{} give at most one output element for each input element"
+
+
+def derive(frame: Frame, goal: ComposeGoal | None = None) -> Goal:
+    """The derivation that a goal of the plan asks for; without one, that of the whole system."""
+    names = goal.select if goal is not None and goal.select else frame.graph.nodes
+    builder = _Builder(frame, tuple(names))
+    name = goal.name if goal is not None else WHOLE
+    root: Derivation | None = None
+    findings: list[Diagnostic] = []
+    if goal is not None and goal.rule is not None:
+        root = builder.as_asked(Rule(goal.rule))
+        if root is None:
+            message = f"compose.{name}: {goal.rule} does not fit {', '.join(names)}: {_WANTED[Rule(goal.rule)]}"
+            findings.append(Diagnostic("PLAN125", message, goal.options.at("rule"), hint="leave the rule to Avow"))
+    root = root or builder.found()
+    return Goal(name, tuple(names), replace(root, name=name), tuple(findings))
+
+
+_WANTED = {
+    Rule.R1: "each node must feed the next",
+    Rule.R2: "one node must feed all others",
+    Rule.R3: "all others must feed one node",
+    Rule.R4: "some of the nodes must form a loop",
+}
+
+
+@dataclass(slots=True)
+class _Builder:
+    frame: Frame
+    nodes: tuple[str, ...]
+    selected: frozenset[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.selected = frozenset(self.nodes)
+
+    # -- facts about the selection -------------------------------------------------------------------------------------
+
+    def edges_into(self, node: str, providers: Iterable[str] | None = None) -> tuple[Edge, ...]:
+        wanted = self.selected if providers is None else frozenset(providers)
+        return tuple(e for e in self.frame.graph.feeding(node) if e.source.node in wanted)
+
+    def providers(self, node: str) -> tuple[str, ...]:
+        """The other selected nodes that feed a node."""
+        return tuple(dict.fromkeys(e.source.node for e in self.edges_into(node) if e.source.node != node))
+
+    def outside(self, node: str, providers: Iterable[str]) -> tuple[str, ...]:
+        """Inputs of a node that the providers do not give, each with where it comes from."""
+        given = frozenset(providers)
+        found: list[str] = []
+        for port in self.frame.node(node).inputs:
+            edge = self.frame.graph.by_target.get(Endpoint(node, port.name))
+            if edge is None:
+                found.append(f"{node}.{port.name} (environment)")
+            elif edge.source.node not in given:
+                found.append(f"{node}.{port.name} ({edge.source}{', delayed' if edge.delayed else ''})")
+        return tuple(found)
+
+    def conditions(
+        self, node: str, providers: Sequence[str]
+    ) -> tuple[tuple[SideCondition, ...], tuple[ClauseName, ...]]:
+        """The side conditions of a consumer, and those of its assumptions that stay assumed in the conclusion."""
+        given = frozenset(providers)
+        conditions: list[SideCondition] = []
+        kept: list[ClauseName] = []
+        for clause in self.frame.node(node).assumptions:
+            sources = self.sources(node, clause)
+            edges = [edge for edge in sources.values() if edge is not None and edge.source.node in given]
+            environment = self.environment(node, [port for port, edge in sources.items() if edge is None])
+            if sources and not edges and not (environment and all(edge is None for edge in sources.values())):
+                kept.append(ClauseName(node, clause.name))
+                continue
+            direct = tuple(dict.fromkeys(edge.source.node for edge in edges))
+            delayed = any(edge.delayed for edge in edges)
+            conditions.append(SideCondition(node, clause.name, direct, delayed, environment))
+        return tuple(conditions), tuple(kept)
+
+    def sources(self, node: str, clause: Clause) -> dict[str, Edge | None]:
+        """The inputs that a clause speaks of, and the edge that feeds each (None: the environment)."""
+        return {v.name: self.frame.graph.by_target.get(Endpoint(node, v.name)) for v in ports_of(clause.formula)}
+
+    def environment(self, node: str, ports: Sequence[str]) -> tuple[str, ...]:
+        """The plan's assumptions on some environment inputs of a node."""
+        names = {f"{owner}.{port}" for owner in ("in", node) for port in ports}
+        return tuple(a.port for a in self.frame.assumed if a.port in names)
+
+    # -- instances -----------------------------------------------------------------------------------------------------
+
+    def premise(self, node: str) -> Derivation:
+        assumed = tuple(ClauseName(node, clause.name) for clause in self.frame.node(node).assumptions)
+        return Derivation(Rule.PREMISE, (node,), assumed=assumed, guaranteed=(node,))
+
+    def sequence(self, before: Derivation, provider: str, node: str) -> Derivation:
+        """R1: one node more at the end of a sequence, or a sequence of two."""
+        conditions, kept = self.conditions(node, (provider,))
+        linking, outside = self.edges_into(node, (provider,)), self.outside(node, (provider,))
+        if before.rule is Rule.R1 and before.nodes[-1] == provider:
+            return Derivation(
+                Rule.R1,
+                (*before.nodes, node),
+                before.linking + linking,
+                before.outside + outside,
+                before.side_conditions + conditions,
+                assumed=before.assumed + kept,
+                guaranteed=(node,),
+                children=(*before.children, self.premise(node)),
+            )
+        return Derivation(
+            Rule.R1,
+            (provider, node),
+            linking,
+            outside,
+            conditions,
+            assumed=before.assumed + kept,
+            guaranteed=(node,),
+            children=(before, self.premise(node)),
+        )
+
+    def branching(self, before: Derivation, root: str, leaves: Sequence[str]) -> Derivation:
+        parts = [self.conditions(leaf, (root,)) for leaf in leaves]
+        return Derivation(
+            Rule.R2,
+            (root, *leaves),
+            tuple(e for leaf in leaves for e in self.edges_into(leaf, (root,))),
+            tuple(o for leaf in leaves for o in self.outside(leaf, (root,))),
+            tuple(c for conditions, _ in parts for c in conditions),
+            assumed=before.assumed + tuple(k for _, kept in parts for k in kept),
+            guaranteed=tuple(leaves),
+            children=(before, *(self.premise(leaf) for leaf in leaves)),
+        )
+
+    def union(self, before: Sequence[Derivation], sources: Sequence[str], sink: str) -> Derivation:
+        conditions, kept = self.conditions(sink, sources)
+        listed = _listed(sources)
+        return Derivation(
+            Rule.R3,
+            (*sources, sink),
+            self.edges_into(sink, sources),
+            self.outside(sink, sources),
+            conditions,
+            (PERSISTENCE.format(listed), ONE_OUTPUT.format(_listed((*sources, sink)))),
+            _union(part.assumed for part in before) + kept,
+            (sink,),
+            (*before, self.premise(sink)),
+        )
+
+    def loop(self, before: Sequence[Derivation], members: Sequence[str], entries: Sequence[str]) -> Derivation:
+        givers = (*entries, *members)
+        parts = [self.conditions(node, givers) for node in members]
+        return Derivation(
+            Rule.R4,
+            tuple(members),
+            tuple(e for node in members for e in self.edges_into(node, givers)),
+            tuple(o for node in members for o in self.outside(node, givers)),
+            tuple(c for conditions, _ in parts for c in conditions),
+            (PERSISTENCE.format(_listed(givers)), ONE_OUTPUT.format(_listed(givers))),
+            _union([*(part.assumed for part in before), *(kept for _, kept in parts)]),
+            tuple(members),
+            (*before, *(self.premise(node) for node in members)),
+            entries=tuple(entries),
+        )
+
+    # -- as the plan asks ----------------------------------------------------------------------------------------------
+
+    def as_asked(self, rule: Rule) -> Derivation | None:
+        """One instance of the rule over all selected nodes, or None where it does not fit."""
+        if len(self.nodes) < 2 and rule is not Rule.R4:
+            return None
+        match rule:
+            case Rule.R1:
+                if not all(
+                    one in self.providers(other) for one, other in zip(self.nodes, self.nodes[1:], strict=False)
+                ):
+                    return None
+                found = self.premise(self.nodes[0])
+                for one, other in zip(self.nodes, self.nodes[1:], strict=False):
+                    found = self.sequence(found, one, other)
+                return found
+            case Rule.R2:
+                for root in self.nodes:
+                    leaves = [node for node in self.nodes if node != root]
+                    if all(root in self.providers(leaf) for leaf in leaves):
+                        return self.branching(self.premise(root), root, leaves)
+                return None
+            case Rule.R3:
+                # The last one named is the paper's node n; where it does not fit, any that does.
+                for sink in reversed(self.nodes):
+                    sources = [node for node in self.nodes if node != sink]
+                    if all(source in self.providers(sink) for source in sources):
+                        return self.union([self.premise(source) for source in sources], sources, sink)
+                return None
+            case _:
+                whole = self.found()
+                return whole if any(part.rule is Rule.R4 for part in whole.walk()) else None
+
+    # -- as it is found ------------------------------------------------------------------------------------------------
+
+    def found(self) -> Derivation:
+        arcs = [(e.source.node, node) for node in self.nodes for e in self.edges_into(node)]
+        groups = components(self.nodes, arcs)
+        home = {node: group for group in groups for node in group}
+        made: dict[str, Derivation] = {}
+        for group in groups:
+            if group[0] in made:
+                continue  # a leaf of a branching made before
+            entries = tuple(dict.fromkeys(p for node in group for p in self.providers(node) if home[p] != group))
+            before = _distinct(made[entry] for entry in entries)
+            if len(group) > 1 or self.depends_on_itself(group[0]):
+                whole = self.loop(before, group, entries)
+                made.update(dict.fromkeys(group, whole))
+            elif not entries:
+                made[group[0]] = self.premise(group[0])
+            elif len(entries) == 1:
+                leaves = self.leaves(entries[0], home)
+                if len(leaves) > 1:
+                    made.update(dict.fromkeys(leaves, self.branching(before[0], entries[0], leaves)))
+                else:
+                    made[group[0]] = self.sequence(before[0], entries[0], group[0])
+            else:
+                made[group[0]] = self.union(before, entries, group[0])
+        fed = {source for source, target in arcs if home[source] != home[target]}
+        used = _distinct(made[source] for source in fed)
+        last = _distinct(made[node] for group in groups for node in group if node not in fed)
+        ends = [d for d in last if not any(d is u for u in used) or d.rule is Rule.R2] or last
+        if len(ends) == 1:
+            return ends[0]
+        return Derivation(
+            Rule.ALL,
+            tuple(dict.fromkeys(node for end in ends for node in end.nodes)),
+            assumed=_union(end.assumed for end in ends),
+            guaranteed=tuple(dict.fromkeys(node for end in ends for node in end.guaranteed)),
+            children=tuple(ends),
+        )
+
+    def leaves(self, root: str, home: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
+        """The nodes that have no other provider than `root`, and are not in loops."""
+        return tuple(
+            node
+            for node in self.frame.graph.consumers(root)
+            if node in self.selected
+            and node != root
+            and len(home[node]) == 1
+            and self.providers(node) == (root,)
+            and not self.depends_on_itself(node)
+        )
+
+    def depends_on_itself(self, node: str) -> bool:
+        """Whether an assumption of the node speaks of an input that it feeds itself."""
+        return any(
+            edge is not None and edge.source.node == node
+            for clause in self.frame.node(node).assumptions
+            for edge in self.sources(node, clause).values()
+        )
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names)
+
+
+def _union(parts: Iterable[tuple[ClauseName, ...]]) -> tuple[ClauseName, ...]:
+    return tuple(dict.fromkeys(name for part in parts for name in part))
+
+
+def _distinct(parts: Iterable[Derivation]) -> list[Derivation]:
+    """Each derivation once, by identity: shared parts are shared, and comparing them would walk them."""
+    seen: dict[int, Derivation] = {}
+    for part in parts:
+        seen.setdefault(id(part), part)
+    return list(seen.values())

@@ -1,0 +1,136 @@
+"""The formulas that a plan gives as text: initial values and environment assumptions, typed against the contract."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.language.sorts import BOOL
+from avow.language.terms import Role, Term, Variable, children
+from avow.system.graph import Edge, Graph
+from avow.system.plan import Endpoint, EnvironmentInput, System
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """What the plan assumes of an environment input: `formula` is over the inputs of `node`."""
+
+    port: str
+    node: str
+    formula: Term
+    text: str
+    because: str
+
+
+def initial_condition(system: System, edge: Edge) -> Term | None:
+    """What holds of the source's ``out.<port>`` before the first step; None where nothing is said.
+
+    The text is a value of the port's type, or a formula about ``out.<port>``. Raises Rejected, located.
+    """
+    if edge.initial is None:
+        return None
+    node = system.contract.node(edge.source.node)
+    port = node.output(edge.source.port)
+    text = edge.initial
+    as_value = f"out.{port.name} == ({text})"
+    about_it = f"out.{port.name}" in text
+    attempts = [text] if about_it else [as_value, text]
+    if port.sort == BOOL and not about_it:
+        attempts = [as_value]
+    failures: list[Rejected] = []
+    for attempt in attempts:
+        try:
+            term = _parse(system, attempt, node.name, edge.span)
+        except Rejected as rejected:
+            failures.append(rejected)
+            continue
+        foreign = [v for v in ports_of(term) if (v.role, v.name) != (Role.OUTPUT, port.name)]
+        if not foreign:
+            return term
+        message = f"an initial value may speak of out.{port.name} only, not of {foreign[0].qualified}"
+        failures.append(Rejected(Diagnostic("PLAN112", message, edge.span)))
+    what = "; ".join(d.message for d in failures[0].diagnostics)
+    message = (
+        f"{text!r} is neither a value of {edge.source} ({port.type_name}) nor a formula about out.{port.name}: {what}"
+    )
+    raise Rejected(Diagnostic("PLAN112", message, edge.span))
+
+
+def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]:
+    """What the plan assumes of the inputs that no node provides. Raises Rejected, with every fault."""
+    found: list[Assumed] = []
+    faults: list[Diagnostic] = []
+    for entry in system.plan.environment:
+        holders = _endpoints(system, entry)
+        outside = [e for e in holders if e in graph.environment]
+        if not outside:
+            providers = [str(graph.by_target[e].source) for e in holders if e in graph.by_target]
+            message = f"environment: {entry.port} is no environment input: {', '.join(providers)} provides it"
+            faults.append(Diagnostic("PLAN113", message, entry.span))
+            continue
+        if entry.assume is None:
+            continue
+        owner = outside[0].node
+        try:
+            term = _parse(system, entry.assume, owner, entry.span)
+        except Rejected as rejected:
+            faults += rejected.diagnostics
+            continue
+        inputs = {e.port for e in graph.environment if e.node == owner}
+        foreign = [v for v in ports_of(term) if v.role is not Role.INPUT or v.name not in inputs]
+        if foreign:
+            message = f"environment: {entry.port}: {foreign[0].qualified} is not the environment's to assume"
+            hint = "only inputs that no node provides may be spoken of"
+            faults.append(Diagnostic("PLAN113", message, entry.span, hint=hint))
+            continue
+        found.append(Assumed(entry.port, owner, term, entry.assume, entry.because or ""))
+    if faults:
+        raise Rejected(*faults)
+    return tuple(found)
+
+
+def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
+    """Every fault in the plan's initial values and environment assumptions."""
+    faults: list[Diagnostic] = []
+    first: dict[Endpoint, Edge] = {}
+    for edge in graph.edges:
+        try:
+            initial_condition(system, edge)
+        except Rejected as rejected:
+            faults += rejected.diagnostics
+        if edge.delayed and first.setdefault(edge.source, edge).initial != edge.initial:
+            message = f"{edge.source} has more than one initial value; all its delayed edges carry the same"
+            faults.append(Diagnostic("PLAN112", message, edge.span))
+    try:
+        environment_assumptions(system, graph)
+    except Rejected as rejected:
+        faults += rejected.diagnostics
+    return tuple(dict.fromkeys(faults))
+
+
+def ports_of(term: Term) -> tuple[Variable, ...]:
+    """The inputs and outputs that a term mentions, each once."""
+    found: dict[Variable, None] = {}
+    stack = [term]
+    while stack:
+        current = stack.pop()
+        if isinstance(current, Variable) and current.role is not Role.BOUND:
+            found[current] = None
+        stack.extend(children(current))
+    return tuple(found)
+
+
+def _endpoints(system: System, entry: EnvironmentInput) -> Sequence[Endpoint]:
+    owner, _, port = entry.port.partition(".")
+    return [
+        Endpoint(node.name, port)
+        for node in system.contract.nodes
+        if owner in ("in", node.name) and port in [p.name for p in node.inputs]
+    ]
+
+
+def _parse(system: System, text: str, node: str, span: Span | None) -> Term:
+    from avow.language.load import parse_formula  # the grammar is slow to import
+
+    return parse_formula(text, system.contract.node(node), system.contract, span)
