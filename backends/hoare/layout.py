@@ -37,7 +37,6 @@ class _Block:
 class Layout:
     """One pass over the tokens of one program."""
 
-
     def __init__(self, file: str) -> None:
         self.file = file
         self._owner: _Block | None = None
@@ -92,12 +91,14 @@ class Layout:
         for block in reversed(blocks):
             if block.explicit:
                 end = next(k for k, v in _ENDS.items() if v == block.statement.type)
-                raise self._rejected(block.statement, f"this {block.statement} needs its branches indented, or an {end}")
+                raise self._rejected(
+                    block.statement, f"this {block.statement} needs its branches indented, or an {end}"
+                )
             yield _mark("_CLOSE", last)
 
     def _close_for(self, token: Token, blocks: list[_Block], starts_line: bool) -> Iterator[Token]:
-        """Close the blocks up to the one that ELSE or an END-keyword ends; ELSE's block is kept for its second branch."""
-        wanted = {"ENDIF": "IF", "ENDMATCH": "MATCH", "ENDWHILE": "WHILE"}.get(token.type)
+        """Close the blocks up to the one that ELSE or an END-keyword ends; it is kept for the second branch."""
+        wanted = _ENDS.get(token.type)
         while blocks:
             block = blocks.pop()
             yield _mark("_CLOSE", token)
@@ -117,7 +118,7 @@ class Layout:
         return token.column, token.column <= around, False
 
     def _rejected(self, token: Token, message: str) -> Rejected:
-        return Rejected(Diagnostic("hoare-syntax", message, span_of(token, self.file)))
+        return Rejected(Diagnostic("HOARE100", message, span_of(token, self.file)))
 
 
 def span_of(token: Token, file: str) -> Span:

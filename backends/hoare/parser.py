@@ -41,7 +41,7 @@ DEEPEST = 120
 
 
 def parse_program(text: str, file: str) -> Source:
-    """Raises Rejected with code ``hoare-syntax``."""
+    """Raises Rejected with code ``HOARE100``."""
     source: Source = _parse(text, file, "program")
     return source
 
@@ -71,14 +71,14 @@ def _parse(text: str, file: str, start: str) -> Any:
         result = _Build(file).transform(interactive.feed_eof(last))
     except UnexpectedCharacters as error:
         span = Span(file, error.line, error.column, error.line, error.column + 1)
-        raise Rejected(Diagnostic("hoare-syntax", f"this character has no meaning here: {error.char!r}", span)) from error
+        raise Rejected(Diagnostic("HOARE100", f"this character has no meaning here: {error.char!r}", span)) from error
     except UnexpectedToken as error:
         raise Rejected(_explain(error, file, last)) from error
     except VisitError as error:
         raise error.orig_exc from None
     deep = _too_deep(result)
     if deep is not None:
-        raise Rejected(Diagnostic("hoare-syntax", f"nested more than {DEEPEST} levels deep", deep))
+        raise Rejected(Diagnostic("HOARE100", f"nested more than {DEEPEST} levels deep", deep))
     return result
 
 
@@ -86,11 +86,13 @@ def _explain(error: UnexpectedToken, file: str, before: Token | None) -> Diagnos
     token: Token = error.token
     span = span_of(token, file)
     expected = set(error.accepts or error.expected or ())
-    text = {"_SEP": "the end of the line", "_CLOSE": "the end of the block", "$END": "the end"}.get(token.type, f"`{token}`")
+    text = {"_SEP": "the end of the line", "_CLOSE": "the end of the block", "$END": "the end"}.get(
+        token.type, f"`{token}`"
+    )
     hint = None
     if token.type == "EQUALS" and "ASSIGN" in expected:
         return Diagnostic(
-            "hoare-syntax", "`=` compares; an assignment is written `:=`", span, hint="write `:=` in place of `=`"
+            "HOARE100", "`=` compares; an assignment is written `:=`", span, hint="write `:=` in place of `=`"
         )
     if token.type == "ASSIGN" and "ASSIGN" not in expected:
         hint = "`:=` assigns and stands only after a variable; to compare, write `==`"
@@ -104,11 +106,11 @@ def _explain(error: UnexpectedToken, file: str, before: Token | None) -> Diagnos
         hint = "start each statement on a line of its own, in the column of the one above, or separate them by `;`"
     elif "INVARIANT" in expected and token.type == "DO":
         hint = "a loop needs its invariant: WHILE … INVARIANT … DO …"
-    return Diagnostic("hoare-syntax", f"did not expect {text} here", span, hint=hint)
+    return Diagnostic("HOARE100", f"did not expect {text} here", span, hint=hint)
 
 
 _KEYWORDS = frozenset(
-    "VAR GIVEN SKIP IF THEN ELSE ENDIF MATCH WITH ENDMATCH WHILE INVARIANT VARIANT DO ENDWHILE".split()
+    ("IF", "THEN", "ELSE", "ENDIF", "MATCH", "WITH", "WHILE", "INVARIANT", "VARIANT", "DO", "SKIP", "VAR", "GIVEN")
 )
 
 
@@ -134,13 +136,14 @@ def _too_deep(root: Any) -> Span | None:
             stack.extend((item, depth) for item in node)
         elif is_dataclass(node) and not isinstance(node, Span):
             if depth > DEEPEST:
-                return node.span  # type: ignore[attr-defined,no-any-return]
+                span: Span = getattr(node, "span")  # noqa: B009 - every node of the syntax has one
+                return span
             stack.extend((getattr(node, f.name), depth + 1) for f in fields(node))
     return None
 
 
 @v_args(meta=True)
-class _Build(Transformer_NonRecursive[Token, Any]):
+class _Build(Transformer_NonRecursive):  # type: ignore[misc]
     """Syntax tree from Lark's, without recursion."""
 
     def __init__(self, file: str) -> None:
@@ -169,10 +172,10 @@ class _Build(Transformer_NonRecursive[Token, Any]):
         span = self._span(meta)
         if result is None:
             if len(words) != 1:
-                raise Rejected(Diagnostic("hoare-syntax", "a type is one name, or A x B --> C", span))
+                raise Rejected(Diagnostic("HOARE100", "a type is one name, or A x B --> C", span))
             return Declaration(names, (), words[0], items[0].type == "GIVEN", span)
         if len(words) % 2 == 0 or any(word != "x" for word in words[1::2]):
-            raise Rejected(Diagnostic("hoare-syntax", "a function's parameters are separated by x: A x B --> C", span))
+            raise Rejected(Diagnostic("HOARE100", "a function's parameters are separated by x: A x B --> C", span))
         return Declaration(names, tuple(words[::2]), str(result), items[0].type == "GIVEN", span)
 
     def skip(self, meta: Any, items: list[Any]) -> SkipStatement:

@@ -1,0 +1,384 @@
+"""A program, the contract's node and the plan's table, made into one checked whole; or what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+from avow.backends.hoare.names import Names, assignments, expect, spread, vocabulary
+from avow.backends.hoare.parser import parse_expression
+from avow.backends.hoare.program import (
+    Assign,
+    Block,
+    If,
+    Match,
+    Predicate,
+    Program,
+    Reading,
+    Skip,
+    Statement,
+    Update,
+    While,
+    variable,
+)
+from avow.backends.hoare.syntax import (
+    AssignStatement,
+    Call,
+    Expression,
+    IfStatement,
+    MatchStatement,
+    Name,
+    SkipStatement,
+    Source,
+    WhileStatement,
+)
+from avow.backends.hoare.syntax import Statement as SurfaceStatement
+from avow.backends.hoare.typing import Scope, fit, formula, rejected, suggest, term
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.language.contract import Contract, Node, Port
+from avow.language.printer import show_sort as show
+from avow.language.printer import show_term
+from avow.language.sorts import BOOL, INTEGER, NATURAL, FunctionSort, Sort
+from avow.language.terms import Apply, Role, Term, Variable
+from avow.logic.formula import free_variables, substitute
+
+T = TypeVar("T")
+
+Table = Mapping[str, tuple[str, Span]]
+"""The plan's `variables`: key as written → meaning as written, and its place."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    program: Program
+    reading: Reading
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """One line of the table, parsed."""
+
+    port: Port
+    parameters: tuple[Variable, ...] | None
+    """Of a predicate's pattern; None for a whole port."""
+    meaning: Expression
+    span: Span
+
+
+def check(source: Source, contract: Contract, node: Node, table: Table) -> Checked:
+    """Raises Rejected, with everything that is wrong (codes ``HOARE200``, ``HOARE300``, ``HOARE400``)."""
+    checker = _Checker(source, contract, node)
+    return checker.run(table)
+
+
+class _Checker:
+    def __init__(self, source: Source, contract: Contract, node: Node) -> None:
+        self.source, self.node = source, node
+        self.names = Names(vocabulary(contract, node))
+        self.problems: list[Diagnostic] = []
+        self.assigned_names = {s.target.name for s, _ in assignments(source.body, self.names)}
+        self.given: dict[str, Variable] = {}
+        self.ghosts: dict[Variable, Variable] = {}
+        self.ports: dict[str, Term] = {}
+
+    def run(self, table: Table) -> Checked:
+        self._declarations()
+        entries = self._attempt(lambda: self._entries(table)) or ()
+        self._sorts(entries)
+        reading = self._reading(entries)
+        scope = Scope(self.names)
+        body = self._block(self.source.body, scope)
+        if self.problems:
+            raise Rejected(*dict.fromkeys(self.problems))
+        sorts = self.names.sorts
+        state = tuple(variable(name, sort) for name, sort in sorted(sorts.items()))
+        assigned = frozenset(v for v in state if v.name in self.assigned_names)
+        return Checked(Program(body, state, assigned, dict(self.ghosts)), reading)
+
+    def _attempt(self, action: Callable[[], T]) -> T | None:
+        try:
+            return action()
+        except Rejected as bad:
+            self.problems.extend(bad.diagnostics)
+            return None
+
+    # -- names ---------------------------------------------------------------------------------------------------------
+
+    def _declarations(self) -> None:
+        types = self.names.vocabulary.types
+        for declaration in self.source.declarations:
+            unknown = [s for s in (*declaration.parameters, declaration.sort) if s not in types]
+            for word in unknown:
+                self._problem("HOARE200", f"there is no type `{word}`", declaration.span, suggest(word, [*types]))
+            if unknown:
+                continue
+            sort: Sort = types[declaration.sort]
+            if declaration.parameters:
+                sort = FunctionSort(tuple(types[p] for p in declaration.parameters), sort)
+            for name in declaration.names:
+                if name.name in self.names.sorts:
+                    self._problem("HOARE200", f"`{name.name}` is declared twice", name.span)
+                self.names.sorts[name.name] = sort
+                if declaration.is_input:
+                    self.given[name.name] = variable(name.name, sort)
+
+    def _sorts(self, entries: tuple[_Entry, ...]) -> None:
+        """Give every name its sort: the plan's table first, then the ports' own names, then the assignments."""
+        for entry in entries:
+            expect(entry.meaning, BOOL if entry.parameters is not None else entry.port.sort, self.names)
+        mapped = {(entry.port.role, entry.port.name) for entry in entries}
+        for port in (*self.node.inputs, *self.node.outputs):
+            wanted = port.role is Role.INPUT or port.name in self.assigned_names
+            if (port.role, port.name) not in mapped and wanted:
+                self.names.sorts.setdefault(port.name, port.sort)
+        spread(self.source.body, self.names)
+        words = self.names.vocabulary
+        for name in sorted(self.names.sorts):
+            if name in words.values or name in words.constructors:
+                what = f"`{name}` is a value of the contract; a variable needs another name"
+                self._problem("HOARE200", what, self._first_use(name))
+
+    def _first_use(self, name: str) -> Span:
+        for statement, _ in assignments(self.source.body, self.names):
+            if statement.target.name == name:
+                return statement.target.span
+        return self.source.span
+
+    def _problem(self, code: str, message: str, span: Span, hint: str | None = None) -> None:
+        self.problems.append(Diagnostic(code, message, span, hint=hint))
+
+    # -- the plan's table ----------------------------------------------------------------------------------------------
+
+    def _entries(self, table: Table) -> tuple[_Entry, ...]:
+        entries: list[_Entry] = []
+        for key, (text, span) in table.items():
+            entry = self._attempt(lambda key=key, text=text, span=span: self._entry(key, text, span))  # type: ignore[misc]
+            if entry is None:
+                continue
+            if any(e.port == entry.port for e in entries):
+                self._problem("HOARE400", f"`{key}` is mapped twice", span)
+            entries.append(entry)
+        return tuple(entries)
+
+    def _entry(self, key: str, text: str, span: Span) -> _Entry:
+        pattern = parse_expression(key, span)
+        meaning = parse_expression(text, span)
+        if isinstance(pattern, Name):
+            return _Entry(self._port(pattern, key, span), None, meaning, span)
+        if isinstance(pattern, Call) and all(isinstance(a, Name) and a.prefix is None for a in pattern.arguments):
+            port = self._port(pattern.function, key, span)
+            names = [a.name for a in pattern.arguments if isinstance(a, Name)]
+            sort = port.sort
+            if not isinstance(sort, FunctionSort) or sort.result != BOOL:
+                raise rejected("HOARE400", f"`{key}`: {port.role}.{port.name} is {show(port.sort)}, no relation", span)
+            if len(names) != len(sort.parameters) or len(set(names)) != len(names):
+                message = f"`{key}` needs {len(sort.parameters)} different names for its arguments"
+                raise rejected("HOARE400", message, span)
+            parameters = tuple(variable(n, s) for n, s in zip(names, sort.parameters, strict=True))
+            return _Entry(port, parameters, meaning, span)
+        raise rejected("HOARE400", f"`{key}` is neither a port (in.r) nor a relation with names (out.done(i))", span)
+
+    def _port(self, name: Name, key: str, span: Span) -> Port:
+        ports = [
+            port
+            for port in (*self.node.inputs, *self.node.outputs)
+            if port.name == name.name and name.prefix in (None, str(port.role))
+        ]
+        if len(ports) == 1:
+            return ports[0]
+        if ports:
+            raise rejected(
+                "HOARE400", f"`{key}`: there is an input and an output of that name; write in. or out.", span
+            )
+        known = [f"{p.role}.{p.name}" for p in (*self.node.inputs, *self.node.outputs)]
+        raise rejected("HOARE400", f"`{key}`: the node has no such input or output", span, suggest(str(name), known))
+
+    # -- what the ports are in the program -----------------------------------------------------------------------------
+
+    def _reading(self, entries: tuple[_Entry, ...]) -> Reading:
+        terms: dict[tuple[Role, str], Term] = {}
+        predicates: dict[tuple[Role, str], Predicate] = {}
+        spans: dict[tuple[Role, str], Span] = {}
+        for entry in entries:
+            at = (entry.port.role, entry.port.name)
+            spans[at] = entry.span
+            if entry.parameters is None:
+                found = self._attempt(lambda entry=entry: self._whole(entry))  # type: ignore[misc]
+                if found is not None:
+                    terms[at] = found
+            else:
+                predicate = self._attempt(lambda entry=entry: self._predicate(entry))  # type: ignore[misc]
+                if predicate is not None:
+                    predicates[at] = predicate
+        mapped = {(entry.port.role, entry.port.name) for entry in entries}
+        for port in (*self.node.inputs, *self.node.outputs):
+            at = (port.role, port.name)
+            if at not in mapped and port.name in self.names.sorts:
+                same = variable(port.name, self.names.sorts[port.name])
+                place = port.span or self.source.span
+                fitted = self._attempt(lambda same=same, port=port, place=place: fit(same, port.sort, place))  # type: ignore[misc]
+                if fitted is not None:
+                    terms[at] = fitted
+        self._givens(terms, predicates)
+        self._outputs(terms, predicates, spans)
+        ghosts: dict[Variable, Term] = dict(self.ghosts)
+        inputs = {at: substitute(t, ghosts) if at[0] is Role.INPUT else t for at, t in terms.items()}
+        relations = {
+            at: Predicate(p.parameters, substitute(p.meaning, ghosts) if at[0] is Role.INPUT else p.meaning)
+            for at, p in predicates.items()
+        }
+        self.ports = {name: t for (role, name), t in inputs.items() if role is Role.INPUT}
+        plain = all(isinstance(t, Variable) for t in terms.values()) and not predicates
+        return Reading(inputs, relations, self._restrictions(terms, predicates), not plain)
+
+    def _whole(self, entry: _Entry) -> Term:
+        found = fit(term(entry.meaning, Scope(self.names)), entry.port.sort, entry.span)
+        if isinstance(entry.port.sort, FunctionSort) and not isinstance(found, Variable):
+            raise rejected("HOARE400", "a function can only be read as a function variable of the program", entry.span)
+        return found
+
+    def _predicate(self, entry: _Entry) -> Predicate:
+        assert entry.parameters is not None
+        taken = [p.name for p in entry.parameters if p.name in self.names.vocabulary.values]
+        if taken:
+            raise rejected("HOARE400", f"`{taken[0]}` is a value of the contract, no name for an argument", entry.span)
+        local = {p.name: p for p in entry.parameters}
+        return Predicate(entry.parameters, formula(entry.meaning, Scope(self.names, local, quantifiers=True)))
+
+    def _givens(self, terms: Mapping[tuple[Role, str], Term], predicates: Mapping[tuple[Role, str], Predicate]) -> None:
+        for (role, _), found in terms.items():
+            if role is Role.INPUT:
+                self.given.update((v.name, v) for v in free_variables(found))
+        for (role, _), predicate in predicates.items():
+            if role is Role.INPUT:
+                free = free_variables(predicate.meaning) - frozenset(predicate.parameters)
+                self.given.update((v.name, v) for v in free)
+        for name, found in self.given.items():
+            if name in self.assigned_names:
+                self.ghosts[found] = variable(f"{name}₀", found.sort)
+
+    def _outputs(
+        self,
+        terms: Mapping[tuple[Role, str], Term],
+        predicates: Mapping[tuple[Role, str], Predicate],
+        spans: Mapping[tuple[Role, str], Span],
+    ) -> None:
+        """What an output is read as must be something that the program sets or is given."""
+        known = sorted({*self.assigned_names, *self.given})
+        spoken = [(at, free_variables(t)) for at, t in terms.items()]
+        spoken += [(at, free_variables(p.meaning) - frozenset(p.parameters)) for at, p in predicates.items()]
+        for at, free in spoken:
+            for found in sorted(free, key=lambda v: v.name):
+                if at[0] is Role.OUTPUT and found.name not in known and at in spans:
+                    message = f"the program neither sets nor is given `{found.name}`"
+                    self._problem("HOARE400", message, spans[at], suggest(found.name, known))
+
+    def _restrictions(
+        self, terms: Mapping[tuple[Role, str], Term], predicates: Mapping[tuple[Role, str], Predicate]
+    ) -> tuple[str, ...]:
+        """Readings of inputs that leave out some of an input's values: the claim is then about the others."""
+        said: list[str] = []
+        used: set[Variable] = set()
+        for (role, name), found in sorted(terms.items(), key=lambda item: item[0]):
+            if role is not Role.INPUT:
+                continue
+            head = found.function if isinstance(found, Apply) else found
+            if isinstance(head, Variable) and head not in used:
+                used.add(head)
+                continue
+            said.append(f"in.{name} is {show_term(found, 'unicode')}: the plan covers no other value of it")
+        said += [
+            f"in.{name}(…) is {show_term(p.meaning, 'unicode')}: the plan covers no other relation"
+            for (role, name), p in sorted(predicates.items())
+            if role is Role.INPUT
+        ]
+        return tuple(said)
+
+    # -- statements ----------------------------------------------------------------------------------------------------
+
+    def _block(self, body: tuple[SurfaceStatement, ...], scope: Scope) -> Block:
+        made = (self._attempt(lambda s=s: self._statement(s, scope)) for s in body)  # type: ignore[misc]
+        return tuple(statement for statement in made if statement is not None)
+
+    def _statement(self, statement: SurfaceStatement, scope: Scope) -> Statement:
+        match statement:
+            case SkipStatement(span=span):
+                return Skip(span)
+            case AssignStatement():
+                return self._assign(statement, scope)
+            case IfStatement(condition=condition, then=then, otherwise=otherwise, span=span):
+                test = self._attempt(lambda: formula(condition, scope))
+                first, second = self._block(then, scope), self._block(otherwise, scope)
+                return Skip(span) if test is None else If(test, first, second, span)
+            case MatchStatement():
+                return self._match(statement, scope)
+            case WhileStatement(condition=condition, invariant=invariant, variant=variant, body=body, span=span):
+                test = self._attempt(lambda: formula(condition, scope))
+                asserting = Scope(self.names, scope.local, self.ports, True)
+                holds = self._attempt(lambda: formula(invariant, asserting))
+                measure = self._attempt(lambda: self._measure(variant, asserting)) if variant is not None else None
+                inside = self._block(body, scope)
+                return Skip(span) if test is None or holds is None else While(test, holds, measure, inside, span)
+
+    def _measure(self, variant: Expression, scope: Scope) -> Term:
+        measure = term(variant, scope)
+        if measure.sort not in (INTEGER, NATURAL):
+            raise rejected("HOARE300", f"a variant is an integer; this is {show(measure.sort)}", variant.span)
+        return measure
+
+    def _assign(self, statement: AssignStatement, scope: Scope) -> Statement:
+        name = statement.target
+        words = self.names.vocabulary
+        if name.name in scope.local or name.name in words.values or name.name in words.constructors:
+            raise rejected("HOARE200", f"`{name.name}` is no variable: it cannot be assigned", name.span)
+        sort = self.names.sorts.get(name.name)
+        if sort is None:
+            value = term(statement.value, scope)  # says what is wrong with it, if something is
+            if statement.arguments:
+                known = [n for n, s in self.names.sorts.items() if isinstance(s, FunctionSort)]
+                hint = (
+                    suggest(name.name, known) or f"declare it (VAR {name.name} : A --> B;) or assign a whole map first"
+                )
+                raise rejected("HOARE200", f"nothing says which map `{name.name}` is", name.span, hint)
+            raise rejected("HOARE300", f"the sort of `{name.name}` is unclear ({show(value.sort)}?)", name.span)
+        target = variable(name.name, sort)
+        if not statement.arguments:
+            value = fit(term(statement.value, scope), sort, statement.value.span)
+            if isinstance(sort, FunctionSort) and not isinstance(value, Variable):
+                raise rejected("HOARE300", "only a whole map can be assigned to a map", statement.value.span)
+            return Assign(target, value, statement.span)
+        if not isinstance(sort, FunctionSort):
+            raise rejected("HOARE300", f"`{name.name}` is {show(sort)}, no map", name.span)
+        if len(statement.arguments) != len(sort.parameters):
+            message = f"`{name.name}` takes {len(sort.parameters)} argument(s), not {len(statement.arguments)}"
+            raise rejected("HOARE300", message, statement.span)
+        arguments = tuple(
+            fit(term(a, scope), p, a.span) for a, p in zip(statement.arguments, sort.parameters, strict=True)
+        )
+        return Update(
+            target, arguments, fit(term(statement.value, scope), sort.result, statement.value.span), statement.span
+        )
+
+    def _match(self, statement: MatchStatement, scope: Scope) -> Statement:
+        subject = term(statement.subject, scope)
+        words = self.names.vocabulary
+        name = statement.constructor
+        if name.name not in words.constructors or words.constructors[name.name][0] != subject.sort:
+            known = [c for c, (data, _) in words.constructors.items() if data == subject.sort]
+            message = f"`{name.name}` does not make values of {show(subject.sort)}"
+            raise rejected("HOARE300", message, name.span, suggest(name.name, known))
+        parameters = words.constructors[name.name][1].parameters
+        if len(parameters) != len(statement.variables):
+            message = f"`{name.name}` has {len(parameters)} argument(s), not {len(statement.variables)}"
+            raise rejected("HOARE300", message, name.span)
+        local = dict(scope.local)
+        bound: list[Variable] = []
+        for found, sort in zip(statement.variables, parameters, strict=True):
+            if found.name in local or found.name in self.names.sorts or found.name in words.values:
+                raise rejected("HOARE200", f"`{found.name}` is in use already", found.span)
+            local[found.name] = variable(found.name, sort)
+            bound.append(local[found.name])
+        then = self._block(statement.then, Scope(self.names, local))
+        otherwise = self._block(statement.otherwise, scope)
+        return Match(subject, name.name, tuple(bound), then, otherwise, statement.span)

@@ -1,0 +1,195 @@
+"""Which sort each name of a program has: by declaration, by the plan's table, by the ports, or by what is assigned.
+
+Nothing here complains: a name without a sort stays without, and the checker says so where it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from avow.backends.hoare.syntax import (
+    AssignStatement,
+    Binary,
+    Call,
+    Chain,
+    Expression,
+    IfStatement,
+    MatchStatement,
+    Member,
+    Name,
+    Number,
+    Quantification,
+    Statement,
+    Text,
+    Truth,
+    Unary,
+    WhileStatement,
+)
+from avow.language.contract import Contract, Node
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    NATURAL,
+    REAL,
+    STRING,
+    Constructor,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    SequenceSort,
+    Sort,
+    TupleSort,
+)
+from avow.language.terms import EnumValue, Term
+
+_NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
+_ARITHMETIC = frozenset("+-*/")
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """The contract's own words: types, elements of enumerations, constructors, constants."""
+
+    types: Mapping[str, Sort]
+    values: Mapping[str, Term]
+    constructors: Mapping[str, tuple[DataSort, Constructor]]
+
+
+@dataclass(slots=True)
+class Names:
+    """The sort of every name known so far; `locals` are the variables of MATCH, which belong to one branch."""
+
+    vocabulary: Vocabulary
+    sorts: dict[str, Sort] = field(default_factory=dict)
+
+
+def vocabulary(contract: Contract, node: Node) -> Vocabulary:
+    types: dict[str, Sort] = {"REAL": REAL, "INTEGER": INTEGER, "NATURAL": NATURAL, "BOOL": BOOL, "STRING": STRING}
+    types.update(contract.types)
+    values: dict[str, Term] = dict(contract.constants)
+    constructors: dict[str, tuple[DataSort, Constructor]] = {}
+    stack: list[Sort] = [*types.values(), *(port.sort for port in (*node.inputs, *node.outputs))]
+    seen: set[Sort] = set()
+    while stack:
+        sort = stack.pop()
+        if sort in seen:
+            continue
+        seen.add(sort)
+        match sort:
+            case EnumSort(members=members):
+                values.update((member, EnumValue(member, sort)) for member in members)
+            case DataSort(constructors=made):
+                constructors.update((c.name, (sort, c)) for c in made)
+                stack.extend(p for c in made for p in c.parameters)
+            case FunctionSort(parameters=parameters, result=result):
+                stack.extend((*parameters, result))
+            case TupleSort(items=items):
+                stack.extend(items)
+            case SequenceSort(item=item):
+                stack.append(item)
+            case _:
+                pass
+    return Vocabulary(types, values, constructors)
+
+
+def join(one: Sort | None, other: Sort | None) -> Sort | None:
+    """The narrowest sort that holds both: numbers widen; anything else stays what it was first."""
+    if one is None or other is None:
+        return one or other
+    if one in _NUMBERS and other in _NUMBERS:
+        return _NUMBERS[max(_NUMBERS.index(one), _NUMBERS.index(other))]
+    return one
+
+
+def estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) -> Sort | None:
+    """The sort that an expression seems to have, if its names' sorts are known."""
+    match expression:
+        case Number(whole=whole):
+            return NATURAL if whole else REAL
+        case Truth() | Member() | Chain() | Quantification():
+            return BOOL
+        case Text():
+            return STRING
+        case Name(name=name, prefix=None):
+            if name in local:
+                return local[name]
+            if name in names.sorts:
+                return names.sorts[name]
+            if name in names.vocabulary.constructors:
+                return names.vocabulary.constructors[name][0]
+            value = names.vocabulary.values.get(name)
+            return value.sort if value is not None else None
+        case Name():
+            return None
+        case Call(function=function):
+            if function.prefix is None and function.name in names.vocabulary.constructors:
+                return names.vocabulary.constructors[function.name][0]
+            sort = names.sorts.get(function.name) if function.prefix is None else None
+            return sort.result if isinstance(sort, FunctionSort) else None
+        case Unary(operator="-", operand=operand):
+            return join(INTEGER, estimate(operand, names, local))
+        case Binary(operator="/"):
+            return REAL
+        case Binary(operator=operator, left=left, right=right) if operator in _ARITHMETIC:
+            sort = join(estimate(left, names, local), estimate(right, names, local))
+            return join(INTEGER, sort) if operator == "-" else sort
+        case _:
+            return BOOL
+
+
+def expect(expression: Expression, sort: Sort, names: Names) -> None:
+    """Give unknown names the sort that the place asks for: `f(i)` for a REAL makes f a function to REAL."""
+    match expression:
+        case Name(name=name, prefix=None) if name not in names.vocabulary.values:
+            names.sorts.setdefault(name, sort)
+        case Call(function=Name(name=name, prefix=None), arguments=arguments):
+            if name in names.vocabulary.constructors:
+                parameters = names.vocabulary.constructors[name][1].parameters
+                for argument, parameter in zip(arguments, parameters, strict=False):
+                    expect(argument, parameter, names)
+            elif name not in names.sorts:
+                known = [estimate(argument, names, {}) for argument in arguments]
+                if all(k is not None for k in known):
+                    names.sorts[name] = FunctionSort(tuple(k for k in known if k is not None), sort)
+        case _:
+            pass
+
+
+def spread(body: tuple[Statement, ...], names: Names) -> None:
+    """Sorts of assigned variables, from what is assigned to them, until nothing more is learnt."""
+    fixed = frozenset(names.sorts)
+    learnt = True
+    while learnt:
+        learnt = False
+        for statement, local in assignments(body, names):
+            if statement.arguments or statement.target.name in fixed or statement.target.name in local:
+                continue
+            old = names.sorts.get(statement.target.name)
+            new = join(old, estimate(statement.value, names, local))
+            if new is not None and new != old:
+                names.sorts[statement.target.name] = new
+                learnt = True
+
+
+def assignments(body: tuple[Statement, ...], names: Names) -> Iterator[tuple[AssignStatement, Mapping[str, Sort]]]:
+    """Every assignment, with the sorts of the MATCH variables around it."""
+    stack: list[tuple[Statement, Mapping[str, Sort]]] = [(s, {}) for s in reversed(body)]
+    while stack:
+        statement, local = stack.pop()
+        match statement:
+            case AssignStatement():
+                yield statement, local
+            case IfStatement(then=then, otherwise=otherwise):
+                stack.extend((s, local) for s in reversed((*then, *otherwise)))
+            case MatchStatement(constructor=constructor, variables=variables, then=then, otherwise=otherwise):
+                inner = dict(local)
+                if constructor.name in names.vocabulary.constructors:
+                    parameters = names.vocabulary.constructors[constructor.name][1].parameters
+                    inner.update((v.name, p) for v, p in zip(variables, parameters, strict=False))
+                stack.extend((s, local) for s in reversed(otherwise))
+                stack.extend((s, inner) for s in reversed(then))
+            case WhileStatement(body=inside):
+                stack.extend((s, local) for s in reversed(inside))
+            case _:
+                pass

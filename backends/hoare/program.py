@@ -1,0 +1,123 @@
+"""A checked program: its statements over typed terms, and how its names stand for the contract's.
+
+Program variables are free variables of role BOUND, which every part of the core prints and translates by bare name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from avow.diagnostics import Span
+from avow.language.sorts import DataSort, Sort
+from avow.language.terms import Role, Term, Variable
+
+
+@dataclass(frozen=True, slots=True)
+class Skip:
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    """``target := value``; `value` has the target's sort, up to INTEGER for NATURAL."""
+
+    target: Variable
+    value: Term
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Update:
+    """``target[arguments] := value``: the function is changed at one point."""
+
+    target: Variable
+    arguments: tuple[Term, ...]
+    value: Term
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class If:
+    condition: Term
+    then: Block
+    otherwise: Block
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    subject: Term
+    constructor: str
+    variables: tuple[Variable, ...]
+    then: Block
+    otherwise: Block
+    span: Span = field(compare=False, repr=False)
+
+    @property
+    def sort(self) -> DataSort:
+        assert isinstance(self.subject.sort, DataSort)
+        return self.subject.sort
+
+
+@dataclass(frozen=True, slots=True)
+class While:
+    condition: Term
+    invariant: Term
+    variant: Term | None
+    body: Block
+    span: Span = field(compare=False, repr=False)
+
+
+Statement = Skip | Assign | Update | If | Match | While
+Block = tuple[Statement, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """`state` are all its variables; `given` those whose first value is an input's. An input that the program assigns
+    has a `ghost`: a constant that keeps its first value, of which the contract speaks."""
+
+    body: Block
+    state: tuple[Variable, ...]
+    assigned: frozenset[Variable]
+    ghosts: Mapping[Variable, Variable]
+
+
+@dataclass(frozen=True, slots=True)
+class Predicate:
+    """``out.inspected(i)`` read as a formula over the program's variables and the pattern's `parameters`."""
+
+    parameters: tuple[Variable, ...]
+    meaning: Term
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What the contract's ports are in the program: inputs in its first state, outputs in its last."""
+
+    terms: Mapping[tuple[Role, str], Term]
+    predicates: Mapping[tuple[Role, str], Predicate]
+    hypotheses: tuple[str, ...]
+    """Where the plan's table restricts what an input can be."""
+    mapped: bool
+    """A person's table says more than which variable is which port."""
+
+
+def statements(block: Block) -> Iterator[Statement]:
+    """Every statement, in reading order, without recursion."""
+    stack = list(reversed(block))
+    while stack:
+        statement = stack.pop()
+        yield statement
+        match statement:
+            case If(then=then, otherwise=otherwise) | Match(then=then, otherwise=otherwise):
+                stack.extend(reversed((*then, *otherwise)))
+            case While(body=body):
+                stack.extend(reversed(body))
+            case _:
+                pass
+
+
+def variable(name: str, sort: Sort) -> Variable:
+    return Variable(Role.BOUND, name, sort)

@@ -1,0 +1,185 @@
+"""Formulas made shorter, with the same meaning: so that a proof outline reads as a person would write it.
+
+Verification conditions do not rest on this: the solver gets them as they come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+
+from avow.language.sorts import BOOL
+from avow.language.terms import (
+    FALSE,
+    TRUE,
+    And,
+    Compare,
+    Construct,
+    EnumValue,
+    Iff,
+    Implies,
+    In,
+    Literal,
+    Not,
+    Or,
+    Quantified,
+    SetTerm,
+    Term,
+    Widen,
+)
+from avow.logic.formula import conjunction, disjunction, free_variables
+from avow.logic.traversal import subterms, transform
+
+_OPPOSITE = {"<": ">=", ">=": "<", "<=": ">", ">": "<=", "==": "!=", "!=": "=="}
+
+
+def simplify(term: Term) -> Term:
+    """An equivalent formula, seldom longer."""
+    return transform(term, _step)
+
+
+def opposite(term: Term) -> Term:
+    """An equivalent of ``not term`` without a `not` in front, if there is one."""
+    match term:
+        case Literal(value=bool(value)):
+            return FALSE if value else TRUE
+        case Not(body=body):
+            return body
+        case Compare(operator=operator, left=left, right=right):
+            return Compare(_OPPOSITE[operator], left, right)
+        case _:
+            return Not(term)
+
+
+def _step(term: Term) -> Term:
+    match term:
+        case Not(body=body):
+            return opposite(body)
+        case And(items=items):
+            return _and(items)
+        case Or(items=items):
+            flat = tuple(dict.fromkeys(_flat(disjunction(items), Or)))
+            if any(opposite(item) in flat for item in flat):
+                return TRUE
+            return disjunction(flat)
+        case Implies(left=left, right=right):
+            return _implies(left, right)
+        case Iff(left=left, right=right):
+            if left == right:
+                return TRUE
+            for one, other in ((left, right), (right, left)):
+                if one == TRUE:
+                    return other
+                if one == FALSE:
+                    return opposite(other)
+            return term
+        case Compare():
+            return _compare(term)
+        case Quantified(body=body) if body in (TRUE, FALSE):
+            return body  # no sort is empty
+        case Quantified(quantifier=quantifier, variables=variables, body=body, span=span):
+            used = free_variables(body)
+            kept = tuple(v for v in variables if v in used)
+            if quantifier == "exists_unique" or len(kept) == len(variables):
+                return term
+            return Quantified(quantifier, kept, body, span) if kept else body
+        case In(item=item, collection=SetTerm(items=items)):
+            tests = [_compare(Compare("==", item, choice)) if item.sort != BOOL else term for choice in items]
+            return TRUE if TRUE in tests else FALSE if all(test == FALSE for test in tests) else term
+        case _:
+            return term
+
+
+def _implies(left: Term, right: Term) -> Term:
+    if left == TRUE:
+        return right
+    if right == TRUE or left in (FALSE, right):
+        return TRUE
+    if right == FALSE:
+        return opposite(left)
+    if isinstance(right, Implies):
+        return _implies(conjunction((left, right.left)), right.right)
+    known = _known(right, _flat(left, And))
+    return _implies(left, known) if known != right else Implies(left, right)
+
+
+def _and(items: tuple[Term, ...]) -> Term:
+    flat = tuple(dict.fromkeys(_flat(conjunction(items), And)))
+    if any(opposite(item) in flat for item in flat):
+        return FALSE
+    merged = _merged(flat)
+    facts = [item for item in merged if not isinstance(item, Implies | Or | And)]
+    result = tuple(item if item in facts else _known(item, facts) for item in merged)
+    if result != items:
+        return _and(result) if result != flat else conjunction(result)
+    return conjunction(result)
+
+
+def _merged(items: tuple[Term, ...]) -> tuple[Term, ...]:
+    """``(a -> q) and (not a -> q)`` is q."""
+    result = list(items)
+    for item in items:
+        if isinstance(item, Implies) and item in result:
+            other = Implies(opposite(item.left), item.right)
+            if other in result:
+                result[result.index(item)] = item.right
+                result.remove(other)
+    return tuple(result)
+
+
+def _known(term: Term, facts: Iterable[Term]) -> Term:
+    """The term where the facts hold: a fact in it is true, its opposite false."""
+    bound = {v for part in subterms(term) if isinstance(part, Quantified) for v in part.variables}
+    usable = [f for f in facts if not (bound & free_variables(f))]
+    yes, no = set(usable), {opposite(f) for f in usable}
+    if not any(part in yes or part in no for part in subterms(term)):
+        return term
+    return transform(term, lambda part: TRUE if part in yes else FALSE if part in no else _step(part))
+
+
+def _flat(term: Term, kind: type[And] | type[Or]) -> tuple[Term, ...]:
+    return term.items if isinstance(term, And | Or) and isinstance(term, kind) else (term,)
+
+
+def _compare(term: Compare) -> Term:
+    left, right = term.left, term.right
+    if left == right:
+        return TRUE if term.operator in {"==", "<=", ">="} else FALSE
+    if isinstance(left, EnumValue) and isinstance(right, EnumValue):
+        return FALSE if term.operator == "==" else TRUE
+    if isinstance(left, Construct) and isinstance(right, Construct):
+        return _constructs(term.operator, left, right)
+    one, other = _number(left), _number(right)
+    if one is not None and other is not None:
+        holds = {
+            "==": one == other,
+            "!=": one != other,
+            "<": one < other,
+            "<=": one <= other,
+            ">": one > other,
+            ">=": one >= other,
+        }
+        return TRUE if holds[term.operator] else FALSE
+    return term
+
+
+def _constructs(operator: str, left: Construct, right: Construct) -> Term:
+    """Constructors are injective, and differ from each other."""
+    if left.constructor != right.constructor:
+        return FALSE if operator == "==" else TRUE
+    same = _and(tuple(_equal(a, b) for a, b in zip(left.arguments, right.arguments, strict=True)))
+    return same if operator == "==" else opposite(same)
+
+
+def _equal(left: Term, right: Term) -> Term:
+    if left.sort == BOOL:
+        return _step(Iff(left, right))
+    return _compare(Compare("==", left, right))
+
+
+def _number(term: Term) -> Fraction | None:
+    if isinstance(term, Widen):
+        return _number(term.term)
+    if isinstance(term, Literal) and isinstance(term.value, int | Fraction) and not isinstance(term.value, bool):
+        return Fraction(term.value)
+    return None

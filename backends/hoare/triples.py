@@ -1,0 +1,259 @@
+"""Hoare triples from a guarantee: {assumptions and antecedent} program {consequent}, one for each conjunct.
+
+The guarantee is taken apart only where that keeps its meaning: outer universal quantifiers become constants, an
+implication's conditions on inputs move to the precondition, a conjunction makes several triples, and an equivalence
+between outputs and inputs two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from avow.backends.hoare.checker import Checked
+from avow.backends.hoare.program import Predicate, Reading, variable
+from avow.backends.hoare.simplify import simplify
+from avow.diagnostics import Diagnostic, Rejected
+from avow.evidence.obligation import Obligation
+from avow.language.contract import Clause, Node
+from avow.language.sorts import INTEGER, NATURAL, FunctionSort
+from avow.language.terms import (
+    And,
+    Apply,
+    Compare,
+    Iff,
+    Implies,
+    Literal,
+    Not,
+    Quantified,
+    Quantifier,
+    Role,
+    Term,
+    Variable,
+    children,
+)
+from avow.logic.formula import conjunction, free_variables, negation, substitute
+from avow.logic.traversal import Steps, rebuild, run
+
+
+@dataclass(frozen=True, slots=True)
+class Triple:
+    """{pre} program {post}. `pre` is over inputs and ghosts, which the program does not change."""
+
+    name: str
+    """``low``, or ``low.2`` where a guarantee makes several."""
+    obligation: str
+    pre: Term
+    post: Term
+    ghosts: tuple[tuple[Variable, Variable], ...]
+    """(variable, its ghost): also part of the precondition, as equations."""
+
+    @property
+    def full_pre(self) -> Term:
+        """The precondition with the ghosts' equations."""
+        return conjunction((*(equation(v, g) for v, g in self.ghosts), self.pre))
+
+
+def equation(one: Variable, other: Variable) -> Term:
+    if one.sort.__class__.__name__ == "BoolSort":
+        return Iff(one, other)
+    return Compare("==", one, other)
+
+
+def triples(obligation: Obligation, clause: Clause, node: Node, checked: Checked) -> tuple[Triple, ...]:
+    """The triples whose validity is the obligation's. Raises Rejected (code ``HOARE400``) where the formula speaks
+    of an output that the program has nothing for."""
+    names = {v.name for v in (*checked.program.state, *checked.program.ghosts.values())}
+    assumed = [translate(a, checked.reading, names) for a in node.assumptions]
+    parts = list(_split(prepared(clause, checked.reading, names), names))
+    found: dict[tuple[Term, Term], None] = {}
+    for outer, conditions, consequent in parts:
+        goal = translate_formula(consequent, checked.reading, clause)
+        read = [translate_formula(c, checked.reading, clause) for c in conditions]
+        pre, post = _solved(outer, (*assumed, *read), goal)
+        found.setdefault((pre, post))
+    ghosts = tuple(sorted(checked.program.ghosts.items(), key=lambda pair: pair[0].name))
+    count = len(found)
+    return tuple(
+        Triple(clause.name if count == 1 else f"{clause.name}.{k}", obligation.id, pre, post, ghosts)
+        for k, (pre, post) in enumerate(found, start=1)
+    )
+
+
+# -- the guarantee, taken apart ----------------------------------------------------------------------------------------
+
+_Part = tuple[tuple[Variable, ...], tuple[Term, ...], Term]
+"""Constants for outer quantifiers, conditions on inputs, consequent; still in the contract's words."""
+
+
+def prepared(clause: Clause, reading: Reading, names: set[str]) -> Term:
+    """The formula with bound names that no program variable has, and functions compared point by point."""
+    return rename_bound(clause.formula, names)
+
+
+def _split(formula: Term, names: set[str]) -> Iterator[_Part]:
+    stack: list[_Part] = [((), (), formula)]
+    while stack:
+        outer, conditions, goal = stack.pop()
+        match goal:
+            case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
+                stack.append(((*outer, *variables), conditions, body))
+            case And(items=items):
+                stack.extend((outer, conditions, item) for item in reversed(items))
+            case Implies(left=left, right=right):
+                early, late = _sides(left)
+                if late:
+                    yield outer, (*conditions, *early), Implies(conjunction(late), right)
+                else:
+                    stack.append((outer, (*conditions, *early), right))
+            case Iff(left=left, right=right) if _is_input(left) != _is_input(right):
+                cause, effect = (left, right) if _is_input(left) else (right, left)
+                stack.append((outer, (*conditions, negation(cause)), negation(effect)))
+                stack.append((outer, (*conditions, cause), effect))
+            case _:
+                yield outer, conditions, goal
+
+
+def _sides(antecedent: Term) -> tuple[list[Term], list[Term]]:
+    """The conjuncts that speak of inputs only, and the others."""
+    early: list[Term] = []
+    late: list[Term] = []
+    stack = [antecedent]
+    while stack:
+        part = stack.pop()
+        if isinstance(part, And):
+            stack.extend(reversed(part.items))
+        else:
+            (early if _is_input(part) else late).append(part)
+    return early, late
+
+
+def _is_input(term: Term) -> bool:
+    return all(v.role is not Role.OUTPUT for v in free_variables(term))
+
+
+def rename_bound(term: Term, taken: Iterable[str]) -> Term:
+    """The same meaning, with every bound name different from the taken ones and from each other."""
+    used = set(taken)
+
+    def steps(current: Term, names: dict[Variable, Variable]) -> Steps[Term]:
+        if isinstance(current, Variable):
+            return names.get(current, current)
+        inner = names
+        if isinstance(current, Quantified):
+            inner = dict(names)
+            for bound in current.variables:
+                name = bound.name
+                while name in used:
+                    name += "'"
+                used.add(name)
+                inner[bound] = variable(name, bound.sort)
+        parts: list[Term] = []
+        for child in children(current):
+            part: Term = yield steps(child, inner)
+            parts.append(part)
+        if isinstance(current, Quantified):
+            return Quantified(current.quantifier, tuple(inner[v] for v in current.variables), parts[0], current.span)
+        return rebuild(current, tuple(parts)) if parts else current
+
+    return run(steps(term, {}))
+
+
+# -- the contract's words in the program's -----------------------------------------------------------------------------
+
+
+def translate(clause: Clause, reading: Reading, names: set[str]) -> Term:
+    """A clause over the program's variables. Raises Rejected."""
+    return translate_formula(rename_bound(clause.formula, names), reading, clause)
+
+
+def translate_formula(formula: Term, reading: Reading, clause: Clause) -> Term:
+    """The formula with every port read as the plan or the names say; bound names are apart already. Raises Rejected."""
+    missing: list[Variable] = []
+    widened: list[Term] = []
+
+    def port(current: Variable) -> Term:
+        found = reading.terms.get((current.role, current.name))
+        if found is None:
+            missing.append(current)
+            return current
+        if current.sort == NATURAL and found.sort == INTEGER and current.role is Role.OUTPUT:
+            widened.append(Compare(">=", found, Literal(0, INTEGER)))
+        return found
+
+    def steps(current: Term) -> Steps[Term]:
+        if isinstance(current, Variable):
+            return current if current.role is Role.BOUND else port(current)
+        if isinstance(current, Compare) and isinstance(current.left.sort, FunctionSort):
+            pointwise: Term = yield steps(_pointwise(current))
+            return pointwise
+        if isinstance(current, Apply) and isinstance(current.function, Variable):
+            predicate = reading.predicates.get((current.function.role, current.function.name))
+            if predicate is not None:
+                arguments: list[Term] = []
+                for child in current.arguments:
+                    argument: Term = yield steps(child)
+                    arguments.append(argument)
+                return _instance(predicate, arguments)
+        parts: list[Term] = []
+        for child in children(current):
+            part: Term = yield steps(child)
+            parts.append(part)
+        return rebuild(current, tuple(parts)) if parts else current
+
+    result = run(steps(formula))
+    if missing:
+        raise Rejected(*(_missing(v, clause) for v in dict.fromkeys(missing)))
+    return conjunction((*dict.fromkeys(widened), result))
+
+
+def _instance(predicate: Predicate, arguments: list[Term]) -> Term:
+    return substitute(predicate.meaning, dict(zip(predicate.parameters, arguments, strict=True)))
+
+
+def _pointwise(compared: Compare) -> Term:
+    sort = compared.left.sort
+    assert isinstance(sort, FunctionSort)
+    points = tuple(variable(f"at~{k}", s) for k, s in enumerate(sort.parameters))
+    left, right = (Apply(side, points, sort.result) for side in (compared.left, compared.right))
+    same: Term = Iff(left, right) if sort.result.__class__.__name__ == "BoolSort" else Compare("==", left, right)
+    everywhere = Quantified(Quantifier.FORALL, points, same)
+    return everywhere if compared.operator == "==" else Not(everywhere)
+
+
+def _missing(port: Variable, clause: Clause) -> Diagnostic:
+    return Diagnostic(
+        "HOARE400",
+        f"{clause.kind} {clause.name} speaks of {port.qualified}, for which the program has nothing",
+        clause.span,
+        hint=f'map it under `variables`: "{port.qualified}": …, or use a variable of that name',
+    )
+
+
+# -- constants that an equation determines -----------------------------------------------------------------------------
+
+
+def _solved(outer: tuple[Variable, ...], hypotheses: tuple[Term, ...], goal: Term) -> tuple[Term, Term]:
+    """Simplify, and put away constants of outer quantifiers that an equation determines (the one-point rule)."""
+    pre, post = simplify(conjunction(hypotheses)), simplify(goal)
+    for constant in outer:
+        for part in _conjuncts(pre):
+            value = _determined(constant, part)
+            if value is not None:
+                pre = simplify(substitute(pre, {constant: value}))
+                post = simplify(substitute(post, {constant: value}))
+                break
+    return pre, post
+
+
+def _conjuncts(term: Term) -> tuple[Term, ...]:
+    return term.items if isinstance(term, And) else (term,)
+
+
+def _determined(constant: Variable, part: Term) -> Term | None:
+    if isinstance(part, Compare) and part.operator == "==":
+        for one, other in ((part.left, part.right), (part.right, part.left)):
+            # the sorts must agree: an INTEGER in place of a NATURAL would widen the claim
+            if one == constant and other.sort == constant.sort and constant not in free_variables(other):
+                return other
+    return None

@@ -1,0 +1,253 @@
+"""Expressions with every name resolved and every sort known: surface syntax to the core's typed terms."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from avow.backends.hoare.names import Names, join
+from avow.backends.hoare.program import variable
+from avow.backends.hoare.syntax import (
+    Binary,
+    Call,
+    Chain,
+    Expression,
+    Member,
+    Name,
+    Number,
+    Quantification,
+    Text,
+    Truth,
+    Unary,
+)
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.language.printer import show_sort as show
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    NATURAL,
+    REAL,
+    STRING,
+    FunctionSort,
+    SetSort,
+    Sort,
+)
+from avow.language.terms import (
+    And,
+    Apply,
+    Arithmetic,
+    Compare,
+    Construct,
+    Iff,
+    Implies,
+    In,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    SetTerm,
+    Term,
+    Variable,
+    Widen,
+)
+
+_NUMERIC = (NATURAL, INTEGER, REAL)
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """What an expression may speak of. `ports` are readings of ``in.…``, in assertions; None elsewhere."""
+
+    names: Names
+    local: Mapping[str, Variable] = field(default_factory=dict)
+    ports: Mapping[str, Term] | None = None
+    quantifiers: bool = False
+
+
+def term(expression: Expression, scope: Scope) -> Term:
+    """The typed term. Raises Rejected (codes ``HOARE200``, ``HOARE300``). Depth is bounded by the parser."""
+    match expression:
+        case Number(value=value, whole=whole, span=span):
+            return Literal(int(value), NATURAL, span) if whole else Literal(value, REAL, span)
+        case Truth(value=truth, span=span):
+            return Literal(truth, BOOL, span)
+        case Text(value=text, span=span):
+            return Literal(text, STRING, span)
+        case Name():
+            return _name(expression, scope)
+        case Call():
+            return _call(expression, scope)
+        case Unary(operator="-", operand=operand, span=span):
+            inner = _number(term(operand, scope), span)
+            return Negative(inner, REAL if inner.sort == REAL else INTEGER, span)
+        case Unary(operand=operand, span=span):
+            return Not(formula(operand, scope), span)
+        case Binary(operator=operator, left=left, right=right, span=span):
+            return _binary(operator, left, right, span, scope)
+        case Chain(items=items, operators=operators, span=span):
+            parts = [term(item, scope) for item in items]
+            pairs = zip(operators, parts, parts[1:], strict=False)
+            return And(tuple(compare(operator, a, b, span) for operator, a, b in pairs), span)
+        case Member(item=item, choices=choices, negated=negated, span=span):
+            one = term(item, scope)
+            others = tuple(fit(term(choice, scope), one.sort, choice.span) for choice in choices)
+            inside = In(one, SetTerm(others, SetSort(one.sort)), span)
+            return Not(inside, span) if negated else inside
+        case Quantification():
+            return _quantified(expression, scope)
+
+
+def formula(expression: Expression, scope: Scope) -> Term:
+    """A term of sort BOOL. Raises Rejected."""
+    return fit(term(expression, scope), BOOL, expression.span)
+
+
+def fit(given: Term, sort: Sort, span: Span | None) -> Term:
+    """The term as one of the sort: integers widen to REAL, INTEGER passes for NATURAL (a condition is proved of it)."""
+    if given.sort == sort or (sort == INTEGER and given.sort == NATURAL) or (sort == NATURAL and given.sort == INTEGER):
+        return given
+    if sort == REAL and given.sort in (INTEGER, NATURAL):
+        return real(given)
+    raise rejected("HOARE300", f"this is {show(given.sort)}, but {show(sort)} is wanted here", span)
+
+
+def real(given: Term) -> Term:
+    """An integer term as a REAL one."""
+    if isinstance(given, Literal) and not isinstance(given.value, str):
+        return Literal(Fraction(given.value), REAL, given.span)
+    return Widen(given, REAL, given.span)
+
+
+def compare(operator: str, left: Term, right: Term, span: Span | None) -> Term:
+    """A comparison of terms of one sort, up to widening. Raises Rejected."""
+    sort = join(left.sort, right.sort)
+    assert sort is not None
+    left, right = fit(left, sort, left.span or span), fit(right, sort, right.span or span)
+    if operator in {"<", "<=", ">", ">="} and sort not in _NUMERIC:
+        raise rejected("HOARE300", f"{operator} compares numbers; these are {show(sort)}", span)
+    if isinstance(sort, FunctionSort):
+        raise rejected("HOARE300", "whole functions cannot be compared", span)
+    if sort == BOOL:
+        return Iff(left, right, span) if operator == "==" else Not(Iff(left, right, span), span)
+    return Compare(operator, left, right, span)
+
+
+def rejected(code: str, message: str, span: Span | None, hint: str | None = None) -> Rejected:
+    return Rejected(Diagnostic(code, message, span, hint=hint))
+
+
+def suggest(name: str, known: list[str]) -> str | None:
+    near = difflib.get_close_matches(name, known, 1, 0.7)
+    return f"did you mean `{near[0]}`?" if near else None
+
+
+def _name(name: Name, scope: Scope) -> Term:
+    if name.prefix is not None:
+        return _port(name, scope)
+    if name.name in scope.local:
+        return scope.local[name.name]
+    if name.name in scope.names.sorts:
+        return variable(name.name, scope.names.sorts[name.name])
+    words = scope.names.vocabulary
+    if name.name in words.values:
+        return words.values[name.name]
+    if name.name in words.constructors:
+        data, constructor = words.constructors[name.name]
+        if constructor.parameters:
+            raise rejected("HOARE300", f"{name.name} needs {len(constructor.parameters)} argument(s)", name.span)
+        return Construct(name.name, (), data, name.span)
+    known = [*scope.local, *scope.names.sorts, *words.values, *words.constructors]
+    raise rejected(
+        "HOARE200",
+        f"nothing is called `{name.name}` here, or nothing says of which sort it is",
+        name.span,
+        suggest(name.name, known)
+        or "declare it (VAR name : REAL; or GIVEN name : REAL;) or map it to a port in the plan",
+    )
+
+
+def _port(name: Name, scope: Scope) -> Term:
+    if scope.ports is None or name.prefix != "in":
+        what = "assertions only (INVARIANT)" if name.prefix == "in" else "the contract only"
+        raise rejected("HOARE200", f"`{name}` belongs into {what}: a program has variables", name.span)
+    if name.name not in scope.ports:
+        raise rejected(
+            "HOARE200", f"the node has no input `{name.name}`", name.span, suggest(name.name, [*scope.ports])
+        )
+    return scope.ports[name.name]
+
+
+def _call(call: Call, scope: Scope) -> Term:
+    words = scope.names.vocabulary
+    name = call.function
+    arguments = [term(argument, scope) for argument in call.arguments]
+    if name.prefix is None and name.name not in scope.local and name.name in words.constructors:
+        data, constructor = words.constructors[name.name]
+        return Construct(name.name, _fitted(call, arguments, constructor.parameters), data, call.span)
+    function = _name(name, scope)
+    if not isinstance(function.sort, FunctionSort):
+        raise rejected("HOARE300", f"`{name}` is {show(function.sort)}, not a function", call.span)
+    if not isinstance(function, Variable):
+        raise rejected("HOARE300", f"`{name}` cannot be applied here: it is not one function of the program", call.span)
+    return Apply(function, _fitted(call, arguments, function.sort.parameters), function.sort.result, call.span)
+
+
+def _fitted(call: Call, arguments: list[Term], parameters: tuple[Sort, ...]) -> tuple[Term, ...]:
+    if len(arguments) != len(parameters):
+        message = f"`{call.function}` takes {len(parameters)} argument(s), not {len(arguments)}"
+        raise rejected("HOARE300", message, call.span)
+    return tuple(fit(a, p, e.span) for a, p, e in zip(arguments, parameters, call.arguments, strict=True))
+
+
+def _binary(operator: str, left: Expression, right: Expression, span: Span, scope: Scope) -> Term:
+    if operator in {"and", "or", "->", "<=>"}:
+        one, other = formula(left, scope), formula(right, scope)
+        match operator:
+            case "and":
+                return And((one, other), span)
+            case "or":
+                return Or((one, other), span)
+            case "->":
+                return Implies(one, other, span)
+            case _:
+                return Iff(one, other, span)
+    one, other = term(left, scope), term(right, scope)
+    if operator in {"+", "-", "*", "/"}:
+        one, other = _number(one, left.span), _number(other, right.span)
+        sort: Sort = REAL if operator == "/" else join(one.sort, other.sort) or REAL
+        if operator == "-" and sort == NATURAL:
+            sort = INTEGER
+        if sort == REAL:
+            one, other = fit(one, REAL, left.span), fit(other, REAL, right.span)
+        return Arithmetic(operator, one, other, sort, span)
+    return compare(operator, one, other, span)
+
+
+def _number(given: Term, span: Span | None) -> Term:
+    if given.sort not in _NUMERIC:
+        raise rejected("HOARE300", f"a number is wanted here; this is {show(given.sort)}", span)
+    return given
+
+
+def _quantified(expression: Quantification, scope: Scope) -> Term:
+    if not scope.quantifiers:
+        raise rejected("HOARE300", f"a program cannot compute {expression.quantifier}", expression.span)
+    local = dict(scope.local)
+    bound: list[Variable] = []
+    for names, sort_name in expression.groups:
+        sort = scope.names.vocabulary.types.get(sort_name)
+        if sort is None:
+            hint = suggest(sort_name, [*scope.names.vocabulary.types])
+            raise rejected("HOARE200", f"there is no type `{sort_name}`", expression.span, hint)
+        for name in names:
+            if name.name in local or name.name in scope.names.sorts:
+                raise rejected("HOARE200", f"`{name.name}` is in use already", name.span)
+            local[name.name] = variable(name.name, sort)
+            bound.append(local[name.name])
+    inner = Scope(scope.names, local, scope.ports, True)
+    kind = Quantifier.FORALL if expression.quantifier == "forall" else Quantifier.EXISTS
+    return Quantified(kind, tuple(bound), formula(expression.body, inner), expression.span)

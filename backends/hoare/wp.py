@@ -1,0 +1,249 @@
+"""Weakest preconditions and verification conditions (E. W. Dijkstra, "A Discipline of Programming", 1976).
+
+The condition of a loop is its invariant; that the invariant is kept, and suffices, are conditions of their own. Every
+assignment and test also demands that what it computes is defined: no division by zero, no negative natural number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statement, Update, While, variable
+from avow.backends.hoare.triples import Triple, rename_bound
+from avow.diagnostics import Span
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, Sort
+from avow.language.terms import (
+    TRUE,
+    And,
+    Apply,
+    Arithmetic,
+    Compare,
+    Construct,
+    Iff,
+    Implies,
+    Literal,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    Term,
+    Variable,
+    children,
+)
+from avow.logic.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.logic.traversal import subterms, transform
+
+LARGEST = 50_000
+"""Nodes of a formula beyond which a program is too much for this method: branches in sequence double it."""
+
+
+class TooLarge(Exception):  # noqa: N818 - it names what happened
+    """The weakest precondition has grown beyond `LARGEST`."""
+
+    def __init__(self, span: Span) -> None:
+        super().__init__(f"the weakest precondition of the statement at {span} has more than {LARGEST} parts")
+        self.span = span
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """One verification condition: the hypotheses imply the goal, for all values of their free variables."""
+
+    name: str
+    hypotheses: tuple[Term, ...]
+    goal: Term
+    what: str
+    span: Span | None = field(default=None, compare=False)
+
+    @property
+    def term(self) -> Term:
+        return Implies(conjunction(self.hypotheses), self.goal)
+
+
+@dataclass(slots=True)
+class Conditions:
+    """Side conditions of loops, as they are met; `known` holds all the time, for it is about constants only."""
+
+    known: Term
+    found: list[Condition] = field(default_factory=list)
+
+
+def conditions(triple: Triple, body: Block) -> tuple[Condition, ...]:
+    """The triple holds if all of these do. Raises TooLarge."""
+    side = Conditions(triple.pre)
+    goal = weakest(body, triple.post, side)
+    whole = Condition("pre", (triple.full_pre,), goal, "the precondition implies the program's weakest precondition")
+    return (whole, *side.found)
+
+
+def weakest(body: Block, post: Term, side: Conditions) -> Term:
+    """The weakest precondition of some statements. Raises TooLarge."""
+    for statement in reversed(body):
+        post = _statement(statement, post, side)
+        if _size(post) > LARGEST:
+            raise TooLarge(statement.span)
+    return post
+
+
+def _statement(statement: Statement, post: Term, side: Conditions) -> Term:
+    match statement:
+        case Skip():
+            return post
+        case Assign(target=target, value=value):
+            safe = [defined(value), *in_range(value, target.sort)]
+            return conjunction((*safe, assigned(post, target, value)))
+        case Update(target=target, arguments=arguments, value=value):
+            assert isinstance(target.sort, FunctionSort)
+            safe = [defined(t) for t in (*arguments, value)]
+            for argument, parameter in zip(arguments, target.sort.parameters, strict=True):
+                safe.extend(in_range(argument, parameter))
+            safe.extend(in_range(value, target.sort.result))
+            return conjunction((*safe, updated(post, target, arguments, value)))
+        case If(condition=condition, then=then, otherwise=otherwise):
+            yes = Implies(condition, weakest(then, post, side))
+            no = Implies(negation(condition), weakest(otherwise, post, side))
+            return conjunction((defined(condition), yes, no))
+        case Match():
+            return _match(statement, post, side)
+        case While():
+            return _while(statement, post, side)
+
+
+def fits(statement: Match, names: Iterable[Variable]) -> Term:
+    """That the subject was made by the pattern's constructor, from values that `names` stand for."""
+    return Compare("==", statement.subject, Construct(statement.constructor, tuple(names), statement.sort))
+
+
+def misfits(statement: Match) -> Term:
+    """That it was made by another constructor."""
+    others: list[Term] = []
+    for constructor in statement.sort.constructors:
+        if constructor.name != statement.constructor:
+            fresh = tuple(variable(f"{constructor.name}~{k}", s) for k, s in enumerate(constructor.parameters))
+            made = Compare("==", statement.subject, Construct(constructor.name, fresh, statement.sort))
+            others.append(Quantified(Quantifier.EXISTS, fresh, made) if fresh else made)
+    return disjunction(others)
+
+
+def _match(statement: Match, post: Term, side: Conditions) -> Term:
+    then = weakest(statement.then, post, side)
+    yes: Term = Implies(fits(statement, statement.variables), then)
+    if statement.variables:
+        yes = Quantified(Quantifier.FORALL, statement.variables, yes)
+    no = Implies(misfits(statement), weakest(statement.otherwise, post, side))
+    return conjunction((defined(statement.subject), yes, no))
+
+
+def _while(statement: While, post: Term, side: Conditions) -> Term:
+    at, test, invariant = statement.span, statement.condition, statement.invariant
+    known = (side.known, invariant)
+    line, name = f"loop-{at.line}-{at.column}", f"line {at.line}"
+    kept: Term = invariant
+    before: tuple[Term, ...] = ()
+    if statement.variant is not None:
+        first = variable(f"variant~{at.line}~{at.column}", INTEGER)
+        before = (Compare("==", first, statement.variant),)
+        kept = conjunction((invariant, Compare("<", statement.variant, first)))
+    body = weakest(statement.body, kept, side)
+    side.found.append(
+        Condition(f"{line}-kept", (*known, test, *before), body, f"the loop at {name} keeps its invariant", at)
+    )
+    side.found.append(
+        Condition(f"{line}-suffices", (*known, negation(test)), post, f"the loop at {name} ends as wanted", at)
+    )
+    side.found.append(Condition(f"{line}-test", known, defined(test), f"the loop's test at {name} is defined", at))
+    if statement.variant is not None:
+        bounded = Compare(">=", statement.variant, Literal(0, INTEGER))
+        side.found.append(
+            Condition(f"{line}-bounded", (*known, test), bounded, f"the variant at {name} is bounded", at)
+        )
+    return invariant
+
+
+# -- assignments -------------------------------------------------------------------------------------------------------
+
+
+def assigned(post: Term, target: Variable, value: Term) -> Term:
+    """The postcondition before ``target := value``."""
+    return substitute(post, {target: value})
+
+
+def updated(post: Term, target: Variable, arguments: tuple[Term, ...], value: Term) -> Term:
+    """The postcondition before ``target[arguments] := value``: each atom split by whether it looks at that point."""
+    names = {v.name for t in (post, value, *arguments) for v in free_variables(t)}
+    after = variable(f"{target.name}~after", target.sort)
+    renamed = substitute(rename_bound(post, names), {target: after})
+    update = Update(target, arguments, value, Span("", 0, 0, 0, 0))
+    return transform(renamed, lambda part: _looked_up(part, after, update))
+
+
+def _looked_up(part: Term, after: Variable, update: Update) -> Term:
+    """An atom about the function after the update, said of the function before."""
+    if isinstance(part, Quantified | And | Or | Not | Implies | Iff) or part.sort != BOOL:
+        return part
+    inner = next((a for a in _applications(part, after) if not any(_applications(x, after) for x in a.arguments)), None)
+    if inner is None:
+        return part
+    same = conjunction(equal(a, b) for a, b in zip(inner.arguments, update.arguments, strict=True))
+    before = Apply(update.target, inner.arguments, inner.sort)
+    if inner == part:
+        return disjunction((conjunction((same, update.value)), conjunction((negation(same), before))))
+    there, elsewhere = (_looked_up(_replaced(part, inner, new), after, update) for new in (update.value, before))
+    return conjunction((Implies(same, there), Implies(negation(same), elsewhere)))
+
+
+def _applications(term: Term, function: Variable) -> list[Apply]:
+    return [part for part in subterms(term) if isinstance(part, Apply) and part.function == function]
+
+
+def _replaced(term: Term, old: Term, new: Term) -> Term:
+    return transform(term, lambda part: new if part == old else part)
+
+
+def equal(left: Term, right: Term) -> Term:
+    """Equality of terms of one sort, up to widening."""
+    return Iff(left, right) if left.sort == BOOL else Compare("==", left, right)
+
+
+# -- what a program can compute ----------------------------------------------------------------------------------------
+
+
+def in_range(value: Term, sort: Sort) -> list[Term]:
+    """That an INTEGER value is a NATURAL one, where it has to be."""
+    return [Compare(">=", value, Literal(0, INTEGER))] if sort == NATURAL and value.sort == INTEGER else []
+
+
+def defined(term: Term) -> Term:
+    """That evaluation from left to right, with `and`, `or` and `->` cut short, divides by nothing that is zero and
+    gives no function a negative natural number."""
+    match term:
+        case And(items=items) | Or(items=items):
+            conditions: list[Term] = []
+            for k, item in enumerate(items):
+                reached = items[:k] if isinstance(term, And) else tuple(negation(i) for i in items[:k])
+                conditions.append(_when(conjunction(reached), defined(item)))
+            return conjunction(conditions)
+        case Implies(left=left, right=right):
+            return conjunction((defined(left), _when(left, defined(right))))
+    parts = [defined(child) for child in children(term)]
+    match term:
+        case Arithmetic(operator="/", right=right):
+            parts.append(Compare("!=", right, Literal(Fraction(0), REAL)))
+        case Apply(function=Variable(sort=FunctionSort(parameters=sorts)), arguments=arguments):
+            parts.extend(r for a, s in zip(arguments, sorts, strict=True) for r in in_range(a, s))
+        case Construct(constructor=name, arguments=arguments, sort=data):
+            sorts = data.constructor(name).parameters
+            parts.extend(r for a, s in zip(arguments, sorts, strict=True) for r in in_range(a, s))
+        case _:
+            pass
+    return conjunction(parts)
+
+
+def _when(condition: Term, consequence: Term) -> Term:
+    return consequence if consequence == TRUE else Implies(condition, consequence)
+
+
+def _size(term: Term) -> int:
+    return sum(1 for _ in zip(range(LARGEST + 1), subterms(term), strict=False))
