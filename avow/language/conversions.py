@@ -1,0 +1,97 @@
+"""Where a term of one sort may stand for another: INTEGER and NATURAL widen to REAL, and nothing else changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+from avow.language.sorts import (
+    INTEGER,
+    NATURAL,
+    REAL,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
+    SequenceSort,
+    Sort,
+    TupleSort,
+)
+from avow.language.terms import Literal, SequenceTerm, Term, TupleTerm, Widen
+
+WHOLE = (IntegerSort, NaturalSort)
+NUMERIC = (IntegerSort, NaturalSort, RealSort)
+
+
+def alike(left: Sort, right: Sort) -> bool:
+    """Whether the sorts are one for a comparison: equal, NATURAL and INTEGER counting as one."""
+    if left == right or (isinstance(left, WHOLE) and isinstance(right, WHOLE)):
+        return True
+    match left, right:
+        case TupleSort(items=a), TupleSort(items=b):
+            return len(a) == len(b) and all(map(alike, a, b))
+        case SequenceSort(item=a_), SequenceSort(item=b_):
+            return alike(a_, b_)
+    return False
+
+
+def fits(sort: Sort, wanted: Sort) -> bool:
+    """Whether every value of `sort` is one of `wanted` as it stands."""
+    if sort == wanted or (sort == NATURAL and wanted == INTEGER):
+        return True
+    match sort, wanted:
+        case TupleSort(items=a), TupleSort(items=b):
+            return len(a) == len(b) and all(map(fits, a, b))
+        case SequenceSort(item=a_), SequenceSort(item=b_):
+            return fits(a_, b_)
+    return False
+
+
+def widen(term: Term) -> Term:
+    """A whole-numbered term as a REAL."""
+    if term.sort == REAL:
+        return term
+    if isinstance(term, Literal) and not isinstance(term.value, bool | str):
+        return Literal(Fraction(term.value), REAL, term.span)
+    return Widen(term, REAL, term.span)
+
+
+def convert(term: Term, wanted: Sort) -> Term | None:
+    """The term as one of sort `wanted`; None where that cannot be."""
+    if fits(term.sort, wanted):
+        return term
+    if wanted == REAL and isinstance(term.sort, WHOLE):
+        return widen(term)
+    match term, wanted:
+        case TupleTerm(items=items), TupleSort(items=sorts) if len(items) == len(sorts):
+            made = [convert(i, s) for i, s in zip(items, sorts, strict=True)]
+            if all(m is not None for m in made):
+                kept = tuple(m for m in made if m is not None)
+                return replace(term, items=kept, sort=TupleSort(tuple(m.sort for m in kept)))
+        case SequenceTerm(items=items), SequenceSort(item=item):
+            made = [convert(i, item) for i in items]
+            if all(m is not None for m in made):
+                return replace(term, items=tuple(m for m in made if m is not None), sort=SequenceSort(item))
+    return None
+
+
+def common(terms: list[Term]) -> list[Term] | None:
+    """The terms brought to one sort, or None."""
+    if not terms:
+        return terms
+    first = terms[0].sort
+    if all(alike(t.sort, first) for t in terms):
+        return terms
+    for candidate in terms:
+        made = [t if alike(t.sort, candidate.sort) else convert(t, candidate.sort) for t in terms]
+        if all(m is not None for m in made):
+            return [m for m in made if m is not None]
+    if all(isinstance(t.sort, NUMERIC) for t in terms):
+        return [widen(t) for t in terms]
+    return None
+
+
+def joined(terms: list[Term]) -> Sort:
+    """The sort of a set or sequence of these (non-empty, already `common`): INTEGER where some may be negative."""
+    if any(t.sort == INTEGER for t in terms) and all(isinstance(t.sort, WHOLE) for t in terms):
+        return INTEGER
+    return terms[0].sort

@@ -1,0 +1,320 @@
+"""The context: type and constant declarations, of one or several files, to an `Environment`.
+
+Declarations may refer to later ones; a circle is an error. A set of fresh names given as a constant declares an
+enumeration of that name, whose name also stands for the set of its elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from avow.diagnostics import Span
+from avow.language.checker import BUILTINS, Checker
+from avow.language.environment import Environment, did_you_mean
+from avow.language.lexer import Token
+from avow.language.scope import Scope
+from avow.language.sorts import (
+    Constructor,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    OpaqueSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    TupleSort,
+)
+from avow.language.source import Reports
+from avow.language.syntax import Tree
+from avow.language.terms import EnumValue, SetTerm
+
+_FOREIGN_TYPES = {
+    **dict.fromkeys(("string", "str"), "STRING"),
+    **dict.fromkeys(("bool", "boolean"), "BOOL"),
+    **dict.fromkeys(("int", "integer", "int8", "int16", "int32", "int64"), "INTEGER"),
+    **dict.fromkeys(("nat", "natural", "uint", "uint8", "uint16", "uint32", "uint64"), "NATURAL"),
+    **dict.fromkeys(("float", "double", "real", "float32", "float64"), "REAL"),
+}
+
+
+@dataclass(slots=True)
+class _Declared:
+    tree: Tree
+    reports: Reports
+    state: str = "new"
+    """new, open (being elaborated: meeting it again is a circle), or done."""
+
+    @property
+    def name(self) -> Token:
+        name: Token = self.tree.parts[0]
+        return name
+
+    @property
+    def place(self) -> Span:
+        return self.reports.source.span(self.name.start, self.name.end)
+
+
+@dataclass(slots=True)
+class Declarations:
+    """Elaborates declarations into `environment`. Use: `add` for each file, then `elaborate`, then `type_of`."""
+
+    environment: Environment = field(default_factory=Environment)
+    declared: dict[str, _Declared] = field(default_factory=dict)
+
+    def add(self, trees: Sequence[Tree], reports: Reports) -> None:
+        for tree in trees:
+            new = _Declared(tree, reports)
+            old = self.declared.get(new.name.text)
+            if old is None:
+                self.declared[new.name.text] = new
+            elif old.reports is reports or not _same_text(old, new):
+                name = new.name.text
+                notes = ((f"`{name}` is first declared here", old.place),)
+                message = f"`{name}` is declared twice"
+                if old.reports is not reports:
+                    message = f"`{name}` is declared differently in another file"
+                reports.error("RCL210", message, new.name.start, new.name.end, notes=notes)
+
+    def elaborate(self) -> None:
+        for name, declared in self.declared.items():
+            if name == "length":
+                declared.reports.error("RCL209", "`length` is built in", declared.name.start, declared.name.end)
+        for declared in self.declared.values():
+            self.resolve(declared)
+        for name, declared in self.declared.items():
+            if name in self.environment.elements:
+                sort = self.environment.elements[name]
+                notes = ((f"the element `{name}`", self.environment.places.get(name)),)
+                message = f"`{name}` is both declared and an element of {sort.name}"
+                declared.reports.error("RCL211", message, declared.name.start, declared.name.end, notes=notes)
+
+    def resolve(self, declared: _Declared) -> None:
+        if declared.state != "new":
+            return
+        declared.state = "open"
+        environment, name = self.environment, declared.name.text
+        environment.places[name] = declared.place
+        if declared.tree.kind == "type":
+            sort = self.type_of(declared.tree.parts[1], declared.reports, name)
+            if sort is None:
+                environment.broken.add(name)
+                environment.broken.update(_names(declared.tree.parts[1]))
+            else:
+                environment.types[name] = sort
+        else:
+            self.constant(declared)
+        declared.state = "done"
+
+    # --- constants ---------------------------------------------------------------------------------------------------
+
+    def constant(self, declared: _Declared) -> None:
+        environment, name = self.environment, declared.name.text
+        value: Tree = declared.tree.parts[1]
+        while value.kind == "parenthesised":
+            value = value.parts[0]
+        self.needed_by(value)
+        if value.kind == "set" and value.parts and all(self.is_fresh(t) for t in value.parts):
+            members = [Token("NAME", t.parts[0], t.start, t.end) for t in value.parts]
+            sort = self.enumeration(name, members, declared.reports)
+            if sort is None:
+                environment.broken.update((name, *(m.text for m in members)))
+                return
+            environment.types[name] = sort
+            span = declared.reports.source.span(value.start, value.end)
+            environment.constants[name] = SetTerm(tuple(EnumValue(m, sort) for m in sort.members), SetSort(sort), span)
+            return
+        term = Checker(Scope(environment), declared.reports).term(value)
+        if term is None:
+            environment.broken.add(name)
+        else:
+            environment.constants[name] = term
+
+    def is_fresh(self, tree: Tree) -> bool:
+        if tree.kind != "name":
+            return False
+        name = tree.parts[0]
+        return name not in self.declared and name not in self.environment.elements
+
+    def needed_by(self, value: Tree) -> None:
+        """Elaborates first what a constant's value mentions, and every type (for their elements)."""
+        for name in _names(value):
+            other = self.declared.get(name)
+            if other is None:
+                continue
+            if other.state == "open":
+                message = f"the declaration of `{name}` refers to itself"
+                other.reports.error("RCL212", message, other.name.start, other.name.end)
+                self.environment.broken.add(name)
+            else:
+                self.resolve(other)
+        for other in list(self.declared.values()):
+            if other.tree.kind == "type" and other.state == "new":
+                self.resolve(other)
+
+    # --- types -------------------------------------------------------------------------------------------------------
+
+    def type_of(self, tree: Tree, reports: Reports, name: str) -> Sort | None:
+        """The sort that a type denotes; `name` is what a new set of names is to be called."""
+        match tree.kind:
+            case "builtin_type":
+                return BUILTINS.get(tree.parts[0], BUILTINS["REAL"])
+            case "named_type":
+                return self.named(tree, reports)
+            case "unspecified_type":
+                return OpaqueSort(name)
+            case "set_type":
+                return self.set_of(tree, reports, name)
+            case "tuple_type":
+                if len(tree.parts) == 1:
+                    return self.type_of(tree.parts[0], reports, name)
+                return _tuple_sort([self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(tree.parts)])
+            case "sequence_type":
+                item = self.type_of(tree.parts[0], reports, f"{name}_item")
+                return None if item is None else SequenceSort(item)
+            case "product_type":
+                return _tuple_sort(self.factors(tree, reports, name))
+            case _:
+                return self.function(tree, reports, name)
+
+    def named(self, tree: Tree, reports: Reports) -> Sort | None:
+        name: str = tree.parts[0]
+        environment = self.environment
+        other = self.declared.get(name)
+        if other is not None and other.state == "open":
+            message = f"the type `{name}` refers to itself"
+            reports.error("RCL212", message, tree.start, tree.end, hint="use a sequence `<T>` for what repeats")
+            return None
+        if other is not None:
+            self.resolve(other)
+        sort = environment.sort(name)
+        if sort is not None or name in environment.broken:
+            return sort
+        if name in environment.constants:
+            message = f"`{name}` is a constant, not a type"
+            reports.error("RCL208", message, tree.start, tree.end, hint=f"declare a type with `:`: `{name} : …;`")
+        elif name in environment.elements:
+            message = f"`{name}` is an element of {environment.elements[name].name}, not a type"
+            reports.error("RCL208", message, tree.start, tree.end)
+        else:
+            near = _FOREIGN_TYPES.get(name.casefold())
+            hint = f"did you mean `{near}`?" if near else did_you_mean(name, (*self.declared, *BUILTINS))
+            hint = hint or f"declare it in the context: `{name} : …;` (`{{}}` where nothing is known of it)"
+            reports.error("RCL208", f"the type `{name}` is not declared", tree.start, tree.end, hint=hint)
+        return None
+
+    def factors(self, tree: Tree, reports: Reports, name: str) -> list[Sort | None]:
+        if tree.kind != "product_type":
+            return [self.type_of(tree, reports, name)]
+        sound = True
+        for sign in tree.parts[1::2]:
+            if sign.text != "x":
+                message = f"expected `x` between two types and not `{sign.text}`"
+                reports.error("RCL120", message, sign.start, sign.end, hint="write `A x B --> C`")
+                sound = False
+        made = [self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(tree.parts[::2])]
+        return made if sound else [None]
+
+    def function(self, tree: Tree, reports: Reports, name: str) -> Sort | None:
+        left, right = tree.parts
+        parameters = self.factors(left, reports, name)
+        result = self.type_of(right, reports, f"{name}_result")
+        if result is None or None in parameters:
+            return None
+        return FunctionSort(tuple(p for p in parameters if p is not None), result)
+
+    def set_of(self, tree: Tree, reports: Reports, name: str) -> Sort | None:
+        elements: Sequence[Tree] = tree.parts
+        if all(e.kind == "element" for e in elements):
+            return self.enumeration(name, [e.parts[0] for e in elements], reports)
+        constructors: list[Constructor] = []
+        sound = True
+        for element in elements:
+            sorts = [self.type_of(t, reports, f"{name}_{element.parts[0].text}") for t in element.parts[1:]]
+            sound = sound and None not in sorts
+            constructors.append(Constructor(element.parts[0].text, tuple(s for s in sorts if s is not None)))
+        sort = DataSort(self.free_name(name), tuple(constructors))
+        return self.introduce(sort, [e.parts[0] for e in elements], reports) if sound else None
+
+    def enumeration(self, name: str, members: Sequence[Token], reports: Reports) -> Sort | None:
+        sort = EnumSort(self.free_name(name), tuple(m.text for m in members))
+        return self.introduce(sort, members, reports)
+
+    def free_name(self, name: str) -> str:
+        """`name` itself for a declaration; a set written in place gets one that nothing else has."""
+        if name in self.declared or (self.environment.sort(name) is None and name not in self.environment.elements):
+            return name
+        number = 2
+        while f"{name}{number}" in self.declared or self.environment.sort(f"{name}{number}") is not None:
+            number += 1
+        return f"{name}{number}"
+
+    def introduce(self, sort: EnumSort | DataSort, names: Sequence[Token], reports: Reports) -> Sort | None:
+        """The sort, its elements made known; or the sort that an equal set was before."""
+        environment = self.environment
+        if sort.name not in self.declared:
+            for known in (*environment.types.values(), *environment.anonymous.values()):
+                if _same_set(known, sort):
+                    return known
+        sound = True
+        seen: dict[str, Token] = {}
+        for name in names:
+            if name.text in seen:
+                message = f"`{name.text}` occurs twice in this set"
+                reports.error("RCL213", message, name.start, name.end)
+                sound = False
+            elif name.text in environment.elements:
+                other = environment.elements[name.text]
+                notes = ((f"`{name.text}` of {other.name}", environment.places.get(name.text)),)
+                message = f"`{name.text}` is already an element of {other.name}"
+                hint = "the elements of types are global: give each its own name"
+                reports.error("RCL213", message, name.start, name.end, hint=hint, notes=notes)
+                sound = False
+            seen[name.text] = name
+        if not sound:
+            return None
+        for name in names:
+            environment.places[name.text] = reports.source.span(name.start, name.end)
+        if sort.name not in self.declared:
+            environment.anonymous[sort.name] = sort
+        environment.add_elements(sort)
+        return sort
+
+
+def _tuple_sort(items: Sequence[Sort | None]) -> Sort | None:
+    return None if None in items else TupleSort(tuple(i for i in items if i is not None))
+
+
+def _same_set(known: Sort, new: EnumSort | DataSort) -> bool:
+    match known, new:
+        case EnumSort(members=a), EnumSort(members=b):
+            return a == b
+        case DataSort(constructors=c), DataSort(constructors=d):
+            return c == d
+    return False
+
+
+def _same_text(one: _Declared, other: _Declared) -> bool:
+    return _shape(one.tree) == _shape(other.tree)
+
+
+def _shape(tree: Tree | Token | str) -> object:
+    if isinstance(tree, Tree):
+        return tree.kind, tuple(_shape(p) for p in tree.parts)
+    return tree.text if isinstance(tree, Token) else tree
+
+
+def _names(tree: Tree) -> set[str]:
+    """Every name that occurs in a tree."""
+    found: set[str] = set()
+    stack: list[Tree | Token] = [tree]
+    while stack:
+        part = stack.pop()
+        if isinstance(part, Token):
+            if part.type == "NAME":
+                found.add(part.text)
+            continue
+        if part.kind in ("name", "named_type"):
+            found.add(part.parts[0])
+        stack.extend(p for p in part.parts if isinstance(p, Tree | Token))
+    return found

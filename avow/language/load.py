@@ -1,0 +1,237 @@
+"""RCL files and texts to a checked contract; formulas of other files (plans) to typed terms.
+
+Every function reports all that is wrong at once. Nothing here raises anything but `Rejected`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.language.checker import Checker
+from avow.language.contract import Contract, Node
+from avow.language.declarations import Declarations
+from avow.language.environment import of_contract
+from avow.language.lexer import tokens
+from avow.language.nodes import check_node, check_ports
+from avow.language.outline import FileSyntax, read
+from avow.language.parser import parse
+from avow.language.scope import BOTH_ROLES, Scope
+from avow.language.sorts import Sort
+from avow.language.source import Reports, Source
+from avow.language.terms import Role, Term, Variable
+
+MAX_BYTES = 16_000_000
+"""A larger file is no contract."""
+
+_NOTHING = Contract((), (), (), ())
+
+
+def load_contract(paths: Sequence[Path]) -> Contract:
+    """The contract that the files declare together. Raises `Rejected` with every error of every file."""
+    contract, diagnostics = check_paths(paths)
+    errors = tuple(d for d in diagnostics if d.is_error)
+    if contract is None or errors:
+        raise Rejected(*errors)
+    return contract
+
+
+def check_paths(
+    paths: Iterable[Path], *, off: frozenset[str] = frozenset()
+) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
+    """The contract of the files, or None, and everything there is to say about them, lints included.
+
+    `off`: codes of lints not to report. A file that cannot be read is reported too.
+    """
+    sources: list[Source] = []
+    unreadable: list[Diagnostic] = []
+    for path in paths:
+        source = read_source(path)
+        if isinstance(source, Diagnostic):
+            unreadable.append(source)
+        else:
+            sources.append(source)
+    contract, diagnostics = check_sources(sources, off=off, partial=bool(unreadable))
+    return (None if unreadable else contract), (*unreadable, *diagnostics)
+
+
+def check_text(
+    text: str, file: str, *, off: frozenset[str] = frozenset()
+) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
+    """The contract that a text declares, or None where it has errors; and all errors and lints."""
+    found = _clean(text, file)
+    if isinstance(found, Diagnostic):
+        return None, (found,)
+    return check_sources([found], off=off)
+
+
+def read_source(path: Path) -> Source | Diagnostic:
+    """A file's text, or why it is none."""
+    file = str(path)
+    start = Span(file, 1, 1, 1, 1)
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        return Diagnostic("RCL002", f"the file cannot be read: {error.strerror or error}", start)
+    except ValueError:  # a NUL in the name
+        return Diagnostic("RCL002", "the file cannot be read: its name is not a file name", start)
+    if len(data) > MAX_BYTES:
+        return Diagnostic("RCL003", f"the file is larger than {MAX_BYTES // 1_000_000} MB", start)
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        begin = data.rfind(b"\n", 0, error.start) + 1
+        column = len(data[begin : error.start].decode("utf-8", "replace")) + 1
+        hint = "save the file as UTF-8"
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            hint = "this looks like UTF-16: save the file as UTF-8"
+        message = f"the file is not UTF-8: the byte 0x{data[error.start]:02X} cannot stand here"
+        return Diagnostic("RCL004", message, Span(file, line, column, line, column + 1), hint=hint)
+    return _clean(text, file)
+
+
+def _clean(text: str, file: str) -> Source | Diagnostic:
+    if len(text) > MAX_BYTES:
+        return Diagnostic("RCL003", f"the text is larger than {MAX_BYTES // 1_000_000} MB", Span(file, 1, 1, 1, 1))
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n")
+    at = text.find("\0")
+    if at >= 0:
+        line, column = Source(file, text).place(at)
+        message = "the file holds a NUL character: it is not a text"
+        return Diagnostic("RCL005", message, Span(file, line, column, line, column + 1))
+    return Source(file, text)
+
+
+def check_sources(
+    sources: Sequence[Source], *, off: frozenset[str] = frozenset(), partial: bool = False
+) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
+    """As `check_paths`, of texts already read. `partial`: other files are missing, so names may be declared there."""
+    parsed: list[tuple[FileSyntax, Reports]] = []
+    declarations = Declarations()
+    for source in sources:
+        reports = Reports(source)
+        syntax = read(tokens(reports), reports)
+        parsed.append((syntax, reports))
+        declarations.environment.broken.update(syntax.broken)
+    for syntax, reports in parsed:
+        declarations.add(syntax.declarations, reports)
+    if partial:
+        declarations.environment.broken.add("*")
+    declarations.elaborate()
+    contract = _contract(parsed, declarations)
+    diagnostics = [d for _, reports in parsed for d in _sorted(reports)]
+    if not any(d.is_error for d in diagnostics):
+        return contract, tuple(diagnostics)
+    return None, tuple(diagnostics)
+
+
+def _contract(parsed: Sequence[tuple[FileSyntax, Reports]], declarations: Declarations) -> Contract:
+    environment = declarations.environment
+    places: dict[str, Span] = {}
+    ready = []
+    for syntax, reports in parsed:
+        for node in syntax.nodes:
+            name = node.name.text
+            span = reports.source.span(node.name.start, node.name.end)
+            if name and name in places:
+                notes: tuple[tuple[str, Span | None], ...] = ((f"the first node `{name}` is here", places[name]),)
+                reports.error("RCL219", f"a second node `{name}`", node.name.start, node.name.end, notes=notes)
+            places.setdefault(name, span)
+            ready.append((node, *check_ports(node, declarations, reports), reports))
+    nodes = tuple(check_node(node, i, o, declarations, reports) for node, i, o, reports in ready)
+    return Contract(
+        tuple(reports.source.file for _, reports in parsed),
+        tuple(environment.types.items()),
+        tuple(environment.constants.items()),
+        nodes,
+    )
+
+
+def _sorted(reports: Reports) -> list[Diagnostic]:
+    found = sorted(reports.found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0))
+    if reports.dropped:
+        at = found[-1].span if found else None
+        found.append(Diagnostic("RCL006", f"{reports.dropped} more errors are not shown", at))
+    return found
+
+
+# --- formulas of other files -----------------------------------------------------------------------------------------
+
+
+def parse_formula(
+    text: str,
+    node: Node | None = None,
+    contract: Contract = _NOTHING,
+    span: Span | None = None,
+    extra: Mapping[str, Sort] | None = None,
+    *,
+    roles: frozenset[Role] = BOTH_ROLES,
+) -> Term:
+    """A formula given as text (in a plan, say) as a term of sort BOOL.
+
+    With `node`, names mean what they mean in that node: ``in.v``, ``out.v``, or bare. Without, ports are written
+    ``agent.command`` (``agent.in.phase`` or ``agent.out.phase`` where the node has both) and become
+    ``Variable(role, "agent.command", sort)``. `extra` are further names, which become bound variables. `roles` are the
+    roles that ports may have; a bare name then means the port of that role. `span` is where the text stands.
+    Raises `Rejected`, with every error.
+    """
+    return _parse(text, node, contract, span, extra, roles, formula=True)
+
+
+def parse_term(
+    text: str,
+    node: Node | None = None,
+    contract: Contract = _NOTHING,
+    span: Span | None = None,
+    extra: Mapping[str, Sort] | None = None,
+    *,
+    roles: frozenset[Role] = BOTH_ROLES,
+    sort: Sort | None = None,
+) -> Term:
+    """As `parse_formula`, of a term of any sort (``move(0, 1)``, ``red``); with `sort`, converted to that."""
+    return _parse(text, node, contract, span, extra, roles, formula=False, sort=sort)
+
+
+def _parse(
+    text: str,
+    node: Node | None,
+    contract: Contract,
+    span: Span | None,
+    extra: Mapping[str, Sort] | None,
+    roles: frozenset[Role],
+    *,
+    formula: bool,
+    sort: Sort | None = None,
+) -> Term:
+    source = Source("<formula>", text) if span is None else Source(span.file, text, span.line, span.column)
+    reports = Reports(source)
+    found = tokens(reports)
+    if not found and not reports.failed:
+        reports.error("RCL120", "there is no formula here", 0, len(text))
+    tree = parse("formula", found, reports, found[-1].end) if found else None
+    term: Term | None = None
+    if tree is not None:
+        bound = {name: Variable(Role.BOUND, name, of) for name, of in (extra or {}).items()}
+        scope = Scope(of_contract(contract), bound=bound, roles=roles)
+        if node is None:
+            scope.nodes = {n.name: n for n in contract.nodes}
+        else:
+            scope.inputs = {p.name: p for p in node.inputs}
+            scope.outputs = {p.name: p for p in node.outputs}
+            scope.node = node.name
+        checker = Checker(scope, reports)
+        if formula:
+            term = checker.formula(tree)
+        elif sort is not None:
+            term = checker.wanted(tree, sort, "this")
+        else:
+            term = checker.term(tree)
+    if term is None or reports.failed:
+        raise Rejected(*_sorted(reports))
+    return term
+
+
+__all__ = ["check_paths", "check_sources", "check_text", "load_contract", "parse_formula", "parse_term"]

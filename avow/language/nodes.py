@@ -1,0 +1,155 @@
+"""Node clauses: ports, topics, assumptions and guarantees, checked against the contract's environment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from avow.diagnostics import Span
+from avow.language.checker import Checker
+from avow.language.contract import Clause, ClauseKind, Node, Port, Topic
+from avow.language.declarations import Declarations
+from avow.language.environment import did_you_mean
+from avow.language.lexer import Token, unquote
+from avow.language.outline import ClauseSyntax, NodeSyntax
+from avow.language.printer import show_type
+from avow.language.scope import Scope
+from avow.language.source import Reports
+from avow.language.syntax import Tree
+from avow.language.terms import Role
+
+ROS_BUILTINS = (
+    *("bool", "byte", "char", "string", "wstring", "time", "duration", "float32", "float64"),
+    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+)
+
+
+def check_ports(
+    node: NodeSyntax, declarations: Declarations, reports: Reports
+) -> tuple[dict[str, Port], dict[str, Port]]:
+    """The node's inputs and outputs by name."""
+    found: list[dict[str, Port]] = []
+    for role, tree in ((Role.INPUT, node.inputs), (Role.OUTPUT, node.outputs)):
+        ports: dict[str, Port] = {}
+        for part in tree.parts if tree is not None else ():
+            name, type_tree = part.parts
+            if name.text in ports:
+                notes: tuple[tuple[str, Span | None], ...] = (
+                    (f"`{name.text}` is first declared here", ports[name.text].span),
+                )
+                message = f"node `{node.name.text}` has two {'in' if role is Role.INPUT else 'out'}puts `{name.text}`"
+                reports.error("RCL214", message, name.start, name.end, notes=notes)
+                continue
+            sort = declarations.type_of(type_tree, reports, name.text)
+            if sort is None:
+                node.broken.add(name.text)
+                continue
+            written = reports.source.text[type_tree.start : type_tree.end]
+            type_name = " ".join(written.split()) if type_tree.kind != "unspecified_type" else show_type(sort)
+            ports[name.text] = Port(role, name.text, sort, type_name, reports.source.span(name.start, name.end))
+        found.append(ports)
+    return found[0], found[1]
+
+
+def check_node(
+    node: NodeSyntax,
+    inputs: Mapping[str, Port],
+    outputs: Mapping[str, Port],
+    declarations: Declarations,
+    reports: Reports,
+) -> Node:
+    """The node, with those of its clauses that are sound; what is not is reported."""
+    scope = Scope(declarations.environment, inputs, outputs, broken=set(node.broken), node=node.name.text)
+    topics = tuple(_topics(node, scope, reports))
+    clauses: dict[ClauseKind, list[Clause]] = {ClauseKind.ASSUMPTION: [], ClauseKind.GUARANTEE: []}
+    counts = dict.fromkeys(ClauseKind, 0)
+    seen: dict[str, Span] = {}
+    for syntax in node.clauses:
+        counts[syntax.kind] += 1
+        clause = _clause(syntax, counts[syntax.kind], scope, seen, reports)
+        if clause is not None:
+            clauses[syntax.kind].append(clause)
+    return Node(
+        node.name.text,
+        tuple(inputs.values()),
+        tuple(outputs.values()),
+        topics,
+        tuple(clauses[ClauseKind.ASSUMPTION]),
+        tuple(clauses[ClauseKind.GUARANTEE]),
+        reports.source.span(node.name.start, node.name.end),
+    )
+
+
+def _clause(
+    syntax: ClauseSyntax, position: int, scope: Scope, seen: dict[str, Span], reports: Reports
+) -> Clause | None:
+    letter = "A" if syntax.kind is ClauseKind.ASSUMPTION else "G"
+    name = syntax.name.text if syntax.name is not None else f"{letter}{position}"
+    place = syntax.name or Token("", "", syntax.start, syntax.start + 1)
+    span = reports.source.span(place.start, place.end)
+    if name in seen:
+        notes: tuple[tuple[str, Span | None], ...] = ((f"`{name}` is first used here", seen[name]),)
+        message = f"two clauses of node `{scope.node}` are called `{name}`"
+        hint = None if syntax.name is not None else "a clause without a name is called A1, G2, … by its position"
+        reports.error("RCL215", message, place.start, place.end, hint=hint, notes=notes)
+    seen.setdefault(name, span)
+    if syntax.formula is None:
+        return None
+    formula = Checker(scope, reports).formula(syntax.formula)
+    if formula is None:
+        return None
+    text = reports.source.text[slice(*syntax.inside)].strip()
+    sentence = unquote(syntax.sentence.text) if syntax.sentence is not None else None
+    whole = reports.source.span(syntax.start, syntax.end)
+    return Clause(syntax.kind, name, position, formula, sentence, text, whole)
+
+
+def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]:
+    seen: dict[str, Span] = {}
+    for tree in node.topics.parts if node.topics is not None else ():
+        ros_type, name, role, matched = tree.parts
+        span = reports.source.span(tree.start, tree.end)
+        if name.text in seen:
+            notes: tuple[tuple[str, Span | None], ...] = ((f"`{name.text}` is first listed here", seen[name.text]),)
+            message = f"node `{scope.node}` lists the topic `{name.text}` twice"
+            reports.error("RCL216", message, name.start, name.end, notes=notes)
+            continue
+        seen[name.text] = span
+        _check_ros_type(ros_type, reports)
+        shown = "/".join(part.text for part in ros_type.parts)
+        port = _matched(tree, role, matched, scope, reports) if matched is not None else None
+        yield Topic(shown, name.text, port, span)
+
+
+def _check_ros_type(tree: Tree, reports: Reports) -> None:
+    parts = [part.text for part in tree.parts]
+    shown = "/".join(parts)
+    if len(parts) == 1 and parts[0] not in ROS_BUILTINS:
+        hint = did_you_mean(shown, ROS_BUILTINS) or f"write the package before it: `package/{shown}`"
+        reports.error("RCL217", f"ROS has no built-in type `{shown}`", tree.start, tree.end, hint=hint)
+    elif len(parts) > 3 or (len(parts) == 3 and parts[1] not in ("msg", "srv", "action")):
+        hint = "a type of a package is written `package/Type` or `package/msg/Type`"
+        reports.error("RCL217", f"`{shown}` is not a ROS type", tree.start, tree.end, hint=hint)
+
+
+def _matched(tree: Tree, role_text: str | None, name: Token, scope: Scope, reports: Reports) -> Port | None:
+    text = name.text
+    roles = [Role(role_text)] if role_text else [Role.INPUT, Role.OUTPUT]
+    candidates = [scope.ports(r)[text] for r in roles if text in scope.ports(r)]
+    if len(candidates) == 1:
+        return candidates[0]
+    if scope.is_broken(text):
+        return None
+    if candidates:
+        hint = f"write `matches(in.{text})` or `matches(out.{text})`"
+        message = f"`{text}` is both an input and an output of node `{scope.node}`"
+        reports.error("RCL202", message, name.start, name.end, hint=hint)
+        return None
+    other = next((r for r in Role if r not in roles and r is not Role.BOUND and text in scope.ports(r)), None)
+    if other is not None:
+        hint: str | None = f"write `matches({other}.{text})`"
+    else:
+        hint = did_you_mean(text, (*scope.inputs, *scope.outputs))
+    what = {"in": "input", "out": "output", None: "input or output"}[role_text]
+    message = f"node `{scope.node}` has no {what} `{text}` for this topic to match"
+    reports.error("RCL218", message, name.start, name.end, hint=hint)
+    return None

@@ -1,0 +1,401 @@
+"""A file's clauses, found by their keywords and brackets, each then parsed on its own.
+
+This is the recovery of the parser: whatever is wrong inside a clause ends with it, so that all errors of a file are
+reported in one run and a broken node does not hide the next. Section keywords are reserved, so they can be trusted to
+begin a section even where a bracket before them was never closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from avow.language.contract import ClauseKind
+from avow.language.lexer import Token
+from avow.language.parser import parse
+from avow.language.source import Reports
+from avow.language.syntax import Tree
+
+_OPEN = {"LPAR": "RPAR", "LBRACE": "RBRACE"}
+_CLOSE = frozenset(_OPEN.values())
+_TOP = frozenset(("CONTEXT", "NODE"))
+_SECTIONS = frozenset(("INPUTS", "OUTPUTS", "TOPICS", "ASSUME", "GUARANTEE"))
+_SIGN = {"LPAR": "(", "RPAR": ")", "LBRACE": "{", "RBRACE": "}"}
+_ORDER = {"INPUTS": 0, "OUTPUTS": 1, "TOPICS": 2, "ASSUME": 3, "GUARANTEE": 4}
+
+
+@dataclass(frozen=True, slots=True)
+class ClauseSyntax:
+    kind: ClauseKind
+    name: Token | None
+    sentence: Token | None
+    formula: Tree | None
+    """None: it was in error, which has been reported."""
+    inside: tuple[int, int]
+    """Where the formula stands, between the parentheses."""
+    start: int
+    end: int
+
+
+@dataclass(slots=True)
+class NodeSyntax:
+    """`broken` are names that a part in error seems to declare; nothing more should be said about them."""
+
+    name: Token
+    start: int
+    end: int = 0
+    inputs: Tree | None = None
+    outputs: Tree | None = None
+    topics: Tree | None = None
+    clauses: list[ClauseSyntax] = field(default_factory=list)
+    broken: set[str] = field(default_factory=set)
+
+
+@dataclass(slots=True)
+class FileSyntax:
+    declarations: list[Tree] = field(default_factory=list)
+    nodes: list[NodeSyntax] = field(default_factory=list)
+    broken: set[str] = field(default_factory=set)
+
+
+def read(tokens: Sequence[Token], reports: Reports) -> FileSyntax:
+    """The clauses of a file, with every syntax error in them reported."""
+    return _Reader(tokens, reports).file()
+
+
+class _Reader:
+    def __init__(self, tokens: Sequence[Token], reports: Reports) -> None:
+        self.tokens = tokens
+        self.reports = reports
+        self.at = 0
+        self.out = FileSyntax()
+
+    # --- looking at tokens -------------------------------------------------------------------------------------------
+
+    def kind(self, ahead: int = 0) -> str:
+        at = self.at + ahead
+        return self.tokens[at].type if at < len(self.tokens) else "$END"
+
+    def end_of_text(self) -> int:
+        return self.tokens[-1].end if self.tokens else 0
+
+    def found(self, at: int) -> tuple[str, int, int]:
+        """The token at a position in words, and its place."""
+        if at >= len(self.tokens):
+            end = self.end_of_text()
+            return "the end of the file", end, end
+        token = self.tokens[at]
+        return f"`{token.text[:40]}`", token.start, token.end
+
+    def complain(self, code: str, message: str, at: int, hint: str | None = None) -> None:
+        words, start, end = self.found(at)
+        self.reports.error(code, message.replace("%", words, 1), start, end, hint=hint)
+
+    # --- the file ----------------------------------------------------------------------------------------------------
+
+    def file(self) -> FileSyntax:
+        contexts = 0
+        if not self.tokens and not self.reports.failed:
+            self.reports.error("RCL001", "there is no contract here: neither a context nor a node", 0, 0)
+        while self.at < len(self.tokens):
+            if self.kind() == "CONTEXT":
+                contexts += 1
+                if contexts > 1:
+                    self.complain("RCL112", "a second `context` in one file", self.at, "put all into one `context`")
+                self.at += 1
+                self.context()
+            elif self.kind() == "NODE":
+                self.node()
+            elif self.kind() == "NAME" and self.kind(1) == "LBRACE":
+                word = self.tokens[self.at].text
+                if word in ("types", "constants", "type", "constant"):
+                    hint = "types (`Name : type;`) and constants (`Name = value;`) both belong in one `context { … }`"
+                    self.complain("RCL111", f"`{word}` is not a clause of RCL", self.at, hint)
+                    self.at += 1
+                    self.context()
+                else:
+                    self.complain(
+                        "RCL111", "expected `context` or `node` and not %", self.at, f"write `node {word} {{`"
+                    )
+                    self.at += 1
+                    self.skip_block()
+            else:
+                hint = "a file is one `context { … }` and any number of `node NAME { … }`"
+                if self.kind() in _SECTIONS:
+                    hint = "this belongs inside a `node NAME { … }`"
+                message = "expected `context` or `node` and not %"
+                if self.kind() in _CLOSE:
+                    message, hint = "% closes nothing", "remove it, or find where a bracket was closed too early"
+                self.complain("RCL111", message, self.at, hint)
+                self.at += 1
+                self.skip_to_top()
+        return self.out
+
+    def skip_to_top(self) -> None:
+        while self.at < len(self.tokens) and self.kind() not in _TOP:
+            if self.kind() == "NAME" and self.kind(1) == "LBRACE":
+                return
+            self.at += 1
+
+    def skip_block(self) -> None:
+        depth = 0
+        while self.at < len(self.tokens) and self.kind() not in _TOP:
+            depth += (self.kind() == "LBRACE") - (self.kind() == "RBRACE")
+            self.at += 1
+            if depth <= 0:
+                return
+
+    def open_brace(self, what: str) -> Token | None:
+        if self.kind() == "LBRACE":
+            self.at += 1
+            return self.tokens[self.at - 1]
+        self.complain("RCL113", f"expected `{{` after {what} and not %", self.at)
+        return None
+
+    # --- context -----------------------------------------------------------------------------------------------------
+
+    def context(self) -> None:
+        brace = self.open_brace("`context`")
+        count = 0
+        while self.at < len(self.tokens) and self.kind() not in _TOP:
+            if self.kind() == "RBRACE":
+                if count == 0 and brace is not None:
+                    self.reports.error("RCL114", "this context declares nothing", brace.start, brace.end)
+                self.at += 1
+                return
+            if self.kind() == "SEMICOLON":
+                self.complain("RCL113", "% ends nothing here", self.at, "remove it")
+                self.at += 1
+                continue
+            count += 1
+            self.declaration()
+        if brace is not None:
+            self.reports.error("RCL115", "this `{` is never closed", brace.start, brace.end, hint="close it with `}`")
+
+    def declaration(self) -> None:
+        first, depth, relation = self.at, 0, False
+        while self.at < len(self.tokens):
+            kind = self.kind()
+            if kind in _TOP or kind in _SECTIONS:
+                break
+            if depth <= 0 and (kind == "SEMICOLON" or kind == "RBRACE"):
+                break
+            if kind in ("COLON", "EQUALS", "EQ") and depth == 0:
+                if relation and self.kind(-1) == "NAME":
+                    self.at -= 1  # the name before belongs to the next declaration
+                    break
+                relation = True
+            depth += (kind in _OPEN) - (kind in _CLOSE)
+            self.at += 1
+        if self.at == first:  # a keyword where a declaration should begin
+            self.complain(
+                "RCL113", "expected a declaration and not %", self.at, "write `Name : type;` or `Name = value;`"
+            )
+            self.at += 1
+            self.skip_to_top()
+            return
+        part = self.tokens[first : self.at]
+        tree = parse("declaration", part, self.reports, part[-1].end)
+        if tree is not None:
+            self.out.declarations.append(tree)
+        else:
+            self.out.broken.update(t.text for t in part if t.type == "NAME")
+        if self.kind() == "SEMICOLON":
+            self.at += 1
+        elif tree is not None:
+            end = part[-1].end
+            message = f"`;` is missing after the declaration of `{part[0].text}`"
+            self.reports.error("RCL113", message, end - 1, end, hint="end every declaration with `;`")
+
+    # --- node --------------------------------------------------------------------------------------------------------
+
+    def node(self) -> None:
+        start = self.tokens[self.at].start
+        self.at += 1
+        if self.kind() == "NAME":
+            node = NodeSyntax(self.tokens[self.at], start)
+            self.at += 1
+        else:
+            self.complain("RCL113", "expected the node's name and not %", self.at)
+            node = NodeSyntax(Token("NAME", "", start, start), start)
+            if self.kind() not in ("LBRACE", "$END") and self.kind() not in _TOP:
+                self.at += 1
+        brace = self.open_brace("the node's name")
+        self.out.nodes.append(node)
+        before, seen = "", dict[str, Token]()
+        while self.at < len(self.tokens) and self.kind() not in _TOP:
+            if self.kind() == "RBRACE":
+                self.at += 1
+                break
+            section = self.section()
+            if section is None:
+                self.not_a_section()
+                continue
+            keyword = self.tokens[self.at]
+            if section in ("INPUTS", "OUTPUTS", "TOPICS") and section in seen:
+                earlier = self.reports.source.span(seen[section].start, seen[section].end)
+                message = f"a second `{keyword.text}` in node `{node.name.text}`"
+                notes = ((f"the first `{keyword.text}` is here", earlier),)
+                self.reports.error("RCL117", message, keyword.start, keyword.end, notes=notes)
+            elif before and _ORDER[section] < _ORDER[before]:
+                words = {"ASSUME": "an assumption", "GUARANTEE": "a guarantee"}
+                message = f"`{keyword.text}` stands after {words.get(before, f'`{before.lower()}`')}"
+                hint = "the order is: inputs, outputs, topics, assumptions, guarantees"
+                self.reports.error("RCL116", message, keyword.start, keyword.end, hint=hint)
+            else:
+                before = section
+            seen.setdefault(section, keyword)
+            self.read_section(section, node)
+        else:
+            if brace is not None:
+                message = f"the `{{` of node `{node.name.text}` is never closed"
+                self.reports.error("RCL115", message, brace.start, brace.end, hint="close it with `}`")
+        node.end = self.tokens[min(self.at, len(self.tokens)) - 1].end
+        self.missing(node, seen)
+
+    def missing(self, node: NodeSyntax, seen: dict[str, Token]) -> None:
+        """Reports the sections that a node must have and does not."""
+        where = (node.name.start, node.name.end)
+        for section in ("INPUTS", "OUTPUTS", "TOPICS"):
+            if section not in seen:
+                word = section.lower()
+                message = f"node `{node.name.text}` has no `{word}( … )`"
+                self.reports.error("RCL118", message, *where, hint=f"write `{word}()` where there are none")
+                node.broken.add("*")
+        if "GUARANTEE" not in seen:
+            message = f"node `{node.name.text}` guarantees nothing"
+            self.reports.error("RCL118", message, *where, hint="a node has at least one `guarantee( … )`")
+
+    def section(self) -> str | None:
+        kind = self.kind()
+        if kind in _SECTIONS:
+            return kind
+        if kind == "NAME" and self.tokens[self.at].text in ("A", "G") and self.kind(1) in ("LPAR", "NAME", "STRING"):
+            return "ASSUME" if self.tokens[self.at].text == "A" else "GUARANTEE"
+        return None
+
+    def not_a_section(self) -> None:
+        token = self.tokens[self.at]
+        hint: str | None = "a node has inputs, outputs, topics, assumptions and guarantees, each with parentheses"
+        message = "expected `inputs`, `outputs`, `topics`, `assume`, `guarantee` or `}` and not %"
+        near = _NEAR.get(token.text.lower())
+        if near is not None:
+            hint = f"did you mean `{near}`?"
+        elif token.type == "RPAR":
+            message, hint = "this `)` closes nothing", "remove it, or find where a `(` is missing"
+        elif token.type in ("SEMICOLON", "COMMA", "DOT"):
+            hint = "no sign stands between the parts of a node: remove it"
+        self.complain("RCL113", message, self.at, hint)
+        self.at += 1
+        while self.at < len(self.tokens) and self.kind() not in _TOP and self.section() is None:
+            if self.kind() == "RBRACE":
+                return
+            if self.kind() in _OPEN:
+                self.balanced()
+            else:
+                self.at += 1
+
+    def balanced(self) -> int | None:
+        """Past the bracket here and its partner; the partner's position, or None where it has none (then: where the
+        search ended, at a section keyword or the end)."""
+        stack = [_OPEN[self.kind()]]
+        self.at += 1
+        while self.at < len(self.tokens):
+            kind = self.kind()
+            if kind in _TOP or kind in _SECTIONS:
+                return None
+            if kind in _OPEN:
+                stack.append(_OPEN[kind])
+            elif kind in _CLOSE:
+                if kind != stack[-1]:
+                    return None
+                stack.pop()
+                if not stack:
+                    self.at += 1
+                    return self.at - 1
+            self.at += 1
+        return None
+
+    def read_section(self, section: str, node: NodeSyntax) -> None:
+        keyword = self.tokens[self.at]
+        self.at += 1
+        name = sentence = None
+        if section in ("ASSUME", "GUARANTEE"):
+            if self.kind() == "NAME":
+                name = self.tokens[self.at]
+                self.at += 1
+            if self.kind() == "STRING":
+                sentence = self.tokens[self.at]
+                self.at += 1
+        if self.kind() != "LPAR":
+            self.complain("RCL113", f"expected `(` after `{(name or keyword).text}` and not %", self.at)
+            if section not in ("ASSUME", "GUARANTEE"):
+                node.broken.add("*")
+            while self.at < len(self.tokens) and self.kind() not in _TOP and self.kind() != "RBRACE":
+                if self.section() is not None:
+                    return
+                self.at += 1
+            return
+        opening = self.tokens[self.at]
+        first = self.at + 1
+        close = self.balanced()
+        if close is None:
+            self.unclosed(opening, first, section, node)
+            return
+        part = self.tokens[first:close]
+        end = self.tokens[close].start
+        if section in ("ASSUME", "GUARANTEE"):
+            kind = ClauseKind.ASSUMPTION if section == "ASSUME" else ClauseKind.GUARANTEE
+            formula = None
+            if part:
+                formula = parse("formula", part, self.reports, end)
+            else:
+                message = f"this {kind.value} says nothing"
+                hint = "leave it out: no assumption means that every input is accepted"
+                if section == "GUARANTEE":
+                    hint = "write `TRUE` where the node promises nothing"
+                self.reports.error("RCL119", message, opening.start, self.tokens[close].end, hint=hint)
+            inside = (opening.end, end)
+            node.clauses.append(
+                ClauseSyntax(kind, name, sentence, formula, inside, keyword.start, self.tokens[close].end)
+            )
+            return
+        tree = parse("topics" if section == "TOPICS" else "ports", part, self.reports, end)
+        if tree is None:
+            node.broken.update(t.text for t in part if t.type == "NAME")
+        match section:
+            case "INPUTS":
+                node.inputs = node.inputs or tree
+            case "OUTPUTS":
+                node.outputs = node.outputs or tree
+            case _:
+                node.topics = node.topics or tree
+
+    def unclosed(self, opening: Token, first: int, section: str, node: NodeSyntax) -> None:
+        """Reports a parenthesis without partner and goes to where reading can begin again."""
+        words, start, end = self.found(self.at)
+        where = self.reports.source.span(start, end)
+        self.reports.error(
+            "RCL115",
+            "this `(` is never closed",
+            opening.start,
+            opening.end,
+            hint="close it with `)`",
+            notes=((f"it should be closed before {words} here", where),),
+        )
+        if section not in ("ASSUME", "GUARANTEE"):
+            node.broken.update(t.text for t in self.tokens[first : self.at] if t.type == "NAME")
+            node.broken.add("*")
+        while self.at < len(self.tokens) and self.kind() not in _TOP and self.section() is None:
+            if self.kind() == "RBRACE" and self.kind(1) in (*_TOP, "$END", "RBRACE"):
+                return
+            self.at += 1
+
+
+_NEAR = {
+    **dict.fromkeys(("input", "ins"), "inputs"),
+    **dict.fromkeys(("output", "outs"), "outputs"),
+    "topic": "topics",
+    **dict.fromkeys(("assumes", "assumption", "assumptions", "requires", "require"), "assume"),
+    **dict.fromkeys(("guarantees", "garantee", "guarentee", "guaranty", "ensures", "ensure"), "guarantee"),
+}

@@ -1,0 +1,247 @@
+"""Tokens to surface syntax, by Lark's LALR parser over grammar.lark.
+
+The parser is driven token by token, so its input is a slice of the file's tokens (see `avow.language.outline`), and its
+callbacks build `Tree`s directly. Parsing is iterative: no nesting, however deep, can exhaust the stack.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from avow.language.lexer import Token
+from avow.language.source import Reports
+from avow.language.syntax import Tree
+
+MAX_DEPTH = 150
+"""How deep a formula or type may be nested. Every later pass may recurse as deep as this."""
+
+QUANTIFIERS = {"FORALL": "forall", "EXISTS": "exists", "UNIQUE": "exists_unique"}
+STARTS = ("declaration", "ports", "topics", "formula")
+
+
+def parse(start: str, tokens: Sequence[Token], reports: Reports, end: int) -> Tree | None:
+    """The tree of one part of a file; `end` is the offset where it ends. Reports the first error; then None."""
+    from lark.exceptions import UnexpectedToken
+
+    machine = _lark().parse_interactive("", start=start)
+    feed = machine.parser_state.feed_token
+    token: Token | None = None
+    try:
+        for token in tokens:
+            feed(token)
+        token = Token("$END", "", end, end)
+        tree: Tree = feed(token, True)
+    except UnexpectedToken as error:
+        from avow.language.expectations import explain
+
+        last = token or Token("$END", "", end, end)
+        explain(start, tokens, last, frozenset(machine.accepts()), reports)
+        del error
+        return None
+    if tree.depth > MAX_DEPTH:
+        reports.error(
+            "RCL110",
+            f"this is nested {tree.depth} levels deep; {MAX_DEPTH} is the most",
+            tree.start,
+            min(tree.end, tree.start + 1),
+            hint="split the clause, or name its parts",
+        )
+        return None
+    return tree
+
+
+@functools.cache
+def _lark() -> Any:
+    from lark import Lark
+
+    grammar = Path(__file__).with_name("grammar.lark")
+    options: dict[str, Any] = {
+        "parser": "lalr",
+        "lexer": "basic",
+        "start": list(STARTS),
+        "maybe_placeholders": False,
+        "transformer": _Build(),
+    }
+    cache = _cache_file()
+    if cache is not None:
+        try:
+            return Lark(grammar.read_text("utf-8"), cache=str(cache), **options)
+        except (OSError, ValueError, EOFError, AttributeError, KeyError):
+            pass
+    return Lark(grammar.read_text("utf-8"), **options)
+
+
+def _cache_file() -> Path | None:
+    """Where the tables are kept between runs; a folder of the user's own, since Lark's cache is a pickle."""
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")  # noqa: PTH
+    folder = Path(base) / "avow"
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if folder.stat().st_uid != os.getuid() or not os.access(folder, os.W_OK):
+            return None
+    except (OSError, AttributeError):
+        return None
+    return folder / f"rcl-{sys.version_info.major}{sys.version_info.minor}.lark"
+
+
+def _make(kind: str, parts: tuple[Any, ...], first: Any, last: Any) -> Tree:
+    depth = 0
+    for part in parts:
+        if type(part) is Tree and part.depth > depth:
+            depth = part.depth
+    return Tree(kind, parts, first.start, last.end, depth + 1)
+
+
+class _Build:
+    """A callback per alias of the grammar; its argument is the list of tokens and trees of the rule."""
+
+    # --- declarations ------------------------------------------------------------------------------------------------
+
+    def type_declaration(self, c: list[Any]) -> Tree:  # (name token, type)
+        return _make("type", (c[0], c[2]), c[0], c[2])
+
+    def constant_declaration(self, c: list[Any]) -> Tree:  # (name token, value)
+        return _make("constant", (c[0], c[2]), c[0], c[2])
+
+    def ports(self, c: list[Any]) -> Tree:  # (port, …)
+        return _listing("ports", c)
+
+    def port(self, c: list[Any]) -> Tree:  # (name token, type)
+        return _make("port", (c[0], c[2]), c[0], c[2])
+
+    def topics(self, c: list[Any]) -> Tree:  # (topic, …)
+        return _listing("topics", c)
+
+    def plain_topic(self, c: list[Any]) -> Tree:  # (ros type, name token, role or None, matched name token or None)
+        return _make("topic", (c[0], c[1], None, None), c[0], c[-1])
+
+    def bare_topic(self, c: list[Any]) -> Tree:
+        return _make("topic", (c[0], c[1], None, c[4]), c[0], c[-1])
+
+    def matched_topic(self, c: list[Any]) -> Tree:
+        return _make("topic", (c[0], c[1], c[4].text, c[6]), c[0], c[-1])
+
+    def ros_type(self, c: list[Any]) -> Tree:  # (name token, …) without the slashes
+        return _make("ros_type", tuple(c[::2]), c[0], c[-1])
+
+    # --- types -------------------------------------------------------------------------------------------------------
+
+    def function_type(self, c: list[Any]) -> Tree:  # (parameters, result)
+        return _make("function_type", (c[0], c[2]), c[0], c[2])
+
+    def product_type(self, c: list[Any]) -> Tree:  # (type, x token, type, …)
+        return _make("product_type", tuple(c), c[0], c[-1])
+
+    def named_type(self, c: list[Any]) -> Tree:  # (name,)
+        return Tree("named_type", (c[0].text,), c[0].start, c[0].end, 1)
+
+    def builtin_type(self, c: list[Any]) -> Tree:  # (name,)
+        return Tree("builtin_type", (c[0].text,), c[0].start, c[0].end, 1)
+
+    def unspecified_type(self, c: list[Any]) -> Tree:
+        return Tree("unspecified_type", (), c[0].start, c[1].end, 1)
+
+    def set_type(self, c: list[Any]) -> Tree:  # (element, …)
+        return _make("set_type", tuple(c[1:-1:2]), c[0], c[-1])
+
+    def tuple_type(self, c: list[Any]) -> Tree:  # (type, …)
+        return _make("tuple_type", tuple(c[1:-1:2]), c[0], c[-1])
+
+    def sequence_type(self, c: list[Any]) -> Tree:  # (type,)
+        return _make("sequence_type", (c[1],), c[0], c[-1])
+
+    def plain_element(self, c: list[Any]) -> Tree:  # (name token,)
+        return Tree("element", (c[0],), c[0].start, c[0].end, 1)
+
+    def constructor(self, c: list[Any]) -> Tree:  # (name token, type, …)
+        return _make("constructor", (c[0], *c[2:-1:2]), c[0], c[-1])
+
+    # --- formulas and terms ------------------------------------------------------------------------------------------
+
+    def iff(self, c: list[Any]) -> Tree:  # (left, right)
+        return _make("iff", (c[0], c[2]), c[0], c[2])
+
+    def implies(self, c: list[Any]) -> Tree:  # (left, right)
+        return _make("implies", (c[0], c[2]), c[0], c[2])
+
+    def disjunction(self, c: list[Any]) -> Tree:  # (formula, …)
+        return _make("or", tuple(c[::2]), c[0], c[-1])
+
+    def conjunction(self, c: list[Any]) -> Tree:  # (formula, …)
+        return _make("and", tuple(c[::2]), c[0], c[-1])
+
+    def negation(self, c: list[Any]) -> Tree:  # (formula,)
+        return _make("not", (c[1],), c[0], c[1])
+
+    def comparison(self, c: list[Any]) -> Tree:  # (term, relation token, term, …)
+        return _make("comparison", tuple(c), c[0], c[-1])
+
+    def arithmetic(self, c: list[Any]) -> Tree:  # (left, operator, right)
+        return _make("arithmetic", (c[0], c[1].text, c[2]), c[0], c[2])
+
+    def negative(self, c: list[Any]) -> Tree:  # (term,)
+        return _make("negative", (c[1],), c[0], c[1])
+
+    def application(self, c: list[Any]) -> Tree:  # (function, argument, …)
+        return _make("application", (c[0], *c[2:-1:2]), c[0], c[-1])
+
+    def name(self, c: list[Any]) -> Tree:  # (name,)
+        return Tree("name", (c[0].text,), c[0].start, c[0].end, 1)
+
+    def builtin(self, c: list[Any]) -> Tree:  # (name,)
+        return Tree("builtin", (c[0].text,), c[0].start, c[0].end, 1)
+
+    def number(self, c: list[Any]) -> Tree:  # (digits,)
+        return Tree("number", (c[0].text,), c[0].start, c[0].end, 1)
+
+    def string(self, c: list[Any]) -> Tree:  # (text with its quotation marks,)
+        return Tree("string", (c[0].text,), c[0].start, c[0].end, 1)
+
+    def truth(self, c: list[Any]) -> Tree:  # (TRUE or FALSE,)
+        return Tree("truth", (c[0].text,), c[0].start, c[0].end, 1)
+
+    def port_name(self, c: list[Any]) -> Tree:  # ("in" or "out", name)
+        return Tree("port_name", (c[0].text, c[2].text), c[0].start, c[2].end, 1)
+
+    def node_port(self, c: list[Any]) -> Tree:  # (node, "in" or "out" or None, name)
+        role = c[2].text if len(c) == 5 else None
+        return Tree("node_port", (c[0].text, role, c[-1].text), c[0].start, c[-1].end, 1)
+
+    def parenthesised(self, c: list[Any]) -> Tree:
+        """The inner tree under the parentheses' place: they group, and are gone."""
+        inner: Tree = c[1]
+        if inner.kind == "parenthesised":  # `((a))` counts as deep as it is written
+            return inner._replace(start=c[0].start, end=c[2].end, depth=inner.depth + 1)
+        return Tree("parenthesised", (inner,), c[0].start, c[2].end, inner.depth + 1)
+
+    def tuple(self, c: list[Any]) -> Tree:  # (term, …)
+        return _make("tuple", tuple(c[1:-1:2]), c[0], c[-1])
+
+    def set(self, c: list[Any]) -> Tree:  # (term, …)
+        return _make("set", tuple(c[1:-1:2]), c[0], c[-1])
+
+    def sequence(self, c: list[Any]) -> Tree:  # (term, …)
+        return _make("sequence", tuple(c[1:-1:2]), c[0], c[-1])
+
+    def range(self, c: list[Any]) -> Tree:  # (low, high)
+        return _make("range", (c[1], c[3]), c[0], c[4])
+
+    def quantified(self, c: list[Any]) -> Tree:  # (quantifier, binders, body)
+        return _make("quantified", (QUANTIFIERS[c[0].type], c[2], c[4]), c[0], c[5])
+
+    def binders(self, c: list[Any]) -> Tree:  # (binder, …)
+        return _make("binders", tuple(c[::2]), c[0], c[-1])
+
+    def binder(self, c: list[Any]) -> Tree:  # (name token, …, domain)
+        return _make("binder", (*c[:-2:2], c[-1]), c[0], c[-1])
+
+
+def _listing(kind: str, c: list[Any]) -> Tree:
+    if not c:
+        return Tree(kind, (), 0, 0, 1)
+    return _make(kind, tuple(c[::2]), c[0], c[-1])

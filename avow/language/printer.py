@@ -1,0 +1,461 @@
+"""Terms and sorts as text: RCL, Unicode mathematics, plain words, or LaTeX; with only the parentheses that are needed.
+
+Printing in the style ``rcl`` and reading that again gives the equal term (tests hold this for generated terms).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal as OneOf
+
+from avow.language.lexer import quote
+from avow.language.sorts import (
+    REAL,
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
+from avow.language.terms import (
+    And,
+    Apply,
+    Arithmetic,
+    Compare,
+    Construct,
+    EnumValue,
+    Iff,
+    Implies,
+    In,
+    Index,
+    Length,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    SequenceRange,
+    SequenceTerm,
+    SetTerm,
+    Term,
+    TupleTerm,
+    Variable,
+    Widen,
+)
+
+StyleName = OneOf["unicode", "rcl", "latex", "text"]
+
+# How tightly a form binds; a part is put in parentheses where it binds less tightly than its place demands.
+IFF, IMPLIES, OR, AND, NOT, COMPARE, SUM, PRODUCT, UNARY, ATOM = range(10)
+_LOOSEST = -1
+_UP, _DOWN = frozenset(("<", "<=", "==")), frozenset((">", ">=", "=="))
+
+
+def show_term(term: Term, style: StyleName = "unicode") -> str:
+    """The term as text. `latex` is for mathematics mode, and escapes every name and string."""
+    return _Printer(_STYLES[style]).show(term, _LOOSEST)
+
+
+def show_sort(sort: Sort, style: StyleName = "rcl") -> str:
+    """A sort by its name, or written out where it has none."""
+    chosen = _STYLES[style]
+    match sort:
+        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort():
+            return chosen.sorts[_BUILTIN[type(sort)]]
+        case EnumSort(name=name) | DataSort(name=name) | OpaqueSort(name=name):
+            return chosen.name(name)
+        case FunctionSort(parameters=parameters, result=result):
+            left = chosen.times.join(_in_product(p, style) for p in parameters)
+            return f"{left}{chosen.arrow}{_in_product(result, style)}"
+        case TupleSort(items=items):
+            return f"({', '.join(show_sort(i, style) for i in items)})"
+        case SequenceSort(item=item):
+            return f"{chosen.sequence[0]}{show_sort(item, style)}{chosen.sequence[1]}"
+        case SetSort(item=item):
+            return f"a set of {show_sort(item, style)}"
+
+
+def show_type(sort: Sort, style: StyleName = "rcl") -> str:
+    """The sort as its declaration writes it: ``{red, orange, green}``, ``{}``."""
+    chosen = _STYLES[style]
+    match sort:
+        case EnumSort(members=members):
+            return chosen.braces(", ".join(chosen.name(m) for m in members))
+        case DataSort(constructors=constructors):
+            shown = []
+            for c in constructors:
+                arguments = ", ".join(show_sort(p, style) for p in c.parameters)
+                shown.append(f"{chosen.name(c.name)}({arguments})" if arguments else chosen.name(c.name))
+            return chosen.braces(", ".join(shown))
+        case OpaqueSort():
+            return chosen.unspecified
+        case _:
+            return show_sort(sort, style)
+
+
+def _in_product(sort: Sort, style: StyleName) -> str:
+    shown = show_sort(sort, style)
+    return f"({shown})" if isinstance(sort, FunctionSort) else shown
+
+
+_BUILTIN = {
+    BoolSort: "BOOL",
+    RealSort: "REAL",
+    IntegerSort: "INTEGER",
+    NaturalSort: "NATURAL",
+    StringSort: "STRING",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Style:
+    words: dict[str, str]
+    quantifiers: dict[Quantifier, tuple[str, str, str]]
+    """Before the variables, after them, and after the body."""
+    sorts: dict[str, str]
+    times: str
+    arrow: str
+    unspecified: str
+    sequence: tuple[str, str]
+    name: Callable[[str], str]
+    string: Callable[[str], str]
+    braces: Callable[[str], str]
+    tight_quantifier: bool
+    """Whether a quantifier closes itself, so that it never needs parentheses."""
+
+
+class _Printer:
+    def __init__(self, style: _Style) -> None:
+        self.style = style
+
+    def show(self, term: Term, place: int, *, real: bool = False) -> str:
+        """`place`: how tightly the text must bind. `real`: a reader takes a number here for a REAL anyway."""
+        if isinstance(term, Widen):
+            return self.show(term.term, place)
+        text, level = self.form(term, real)
+        return f"({text})" if level < place else text
+
+    def form(self, term: Term, real: bool) -> tuple[str, int]:
+        words = self.style.words
+        match term:
+            case Literal():
+                return self.literal(term, real)
+            case EnumValue(name=name):
+                return self.style.name(name), ATOM
+            case Variable():
+                return self.style.name(term.qualified), ATOM
+            case Construct(constructor=name, arguments=arguments, sort=sort):
+                parameters = sort.constructor(name).parameters
+                return self.applied(self.style.name(name), arguments, parameters), ATOM
+            case Apply(function=function, arguments=arguments):
+                sort_ = function.sort
+                parameters = sort_.parameters if isinstance(sort_, FunctionSort) else ()
+                return self.call(self.show(function, ATOM), arguments, parameters), ATOM
+            case Index(sequence=sequence, index=index):
+                return self.call(self.show(sequence, ATOM), (index,), ()), ATOM
+            case Length(sequence=sequence):
+                return f"{self.style.name('length')}({self.show(sequence, _LOOSEST)})", ATOM
+            case Arithmetic():
+                return self.arithmetic(term)
+            case Negative(term=inner):
+                shown = self.show(inner, UNARY, real=real)
+                return f"-({shown})" if isinstance(inner, Literal) else f"-{shown}", UNARY
+            case TupleTerm(items=items):
+                return f"({self.listed(items, _LOOSEST)})", ATOM
+            case SequenceTerm(items=items):
+                left, right = self.style.sequence
+                return f"{left}{self.listed(items, SUM)}{right}", ATOM
+            case SequenceRange(low=low, high=high):
+                left, right = self.style.sequence
+                return f"{left}{self.show(low, SUM)}{words['upto']}{self.show(high, SUM)}{right}", ATOM
+            case SetTerm(items=items):
+                return self.style.braces(self.listed(items, SUM)), ATOM
+            case Compare():
+                return self.chain((term,)), COMPARE
+            case In(item=item, collection=collection):
+                return self.membership(item, collection, "in"), COMPARE
+            case Not(body=In(item=item, collection=collection)):
+                return self.membership(item, collection, "!in"), COMPARE
+            case Not(body=body):
+                return f"{words['not']}{self.show(body, NOT)}", NOT
+            case And(items=items) if len(items) > 1 and _is_chain(items):
+                return self.chain(tuple(i for i in items if isinstance(i, Compare))), COMPARE
+            case And(items=()):
+                return words["TRUE"], ATOM
+            case Or(items=()):
+                return words["FALSE"], ATOM
+            case And(items=(only,)) | Or(items=(only,)):
+                return self.form(only, real)
+            case And(items=items):
+                return words["and"].join(self.show(i, NOT) for i in items), AND
+            case Or(items=items):
+                return words["or"].join(self.show(i, AND) for i in items), OR
+            case Implies(left=left, right=right):
+                return f"{self.show(left, OR)}{words['->']}{self.show(right, IMPLIES)}", IMPLIES
+            case Iff(left=left, right=right):
+                return f"{self.show(left, IFF)}{words['<=>']}{self.show(right, IMPLIES)}", IFF
+            case Quantified():
+                return self.quantified(term)
+            case Widen(term=inner):
+                return self.form(inner, real)
+
+    def literal(self, term: Literal, real: bool) -> tuple[str, int]:
+        value = term.value
+        if isinstance(value, bool):
+            return self.style.words["TRUE" if value else "FALSE"], ATOM
+        if isinstance(value, str):
+            return self.style.string(value), ATOM
+        fraction = Fraction(value)
+        text, level = show_number(fraction)
+        if term.sort == REAL and fraction.denominator == 1 and not real:
+            text += ".0"
+        return text, level
+
+    def applied(self, name: str, arguments: tuple[Term, ...], parameters: tuple[Sort, ...]) -> str:
+        return self.call(name, arguments, parameters) if arguments else name
+
+    def call(self, name: str, arguments: tuple[Term, ...], parameters: tuple[Sort, ...]) -> str:
+        shown = []
+        for i, argument in enumerate(arguments):
+            real = i < len(parameters) and parameters[i] == REAL
+            shown.append(self.show(argument, _LOOSEST, real=real))
+        return f"{name}({', '.join(shown)})"
+
+    def listed(self, items: tuple[Term, ...], place: int, *, real: bool = False) -> str:
+        return ", ".join(self.show(i, place, real=real) for i in items)
+
+    def arithmetic(self, term: Arithmetic) -> tuple[str, int]:
+        level = SUM if term.operator in "+-" else PRODUCT
+        divided = term.operator == "/"
+        left = self.show(term.left, level, real=divided or _shows_real(term.right))
+        right = self.show(term.right, level + 1, real=divided or _shows_real(term.left))
+        return f"{left}{self.style.words[term.operator]}{right}", level
+
+    def membership(self, item: Term, collection: Term, relation: str) -> str:
+        shown = self.show(item, SUM)
+        if isinstance(collection, SetTerm):
+            of = self.style.braces(self.listed(collection.items, SUM, real=_shows_real(item)))
+        else:
+            of = self.show(collection, SUM)
+        return f"{shown}{self.style.words[relation]}{of}"
+
+    def chain(self, links: tuple[Compare, ...]) -> str:
+        parts = [self.show(links[0].left, SUM, real=_shows_real(links[0].right))]
+        for i, link in enumerate(links):
+            neighbours = (link.left, links[i + 1].right) if i + 1 < len(links) else (link.left,)
+            real = all(_shows_real(n) for n in neighbours)
+            parts.append(self.style.words[link.operator])
+            parts.append(self.show(link.right, SUM, real=real))
+        return "".join(parts)
+
+    def quantified(self, term: Quantified) -> tuple[str, int]:
+        groups: list[tuple[list[str], Sort]] = []
+        for variable in term.variables:
+            if groups and groups[-1][1] == variable.sort:
+                groups[-1][0].append(self.style.name(variable.name))
+            else:
+                groups.append(([self.style.name(variable.name)], variable.sort))
+        style_name = next(n for n, s in _STYLES.items() if s is self.style)
+        binders = ", ".join(
+            f"{', '.join(names)}{self.style.words['in']}{show_sort(sort, style_name)}" for names, sort in groups
+        )
+        before, between, after = self.style.quantifiers[term.quantifier]
+        text = f"{before}{binders}{between}{self.show(term.body, _LOOSEST)}{after}"
+        return text, ATOM if self.style.tight_quantifier else _LOOSEST
+
+
+def show_number(value: Fraction) -> tuple[str, int]:
+    """A number and how tightly its text binds: a decimal where it has one, else a division."""
+    level = UNARY if value < 0 else ATOM
+    denominator, twos, fives = value.denominator, 0, 0
+    while denominator % 2 == 0:
+        denominator, twos = denominator // 2, twos + 1
+    while denominator % 5 == 0:
+        denominator, fives = denominator // 5, fives + 1
+    if denominator != 1:
+        return f"{value.numerator} / {value.denominator}", PRODUCT
+    digits = max(twos, fives)
+    if digits == 0:
+        return str(value.numerator), level
+    scaled = str(abs(value.numerator) * 10**digits // value.denominator).rjust(digits + 1, "0")
+    return f"{'-' if value < 0 else ''}{scaled[:-digits]}.{scaled[-digits:]}", level
+
+
+def _shows_real(term: Term) -> bool:
+    """Whether the printed term is a REAL for a reader who does not know what is wanted."""
+    match term:
+        case Literal(value=value):
+            return isinstance(value, Fraction) and value.denominator != 1
+        case Widen():
+            return False
+        case Arithmetic(operator="/"):
+            return True
+        case Arithmetic(left=left, right=right, sort=sort):
+            return sort == REAL and (_shows_real(left) or _shows_real(right))
+        case Negative(term=inner):
+            return _shows_real(inner)
+        case _:
+            return bool(term.sort == REAL)
+
+
+def _is_chain(items: tuple[Term, ...]) -> bool:
+    """Whether a conjunction is ``a < b <= c``: each comparison begins where the last one ended, all one way."""
+    previous: Term | None = None
+    operators = set()
+    for item in items:
+        if not isinstance(item, Compare) or isinstance(item.left.sort, BoolSort):
+            return False
+        if previous is not None and _bare(previous) != _bare(item.left):
+            return False
+        operators.add(item.operator)
+        previous = item.right
+    return operators <= _UP or operators <= _DOWN
+
+
+def _bare(term: Term) -> Term:
+    if isinstance(term, Widen):
+        return term.term
+    if isinstance(term, Literal) and not isinstance(term.value, bool | str):
+        return Literal(Fraction(term.value), REAL)
+    return term
+
+
+def latex_escape(text: str) -> str:
+    """Any text as LaTeX text."""
+    return "".join(_LATEX_TEXT.get(c, c) for c in text)
+
+
+_LATEX_TEXT = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "%": r"\%",
+    "_": r"\_",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    '"': r"\textquotedbl{}",
+    "\n": " ",
+    "\t": " ",
+}
+
+
+def _latex_name(name: str) -> str:
+    body = name.rstrip("'")
+    shown = body.replace("_", r"\_").replace("'", r"\textquotesingle{}")
+    if len(body) == 1:
+        return name
+    return rf"\mathit{{{shown}}}{name[len(body) :]}"
+
+
+def _same(text: str) -> str:
+    return text
+
+
+_WORDS = {
+    **{operator: f" {operator} " for operator in ("+", "-", "*", "/", "==", "!=", "<", "<=", ">", ">=", "in", "!in")},
+    **{word: f" {word} " for word in ("and", "or", "->", "<=>", "upto")},
+    "not": "not ",
+    "TRUE": "TRUE",
+    "FALSE": "FALSE",
+}
+_SORTS = {name: name for name in ("BOOL", "REAL", "INTEGER", "NATURAL", "STRING")}
+_STYLES: dict[StyleName, _Style] = {
+    "rcl": _Style(
+        words=_WORDS,
+        quantifiers={q: (f"{q.value}(", " | ", ")") for q in Quantifier},
+        sorts=_SORTS,
+        times=" x ",
+        arrow=" --> ",
+        unspecified="{}",
+        sequence=("<", ">"),
+        name=_same,
+        string=quote,
+        braces=lambda inner: f"{{{inner}}}",
+        tight_quantifier=True,
+    ),
+    "unicode": _Style(
+        words={
+            **_WORDS,
+            **{"==": " = ", "!=": " ≠ ", "<=": " ≤ ", ">=": " ≥ ", "in": " ∈ ", "!in": " ∉ ", "*": " · "},
+            **{"and": " ∧ ", "or": " ∨ ", "not": "¬", "->": " → ", "<=>": " ↔ ", "upto": " … "},
+            **{"TRUE": "true", "FALSE": "false"},
+        },
+        quantifiers={
+            Quantifier.FORALL: ("∀ ", " · ", ""),
+            Quantifier.EXISTS: ("∃ ", " · ", ""),
+            Quantifier.UNIQUE: ("∃! ", " · ", ""),
+        },
+        sorts={"BOOL": "𝔹", "REAL": "ℝ", "INTEGER": "ℤ", "NATURAL": "ℕ", "STRING": "String"},
+        times=" × ",
+        arrow=" → ",
+        unspecified="unspecified",
+        sequence=("⟨", "⟩"),
+        name=_same,
+        string=quote,
+        braces=lambda inner: f"{{{inner}}}",
+        tight_quantifier=False,
+    ),
+    "text": _Style(
+        words={
+            **_WORDS,
+            **{"==": " is ", "!=": " is not ", "<=": " <= ", ">=": " >= ", "in": " in ", "!in": " not in "},
+            **{"->": " implies ", "<=>": " if and only if ", "TRUE": "true", "FALSE": "false", "upto": " to "},
+        },
+        quantifiers={
+            Quantifier.FORALL: ("for all ", ": ", ""),
+            Quantifier.EXISTS: ("for some ", ": ", ""),
+            Quantifier.UNIQUE: ("for exactly one ", ": ", ""),
+        },
+        sorts={"BOOL": "booleans", "REAL": "reals", "INTEGER": "integers", "NATURAL": "naturals", "STRING": "strings"},
+        times=" by ",
+        arrow=" to ",
+        unspecified="unspecified",
+        sequence=("<", ">"),
+        name=_same,
+        string=quote,
+        braces=lambda inner: f"{{{inner}}}",
+        tight_quantifier=False,
+    ),
+    "latex": _Style(
+        words={
+            **_WORDS,
+            **{"==": " = ", "!=": r" \neq ", "<=": r" \leq ", ">=": r" \geq ", "*": r" \cdot "},
+            **{"in": r" \in ", "!in": r" \notin ", "and": r" \land ", "or": r" \lor ", "not": r"\lnot "},
+            **{"->": r" \Rightarrow ", "<=>": r" \Leftrightarrow ", "upto": r" \ldots "},
+            **{"TRUE": r"\mathit{TRUE}", "FALSE": r"\mathit{FALSE}"},
+        },
+        quantifiers={
+            Quantifier.FORALL: (r"\forall ", r" \cdot ", ""),
+            Quantifier.EXISTS: (r"\exists ", r" \cdot ", ""),
+            Quantifier.UNIQUE: (r"\exists!\, ", r" \cdot ", ""),
+        },
+        sorts={
+            **{"BOOL": r"\mathbb{B}", "REAL": r"\mathbb{R}", "INTEGER": r"\mathbb{Z}", "NATURAL": r"\mathbb{N}"},
+            "STRING": r"\mathit{STRING}",
+        },
+        times=r" \times ",
+        arrow=r" \rightarrow ",
+        unspecified=r"\emptyset",
+        sequence=(r"\langle ", r"\rangle "),
+        name=_latex_name,
+        string=lambda value: rf"\text{{``{latex_escape(value)}''}}",
+        braces=lambda inner: rf"\{{{inner}\}}",
+        tight_quantifier=False,
+    ),
+}

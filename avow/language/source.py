@@ -1,0 +1,80 @@
+"""A text with its places: offsets to lines and columns, and the collecting of diagnostics about it."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, field
+
+from avow.diagnostics import Diagnostic, Severity, Span
+
+MAX_DIAGNOSTICS = 200
+"""More than this of one file are of no use to anyone; the rest is counted, not kept."""
+
+
+@dataclass(slots=True)
+class Source:
+    """A text and where it stands: lines and columns count from 1.
+
+    `line` and `column` say where the text begins, for a formula that stands inside another file.
+    """
+
+    file: str
+    text: str
+    line: int = 1
+    column: int = 1
+    _starts: list[int] | None = None
+
+    def place(self, offset: int) -> tuple[int, int]:
+        """The line and column of an offset (counted in characters)."""
+        if self._starts is None:
+            starts = [0]
+            at = self.text.find("\n")
+            while at >= 0:
+                starts.append(at + 1)
+                at = self.text.find("\n", at + 1)
+            self._starts = starts
+        row = bisect_right(self._starts, offset) - 1
+        column = offset - self._starts[row] + (self.column if row == 0 else 1)
+        return self.line + row, column
+
+    def span(self, start: int, end: int) -> Span:
+        line, column = self.place(start)
+        end_line, end_column = self.place(max(end, start))
+        return Span(self.file, line, column, end_line, end_column)
+
+
+@dataclass(slots=True)
+class Reports:
+    """Diagnostics about one text, in the order found; identical ones are kept once."""
+
+    source: Source
+    found: list[Diagnostic] = field(default_factory=list)
+    dropped: int = 0
+    _seen: set[tuple[str, str, Span | None]] = field(default_factory=set)
+
+    def add(self, diagnostic: Diagnostic) -> None:
+        key = (diagnostic.code, diagnostic.message, diagnostic.span)
+        if key in self._seen:
+            return
+        if len(self.found) >= MAX_DIAGNOSTICS:
+            self.dropped += 1
+            return
+        self._seen.add(key)
+        self.found.append(diagnostic)
+
+    def error(
+        self,
+        code: str,
+        message: str,
+        start: int,
+        end: int,
+        *,
+        hint: str | None = None,
+        notes: tuple[tuple[str, Span | None], ...] = (),
+        severity: Severity = Severity.ERROR,
+    ) -> None:
+        self.add(Diagnostic(code, message, self.source.span(start, end), severity, hint, notes))
+
+    @property
+    def failed(self) -> bool:
+        return any(d.is_error for d in self.found)
