@@ -136,7 +136,7 @@ class Search:
             self._strengthened,
             self._refute,
         ]
-        for limit in (300, 1_500, 10_000):
+        for limit in (300, 1_000, 4_000, 10_000):
             for method in rounds:
                 answer = method(max(50, min(limit, self.left())))
                 if answer is not None:
@@ -181,13 +181,21 @@ class Search:
         return self._prove(list(self.group.guarantees.values()), limit)
 
     def _strengthened(self, limit: int) -> Realizability | None:
-        stronger = [instantiate(self.found, guarantee) for guarantee in self.group.guarantees.values()]
-        return self._prove(stronger, limit) if stronger != list(self.group.guarantees.values()) else None
+        whole = list(self.group.guarantees.values())
+        tried = []
+        for wide, few in ((False, 1), (False, 2), (True, None)):
+            stronger = [instantiate(self.found, guarantee, wide=wide) for guarantee in whole]
+            if stronger != whole and (stronger, few) not in tried:
+                tried.append((stronger, few))
+                answer = self._prove(stronger, limit // 3, few)
+                if answer is not None:
+                    return answer
+        return None
 
-    def _prove(self, guarantees: Sequence[Term], limit: int) -> Realizability | None:
+    def _prove(self, guarantees: Sequence[Term], limit: int, few: int | None = None) -> Realizability | None:
         translator = Translator()
         fixed = self._fixed(translator)
-        facts = self._defeated(translator, guarantees, fixed)
+        facts = self._defeated(translator, guarantees, fixed, few)
         facts += translator.background([*self.inputs, *self.found.constants])
         tracked = [(label, translator.term(formula, fixed)) for label, formula in self.assumptions.items()]
         answer = check(translator, facts, tracked=tracked, timeout_ms=limit, seed=self.seed)
@@ -197,12 +205,16 @@ class Search:
         return None
 
     def _defeated(
-        self, translator: Translator, guarantees: Iterable[Term], meanings: Mapping[Variable, Meaning]
+        self,
+        translator: Translator,
+        guarantees: Iterable[Term],
+        meanings: Mapping[Variable, Meaning],
+        few: int | None = None,
     ) -> list[Expr]:
         """That the constants are as chosen, and no witness meets the guarantees."""
         guarantees = list(guarantees)
         facts = [translator.term(axiom, meanings) for axiom in self.found.axioms]
-        for witness in self.witnesses:
+        for witness in self.witnesses[:few]:
             whole = {**meanings, **meanings_of(translator, witness, meanings)}
             met = [*translator.background(witness, whole), *(translator.term(g, whole) for g in guarantees)]
             facts.append(z3.Not(z3.And(met)))

@@ -298,7 +298,7 @@ def _solve(
 
 
 def _is_simple(value: Value) -> bool:
-    return not isinstance(value, FunctionValue) or len(value.table) <= 1
+    return not isinstance(value, FunctionValue) or (len(value.table) <= 1 and value.default is not True)
 
 
 _TABLES = ((0, True), (1, True), (2, True), (3, True), (1, False), (2, False))

@@ -69,6 +69,8 @@ MAX_DEPTH = 200
 
 MAX_PER_OUTPUT = 24
 MAX_WITNESSES = 96
+ARGUMENTS = 12
+"""How many terms are tried for one argument of a constructor or one quantified variable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +116,10 @@ class Candidates:
     lower: dict[Variable, list[Definition]] = field(default_factory=dict)
     upper: dict[Variable, list[Definition]] = field(default_factory=dict)
     branches: dict[Variable, list[tuple[Definition, Term]]] = field(default_factory=dict)
+    chosen: dict[Sort, list[Term]] = field(default_factory=dict)
+    """Constants with an axiom: the likeliest arguments."""
+    blocks: list[tuple[Term, ...]] = field(default_factory=list)
+    """The same, in the groups in which they were chosen."""
     pool: dict[Sort, list[Term]] = field(default_factory=dict)
 
     def mentions(self, term: Term) -> bool:
@@ -151,11 +157,12 @@ def witnesses(found: Candidates) -> list[Witness]:
     return result
 
 
-def instantiate(found: Candidates, guarantee: Term) -> Term:
-    """A stronger guarantee: `exists` that concern an output are replaced by their instances at known terms."""
+def instantiate(found: Candidates, guarantee: Term, *, wide: bool = True) -> Term:
+    """A stronger guarantee: `exists` that concern an output are replaced by their instances at known terms; if not
+    `wide`, only at terms that were read together."""
     if depth(guarantee) > MAX_DEPTH:
         return guarantee
-    return _instantiate(found, push_negations(guarantee))
+    return _instantiate(found, push_negations(guarantee), wide)
 
 
 # -- reading the guarantees --------------------------------------------------------------------------------------------
@@ -242,8 +249,9 @@ def _choose(
     if guard != TRUE:
         chosen = substitute(guard, fresh)
         found.axioms.append(Implies(Quantified(Quantifier.EXISTS, tuple(variables), guard), chosen))
+        found.blocks.append(tuple(fresh.values()))
         for constant in fresh.values():
-            _add(found, constant)
+            found.chosen.setdefault(constant.sort, []).append(constant)
     else:
         for constant in fresh.values():
             _add(found, constant)
@@ -451,7 +459,7 @@ def _at(definition: Definition, parameters: Sequence[Variable]) -> Term:
 
 def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
     """Terms of a sort, without outputs: those seen in the guarantees, and the simplest ones."""
-    seen = [term for term in found.pool.get(sort, ()) if not found.mentions(term)]
+    seen = [*found.chosen.get(sort, ()), *(term for term in found.pool.get(sort, ()) if not found.mentions(term))]
     match sort:
         case BoolSort():
             return [TRUE, FALSE]
@@ -470,7 +478,7 @@ def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
             made: list[Term] = []
             for constructor in constructors:
                 pools = [_ground(found, parameter, level + 1) for parameter in constructor.parameters]
-                combinations = sorted(product(*(list(enumerate(pool))[:8] for pool in pools)), key=_spread)
+                combinations = sorted(product(*(list(enumerate(pool))[:ARGUMENTS] for pool in pools)), key=_spread)
                 made.extend(
                     Construct(constructor.name, tuple(term for _, term in combination), sort)
                     for combination in combinations[:12]
@@ -478,7 +486,7 @@ def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
             return list(_unique([*seen, *made]))
         case TupleSort(items=items) if level < 2:
             pools = [_ground(found, item, level + 1) for item in items]
-            combinations = sorted(product(*(list(enumerate(pool))[:8] for pool in pools)), key=_spread)
+            combinations = sorted(product(*(list(enumerate(pool))[:ARGUMENTS] for pool in pools)), key=_spread)
             return list(_unique([*seen, *(TupleTerm(tuple(t for _, t in c), sort) for c in combinations[:12])]))
         case SequenceSort():
             return list(_unique([*seen, SequenceTerm((), sort)]))
@@ -533,21 +541,27 @@ def _chosen(terms: Mapping[Variable, Term], value: Term, outputs: set[Variable])
     return {other: terms[other] for other in free_variables(value) & outputs if other in terms}
 
 
-def _instantiate(found: Candidates, term: Term) -> Term:
+def _instantiate(found: Candidates, term: Term, wide: bool) -> Term:
     match term:
         case And(items=items):
-            return And(tuple(_instantiate(found, item) for item in items))
+            return And(tuple(_instantiate(found, item, wide) for item in items))
         case Or(items=items):
-            return Or(tuple(_instantiate(found, item) for item in items))
+            return Or(tuple(_instantiate(found, item, wide) for item in items))
         case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
-            return Quantified(Quantifier.FORALL, variables, _instantiate(found, body))
+            return Quantified(Quantifier.FORALL, variables, _instantiate(found, body, wide))
         case Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=body) if found.mentions(body):
-            pools = [list(enumerate(_ground(found, v.sort)))[:8] for v in variables]
-            combinations = sorted(product(*pools), key=_spread)[:24]
-            instances = [
-                substitute(_instantiate(found, body), dict(zip(variables, (t for _, t in c), strict=True)))
-                for c in combinations
-            ]
-            return Or(tuple(instances)) if instances else term
+            inner = _instantiate(found, body, wide)
+            places = _places(found, variables, wide)
+            instances = [substitute(inner, dict(zip(variables, place, strict=True))) for place in places]
+            return disjunction(instances) if instances else term
         case _:
             return term
+
+
+def _places(found: Candidates, variables: Sequence[Variable], wide: bool) -> list[tuple[Term, ...]]:
+    sorts = [variable.sort for variable in variables]
+    if not wide:
+        return [block for block in found.blocks if [term.sort for term in block] == sorts]
+    pools = [list(enumerate(_ground(found, sort)))[:ARGUMENTS] for sort in sorts]
+    combinations = sorted(product(*pools), key=_spread)[:24]
+    return [tuple(term for _, term in combination) for combination in combinations]
