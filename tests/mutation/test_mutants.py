@@ -1,0 +1,57 @@
+"""Mutants of a formula are near misses: well-typed, of another meaning, and only telling ones are used."""
+
+from __future__ import annotations
+
+from avow.language.load import check_text
+from avow.language.terms import Term
+from avow.logic.formula import normalise
+from avow.logic.mutants import mutants, telling
+
+
+def guarantee(formula: str) -> Term:
+    text = f"node n {{ inputs(r : REAL, k : INTEGER) outputs(s : {{low, mid, high}}) topics() guarantee({formula}) }}"
+    contract, found = check_text(text, "t.rcl")
+    assert contract is not None, found
+    return contract.nodes[0].guarantees[0].formula
+
+
+def changes(formula: str) -> set[str]:
+    return {m.change for m in mutants(guarantee(formula))}
+
+
+def test_every_kind_of_change_is_made() -> None:
+    found = changes("0 <= in.r and in.r < 120 -> out.s == low")
+    assert {
+        "the whole is negated",
+        "part 1 of a conjunction is dropped",
+        "part 2 of a conjunction is dropped",
+        "< becomes <=",
+        "<= becomes <",
+        "120 becomes 132",
+        "120 becomes 108",
+        "low becomes mid",
+        "== becomes !=",
+    } <= found
+
+
+def test_no_mutant_means_the_original_and_none_stands_twice() -> None:
+    formula = guarantee("not (in.r < 1 or in.k > 2) -> out.s != high")
+    meanings = [normalise(m.formula) for m in mutants(formula)]
+    assert normalise(formula) not in meanings
+    assert len(meanings) == len(set(meanings))
+
+
+def test_a_weaker_claim_is_no_test_of_the_evidence() -> None:
+    formula = guarantee("in.r <= 10 -> out.s == low")
+    told = {m.change for m in telling(formula, (), limit=99)}
+    assert "<= becomes <" not in told, "it follows from the original"
+    assert "10 becomes 9" not in told
+    assert {"10 becomes 11", "low becomes mid", "the whole is negated"} <= told
+
+
+def test_the_limit_spreads_over_the_formula() -> None:
+    formula = guarantee("0 <= in.r and in.r < 120 and in.k > 5 -> out.s == low")
+    every = telling(formula, (), limit=99)
+    some = telling(formula, (), limit=3)
+    assert len(some) == 3
+    assert set(some) < set(every)
