@@ -1,6 +1,6 @@
 """Every diagnostic code of the language, declared once: what it means, why, and an example of each.
 
-Numbers: 0xx the file, 1xx the syntax, 2xx names, 3xx sorts, 4xx lints (warnings that a plan or a comment may switch off).
+Numbers: 0xx the file, 1xx the syntax, 2xx names, 3xx sorts, 4xx lints (warnings that can be switched off).
 """
 
 from __future__ import annotations

@@ -184,7 +184,7 @@ class Checker:
                 "RCL203", f"no node is meant here, so `{role}.{name}` has no meaning", tree, hint="write `node.port`"
             )
             return
-        hint = did_you_mean(name, scope.ports(role))
+        hint: str | None = did_you_mean(name, scope.ports(role))
         if name in scope.ports(role):
             self.error("RCL203", f"the {words[role]}s of a node have no place here: `{role}.{name}`", tree)
             return
@@ -216,8 +216,8 @@ class Checker:
             p for p in (*node.inputs, *node.outputs) if p.name == name and p.role in roles and p.role in scope.roles
         ]
         if not ports:
-            hint = did_you_mean(name, (p.name for p in (*node.inputs, *node.outputs)))
-            self.error("RCL203", f"node `{node_name}` has no input or output `{name}`", tree, hint=hint)
+            near = did_you_mean(name, (p.name for p in (*node.inputs, *node.outputs)))
+            self.error("RCL203", f"node `{node_name}` has no input or output `{name}`", tree, hint=near)
             return None
         if len(ports) > 1:
             hint = f"write `{node_name}.in.{name}` or `{node_name}.out.{name}`"
@@ -536,9 +536,8 @@ class Checker:
         for tree, one, other in ((left_tree, left, right), (right_tree, right, left)):
             if isinstance(one.sort, FunctionSort) and one.sort.result == other.sort:
                 return f"apply `{self.text(tree)}` to its {_count(len(one.sort.parameters), 'argument')} first"
-            if isinstance(one.sort, EnumSort) and other.sort == STRING and isinstance(other, Literal):
-                if other.value in one.sort.members:
-                    return f"write `{other.value}` without quotation marks"
+            if isinstance(one.sort, EnumSort) and isinstance(other, Literal) and other.value in one.sort.members:
+                return f"write `{other.value}` without quotation marks"
             if isinstance(one.sort, EnumSort) and other.sort == BOOL:
                 return f"the values of {one.sort.name} are {', '.join(one.sort.members[:6])}"
         return None
@@ -687,7 +686,7 @@ class Checker:
         """The sort that a term-like text names: ``REAL``, ``RadStat``, ``(REAL, REAL)``; None where it names none."""
         match tree.kind:
             case "builtin":
-                return BUILTINS[tree.parts[0]] if tree.parts[0] in BUILTINS else REAL
+                return BUILTINS.get(tree.parts[0], REAL)
             case "name":
                 name = tree.parts[0]
                 return None if name in self.scope.bound else self.scope.environment.sort(name)

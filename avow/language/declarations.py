@@ -61,12 +61,16 @@ class Declarations:
 
     environment: Environment = field(default_factory=Environment)
     declared: dict[str, _Declared] = field(default_factory=dict)
+    owners: dict[str, str] = field(default_factory=dict)
+    """Which type declaration writes down an element or constructor: known before anything is elaborated."""
 
     def add(self, trees: Sequence[Tree], reports: Reports) -> None:
         for tree in trees:
             new = _Declared(tree, reports)
             old = self.declared.get(new.name.text)
             if old is None:
+                for element in _elements(tree):
+                    self.owners.setdefault(element, new.name.text)
                 self.declared[new.name.text] = new
             elif old.reports is reports or not _same_text(old, new):
                 name = new.name.text
@@ -134,12 +138,13 @@ class Declarations:
         if tree.kind != "name":
             return False
         name = tree.parts[0]
-        return name not in self.declared and name not in self.environment.elements
+        return not (name in self.declared or name in self.owners or name in self.environment.elements)
 
     def needed_by(self, value: Tree) -> None:
-        """Elaborates first what a constant's value mentions, and every type (for their elements)."""
+        """Elaborates first what a constant's value mentions: other constants, and the types of elements."""
         for name in _names(value):
-            other = self.declared.get(name)
+            owner = self.owners.get(name)
+            other = self.declared.get(name) or (self.declared[owner] if owner is not None else None)
             if other is None:
                 continue
             if other.state == "open":
@@ -147,9 +152,6 @@ class Declarations:
                 other.reports.error("RCL212", message, other.name.start, other.name.end)
                 self.environment.broken.add(name)
             else:
-                self.resolve(other)
-        for other in list(self.declared.values()):
-            if other.tree.kind == "type" and other.state == "new":
                 self.resolve(other)
 
     # --- types -------------------------------------------------------------------------------------------------------
@@ -236,9 +238,10 @@ class Declarations:
         sort = DataSort(self.free_name(name), tuple(constructors))
         return self.introduce(sort, [e.parts[0] for e in elements], reports) if sound else None
 
-    def enumeration(self, name: str, members: Sequence[Token], reports: Reports) -> Sort | None:
+    def enumeration(self, name: str, members: Sequence[Token], reports: Reports) -> EnumSort | None:
         sort = EnumSort(self.free_name(name), tuple(m.text for m in members))
-        return self.introduce(sort, members, reports)
+        found = self.introduce(sort, members, reports)
+        return found if isinstance(found, EnumSort) else None
 
     def free_name(self, name: str) -> str:
         """`name` itself for a declaration; a set written in place gets one that nothing else has."""
@@ -302,6 +305,18 @@ def _shape(tree: Tree | Token | str) -> object:
     if isinstance(tree, Tree):
         return tree.kind, tuple(_shape(p) for p in tree.parts)
     return tree.text if isinstance(tree, Token) else tree
+
+
+def _elements(tree: Tree) -> set[str]:
+    """Every element and constructor that a declaration's types write down."""
+    found: set[str] = set()
+    stack: list[Tree] = [tree]
+    while stack:
+        part = stack.pop()
+        if part.kind in ("element", "constructor"):
+            found.add(part.parts[0].text)
+        stack.extend(p for p in part.parts if isinstance(p, Tree))
+    return found
 
 
 def _names(tree: Tree) -> set[str]:

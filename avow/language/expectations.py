@@ -47,7 +47,7 @@ def _expected(start: str, expected: frozenset[str]) -> str:
     if start in ("declaration", "ports") and {"NAME", "BUILTIN"} <= expected:
         return "a type"
     rest = expected - {"$END"}
-    if _OPERATOR <= rest or {"AND", "OR", "IMPLIES"} <= rest:
+    if rest >= _OPERATOR or {"AND", "OR", "IMPLIES"} <= rest:
         named = sorted(_WORDS[k] for k in rest & {"COMMA", "RPAR", "GT", "BAR", "RBRACE"} if k in _WORDS)
         return " or ".join(["an operator", *(n for n in named if n != "`>`")])
     named = sorted(_WORDS.get(kind, f"`{kind.lower()}`") for kind in rest)

@@ -140,13 +140,13 @@ def _matched(tree: Tree, role_text: str | None, name: Token, scope: Scope, repor
     if scope.is_broken(text):
         return None
     if candidates:
-        hint = f"write `matches(in.{text})` or `matches(out.{text})`"
+        hint: str | None = f"write `matches(in.{text})` or `matches(out.{text})`"
         message = f"`{text}` is both an input and an output of node `{scope.node}`"
         reports.error("RCL202", message, name.start, name.end, hint=hint)
         return None
     other = next((r for r in Role if r not in roles and r is not Role.BOUND and text in scope.ports(r)), None)
     if other is not None:
-        hint: str | None = f"write `matches({other}.{text})`"
+        hint = f"write `matches({other}.{text})`"
     else:
         hint = did_you_mean(text, (*scope.inputs, *scope.outputs))
     what = {"in": "input", "out": "output", None: "input or output"}[role_text]

@@ -78,13 +78,13 @@ def _lark() -> Any:
 
 def _cache_file() -> Path | None:
     """Where the tables are kept between runs; a folder of the user's own, since Lark's cache is a pickle."""
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")  # noqa: PTH
-    folder = Path(base) / "avow"
     try:
+        base = os.environ.get("XDG_CACHE_HOME")
+        folder = (Path(base) if base else Path.home() / ".cache") / "avow"
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if folder.stat().st_uid != os.getuid() or not os.access(folder, os.W_OK):
             return None
-    except (OSError, AttributeError):
+    except (OSError, AttributeError, RuntimeError):
         return None
     return folder / f"rcl-{sys.version_info.major}{sys.version_info.minor}.lark"
 

@@ -1,6 +1,6 @@
 """The surface syntax of declarations and formulas: what the parser makes of the tokens, before any name is resolved.
 
-One generic node, `Tree`, keeps parsing fast: `kind` says what it is (the aliases of grammar.lark), `parts` are subtrees,
+One generic node, `Tree`, keeps parsing fast: `kind` says what it is (the aliases of grammar.lark), `parts` are trees,
 tokens or plain strings as described per kind in `avow.language.parser`.
 """
 
