@@ -85,28 +85,56 @@ def evaluate(term: Term, valuation: Mapping[str, Value], *, domains: Domains | N
 
 def compile_term(term: Term, *, domains: Domains | None = None) -> Evaluator:
     """Compile once, evaluate often. The result raises NotEvaluable; so does compiling a term nested too deeply."""
-    try:
-        compiler = Compiler(domains or {})
-        code = compiler.code(rename_apart(term))
-    except RecursionError:
-        raise NotEvaluable("the formula is nested too deeply") from None
+    compiler = Compiler(domains or {})
+    code = _guarded(lambda: compiler.code(rename_apart(term)))
+    fill = _filler(compiler)
+    return lambda valuation: _guarded(lambda: code(fill(valuation)))
+
+
+def compile_counterexample(term: Term) -> Callable[[Mapping[str, Value]], dict[str, Value] | None]:
+    """For ``forall(x, y | …)``: values of x, y under which the body is false, or None if none were found.
+
+    The result, and compiling, raise NotEvaluable. Other formulas have no bound variables to name: always None.
+    """
+    from avow.logic.saferange import Search
+
+    compiler = Compiler({})
+    if not isinstance(term, Quantified) or term.quantifier is not Quantifier.FORALL:
+        return lambda valuation: None
+    apart = _guarded(lambda: rename_apart(term))
+    assert isinstance(apart, Quantified)
+    search = _guarded(lambda: Search(compiler, apart.variables, apart.body, False))
+    names, fill = tuple(v.name for v in term.variables), _filler(compiler)
+
+    def find(valuation: Mapping[str, Value]) -> dict[str, Value] | None:
+        for witness in search.witnesses(fill(valuation)):
+            return dict(zip(names, witness, strict=True))
+        return None
+
+    return lambda valuation: _guarded(lambda: find(valuation))
+
+
+def _filler(compiler: Compiler) -> Callable[[Mapping[str, Value]], Env]:
     names = tuple(compiler.free.items())
     size = compiler.size
 
-    def run(valuation: Mapping[str, Value]) -> Value:
+    def fill(valuation: Mapping[str, Value]) -> Env:
         env: Env = [None] * size
         for name, slot in names:
             try:
                 env[slot] = valuation[name]
             except KeyError:
                 raise NotEvaluable(f"{name} has no value") from None
-        try:
-            result: Value = code(env)
-        except RecursionError:
-            raise NotEvaluable("the formula is nested too deeply") from None
-        return result
+        return env
 
-    return run
+    return fill
+
+
+def _guarded(action: Callable[[], Any]) -> Any:
+    try:
+        return action()
+    except RecursionError:
+        raise NotEvaluable("the formula is nested too deeply") from None
 
 
 def free_names(term: Term) -> frozenset[str]:

@@ -1,0 +1,278 @@
+"""Our own monitor: the clauses of one node over events, judged exactly; cost for each event does not grow with the trace.
+
+A snapshot maps each variable to its latest value. A clause is judged when an event brings a value of one of its outputs
+(the node has answered), a clause about inputs when it brings any of them, by the values then known; until every
+variable has a value it is not judged. A guarantee that fails while an assumption is broken is laid at the
+environment's door, not the node's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
+from avow.backends.rosmonitoring.options import Setup, same_topic
+from avow.backends.rosmonitoring.reading import MappingError, Reader, reader
+from avow.backends.rosmonitoring.rules import Choice, Constant, Fields, InOrder, Previous
+from avow.language.contract import Clause, ClauseKind
+from avow.language.terms import Implies, Quantified, Quantifier, Role, Term
+from avow.logic.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
+from avow.logic.judge import judge
+from avow.logic.values import Value, show
+
+
+class Fault(StrEnum):
+    """What an event showed to be wrong."""
+
+    GUARANTEE = "guarantee broken: this node"
+    EXCUSED = "guarantee not met, with an assumption broken: environment"
+    ASSUMPTION = "assumption broken: environment"
+    MAPPING = "message outside its mapping"
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """One judgement against the trace. `index` counts events from 1; `time` is the event's own, as text."""
+
+    fault: Fault
+    node: str
+    clause: str
+    index: int
+    time: str
+    values: tuple[tuple[str, str], ...]
+    bindings: tuple[tuple[str, str], ...]
+    explanation: str
+
+    def text(self) -> str:
+        about = ", ".join(f"{n} = {v}" for n, v in (*self.bindings, *self.values))
+        at = f"event {self.index}" + (f" (t = {self.time})" if self.time else "")
+        return f"{at}: {self.fault}: {self.node}.{self.clause}: {self.explanation}" + (f" [{about}]" if about else "")
+
+
+@dataclass(slots=True)
+class Tally:
+    """What became of one clause over a trace."""
+
+    judged: int = 0
+    broken: int = 0
+    excused: int = 0
+    undecided: int = 0
+    triggered: bool = False
+    """Its antecedent held at least once (or it has none)."""
+    reason: str = ""
+    """Why it is not judged at all, or the first reason why it was once undecided."""
+
+
+@dataclass(slots=True)
+class _Watched:
+    clause: Clause
+    names: tuple[str, ...]
+    holds: Callable[[Mapping[str, Value]], Value]
+    trigger: Callable[[Mapping[str, Value]], Value] | None
+    witness: Callable[[Mapping[str, Value]], dict[str, Value] | None]
+    tally: Tally
+    key: tuple[int, ...] = ()
+    truth: bool | None = None
+
+
+@dataclass(slots=True)
+class Monitor:
+    """Feed it events with `step`. `guarantees` are the names of those to judge (all by default)."""
+
+    setup: Setup
+    guarantees: Iterable[str] | None = None
+    solver: bool = True
+    """Ask Z3 where evaluation alone cannot answer."""
+    events: int = 0
+    relevant: int = 0
+    tallies: dict[str, Tally] = field(default_factory=dict)
+    values: dict[str, Value] = field(default_factory=dict)
+    _versions: dict[str, int] = field(default_factory=dict)
+    _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
+    _previous: list[tuple[str, str]] = field(default_factory=list)
+    _clauses: dict[str, list[_Watched]] = field(default_factory=dict)
+    _assumptions: list[_Watched] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        for name, rule in self.setup.rules.items():
+            self._versions[name] = 0
+            match rule:
+                case Constant(value=value):
+                    self.values[name] = value
+                case Previous(source=source, initial=initial):
+                    self._previous.append((name, source))
+                    self._start(name, initial)
+                case Fields() | InOrder() | Choice():
+                    self._readers.setdefault(same_topic(rule.topic), []).append((name, reader(rule)))
+                    self._start(name, rule.initial)
+        for name, source in self._previous:
+            if name not in self.values and source in self.values:
+                self.values[name] = self.values[source]
+        wanted = None if self.guarantees is None else set(self.guarantees)
+        node = self.setup.node
+        for clause in node.clauses:
+            if clause.kind is ClauseKind.ASSUMPTION or wanted is None or clause.name in wanted:
+                self._watch(clause)
+
+    def step(self, event: Mapping[str, Any]) -> list[Violation]:
+        """Judge one event. Never raises for what the event holds."""
+        self.events += 1
+        topic = event.get("topic")
+        readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
+        if readers is None:
+            return []
+        self.relevant += 1
+        found: list[Violation] = []
+        updated: list[str] = []
+        for name, read in readers:
+            old = self.values.get(name)
+            try:
+                new = read(event, old)
+            except MappingError as error:
+                found.append(self._violation(Fault.MAPPING, name, event, str(error)))
+                continue
+            updated.append(name)
+            if old is None or new != old:
+                self.values[name] = new
+                self._versions[name] += 1
+        done: set[int] = set()
+        for name in updated:
+            for watched in self._clauses.get(name, ()):
+                if id(watched) not in done:
+                    done.add(id(watched))
+                    self._judge(watched, event, found)
+        for name, source in self._previous:
+            value = self.values.get(source)
+            if value is not None and self.values.get(name) is not value:
+                self.values[name] = value
+                self._versions[name] += 1
+        return found
+
+    def _start(self, name: str, initial: Value | None) -> None:
+        if initial is not None:
+            self.values[name] = initial
+
+    def _watch(self, clause: Clause) -> None:
+        tally = self.tallies[clause.name] = Tally()
+        try:
+            names = tuple(sorted(free_names(clause.formula)))
+            hidden = [self.setup.hidden[n] for n in names if n in self.setup.hidden]
+            if hidden:
+                tally.reason = hidden[0]
+                return
+            trigger = _trigger(clause.formula)
+            watched = _Watched(
+                clause,
+                names,
+                compile_term(clause.formula),
+                None if trigger is None else compile_term(trigger),
+                compile_counterexample(clause.formula),
+                tally,
+            )
+        except NotEvaluable as error:
+            tally.reason = error.reason
+            return
+        tally.triggered = trigger is None
+        for name in self._triggers(names):
+            self._clauses.setdefault(name, []).append(watched)
+        if clause.kind is ClauseKind.ASSUMPTION:
+            self._assumptions.append(watched)
+
+    def _triggers(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """The variables whose publication makes a clause judged."""
+        direct = tuple(n for n in names if isinstance(self.setup.rules[n], Fields | InOrder | Choice))
+        outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
+        sources = tuple(rule.source for n in names if isinstance(rule := self.setup.rules[n], Previous))
+        if outputs and not self.setup.judge_every:
+            return outputs
+        return direct or sources
+
+    def _judge(self, watched: _Watched, event: Mapping[str, Any], found: list[Violation]) -> None:
+        values, versions, tally = self.values, self._versions, watched.tally
+        for name in watched.names:
+            if name not in values:
+                return
+        key = tuple([versions[n] for n in watched.names])
+        if key != watched.key:
+            watched.key = key
+            watched.truth = self._truth(watched)
+            self._note_trigger(watched)
+        tally.judged += 1
+        if watched.truth:
+            return
+        if watched.truth is None:
+            tally.undecided += 1
+            return
+        tally.broken += 1
+        fault, why = self._blame(watched.clause)
+        if fault is Fault.EXCUSED:
+            tally.excused += 1
+        found.append(self._violation(fault, watched.clause.name, event, why, watched))
+
+    def _truth(self, watched: _Watched) -> bool | None:
+        try:
+            return bool(watched.holds(self.values))
+        except NotEvaluable as error:
+            answer = judge(watched.clause.formula, self.values, timeout_ms=2_000) if self.solver else None
+            if answer is None and not watched.tally.reason:
+                watched.tally.reason = error.reason
+            return answer
+
+    def _note_trigger(self, watched: _Watched) -> None:
+        if watched.tally.triggered or watched.trigger is None:
+            return
+        try:
+            watched.tally.triggered = bool(watched.trigger(self.values))
+        except NotEvaluable:
+            watched.tally.triggered = True
+
+    def _blame(self, clause: Clause) -> tuple[Fault, str]:
+        said = clause.sentence or clause.text or clause.name
+        if clause.kind is ClauseKind.ASSUMPTION:
+            return Fault.ASSUMPTION, said
+        for assumed in self._assumptions:
+            if all(n in self.values for n in assumed.names) and self._truth(assumed) is False:
+                return Fault.EXCUSED, f"{said}; but the assumption {assumed.clause.name} does not hold"
+        return Fault.GUARANTEE, said
+
+    def _violation(
+        self, fault: Fault, clause: str, event: Mapping[str, Any], explanation: str, watched: _Watched | None = None
+    ) -> Violation:
+        bindings: dict[str, Value] = {}
+        values: list[tuple[str, str]] = []
+        if watched is not None:
+            try:
+                bindings = watched.witness(self.values) or {}
+            except NotEvaluable:
+                bindings = {}
+            values = [(n, _shorten(show(self.values[n]))) for n in watched.names]
+        pairs = tuple((n, show(v)) for n, v in bindings.items())
+        time = _time(event.get("time"))
+        return Violation(fault, self.setup.node.name, clause, self.events, time, tuple(values), pairs, explanation)
+
+
+def _trigger(formula: Term) -> Term | None:
+    """What must hold somewhere for the formula to say anything: the antecedent, over all its variables."""
+    variables = []
+    while isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL:
+        variables.extend(formula.variables)
+        formula = formula.body
+    if not isinstance(formula, Implies):
+        return None
+    return Quantified(Quantifier.EXISTS, tuple(variables), formula.left) if variables else formula.left
+
+
+def _time(raw: Any) -> str:
+    if isinstance(raw, int | float | Decimal) and not isinstance(raw, bool):
+        try:
+            return show(exact(raw))
+        except NotANumber:
+            return ""
+    return ""
+
+
+def _shorten(text: str) -> str:
+    return text if len(text) <= 200 else text[:199] + "…"

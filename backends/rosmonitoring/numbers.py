@@ -1,0 +1,61 @@
+"""Numbers of a trace, exact: a decimal means what its digits say, not the nearest binary fraction."""
+
+from __future__ import annotations
+
+import functools
+import math
+from fractions import Fraction
+
+
+class Decimal:
+    """A JSON number with a point or an exponent, kept as its text until somebody needs its value."""
+
+    __slots__ = ("text",)
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def __repr__(self) -> str:
+        return self.text
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Decimal) and other.text == self.text
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+
+class NotANumber(Exception):  # noqa: N818 - it names what was found
+    """NaN, an infinity, or a number too long to be meant."""
+
+
+_LONGEST = 400
+
+
+def exact(raw: object) -> Fraction | int:
+    """The value of a number as it came from JSON or from a bag. Raises NotANumber."""
+    if isinstance(raw, Decimal):
+        return _fraction(raw.text)
+    if isinstance(raw, int) and not isinstance(raw, bool):
+        return raw
+    if isinstance(raw, float):
+        if not math.isfinite(raw):
+            raise NotANumber
+        return _fraction(repr(float(raw)))
+    raise NotANumber
+
+
+@functools.lru_cache(maxsize=65536)
+def _fraction(text: str) -> Fraction:
+    if len(text) > _LONGEST or abs(_exponent(text)) > _LONGEST:
+        raise NotANumber
+    try:
+        return Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        raise NotANumber from None
+
+
+def _exponent(text: str) -> int:
+    mantissa, _, exponent = text.lower().partition("e")
+    del mantissa
+    return int(exponent) if exponent else 0

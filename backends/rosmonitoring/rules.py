@@ -1,0 +1,103 @@
+"""How messages become values: rules as data (design: page "RCL", "Mapping from ROS messages").
+
+A rule says from which topic and fields a contract variable gets its value, or that it gets it another way: from the
+scenario's tables, or from an output's value of the step before. `avow.backends.rosmonitoring.options` makes the rules
+from the plan; `reading` turns messages into values by them; `rml_guard` turns them into RML patterns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from avow.language.terms import Variable
+from avow.logic.values import Value
+
+Path = tuple[str, ...]
+"""``("pose", "x")``: a field, and the fields within it."""
+
+
+class Hold(StrEnum):
+    """What a relation holds of, after several messages."""
+
+    LATEST = "latest"
+    """The tuple (or tuples) of the latest message: a position."""
+    SEEN = "seen"
+    """Every tuple that a message has brought so far: what has been inspected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lookup:
+    """The cell of a table in the row that a field names: the coordinates of the waypoint with this id."""
+
+    table: str
+    key: Path
+    rows: Mapping[str, str] = field(hash=False)
+    """Text of the key → text of the cell."""
+
+
+Argument = Path | Lookup
+
+
+@dataclass(frozen=True, slots=True)
+class Fields:
+    """Scalar, Collection and Function rules with the fields named. For a function with a result, the last path is the
+    result's, and `elsewhere` its value where no message has said. `each` leads to a list of tuples in one message.
+    `names` turns a message's word into the contract's."""
+
+    variable: Variable
+    topic: str
+    paths: tuple[Path, ...]
+    names: Mapping[str, str] = field(default_factory=dict, hash=False)
+    hold: Hold = Hold.LATEST
+    each: Path | None = None
+    elsewhere: Value | None = None
+    initial: Value | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class InOrder:
+    """The same where no fields are named: they are taken in the message's order, those that do not fit are skipped."""
+
+    variable: Variable
+    topic: str
+    names: Mapping[str, str] = field(default_factory=dict, hash=False)
+    hold: Hold = Hold.LATEST
+    elsewhere: Value | None = None
+    initial: Value | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A value of an algebraic type: a field names the constructor, others are its arguments."""
+
+    variable: Variable
+    topic: str
+    tag: Path
+    arguments: Mapping[str, tuple[Argument, ...]] = field(hash=False)
+    """Constructor → where its arguments come from."""
+    names: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """The message's word → constructor."""
+    initial: Value | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A value that no message changes, such as the scenario's map."""
+
+    variable: Variable
+    value: Value = field(hash=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Previous:
+    """The value that an output had before the step: while an event changes `source`, still the old one."""
+
+    variable: Variable
+    source: str
+    """Qualified name of one of the node's own variables."""
+    initial: Value | None = None
+
+
+Rule = Fields | InOrder | Choice | Constant | Previous

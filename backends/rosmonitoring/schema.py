@@ -1,0 +1,104 @@
+"""JSON schema of the method's options in plan.yaml."""
+
+from __future__ import annotations
+
+from typing import Any
+
+_PATH = {"type": "string", "description": "a field of the message; dots lead into nested messages: pose.position.x"}
+_ARGUMENT = {
+    "oneOf": [
+        _PATH,
+        {
+            "type": "object",
+            "additionalProperties": False,
+            "required": ["table", "key", "by", "column"],
+            "properties": {
+                "table": {"type": "string", "description": "a table of the plan's scenario"},
+                "key": {"type": "string", "description": "the message's field that names the row"},
+                "by": {"type": "string", "description": "the table's column that the key is looked up in"},
+                "column": {"type": "string", "description": "the column of the value"},
+            },
+        },
+    ]
+}
+
+SCHEMA: dict[str, Any] = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    "type": "object",
+    "additionalProperties": False,
+    "properties": {
+        "id": {"type": "string", "description": "tells several methods of one node apart"},
+        "guarantees": {
+            "type": ["array", "string"],
+            "items": {"type": "string"},
+            "description": "the guarantees that are monitored (default: all of the node's)",
+        },
+        "traces": {
+            "type": "array",
+            "items": {"type": "string"},
+            "description": "recorded runs, one by one: JSON lines (.jsonl), ROS 1 bags (.bag), ROS 2 bags (folders)",
+        },
+        "when": {
+            "enum": ["outputs", "every"],
+            "description": "judge a clause when one of its outputs is published (default), or at every event that "
+            "changes one of its variables",
+        },
+        "ros_version": {"enum": ["ros1", "ros2"], "description": "for the generated configuration"},
+        "silent": {"type": "boolean", "description": "whether the ROS monitor keeps its messages to itself"},
+        "warning": {"type": "integer", "minimum": 0, "description": "the ROS monitor's warning level (default 1)"},
+        "oracle": {
+            "type": "object",
+            "additionalProperties": False,
+            "required": ["port"],
+            "properties": {
+                "url": {"type": "string", "pattern": "^[A-Za-z0-9.:_-]+$"},
+                "port": {"type": "integer", "minimum": 1, "maximum": 65535},
+                "action": {"enum": ["nothing"]},
+                "timeout": {"type": "number", "exclusiveMinimum": 0},
+            },
+            "description": "where the online oracle listens; without it the monitor only writes its log",
+        },
+        "package": {"type": "string", "description": "the ROS package of the node, for instrumentation"},
+        "path": {"type": "string", "description": "the launch file of the node, for instrumentation"},
+        "mapping": {
+            "type": "object",
+            "description": "how messages become values of the node's variables (in.r, out.command)",
+            "additionalProperties": {
+                "oneOf": [
+                    _PATH,
+                    {"type": "array", "items": _PATH, "minItems": 1, "description": "the fields, in order"},
+                    {
+                        "type": "object",
+                        "properties": {
+                            "topic": {"type": "string", "description": "a topic's name, if not the contract's"},
+                            "field": _PATH,
+                            "fields": {"type": "array", "items": _PATH, "minItems": 1},
+                            "each": {"type": "string", "description": "a field that holds a list of tuples"},
+                            "hold": {
+                                "enum": ["latest", "seen"],
+                                "description": "a relation holds at the latest message's tuples (default), or at all "
+                                "that were seen",
+                            },
+                            "values": {
+                                "type": "object",
+                                "additionalProperties": {"type": "string"},
+                                "description": "a message's word: the contract's name",
+                            },
+                            "elsewhere": {"description": "a function's value where no message has given one"},
+                            "initial": {"description": "the value before the first message"},
+                            "scenario": {"const": True, "description": "the plan's interpretation, at all times"},
+                            "previous": {"type": "string", "description": "an output's value of the step before"},
+                            "constructor": {"type": "string", "description": "the field that names the constructor"},
+                            "arguments": {
+                                "type": "object",
+                                "additionalProperties": {"type": "array", "items": _ARGUMENT},
+                                "description": "constructor: the fields of its arguments (a constructor's name may "
+                                "also stand beside `constructor` itself)",
+                            },
+                        },
+                    },
+                ]
+            },
+        },
+    },
+}
