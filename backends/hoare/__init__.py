@@ -1,0 +1,70 @@
+"""Hoare logic for small programs: triples from the contract's guarantees, proved by weakest preconditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from avow.backend import Job, Limits, Report, Tool
+from avow.diagnostics import Diagnostic, Rejected
+from avow.verdict import Link, Verdict
+
+_FILE = {"type": "string", "description": "the program's file, relative to the system's folder"}
+_TABLE = {
+    "type": "object",
+    "description": "an input, output or relation of the contract (in.r, out.done(i)) and what it is in the program; "
+    "by default a variable of the same name",
+    "additionalProperties": {"type": ["string", "number", "boolean"]},
+}
+
+
+class Hoare:
+    """See `docs/backends/hoare.md`."""
+
+    name = "hoare"
+    title = "Hoare triples from the guarantee, proved of an imperative program by weakest preconditions"
+    version = "1"
+    strength = Verdict.PROVED
+    link = Link.GENERATED
+    options_schema: Mapping[str, Any] = {
+        "type": "object",
+        "properties": {"program": _FILE, "variables": _TABLE},
+        "required": ["program"],
+        "additionalProperties": False,
+    }
+    green_means = (
+        "Every run of the program that starts in an input allowed by the assumptions ends in outputs that meet the "
+        "guarantee. It is about the program as written in the imperative language, over exact numbers, and says "
+        "nothing of how the robot's own code was made from it; without a VARIANT it takes for granted that a loop ends."
+    )
+
+    def tools(self) -> tuple[Tool, ...]:
+        return (Tool("z3", metadata.version("z3-solver"), None, "pip install z3-solver", optional=False),)
+
+    def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        from avow.backends.hoare.backend import problems
+
+        return problems(job)
+
+    def files(self, job: Job) -> tuple[Path, ...]:
+        from avow.backends.hoare.backend import program_file
+
+        try:
+            return (program_file(job),)
+        except Rejected:
+            return ()
+
+    def export(self, job: Job) -> Mapping[str, str]:
+        from avow.backends.hoare.backend import files
+
+        return files(job)
+
+    def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+        from avow.backends.hoare.backend import settle
+
+        return settle(job, limits)
+
+
+BACKEND = Hoare()

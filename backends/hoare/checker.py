@@ -125,14 +125,17 @@ class _Checker:
 
     def _sorts(self, entries: tuple[_Entry, ...]) -> None:
         """Give every name its sort: the plan's table first, then the ports' own names, then the assignments."""
-        for entry in entries:
-            expect(entry.meaning, BOOL if entry.parameters is not None else entry.port.sort, self.names)
         mapped = {(entry.port.role, entry.port.name) for entry in entries}
         for port in (*self.node.inputs, *self.node.outputs):
             wanted = port.role is Role.INPUT or port.name in self.assigned_names
             if (port.role, port.name) not in mapped and wanted:
                 self.names.sorts.setdefault(port.name, port.sort)
-        spread(self.source.body, self.names)
+        known = -1
+        while known != len(self.names.sorts):  # what one line of the table says helps to read another
+            known = len(self.names.sorts)
+            for entry in entries:
+                expect(entry.meaning, BOOL if entry.parameters is not None else entry.port.sort, self.names)
+            spread(self.source.body, self.names)
         words = self.names.vocabulary
         for name in sorted(self.names.sorts):
             if name in words.values or name in words.constructors:

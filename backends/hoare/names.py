@@ -58,10 +58,12 @@ class Vocabulary:
 
 @dataclass(slots=True)
 class Names:
-    """The sort of every name known so far; `locals` are the variables of MATCH, which belong to one branch."""
+    """The sort of every name known so far."""
 
     vocabulary: Vocabulary
     sorts: dict[str, Sort] = field(default_factory=dict)
+    inferred: set[str] = field(default_factory=set)
+    """Those whose sort was read off assignments, and may still widen."""
 
 
 def vocabulary(contract: Contract, node: Node) -> Vocabulary:
@@ -158,7 +160,7 @@ def expect(expression: Expression, sort: Sort, names: Names) -> None:
 
 def spread(body: tuple[Statement, ...], names: Names) -> None:
     """Sorts of assigned variables, from what is assigned to them, until nothing more is learnt."""
-    fixed = frozenset(names.sorts)
+    fixed = frozenset(names.sorts) - names.inferred
     learnt = True
     while learnt:
         learnt = False
@@ -169,6 +171,7 @@ def spread(body: tuple[Statement, ...], names: Names) -> None:
             new = join(old, estimate(statement.value, names, local))
             if new is not None and new != old:
                 names.sorts[statement.target.name] = new
+                names.inferred.add(statement.target.name)
                 learnt = True
 
 

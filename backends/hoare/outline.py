@@ -1,4 +1,4 @@
-"""A proof outline in the paper's notation: assertions in braces between the statements, each with the rule it is from."""
+"""A proof outline in the paper's notation: assertions in braces between the statements, each with its rule."""
 
 from __future__ import annotations
 

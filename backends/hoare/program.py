@@ -83,6 +83,12 @@ class Program:
     assigned: frozenset[Variable]
     ghosts: Mapping[Variable, Variable]
 
+    @property
+    def names(self) -> frozenset[str]:
+        """Every name that a variable of the program, a ghost or a MATCH pattern has."""
+        matched = (v.name for s in statements(self.body) if isinstance(s, Match) for v in s.variables)
+        return frozenset((*(v.name for v in (*self.state, *self.ghosts.values())), *matched))
+
 
 @dataclass(frozen=True, slots=True)
 class Predicate:

@@ -61,7 +61,8 @@ def _step(term: Term) -> Term:
             flat = tuple(dict.fromkeys(_flat(disjunction(items), Or)))
             if any(opposite(item) in flat for item in flat):
                 return TRUE
-            return disjunction(flat)
+            atoms = [opposite(item) for item in flat if not isinstance(item, And | Implies)]
+            return disjunction(_known(item, atoms) if isinstance(item, And) else item for item in flat)
         case Implies(left=left, right=right):
             return _implies(left, right)
         case Iff(left=left, right=right):
@@ -108,6 +109,9 @@ def _and(items: tuple[Term, ...]) -> Term:
     if any(opposite(item) in flat for item in flat):
         return FALSE
     merged = _merged(flat)
+    merged = _bounds(merged)
+    if FALSE in merged:
+        return FALSE
     facts = [item for item in merged if not isinstance(item, Implies | Or | And)]
     result = tuple(item if item in facts else _known(item, facts) for item in merged)
     if result != items:
@@ -127,6 +131,48 @@ def _merged(items: tuple[Term, ...]) -> tuple[Term, ...]:
     return tuple(result)
 
 
+def _bounds(items: tuple[Term, ...]) -> tuple[Term, ...]:
+    """Of several constant bounds of one term only the tightest; FALSE where they leave nothing."""
+    best: dict[tuple[Term, bool], tuple[Fraction, bool, Term]] = {}
+    loose: set[Term] = set()
+    for item in items:
+        found = _bound(item)
+        if found is None:
+            continue
+        term, is_lower, value, strict = found
+        old = best.get((term, is_lower))
+        if old is None:
+            best[term, is_lower] = (value, strict, item)
+        elif (
+            (value, strict) == old[:2]
+            or ((value > old[0]) is is_lower and value != old[0])
+            or (strict and value == old[0])
+        ):
+            loose.add(old[2])
+            best[term, is_lower] = (value, strict, item)
+        else:
+            loose.add(item)
+    for (term, is_lower), (value, strict, _) in best.items():
+        upper = best.get((term, False)) if is_lower else None
+        if upper is not None and (value > upper[0] or (value == upper[0] and (strict or upper[1]))):
+            return (FALSE,)
+    return tuple(item for item in items if item not in loose)
+
+
+def _bound(item: Term) -> tuple[Term, bool, Fraction, bool] | None:
+    """(term, is it a lower bound, the number, is it strict)."""
+    if not isinstance(item, Compare) or item.operator not in {"<", "<=", ">", ">="}:
+        return None
+    one, other = _number(item.left), _number(item.right)
+    if (one is None) == (other is None):
+        return None
+    strict = item.operator in {"<", ">"}
+    if other is not None:
+        return item.left, item.operator.startswith(">"), other, strict
+    assert one is not None
+    return item.right, item.operator.startswith("<"), one, strict
+
+
 def _known(term: Term, facts: Iterable[Term]) -> Term:
     """The term where the facts hold: a fact in it is true, its opposite false."""
     bound = {v for part in subterms(term) if isinstance(part, Quantified) for v in part.variables}
@@ -143,6 +189,9 @@ def _flat(term: Term, kind: type[And] | type[Or]) -> tuple[Term, ...]:
 
 def _compare(term: Compare) -> Term:
     left, right = term.left, term.right
+    if left.sort == BOOL:
+        same = _step(Iff(left, right))
+        return same if term.operator == "==" else opposite(same)
     if left == right:
         return TRUE if term.operator in {"==", "<=", ">="} else FALSE
     if isinstance(left, EnumValue) and isinstance(right, EnumValue):
@@ -172,8 +221,6 @@ def _constructs(operator: str, left: Construct, right: Construct) -> Term:
 
 
 def _equal(left: Term, right: Term) -> Term:
-    if left.sort == BOOL:
-        return _step(Iff(left, right))
     return _compare(Compare("==", left, right))
 
 

@@ -63,9 +63,9 @@ def equation(one: Variable, other: Variable) -> Term:
 def triples(obligation: Obligation, clause: Clause, node: Node, checked: Checked) -> tuple[Triple, ...]:
     """The triples whose validity is the obligation's. Raises Rejected (code ``HOARE400``) where the formula speaks
     of an output that the program has nothing for."""
-    names = {v.name for v in (*checked.program.state, *checked.program.ghosts.values())}
+    names = set(checked.program.names)
     assumed = [translate(a, checked.reading, names) for a in node.assumptions]
-    parts = list(_split(prepared(clause, checked.reading, names), names))
+    parts = tuple(_split(rename_bound(clause.formula, names)))
     found: dict[tuple[Term, Term], None] = {}
     for outer, conditions, consequent in parts:
         goal = translate_formula(consequent, checked.reading, clause)
@@ -86,12 +86,7 @@ _Part = tuple[tuple[Variable, ...], tuple[Term, ...], Term]
 """Constants for outer quantifiers, conditions on inputs, consequent; still in the contract's words."""
 
 
-def prepared(clause: Clause, reading: Reading, names: set[str]) -> Term:
-    """The formula with bound names that no program variable has, and functions compared point by point."""
-    return rename_bound(clause.formula, names)
-
-
-def _split(formula: Term, names: set[str]) -> Iterator[_Part]:
+def _split(formula: Term) -> Iterator[_Part]:
     stack: list[_Part] = [((), (), formula)]
     while stack:
         outer, conditions, goal = stack.pop()

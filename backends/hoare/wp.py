@@ -102,9 +102,11 @@ def _statement(statement: Statement, post: Term, side: Conditions) -> Term:
             safe.extend(in_range(value, target.sort.result))
             return conjunction((*safe, updated(post, target, arguments, value)))
         case If(condition=condition, then=then, otherwise=otherwise):
-            yes = Implies(condition, weakest(then, post, side))
-            no = Implies(negation(condition), weakest(otherwise, post, side))
-            return conjunction((defined(condition), yes, no))
+            yes, no = weakest(then, post, side), weakest(otherwise, post, side)
+            if yes == no:
+                return conjunction((defined(condition), yes))
+            cases = (Implies(condition, yes), Implies(negation(condition), no))
+            return conjunction((defined(condition), *cases))
         case Match():
             return _match(statement, post, side)
         case While():
@@ -121,19 +123,27 @@ def misfits(statement: Match) -> Term:
     others: list[Term] = []
     for constructor in statement.sort.constructors:
         if constructor.name != statement.constructor:
-            fresh = tuple(variable(f"{constructor.name}~{k}", s) for k, s in enumerate(constructor.parameters))
+            # no variable of a program has such a name, so none is captured
+            fresh = tuple(
+                variable(f"x{_BELOW[k % 10]}" + "'" * (k // 10), s) for k, s in enumerate(constructor.parameters)
+            )
             made = Compare("==", statement.subject, Construct(constructor.name, fresh, statement.sort))
             others.append(Quantified(Quantifier.EXISTS, fresh, made) if fresh else made)
     return disjunction(others)
 
 
+_BELOW = "₁₂₃₄₅₆₇₈₉₀"
+
+
 def _match(statement: Match, post: Term, side: Conditions) -> Term:
-    then = weakest(statement.then, post, side)
+    assert not free_variables(post) & frozenset(statement.variables), "bound names of triples are apart from these"
+    then, otherwise = weakest(statement.then, post, side), weakest(statement.otherwise, post, side)
+    if then == otherwise:
+        return conjunction((defined(statement.subject), then))
     yes: Term = Implies(fits(statement, statement.variables), then)
     if statement.variables:
         yes = Quantified(Quantifier.FORALL, statement.variables, yes)
-    no = Implies(misfits(statement), weakest(statement.otherwise, post, side))
-    return conjunction((defined(statement.subject), yes, no))
+    return conjunction((defined(statement.subject), yes, Implies(misfits(statement), otherwise)))
 
 
 def _while(statement: While, post: Term, side: Conditions) -> Term:

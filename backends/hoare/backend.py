@@ -1,0 +1,287 @@
+"""The Hoare backend: triples from a guarantee, proved of a small program by weakest preconditions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from avow.backend import Job, Limits, Report
+from avow.backends.hoare.checker import Checked, check
+from avow.backends.hoare.outline import outline, show
+from avow.backends.hoare.parser import parse_program
+from avow.backends.hoare.program import While, statements
+from avow.backends.hoare.triples import Triple, triples
+from avow.backends.hoare.witness import Breach, breach
+from avow.backends.hoare.wp import Condition, TooLarge, conditions
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.evidence.obligation import Obligation
+from avow.language.terms import FALSE, Not, Role, Variable
+from avow.logic.evaluate import NotEvaluable, evaluate
+from avow.logic.formula import conjunction, free_variables
+from avow.logic.smt import Entailment, entails, z3_version
+from avow.logic.smtlib import export as smtlib
+from avow.logic.translation import Unsupported
+from avow.logic.values import show as show_value
+from avow.system.paths import inside
+from avow.verdict import Counterexample, Link, Outcome, Verdict
+
+
+@dataclass(frozen=True)
+class Work:
+    """A job, read: the program checked against node and table, and the triples of each obligation."""
+
+    job: Job
+    checked: Checked
+    text: str
+
+    @cached_property
+    def triples(self) -> dict[str, tuple[Triple, ...]]:
+        """Obligation id → its triples. Raises Rejected."""
+        return {o.id: triples(o, self.job.clause(o), self.job.node, self.checked) for o in self.job.obligations}
+
+
+def load(job: Job) -> Work:
+    """Read program and table. Raises Rejected with all that is wrong."""
+    path = program_file(job)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        message = f"{path.name} cannot be read: {error}"
+        raise Rejected(Diagnostic("HOARE400", message, job.method.options.at("program"))) from error
+    source = parse_program(text, str(path))
+    return Work(job, check(source, job.contract, job.node, _table(job)), text)
+
+
+def program_file(job: Job) -> Path:
+    """The plan's program. Raises Rejected (``HOARE400``) where there is none, or outside the system's folder."""
+    name = job.options.get("program")
+    place = job.method.options.at("program")
+    if not isinstance(name, str):
+        message = "the method needs a program: `program: models/….imp`"
+        raise Rejected(Diagnostic("HOARE400", message, job.method.options.span))
+    path = inside(job.root, name)
+    if path is None:
+        raise Rejected(Diagnostic("HOARE400", f"`{name}` is outside the system's folder", place))
+    if not path.is_file():
+        raise Rejected(Diagnostic("HOARE400", f"there is no file `{name}` in the system's folder", place))
+    return path
+
+
+def _table(job: Job) -> dict[str, tuple[str, Span]]:
+    options = job.method.options
+    given = job.options.get("variables") or {}
+    if not isinstance(given, Mapping):
+        message = "`variables` maps inputs and outputs to the program's expressions"
+        raise Rejected(Diagnostic("HOARE400", message, options.at("variables")))
+    words = {True: "TRUE", False: "FALSE"}
+    return {
+        str(key): (words[value] if isinstance(value, bool) else str(value), options.at("variables", key))
+        for key, value in given.items()
+    }
+
+
+def problems(job: Job) -> tuple[Diagnostic, ...]:
+    """What is wrong with the plan's options, the program, or a guarantee that the program has nothing for."""
+    try:
+        work = load(job)
+        _ = work.triples
+    except Rejected as rejected:
+        return rejected.diagnostics
+    return ()
+
+
+# -- export ------------------------------------------------------------------------------------------------------------
+
+
+def files(job: Job) -> Mapping[str, str]:
+    """Triples, proof outlines and verification conditions of every obligation; nothing where the job is at fault."""
+    try:
+        work = load(job)
+        all_triples = work.triples
+    except Rejected:
+        return {}
+    made: dict[str, str] = {}
+    for found in all_triples.values():
+        for triple in found:
+            made[f"{_stem(triple)}.hoare"] = _triple_text(triple, work)
+            try:
+                made[f"{_stem(triple)}.outline.txt"] = outline(triple, work.checked.program.body)
+                for condition in conditions(triple, work.checked.program.body):
+                    made[f"{_stem(triple)}.{condition.name}.smt2"] = _script(triple, condition)
+            except TooLarge as error:
+                made[f"{_stem(triple)}.outline.txt"] = f"no outline: {error}\n"
+    return made
+
+
+def _stem(triple: Triple) -> str:
+    return "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "_" for c in triple.name)
+
+
+def _triple_text(triple: Triple, work: Work) -> str:
+    body = work.text.rstrip("\n")
+    return f"{{{show(triple.full_pre)}}}\n{body}\n{{{show(triple.post)}}}\n"
+
+
+def _script(triple: Triple, condition: Condition) -> str:
+    """`unsat` means that the condition holds."""
+    formulas = {f"H{k}": h for k, h in enumerate(condition.hypotheses, start=1)}
+    try:
+        return smtlib(
+            {**formulas, "goal": Not(condition.goal)}, comment=f"{triple.name}: {condition.what}; valid if unsat"
+        )
+    except Unsupported as error:
+        return f"; not expressible in SMT-LIB: {' '.join(error.what.split())}\n"
+
+
+# -- discharge ---------------------------------------------------------------------------------------------------------
+
+
+def settle(job: Job, limits: Limits) -> Report:
+    """One outcome for each obligation."""
+    version = f"z3 {z3_version()}"
+    try:
+        work = load(job)
+        found = work.triples
+    except Rejected as rejected:
+        why = "; ".join(f"{d.span}: {d.message}" for d in rejected.diagnostics)
+        failed = tuple(Outcome(o.id, Verdict.ERROR, why) for o in job.obligations)
+        return Report(failed, "weakest preconditions", version)
+    logs: dict[str, str] = {}
+    outcomes = tuple(_obligation(o, found[o.id], work, limits, logs) for o in job.obligations)
+    return Report(outcomes, "weakest preconditions", version, logs=logs)
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """What was found of one triple."""
+
+    triple: Triple
+    verdict: Verdict
+    why: str
+    breach: Breach | None = None
+    vacuous: str = ""
+    """Why the triple says nothing of the program, if it does not."""
+    conditions: int = 0
+
+
+def _obligation(
+    obligation: Obligation, found: Sequence[Triple], work: Work, limits: Limits, logs: dict[str, str]
+) -> Outcome:
+    deadline = time.monotonic() + limits.seconds
+    settled = [_triple(triple, work, limits, deadline) for triple in found]
+    log = [f"{s.triple.name}: {s.verdict} - {s.why}{f' ({s.vacuous})' if s.vacuous else ''}" for s in settled]
+    logs[f"{_stem(found[0])}.log" if found else f"{obligation.digest[:12]}.log"] = "\n".join(log) + "\n"
+    worst = next(
+        (s for v in (Verdict.REFUTED, Verdict.ERROR, Verdict.UNKNOWN) for s in settled if s.verdict is v), None
+    )
+    link = Link.MAPPED if work.checked.reading.mapped else Link.GENERATED
+    details: dict[str, object] = {
+        "triples": [
+            {
+                "name": s.triple.name,
+                "pre": show(s.triple.full_pre),
+                "post": show(s.triple.post),
+                "verdict": str(s.verdict),
+                "vacuous": s.vacuous,
+            }
+            for s in settled
+        ]
+    }
+    if worst is not None:
+        shown = _counterexample(worst, work) if worst.breach is not None else None
+        summary = f"{worst.triple.name}: {worst.why}"
+        return Outcome(obligation.id, worst.verdict, summary, shown, link=link, details=details)
+    vacuous = bool(settled) and all(s.vacuous for s in settled)
+    count = sum(s.conditions for s in settled)
+    summary = f"{len(settled)} Hoare triple(s) proved: {count} verification condition(s)"
+    if vacuous:
+        summary += f"; but {settled[0].vacuous}"
+    return Outcome(
+        obligation.id,
+        Verdict.PROVED,
+        summary,
+        hypotheses=(*work.checked.reading.hypotheses, *_termination(work)),
+        details=details,
+        link=link,
+        vacuous=vacuous,
+    )
+
+
+def _termination(work: Work) -> tuple[str, ...]:
+    """Loops without a variant: the triple is about runs that end."""
+    return tuple(
+        f"the loop at line {s.span.line} of {Path(s.span.file).name} terminates"
+        for s in statements(work.checked.program.body)
+        if isinstance(s, While) and s.variant is None
+    )
+
+
+def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Settled:
+    program = work.checked.program
+    try:
+        wanted = conditions(triple, program.body)
+    except TooLarge as error:
+        return Settled(triple, Verdict.UNKNOWN, str(error))
+    failed: list[tuple[Condition, Entailment]] = []
+    for condition in wanted:
+        answer = entails(condition.hypotheses, condition.goal, timeout_ms=_left(deadline), seed=limits.seed)
+        if answer.verdict is not Verdict.PROVED:
+            failed.append((condition, answer))
+    if not failed:
+        return Settled(triple, Verdict.PROVED, "proved", None, _vacuous(triple, deadline, limits), len(wanted))
+    shown = breach(triple, program, [c for c, _ in failed], max(1000, _left(deadline)))
+    if shown is not None:
+        return Settled(triple, Verdict.REFUTED, shown.why, shown)
+    condition, answer = failed[0]
+    if answer.verdict is Verdict.REFUTED and condition.name != "pre":
+        why = f"{condition.what}: not so; the invariant may be too weak, for no run was found that breaks the triple"
+    elif answer.verdict is Verdict.REFUTED:
+        why = f"{condition.what}: the solver says no, but no run of the program shows it"
+    else:
+        why = f"{condition.what}: {answer.reason or 'no answer'}"
+    return Settled(triple, Verdict.UNKNOWN, why)
+
+
+def _vacuous(triple: Triple, deadline: float, limits: Limits) -> str:
+    """A triple that every program meets says nothing of this one."""
+    free = entails([triple.pre], FALSE, timeout_ms=min(2000, _left(deadline)), seed=limits.seed)
+    if free.verdict is Verdict.PROVED:
+        return f"no input meets the precondition {show(triple.pre)}"
+    always = entails([triple.pre], triple.post, timeout_ms=min(2000, _left(deadline)), seed=limits.seed)
+    if always.verdict is Verdict.PROVED:
+        return "it holds whatever a program does: it says nothing of this one"
+    return ""
+
+
+def _left(deadline: float) -> int:
+    return max(100, min(20_000, int((deadline - time.monotonic()) * 1000)))
+
+
+def _counterexample(settled: Settled, work: Work) -> Counterexample:
+    """The breach in the contract's words, and then in the program's where it has more to say."""
+    assert settled.breach is not None
+    shown = settled.breach
+    values: list[tuple[str, str]] = []
+    told: set[Variable] = set()
+    for role, ports, state in (
+        (Role.INPUT, work.job.node.inputs, shown.start),
+        (Role.OUTPUT, work.job.node.outputs, shown.end),
+    ):
+        for port in ports:
+            term = work.checked.reading.terms.get((role, port.name))
+            if term is None or state is None:
+                continue
+            try:
+                values.append((f"{role}.{port.name}", show_value(evaluate(term, state))))
+            except NotEvaluable:
+                continue
+            if isinstance(term, Variable):
+                told.add(term)
+    spoken = free_variables(conjunction((settled.triple.pre, settled.triple.post)))
+    for variable in sorted(spoken - told - frozenset(work.checked.program.assigned), key=lambda v: v.name):
+        if variable.name in shown.start and variable not in work.checked.program.ghosts.values():
+            values.append((variable.name, show_value(shown.start[variable.name])))
+    return Counterexample(tuple(values), settled.breach.why)
