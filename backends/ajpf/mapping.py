@@ -1,0 +1,266 @@
+"""From contract formulas to properties of the agent, through the table that a person wrote in the plan.
+
+Each row says which agent formula stands for which contract formula (the paper's mapping table). What no row covers, and
+what the scenario does not decide, is reported, never dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from avow.backends.ajpf import psl
+from avow.backends.ajpf.matching import Binding, choose, match
+from avow.backends.ajpf.psl import Formula
+from avow.backends.ajpf.psl_parser import Malformed, instantiate
+from avow.backends.ajpf.shape import conjunction, conjuncts, disjunction, disjuncts, free, shape
+from avow.diagnostics import Span
+from avow.language.printer import show_term
+from avow.language.sorts import IntegerSort, NaturalSort
+from avow.language.terms import FALSE, TRUE, And, Literal, Not, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.logic.formula import substitute
+from avow.logic.traversal import subterms
+
+
+class NotCovered(Exception):  # noqa: N818 - it names what happened
+    """No row of the table fits; `reason` is a clause for people."""
+
+    def __init__(self, reason: str, span: Span | None = None) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.span = span
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """``pattern`` (in normal form, with free `variables`) is mapped to `formula`."""
+
+    text: str
+    pattern: Term
+    variables: frozenset[str]
+    formula: Formula
+    span: Span | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """What one row covered, mapped; `output` where the row speaks of an output."""
+
+    formula: Formula
+    output: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Junction:
+    """`items` all (``and``) or one at least (``or``)."""
+
+    all: bool
+    items: tuple[Mapped, ...]
+
+
+Mapped = Unit | Junction
+
+Decide = Callable[[Term], bool | None]
+"""The truth of a closed formula in the plan's scenario, or None where the scenario does not say."""
+
+Range = Callable[[Variable], Sequence[int] | None]
+"""The finite range of a quantified index variable, or None."""
+
+YES = Junction(True, ())
+NO = Junction(False, ())
+
+
+@dataclass(slots=True)
+class Mapper:
+    rows: Sequence[Row]
+    decide: Decide
+    range_of: Range
+    used: set[str] = field(default_factory=set)
+    """The texts of the rows that covered something."""
+
+    def map(self, term: Term) -> Mapped:
+        """A formula in normal form. Raises NotCovered."""
+        match term:
+            case Literal(value=value):
+                return YES if value else NO
+            case And() | Or():
+                return self._junction(term)
+            case Quantified():
+                return self._quantified(term)
+            case _:
+                return self._atom(term)
+
+    def _junction(self, term: And | Or) -> Mapped:
+        is_and = isinstance(term, And)
+        return _join(is_and, [made for made, _ in self._cover(term.items, is_and)])
+
+    def _cover(self, items: Sequence[Term], is_and: bool) -> list[tuple[Mapped, tuple[Term, ...]]]:
+        """Rows that span several items first, the longest before; then item by item."""
+        found: list[tuple[Mapped, tuple[Term, ...]]] = []
+        rest = list(items)
+        kind = And if is_and else Or
+        rows = [row for row in self.rows if isinstance(row.pattern, kind)]
+        for row in sorted(rows, key=lambda row: -len(_items(row.pattern))):
+            while True:
+                taken = next(choose(_items(row.pattern), rest, row.variables, {}), None)
+                if taken is None:
+                    break
+                binding, places = taken
+                covered = tuple(rest[p] for p in places)
+                found.append((self._unit(row, binding, covered), covered))
+                rest = [t for p, t in enumerate(rest) if p not in places]
+        return found + [(self.map(item), (item,)) for item in rest]
+
+    def _atom(self, term: Term) -> Mapped:
+        made = self._whole(term)
+        if made is not None:
+            return made
+        truth = self._decided(term)
+        if truth is not None:
+            return YES if truth else NO
+        if isinstance(term, Not):
+            made = self._whole(term.body)
+            if made is not None:
+                return Unit(psl.negation(made.formula), made.output)
+        raise NotCovered(f"no mapping for {show_term(term)}", term.span or _first_span(term))
+
+    def _whole(self, term: Term) -> Unit | None:
+        """By a row that covers just this."""
+        for row in self.rows:
+            binding = next(match(row.pattern, term, row.variables, {}), None)
+            if binding is not None:
+                return self._unit(row, binding, (term,))
+        return None
+
+    def _decided(self, term: Term) -> bool | None:
+        return None if free(term) else self.decide(term)
+
+    def _quantified(self, term: Quantified) -> Mapped:
+        made = self._whole(term)
+        if made is not None:
+            return made
+        truth = self._decided(term)
+        if truth is not None:
+            return YES if truth else NO
+        if term.quantifier is Quantifier.UNIQUE:
+            raise NotCovered(f"no mapping for {show_term(term)}", term.span or _first_span(term))
+        exists = term.quantifier is Quantifier.EXISTS
+        for variable in term.variables:
+            if isinstance(variable.sort, IntegerSort | NaturalSort):
+                return self._expanded(term, variable, exists)
+        if not exists:
+            # forall x: P  is  not exists x: not P
+            inner = shape(Not(term))
+            return _negated(self.map(inner)) if inner != term else self._fail(term)
+        return self._block(term)
+
+    def _fail(self, term: Term) -> Mapped:
+        raise NotCovered(f"no mapping for {show_term(term)}", term.span or _first_span(term))
+
+    def _expanded(self, term: Quantified, variable: Variable, exists: bool) -> Mapped:
+        values = self.range_of(variable)
+        if values is None:
+            raise NotCovered(f"{variable.name} has no finite range here (options: instances)", term.span)
+        rest = tuple(v for v in term.variables if v != variable)
+        cases = []
+        for value in values:
+            body = substitute(term.body, {variable: Literal(value, variable.sort)})
+            cases.append(shape(Quantified(term.quantifier, rest, body, term.span) if rest else body))
+        return self.map(disjunction(cases) if exists else conjunction(cases))
+
+    def _block(self, term: Quantified) -> Mapped:
+        """``exists(x | P and Q)``: rows may not tear apart what x joins."""
+        names = {v.name for v in term.variables}
+        items = conjuncts(term.body)
+        static = [i for i in items if not free(i) - names and not _has_output(i)]
+        for group in (static,):
+            if group:
+                truth = self._decided(Quantified(Quantifier.EXISTS, _used(term, group), conjunction(group), term.span))
+                if truth is False:
+                    return NO
+        made = self._cover(items, True)
+        for name in names:
+            joined = [m for m, covered in made if m != YES and any(name in free(c) for c in covered)]
+            if len(joined) > 1:
+                raise NotCovered(
+                    f"{name} joins parts of {show_term(term)} that different rows would cover; one row must cover both",
+                    term.span or _first_span(term),
+                )
+        return _join(True, [m for m, _ in made])
+
+    def _unit(self, row: Row, binding: Binding, covered: tuple[Term, ...]) -> Unit:
+        self.used.add(row.text)
+        values = {
+            name: value.value
+            for name, value in binding.items()
+            if isinstance(value, Literal) and type(value.value) is int
+        }
+        try:
+            formula = instantiate(row.formula, values)
+        except Malformed as error:
+            raise NotCovered(f"the row “{row.text}” cannot be used here: {error.reason}", row.span) from None
+        return Unit(formula, any(_has_output(c) for c in covered))
+
+
+def _used(term: Quantified, items: Sequence[Term]) -> tuple[Variable, ...]:
+    mentioned = {name for item in items for name in free(item)}
+    return tuple(v for v in term.variables if v.name in mentioned) or term.variables
+
+
+def _items(pattern: Term) -> tuple[Term, ...]:
+    return pattern.items if isinstance(pattern, And | Or) else (pattern,)
+
+
+def _has_output(term: Term) -> bool:
+    return any(isinstance(t, Variable) and t.role is Role.OUTPUT for t in subterms(term))
+
+
+def _first_span(term: Term) -> Span | None:
+    return next((t.span for t in subterms(term) if t.span is not None), None)
+
+
+def _join(all_: bool, items: Sequence[Mapped]) -> Mapped:
+    unit, zero = (YES, NO) if all_ else (NO, YES)
+    flat: list[Mapped] = []
+    for item in items:
+        pieces = item.items if isinstance(item, Junction) and item.all is all_ else (item,)
+        for piece in pieces:
+            if piece == zero:
+                return zero
+            if piece != unit and piece not in flat:
+                flat.append(piece)
+    return flat[0] if len(flat) == 1 else Junction(all_, tuple(flat))
+
+
+def _negated(mapped: Mapped) -> Mapped:
+    if isinstance(mapped, Unit):
+        return Unit(psl.negation(mapped.formula), mapped.output)
+    return _join(not mapped.all, [_negated(item) for item in mapped.items])
+
+
+def to_formula(mapped: Mapped) -> Formula:
+    if isinstance(mapped, Unit):
+        return mapped.formula
+    made = [to_formula(item) for item in mapped.items]
+    return psl.conjunction(made) if mapped.all else psl.disjunction(made)
+
+
+def clauses(mapped: Mapped, limit: int = 64) -> list[tuple[Unit, ...]]:
+    """Conjunctive normal form. Raises NotCovered where it is too large."""
+    if isinstance(mapped, Unit):
+        return [(mapped,)]
+    if mapped.all:
+        return [clause for item in mapped.items for clause in clauses(item, limit)]
+    rows: list[tuple[Unit, ...]] = [()]
+    for item in mapped.items:
+        rows = [tuple(dict.fromkeys((*row, *clause))) for row in rows for clause in clauses(item, limit)]
+        if len(rows) > limit:
+            raise NotCovered("the guarantee's consequent multiplies out to too many cases")
+    return rows
+
+
+def substituted(term: Term, values: Mapping[Variable, int]) -> Term:
+    """The formula with numbers for index variables."""
+    return substitute(term, {v: Literal(n, v.sort) for v, n in values.items()}) if values else term
+
+

@@ -1,0 +1,318 @@
+"""The method's options in plan.yaml, read and checked; every problem has its place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from avow.backend import Job
+from avow.backends.ajpf.environment import Environment, read_environment
+from avow.backends.ajpf.interpreter import Semantics
+from avow.backends.ajpf.mapping import Row
+from avow.backends.ajpf.parser import read_program
+from avow.backends.ajpf.psl import AGENT_NAME, KEYWORDS, Formula, Modality, atoms
+from avow.backends.ajpf.psl_parser import Malformed, index_names, instantiate, parse_psl
+from avow.backends.ajpf.shape import TooComplex, free, shape
+from avow.backends.ajpf.syntax import Program
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.language.load import parse_formula
+from avow.language.sorts import IntegerSort, NaturalSort, Sort
+from avow.language.terms import Quantified
+from avow.logic.traversal import subterms
+from avow.system.paths import inside
+
+MAX_INSTANCES = 1_000
+DEFAULT_STATES = 1_000_000
+
+_TEXT = {"type": "string"}
+SCHEMA: dict[str, Any] = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    "type": "object",
+    "properties": {
+        "program": {**_TEXT, "description": "the Gwendolen program (.gwen), relative to the system's folder"},
+        "agent": {**_TEXT, "description": "the agent's name, as the properties use it"},
+        "environment": {**_TEXT, "description": "how percepts are drawn (YAML)"},
+        "predicates": {
+            "type": "object",
+            "additionalProperties": _TEXT,
+            "description": "RCL pattern → BDI formula; free variables of the pattern stand for terms",
+        },
+        "instances": {
+            "type": "object",
+            "description": "index variable → its finite range: '1..12', 'table.column' or a list of numbers",
+            "additionalProperties": {
+                "anyOf": [_TEXT, {"type": "array", "items": {"type": ["integer", "string"]}, "minItems": 1}]
+            },
+        },
+        "variables": {
+            "type": "object",
+            "additionalProperties": {"enum": ["REAL", "NATURAL", "INTEGER", "BOOL", "STRING"]},
+            "description": "sorts of pattern variables that the node's own clauses do not bind",
+        },
+        "properties": {
+            "type": "object",
+            "description": "further properties: PSL text, or a mapping that attaches one to a guarantee",
+            "propertyNames": {"pattern": "^[A-Za-z][A-Za-z0-9_]*$"},
+            "additionalProperties": {
+                "anyOf": [
+                    _TEXT,
+                    {
+                        "type": "object",
+                        "properties": {"psl": _TEXT, "guarantee": _TEXT, "because": _TEXT},
+                        "required": ["psl"],
+                        "additionalProperties": False,
+                    },
+                ]
+            },
+        },
+        "semantics": {"enum": ["mcapl", "edge"], "description": "how percepts become events; default mcapl"},
+        "engine": {"enum": ["auto", "builtin", "ajpf", "spin"], "description": "default auto"},
+        "states": {"type": "integer", "minimum": 1, "description": "bound on the states explored"},
+        "environment_class": {**_TEXT, "description": "AJPF only: the Java class of the environment"},
+    },
+    "required": ["program", "environment", "predicates"],
+    "additionalProperties": False,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Extra:
+    """A property that the plan adds."""
+
+    name: str
+    formula: Formula
+    guarantee: str | None
+    because: str
+    indices: tuple[str, ...]
+    """Index variables that it is instantiated over."""
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """The options, usable."""
+
+    program: Program
+    program_path: Path
+    program_text: str
+    environment: Environment
+    environment_path: Path
+    rows: tuple[Row, ...]
+    instances: Mapping[str, tuple[int, ...]]
+    extras: tuple[Extra, ...]
+    semantics: Semantics
+    engine: str
+    states: int
+    environment_class: str | None
+
+
+def read(job: Job) -> Setup:
+    """Raises Rejected with every problem."""
+    reader = _Reader(job)
+    setup = reader.setup()
+    if reader.faults or setup is None:
+        raise Rejected(*reader.faults)
+    return setup
+
+
+def named_files(job: Job) -> tuple[Path, ...]:
+    """The files that the options name, also where they are not in order."""
+    names = [v for key in ("program", "environment") if isinstance(v := job.options.get(key), str)]
+    return tuple(path for name in names if (path := inside(job.root, name)) is not None)
+
+
+class _Reader:
+    def __init__(self, job: Job) -> None:
+        self.job = job
+        self.faults: list[Diagnostic] = []
+        self.options = job.options
+
+    def fault(self, code: str, message: str, *path: str | int, hint: str | None = None) -> None:
+        self.faults.append(Diagnostic(code, message, self.job.method.options.at(*path), hint=hint))
+
+    def setup(self) -> Setup | None:
+        program, program_path = self.file("program", read_program)
+        environment, environment_path = self.file("environment", read_environment)
+        if program is not None:
+            self.agent(program)
+        instances = self.instances()
+        rows = self.rows(program)
+        extras = self.extras(program, instances)
+        if program is None or environment is None or program_path is None or environment_path is None:
+            return None
+        return Setup(
+            program,
+            program_path,
+            program_path.read_text(encoding="utf-8-sig"),
+            environment,
+            environment_path,
+            rows,
+            instances,
+            extras,
+            Semantics(self.options.get("semantics", "mcapl")),
+            self.options.get("engine", "auto"),
+            self.options.get("states", DEFAULT_STATES),
+            self.options.get("environment_class"),
+        )
+
+    def file(self, key: str, read_file: Any) -> tuple[Any, Path | None]:
+        name = self.options.get(key)
+        if not isinstance(name, str):
+            self.fault("AJPF120", f"'{key}' must name a file")
+            return None, None
+        path = inside(self.job.root, name)
+        if path is None:
+            self.fault("AJPF120", f"{key}: {name!r} leaves the system's folder", key)
+            return None, None
+        if not path.is_file():
+            self.fault("AJPF120", f"{key}: there is no file {name!r}", key)
+            return None, None
+        try:
+            return read_file(path), path
+        except Rejected as error:
+            self.faults.extend(error.diagnostics)
+            return None, path
+
+    def agent(self, program: Program) -> None:
+        if program.name in KEYWORDS or not AGENT_NAME.match(program.name):
+            why = "is a word of AJPF's property language" if program.name in KEYWORDS else "must start with a small letter"
+            message = f"an agent cannot be called '{program.name}': the name {why}"
+            self.faults.append(Diagnostic("AJPF104", message, program.name_span))
+        wanted = self.options.get("agent", program.name)
+        if wanted != program.name:
+            self.fault("AJPF121", f"agent: the program's agent is called '{program.name}', not {wanted!r}", "agent")
+
+    def instances(self) -> dict[str, tuple[int, ...]]:
+        given = self.options.get("instances", {})
+        result = {}
+        for name, value in given.items():
+            found = self.range_of(value)
+            if isinstance(found, str):
+                self.fault("AJPF122", f"instances.{name}: {found}", "instances", name)
+            else:
+                result[name] = found
+        return result
+
+    def range_of(self, value: object) -> tuple[int, ...] | str:
+        cells: Sequence[object]
+        if isinstance(value, list):
+            cells = value
+        else:
+            text = str(value)
+            span = re.fullmatch(r"\s*([0-9]{1,9})\s*\.\.\s*([0-9]{1,9})\s*", text)
+            table, dot, column = text.partition(".")
+            if span:
+                low, high = int(span[1]), int(span[2])
+                if high - low >= MAX_INSTANCES:
+                    return f"more than {MAX_INSTANCES} instances"
+                cells = range(low, high + 1)
+            elif dot and self.job.system.plan.scenario is not None:
+                try:
+                    cells = self.job.system.plan.scenario.table(table).column(column)
+                except (KeyError, ValueError):
+                    return f"the scenario has no column {text!r}"
+            else:
+                cells = [value]
+        if not all(re.fullmatch(r"[0-9]{1,9}", str(cell)) for cell in cells):
+            return "the instances must be natural numbers"
+        found = tuple(dict.fromkeys(int(str(cell)) for cell in cells))
+        if not found:
+            return "the range is empty"
+        return found if len(found) <= MAX_INSTANCES else f"more than {MAX_INSTANCES} instances"
+
+    def sorts(self) -> dict[str, Sort]:
+        """Pattern variables by default have the sorts that the node's own clauses give to these names."""
+        found: dict[str, Sort] = {}
+        for clause in self.job.node.clauses:
+            for term in subterms(clause.formula):
+                if isinstance(term, Quantified):
+                    for variable in term.variables:
+                        found.setdefault(variable.name, variable.sort)
+        for name, sort in self.options.get("variables", {}).items():
+            found[name] = _sort(sort)
+        ports = {p.name for p in (*self.job.node.inputs, *self.job.node.outputs)}
+        return {name: sort for name, sort in found.items() if name not in ports}
+
+    def rows(self, program: Program | None) -> tuple[Row, ...]:
+        sorts = self.sorts()
+        rows = []
+        for text, target in self.options.get("predicates", {}).items():
+            span = self.job.method.options.at("predicates", text)
+            pattern = self.pattern(text, span, sorts)
+            formula = self.psl(target, program, "predicates", text)
+            if pattern is None or formula is None:
+                continue
+            made, names = pattern
+            loose = sorted(index_names(formula) & set(sorts) - names)
+            if loose:
+                message = f"'{loose[0]}' in the formula is no variable of the pattern “{text}”"
+                self.fault("AJPF123", message, "predicates", text)
+                continue
+            rows.append(Row(text, made, names, formula, span))
+        return tuple(rows)
+
+    def pattern(self, text: str, span: Span, sorts: Mapping[str, Sort]) -> Any:
+        try:
+            term = shape(parse_formula(text, self.job.node, self.job.contract, span, sorts))
+        except Rejected as error:
+            self.faults.extend(error.diagnostics)
+            return None
+        except TooComplex:
+            self.fault("AJPF123", "the pattern is too complex", "predicates", text)
+            return None
+        return term, free(term)
+
+    def psl(self, text: str, program: Program | None, *path: str) -> Formula | None:
+        try:
+            formula = parse_psl(text)
+        except Malformed as error:
+            span = self.job.method.options.at(*path)
+            shown = f"{text[: error.offset]}▸{text[error.offset :]}" if len(text) <= 200 else text[error.offset :][:40]
+            hint = f"at the mark: {shown}" if error.offset else None
+            self.faults.append(Diagnostic("AJPF124", f"{path[-1]}: {error.reason}", span, hint=hint))
+            return None
+        for atom in atoms(formula):
+            if program is not None and atom.modality is not Modality.PERCEPT and atom.agent != program.name:
+                message = f"there is no agent '{atom.agent}'; the program's is '{program.name}'"
+                self.fault("AJPF121", message, *path)
+                return None
+        return formula
+
+    def extras(self, program: Program | None, instances: Mapping[str, tuple[int, ...]]) -> tuple[Extra, ...]:
+        found = []
+        for name, entry in self.options.get("properties", {}).items():
+            text = entry if isinstance(entry, str) else entry["psl"]
+            formula = self.psl(text, program, "properties", name)
+            if formula is None:
+                continue
+            guarantee = None if isinstance(entry, str) else entry.get("guarantee")
+            if guarantee is not None and guarantee not in [c.name for c in self.job.node.guarantees]:
+                message = f"properties.{name}: there is no guarantee '{guarantee}'"
+                self.fault("AJPF125", message, "properties", name, "guarantee")
+                continue
+            indices = tuple(sorted(index_names(formula) & set(instances)))
+            try:
+                for choice in product(*(instances[i] for i in indices)):
+                    instantiate(formula, dict(zip(indices, choice, strict=True)))
+            except Malformed as error:
+                self.fault("AJPF124", f"properties.{name}: {error.reason}", "properties", name)
+                continue
+            because = "" if isinstance(entry, str) else entry.get("because", "")
+            span = self.job.method.options.at("properties", name)
+            found.append(Extra(name, formula, guarantee, because, indices, span))
+        return tuple(found)
+
+
+def _sort(name: str) -> Sort:
+    from avow.language import sorts
+
+    found: Sort = getattr(sorts, name)
+    return found
+
+
+def is_index(sort: Sort) -> bool:
+    return isinstance(sort, IntegerSort | NaturalSort)

@@ -1,0 +1,240 @@
+"""A normal form of formulas for matching against a plan's table: what differs in writing only must look the same.
+
+Negation normal form over ``== < <= in`` and applications; ``f(x) == TRUE`` is ``f(x)``; ``t != s`` and ``!in`` are
+negations; quantifiers stand as far inside as they can: ``exists(x | P or Q)`` is two, and what does not mention x stands
+outside. (All sorts are non-empty, so that is sound.) Meaning is kept exactly.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from avow.language.sorts import BOOL, INTEGER, NATURAL, IntegerSort, NaturalSort, RealSort
+from avow.language.terms import (
+    FALSE,
+    TRUE,
+    And,
+    Arithmetic,
+    Compare,
+    Iff,
+    Implies,
+    In,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    Role,
+    SetTerm,
+    Term,
+    Variable,
+    Widen,
+    children,
+)
+from avow.logic.traversal import depth, rebuild
+
+MAX_DEPTH = 120
+MAX_ITEMS = 256
+"""More disjuncts (or conjuncts) than this under one quantifier are not multiplied out."""
+
+
+class TooComplex(Exception):  # noqa: N818 - it names what happened
+    """The formula is nested too deeply, or multiplies out to too much."""
+
+
+def shape(term: Term) -> Term:
+    """The normal form of a formula. Raises TooComplex."""
+    if depth(term) > MAX_DEPTH:
+        raise TooComplex
+    return _formula(term, True)
+
+
+def conjuncts(term: Term) -> tuple[Term, ...]:
+    return term.items if isinstance(term, And) else (() if term == TRUE else (term,))
+
+
+def disjuncts(term: Term) -> tuple[Term, ...]:
+    return term.items if isinstance(term, Or) else (() if term == FALSE else (term,))
+
+
+def conjunction(items: list[Term]) -> Term:
+    return _junction(items, And, TRUE, FALSE)
+
+
+def disjunction(items: list[Term]) -> Term:
+    return _junction(items, Or, FALSE, TRUE)
+
+
+def _junction(items: list[Term], kind: type[And] | type[Or], unit: Term, zero: Term) -> Term:
+    flat: dict[Term, None] = {}
+    for item in items:
+        for piece in item.items if isinstance(item, And | Or) and type(item) is kind else (item,):
+            if piece == zero:
+                return zero
+            if piece != unit:
+                flat[piece] = None
+    if not flat:
+        return unit
+    return kind(tuple(flat)) if len(flat) > 1 else next(iter(flat))
+
+
+def _formula(term: Term, positive: bool) -> Term:
+    match term:
+        case Not(body=body):
+            return _formula(body, not positive)
+        case And(items=items):
+            made = [_formula(i, positive) for i in items]
+            return conjunction(made) if positive else disjunction(made)
+        case Or(items=items):
+            made = [_formula(i, positive) for i in items]
+            return disjunction(made) if positive else conjunction(made)
+        case Implies(left=left, right=right):
+            made = [_formula(left, not positive), _formula(right, positive)]
+            return disjunction(made) if positive else conjunction(made)
+        case Iff(left=left, right=right):
+            return _equivalence(left, right, positive)
+        case Quantified(quantifier=quantifier, variables=variables, body=body):
+            if quantifier is Quantifier.UNIQUE:
+                inner = Quantified(quantifier, variables, _formula(body, True), term.span)
+                return inner if positive else Not(inner)
+            exists = (quantifier is Quantifier.EXISTS) is positive
+            return _quantified(exists, variables, _formula(body, positive))
+        case Literal(value=value) if term.sort == BOOL:
+            return TRUE if value is positive else FALSE
+        case Compare():
+            return _comparison(term, positive)
+        case In(item=item, collection=collection):
+            if isinstance(collection, SetTerm):
+                members = tuple(sorted({_value(m) for m in collection.items}, key=repr))
+                collection = SetTerm(members, collection.sort)
+            else:
+                collection = _value(collection)
+            made_in = In(_value(item), collection, term.span)
+            return made_in if positive else Not(made_in)
+        case _:
+            value_term = _value(term)
+            return value_term if positive else Not(value_term)
+
+
+def _equivalence(left: Term, right: Term, positive: bool) -> Term:
+    one = disjunction([_formula(left, False), _formula(right, positive)])
+    other = disjunction([_formula(left, True), _formula(right, not positive)])
+    return conjunction([one, other])
+
+
+def _comparison(term: Compare, positive: bool) -> Term:
+    operator, left, right = term.operator, term.left, term.right
+    if left.sort == BOOL and operator in ("==", "!="):
+        return _equivalence(left, right, positive is (operator == "=="))
+    if operator in (">", ">="):
+        operator, left, right = {">": "<", ">=": "<="}[operator], right, left
+    if operator == "!=":
+        operator, positive = "==", not positive
+    if not positive and operator in ("<", "<="):
+        operator, left, right, positive = {"<": "<=", "<=": "<"}[operator], right, left, True
+    made_left, made_right = _value(left), _value(right)
+    if isinstance(made_left, Literal) and isinstance(made_right, Literal):
+        a, b = made_left.value, made_right.value
+        holds = a == b if operator == "==" else (a < b if operator == "<" else a <= b)  # type: ignore[operator]
+        return TRUE if holds is positive else FALSE
+    made = Compare(operator, made_left, made_right, term.span)
+    return made if positive else Not(made)
+
+
+def _value(term: Term) -> Term:
+    """A term of another sort than BOOL, or an atom: literals folded, the formulas within it normalised."""
+    if isinstance(term, Literal):
+        if isinstance(term.sort, IntegerSort | NaturalSort) and isinstance(term.value, int):
+            return _integer(term.value)
+        return Literal(Fraction(term.value), term.sort) if isinstance(term.sort, RealSort) else term  # type: ignore[arg-type]
+    parts = tuple(_formula(p, True) if p.sort == BOOL and children(p) else _value(p) for p in children(term))
+    made = rebuild(term, parts)
+    match made:
+        case Widen(term=Literal(value=value)) if not isinstance(value, str):
+            return Literal(Fraction(value), made.sort)
+        case Negative(term=Literal(value=value)) if not isinstance(value, str):
+            return _integer(-value) if isinstance(value, int) else Literal(-value, made.sort)
+        case Arithmetic(operator=operator, left=Literal(value=a), right=Literal(value=b)):
+            if isinstance(a, int) and isinstance(b, int) and operator in ("+", "-", "*"):
+                return _integer(a + b if operator == "+" else a - b if operator == "-" else a * b)
+    return made
+
+
+def _integer(value: int) -> Literal:
+    return Literal(value, NATURAL if value >= 0 else INTEGER)
+
+
+def free(term: Term) -> frozenset[str]:
+    """The names of the bound-role variables that are free in it."""
+    found: set[str] = set()
+
+    def walk(part: Term, inner: frozenset[str]) -> None:
+        if isinstance(part, Variable):
+            if part.role is Role.BOUND and part.name not in inner:
+                found.add(part.name)
+            return
+        if isinstance(part, Quantified):
+            inner = inner | {v.name for v in part.variables}
+        for child in children(part):
+            walk(child, inner)
+
+    walk(term, frozenset())
+    return frozenset(found)
+
+
+def _quantified(exists: bool, variables: tuple[Variable, ...], body: Term) -> Term:
+    """``exists`` distributes over ``or`` and stands outside only of what it binds (``forall`` the other way round)."""
+    outer = disjuncts if exists else conjuncts
+    join_outer = disjunction if exists else conjunction
+    blocks = []
+    for block in outer(_multiplied(exists, variables, body)):
+        blocks.append(_scoped(exists, variables, block))
+    return join_outer(blocks)
+
+
+def _multiplied(exists: bool, variables: tuple[Variable, ...], body: Term) -> Term:
+    """Disjunctive form (for ``exists``) of what mentions the variables."""
+    names = {v.name for v in variables}
+    inner = conjuncts if exists else disjuncts
+    outer = disjuncts if exists else conjuncts
+    join_inner = conjunction if exists else disjunction
+    join_outer = disjunction if exists else conjunction
+    kind = Or if exists else And
+    if isinstance(body, kind):
+        return join_outer([_multiplied(exists, variables, part) for part in body.items])
+    rows: list[list[Term]] = [[]]
+    for item in inner(body):
+        choices = outer(item) if isinstance(item, kind) and names & free(item) else (item,)
+        rows = [[*row, choice] for row in rows for choice in choices]
+        if len(rows) > MAX_ITEMS:
+            raise TooComplex
+    if len(rows) == 1:
+        return body
+    return join_outer([_multiplied(exists, variables, join_inner(row)) for row in rows])
+
+
+def _scoped(exists: bool, variables: tuple[Variable, ...], block: Term) -> Term:
+    """Conjuncts (for ``exists``) that share no variable are parted."""
+    inner = conjuncts if exists else disjuncts
+    join = conjunction if exists else disjunction
+    names = {v.name for v in variables}
+    groups: list[tuple[set[str], list[Term]]] = []
+    outside: list[Term] = []
+    for item in inner(block):
+        mentioned = set(free(item)) & names
+        if not mentioned:
+            outside.append(item)
+            continue
+        joined = [item]
+        for group in [g for g in groups if g[0] & mentioned]:
+            mentioned |= group[0]
+            joined = group[1] + joined
+            groups.remove(group)
+        groups.append((mentioned, joined))
+    quantifier = Quantifier.EXISTS if exists else Quantifier.FORALL
+    made = [
+        Quantified(quantifier, tuple(v for v in variables if v.name in mentioned), join(items), items[0].span)
+        for mentioned, items in groups
+    ]
+    return join([*outside, *made]) if inner(block) else block
