@@ -1,0 +1,427 @@
+"""Is a contract worth verifying? The sanity claims of a node (`avow.logic.claims`), settled by the solver.
+
+`proved` is always good and `refuted` always bad (see the table in `avow.logic.claims`). A refutation carries a replayed
+counterexample in the contract's words, or the smallest conflicting sets of clauses, or both. What the solver cannot
+decide stays `unknown`; with a scenario (concrete values of some inputs), a claim about all inputs that stays unknown is
+tried for these values, and if it holds there it is `checked`, and says that it is bounded.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+
+from avow.diagnostics import Severity, Span
+from avow.language.contract import ClauseKind, Contract, Node
+from avow.language.terms import Compare, Not, Role, Term, Variable
+from avow.logic.claims import Claim, Property, claims, node_key, triggers
+from avow.logic.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.logic.values import Value
+from avow.verdict import Counterexample, Outcome, Verdict
+
+__all__ = ["Bounds", "Claim", "Property", "SanityResult", "analyse", "claims", "node_key", "outcomes"]
+
+Given = Mapping[Variable, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Limits on the whole analysis of a node: milliseconds for one question, and the solver's seed."""
+
+    milliseconds: int = 5_000
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class SanityResult:
+    """What became of one claim. `subject` is the clause or output that the claim is about, if it is about one."""
+
+    node: str
+    about: Property
+    subject: str | None
+    name: str
+    """``realizable``, ``vacuous-G1``."""
+    claim: str
+    verdict: Verdict
+    severity: Severity
+    clauses: tuple[str, ...] = ()
+    """The clauses that a refutation or a proof rests on (of a conflict: the first one's), without the node's name."""
+    counterexample: Counterexample | None = None
+    explanation: str = ""
+    conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
+    """Every conflict found: a minimal set of clauses that cannot all be met, with an input and what each demands."""
+    because: str | None = None
+    """The name of the result of which this one is a mere consequence."""
+    engine: str = "z3"
+    bounded: bool = False
+    """The answer is about the scenario only."""
+    seconds: float = 0.0
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def fails(self) -> bool:
+        """Whether it is reason enough to call the contract bad."""
+        return self.verdict is Verdict.REFUTED and self.severity is Severity.ERROR
+
+
+@dataclass(frozen=True, slots=True)
+class _Finding:
+    verdict: Verdict
+    explanation: str = ""
+    clauses: tuple[str, ...] = ()
+    counterexample: Counterexample | None = None
+    conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
+    because: str | None = None
+    engine: str = "z3"
+    bounded: bool = False
+
+
+def analyse(
+    node: Node,
+    contract: Contract | None = None,
+    *,
+    scenario: Given | None = None,
+    bounds: Bounds | None = None,
+    wanted: Collection[str] | None = None,
+) -> tuple[SanityResult, ...]:
+    """Settle a node's claims, in their order; with `wanted`, only the claims of these names.
+
+    `contract` is not consulted (formulas are whole); it is accepted so that callers need not know that.
+    """
+    analysis = _Analysis(node, scenario or {}, bounds or Bounds())
+    results = []
+    for claim in claims(node):
+        if wanted is not None and claim.name not in wanted:
+            continue
+        start = time.monotonic()
+        finding = analysis.settle(claim)
+        results.append(_result(node, claim, finding, time.monotonic() - start))
+    return tuple(results)
+
+
+def outcomes(
+    node: Node, obligations: Mapping[str, str], *, scenario: Given | None = None, bounds: Bounds | None = None
+) -> tuple[Outcome, ...]:
+    """For the pipeline: one outcome for each obligation id, given its claim's name (an unknown name is an error)."""
+    results = {r.name: r for r in analyse(node, scenario=scenario, bounds=bounds, wanted=set(obligations.values()))}
+    found = []
+    for identity, name in obligations.items():
+        result = results.get(name)
+        if result is None:
+            found.append(Outcome(identity, Verdict.ERROR, f"{node.name} has no sanity claim named {name}"))
+            continue
+        details: dict[str, object] = {"severity": str(result.severity), "clauses": list(result.clauses)}
+        if result.because:
+            details["because"] = result.because
+        if result.conflicts:
+            details["conflicts"] = [{"clauses": list(c), "counterexample": e.text()} for c, e in result.conflicts]
+        bound: dict[str, object] = {"scenario": True} if result.bounded else {}
+        found.append(
+            Outcome(
+                identity,
+                result.verdict,
+                result.explanation or _SUMMARY[result.verdict],
+                result.counterexample,
+                bound=bound,
+                details=details,
+            )
+        )
+    return tuple(found)
+
+
+_SUMMARY = {
+    Verdict.PROVED: "proved for all inputs",
+    Verdict.CHECKED: "holds within the scenario",
+    Verdict.REFUTED: "does not hold",
+    Verdict.UNKNOWN: "the solver could not decide it",
+}
+
+
+def _result(node: Node, claim: Claim, finding: _Finding, seconds: float) -> SanityResult:
+    return SanityResult(
+        node.name,
+        claim.about,
+        claim.subject,
+        claim.name,
+        claim.sentence,
+        finding.verdict,
+        claim.severity,
+        finding.clauses,
+        finding.counterexample,
+        finding.explanation,
+        finding.conflicts,
+        finding.because,
+        finding.engine,
+        finding.bounded,
+        seconds,
+        claim.span,
+    )
+
+
+class _Analysis:
+    """One node under analysis. Each claim is settled once, others ask for it."""
+
+    def __init__(self, node: Node, scenario: Given, bounds: Bounds) -> None:
+        self.node = node
+        self.scenario = scenario
+        self.bounds = bounds
+        self.inputs = tuple(port.variable for port in node.inputs)
+        self.outputs = tuple(port.variable for port in node.outputs)
+        self.assumptions = {c.name: c.formula for c in node.assumptions}
+        self.guarantees = {c.name: c.formula for c in node.guarantees}
+        self.known: dict[str, _Finding] = {}
+        self.claims = {claim.name: claim for claim in claims(node)}
+        self.needed: tuple[str, ...] = ()
+
+    def settle(self, claim: Claim) -> _Finding:
+        if claim.name not in self.known:
+            self.known[claim.name] = self._settle(claim)
+        return self.known[claim.name]
+
+    def _settle(self, claim: Claim) -> _Finding:
+        subject = claim.subject or ""
+        methods: dict[Property, Callable[[str], _Finding]] = {
+            Property.ASSUMPTIONS_SATISFIABLE: lambda _: self._satisfiable(),
+            Property.CONSISTENT: lambda _: self._consistent(),
+            Property.REALIZABLE: lambda _: self._realizable(),
+            Property.TAUTOLOGY: self._tautology,
+            Property.VACUOUS: self._vacuous,
+            Property.REDUNDANT: self._redundant,
+            Property.UNCONSTRAINED: self._unconstrained,
+            Property.UNDETERMINED: self._undetermined,
+            Property.UNNEEDED: self._unneeded,
+        }
+        return methods[claim.about](subject)
+
+    def _other(self, name: str) -> _Finding:
+        return self.settle(self.claims[name])
+
+    # -- the whole contract --------------------------------------------------------------------------------------------
+
+    def _satisfiable(self) -> _Finding:
+        return self._possible(self.assumptions, "no input meets {} together", "no input meets {}")
+
+    def _consistent(self) -> _Finding:
+        finding = self._possible(
+            {**self.assumptions, **self.guarantees},
+            "no inputs and outputs meet {} together",
+            "no inputs and outputs meet {}",
+        )
+        if finding.verdict is Verdict.REFUTED and self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
+            return replace(finding, because="assumptions-satisfiable")
+        return finding
+
+    def _realizable(self) -> _Finding:
+        from avow.logic.conflicts import conflicts
+        from avow.logic.realizability import Realizability, groups, realizable
+
+        def ask(given: Given) -> Realizability:
+            limit = 2 * self.bounds.milliseconds
+            return realizable(
+                self.inputs,
+                self.outputs,
+                self.assumptions,
+                self.guarantees,
+                given=given,
+                timeout_ms=limit,
+                seed=self.bounds.seed,
+            )
+
+        answer, bounded = ask({}), False
+        if answer.verdict is Verdict.UNKNOWN and self.scenario:
+            within = ask(self.scenario)
+            if within.verdict is not Verdict.UNKNOWN:
+                answer, bounded = within, within.verdict is Verdict.PROVED
+        if answer.verdict is Verdict.PROVED:
+            self.needed = answer.needed
+            if self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
+                return _Finding(Verdict.PROVED, "vacuously: no input is allowed", because="assumptions-satisfiable")
+            verdict = Verdict.CHECKED if bounded else Verdict.PROVED
+            return _Finding(verdict, _resting(answer.needed), answer.needed, engine=answer.engine, bounded=bounded)
+        if answer.verdict is not Verdict.REFUTED:
+            return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+        group = next(g for g in groups(self.guarantees, self.outputs) if tuple(g.guarantees) == answer.group)
+        found = conflicts(
+            self.inputs,
+            group,
+            self.assumptions,
+            answer.inputs,
+            timeout_ms=self.bounds.milliseconds,
+            seed=self.bounds.seed,
+        )
+        listed = tuple((conflict.clauses, conflict.counterexample()) for conflict in found)
+        if not listed:
+            from avow.logic.counterexample import show_values
+
+            shown = Counterexample(show_values(answer.inputs), "no output meets the guarantees here")
+            return _Finding(Verdict.REFUTED, shown.explanation, answer.group, shown, engine=answer.engine)
+        # A conflict between guarantees tells more than one guarantee that cannot be met by itself.
+        clauses, shown = next((pair for pair in listed if len(pair[0]) > 1), listed[0])
+        because = "consistent" if self._other("consistent").verdict is Verdict.REFUTED else None
+        text = f"for some inputs no output meets {_listing(clauses)}"
+        return _Finding(Verdict.REFUTED, text, clauses, shown, listed, because, answer.engine)
+
+    # -- one clause ----------------------------------------------------------------------------------------------------
+
+    def _tautology(self, name: str) -> _Finding:
+        clause = self.node.clause(name)
+        if clause.kind is ClauseKind.ASSUMPTION:
+            return self._fails_somewhere({}, clause.formula, "every input meets it: it assumes nothing", "")
+        return self._fails_somewhere(
+            self.assumptions,
+            clause.formula,
+            "it holds of all inputs and outputs: it demands nothing",
+            "it follows from {}: it demands nothing of any output",
+        )
+
+    def _vacuous(self, name: str) -> _Finding:
+        impossible = []
+        undecided: _Finding | None = None
+        for number, trigger in enumerate(triggers(self.guarantees[name]), start=1):
+            finding = self._possible(
+                {**self.assumptions, "its trigger": trigger}, "{} cannot hold together", "{} cannot hold"
+            )
+            if finding.verdict is Verdict.REFUTED:
+                impossible.append((number, finding))
+            elif finding.verdict is not Verdict.PROVED:
+                undecided = finding
+        if impossible:
+            first = impossible[0][1]
+            empty = self._other("assumptions-satisfiable").verdict is Verdict.REFUTED
+            because = "assumptions-satisfiable" if empty else self._if_refuted(f"tautology-{name}")
+            clauses = tuple(c for c in first.clauses if c in self.assumptions)
+            text = "what it demands is never demanded: its condition cannot come about"
+            return _Finding(
+                Verdict.REFUTED, text + _given(clauses), (name, *clauses), because=because, engine=first.engine
+            )
+        return undecided or _Finding(Verdict.PROVED)
+
+    def _redundant(self, name: str) -> _Finding:
+        kind = self.node.clause(name).kind
+        others = self.assumptions if kind is ClauseKind.ASSUMPTION else {**self.assumptions, **self.guarantees}
+        others = {other: formula for other, formula in others.items() if other != name}
+        formula = self.node.clause(name).formula
+        finding = self._fails_somewhere(others, formula, "it is true by itself", "it follows from {}")
+        if finding.verdict is not Verdict.REFUTED:
+            return finding
+        whole = "assumptions-satisfiable" if kind is ClauseKind.ASSUMPTION else "consistent"
+        return replace(finding, because=self._if_refuted(whole) or self._if_refuted(f"tautology-{name}"))
+
+    def _unneeded(self, name: str) -> _Finding:
+        from avow.logic.realizability import realizable
+
+        if self._other("realizable").verdict is not Verdict.PROVED:
+            return _Finding(Verdict.UNKNOWN, "only a realizable contract shows what it needs")
+        unused = "every guarantee can be met without it"
+        if name not in self.needed:
+            return _Finding(Verdict.REFUTED, unused, (name,), because=self._if_refuted(f"tautology-{name}"))
+        rest = {other: formula for other, formula in self.assumptions.items() if other != name}
+        answer = realizable(
+            self.inputs,
+            self.outputs,
+            rest,
+            self.guarantees,
+            timeout_ms=self.bounds.milliseconds // 2,
+            seed=self.bounds.seed,
+        )
+        if answer.verdict is Verdict.REFUTED:
+            return _Finding(Verdict.PROVED, engine=answer.engine)
+        if answer.verdict is Verdict.PROVED:
+            return _Finding(Verdict.REFUTED, unused, (name,), engine=answer.engine)
+        return _Finding(Verdict.UNKNOWN, answer.reason)
+
+    # -- one output ----------------------------------------------------------------------------------------------------
+
+    def _unconstrained(self, name: str) -> _Finding:
+        output = self.node.output(name).variable
+        everything = conjunction(self.guarantees.values())
+        if output not in free_variables(everything):
+            return _Finding(Verdict.REFUTED, f"no guarantee mentions out.{name}")
+        again = Variable(Role.OUTPUT, f"{name} (another)", output.sort)
+        changed = [substitute(f, {output: again}) for f in self.guarantees.values() if output in free_variables(f)]
+        finding = self._possible(
+            {**self.assumptions, **self.guarantees, "another value": disjunction(map(negation, changed))}, "", ""
+        )
+        if finding.verdict is not Verdict.REFUTED:
+            return finding
+        text = f"wherever the guarantees hold, they hold for every other value of out.{name} too"
+        blamed = [f"tautology-{g}" for g, f in self.guarantees.items() if output in free_variables(f)]
+        because = self._if_refuted("consistent") or next((b for b in blamed if self._if_refuted(b)), None)
+        return replace(finding, explanation=text, clauses=(), because=because)
+
+    def _undetermined(self, name: str) -> _Finding:
+        from avow.logic.counterexample import show_values
+        from avow.logic.smt import solve
+
+        output = self.node.output(name).variable
+        again = {v: Variable(Role.OUTPUT, f"{v.name} (another)", v.sort) for v in self.outputs}
+        group = [f for f in self.guarantees.values() if output in free_variables(f)]
+        question = {
+            **self.assumptions,
+            **self.guarantees,
+            **{f"{label} again": substitute(f, again) for label, f in self.guarantees.items() if f in group},
+            "different": Not(Compare("==", output, again[output])),
+        }
+        # Outputs that share no guarantee with this one stay the same in both.
+        same = {again[v]: v for v in self.outputs if not any(v in free_variables(f) for f in group) and v != output}
+        question = {label: substitute(f, same) for label, f in question.items()}
+        for given in self._attempts():
+            answer = solve(question, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed, given=given)
+            if answer.status == "unsat" and not given:
+                return _Finding(Verdict.PROVED, engine=answer.engine, because=self._if_refuted("consistent"))
+            if answer.status == "sat":
+                values = {v: value for v, value in {**answer.values, **given}.items() if v.role is not Role.BOUND}
+                text = f"the guarantees allow both values of out.{name}"
+                shown = Counterexample(show_values(values), text)
+                because = self._if_refuted(f"unconstrained-{name}")
+                return _Finding(Verdict.REFUTED, text, counterexample=shown, because=because, engine=answer.engine)
+        return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+
+    # -- asking --------------------------------------------------------------------------------------------------------
+
+    def _attempts(self) -> tuple[Given, ...]:
+        """Without the scenario first: an answer without it is worth more."""
+        return ({}, self.scenario) if self.scenario else ({},)
+
+    def _if_refuted(self, name: str) -> str | None:
+        return name if name in self.claims and self._other(name).verdict is Verdict.REFUTED else None
+
+    def _possible(self, formulas: Mapping[str, Term], several: str, one: str) -> _Finding:
+        """Can they hold together? If not, the texts say so of the smallest set that cannot."""
+        from avow.logic.smt import solve
+
+        answer = solve(formulas, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed)
+        if answer.status == "unknown" and self.scenario:
+            within = solve(formulas, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed, given=self.scenario)
+            # An example in the scenario is an example; that there is none in it proves nothing.
+            answer = within if within.status == "sat" else answer
+        match answer.status:
+            case "sat":
+                return _Finding(Verdict.PROVED, engine=answer.engine)
+            case "unsat":
+                text = several if len(answer.core) > 1 else one
+                return _Finding(Verdict.REFUTED, text.format(_listing(answer.core)), answer.core, engine=answer.engine)
+            case _:
+                return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+
+    def _fails_somewhere(self, hypotheses: Mapping[str, Term], formula: Term, alone: str, implied: str) -> _Finding:
+        """Is there a case where the hypotheses hold and the formula does not? If not, the texts say so."""
+        finding = self._possible({**hypotheses, "": negation(formula)}, "", "")
+        if finding.verdict is not Verdict.REFUTED:
+            return finding
+        needed = tuple(label for label in finding.clauses if label)
+        text = implied.format(_listing(needed)) if needed else alone
+        return replace(finding, explanation=text, clauses=needed)
+
+
+def _listing(labels: tuple[str, ...]) -> str:
+    return labels[0] if len(labels) == 1 else f"{', '.join(labels[:-1])} and {labels[-1]}" if labels else "nothing"
+
+
+def _resting(needed: tuple[str, ...]) -> str:
+    return f"given {_listing(needed)}" if needed else ""
+
+
+def _given(clauses: tuple[str, ...]) -> str:
+    return f" (given {_listing(clauses)})" if clauses else ""
