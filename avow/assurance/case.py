@@ -14,7 +14,7 @@ The pipeline calls, once a system:
         derivations=(Derivation(...), …),  # what the calculus derived (view dataclass in avow.assurance.model)
         methods=(MethodInfo(...), …),      # the backends known: for suggestions and for "what green means"
         tools=(ToolInfo(...), …),
-        discrepancies=audit(ledger.records(), ledger.damage, root, system=…, obligations=…, keys=…),
+        discrepancies=audit(ledger, root, system=…, obligations={o.id: o.digest …}, keys=keys),
                                            # avow.evidence.audit; None: not audited (then never CERTIFIED)
         digests={"contracts/x/plan.yaml": sha256, …},
         ledger_head=ledger.head,
@@ -288,7 +288,8 @@ def _answer(
         rest = f", on {hypotheses} hypothes{'is' if hypotheses == 1 else 'es'}" if hypotheses else ""
         return f"{how}{rest}; the weakest link is {short(name)}, {status}."
     if standing.direct and standing.status is not Status.MISSING:
-        return f"{standing.status.value.capitalize()}: see {', '.join(short(n) for n in standing.below) or 'its evidence'}."
+        where = ", ".join(short(name) for name in standing.below) or "its evidence"
+        return f"{standing.status.value.capitalize()}: see {where}."
     if standing.below:
         causes = [f"{short(name)} is {statuses.get(name, 'not shown')}" for name in standing.below]
         more = f" and {len(causes) - 3} more" if len(causes) > 3 else ""

@@ -62,9 +62,14 @@ def evidence_schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "https://avow.invalid/schemas/evidence-1",
         "title": "A line of Avow's evidence ledger",
-        "description": "hash is the SHA-256 of the line's canonical JSON without its hash; prev is the hash of the line before.",
+        "description": "hash is the SHA-256 of the line's canonical JSON without hash; prev is the hash of the line before.",
         "type": "object",
-        "properties": {"evidence": {"$ref": "#/$defs/Evidence"}, "hash": mark, "n": {"type": "integer", "minimum": 0}, "prev": mark},
+        "properties": {
+            "evidence": {"$ref": "#/$defs/Evidence"},
+            "hash": mark,
+            "n": {"type": "integer", "minimum": 0},
+            "prev": mark,
+        },
         "required": ["evidence", "hash", "n", "prev"],
         "additionalProperties": False,
         "$defs": dict(sorted(definitions.items())),
@@ -117,7 +122,9 @@ def _decode_tuple(arguments: tuple[Any, ...], data: Any, where: str) -> tuple[An
         return tuple(_decode(arguments[0], item, f"{where}[{at}]") for at, item in enumerate(data))
     if len(data) != len(arguments):
         raise Unreadable(f"{where}: {len(arguments)} items are wanted")
-    return tuple(_decode(kind, item, f"{where}[{at}]") for at, (kind, item) in enumerate(zip(arguments, data, strict=True)))
+    return tuple(
+        _decode(kind, item, f"{where}[{at}]") for at, (kind, item) in enumerate(zip(arguments, data, strict=True))
+    )
 
 
 def _decode_plain(kind: Any, data: Any, where: str) -> Any:

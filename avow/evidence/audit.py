@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from avow.evidence.ledger import Damage, Entry
+from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.status import effective
 from avow.files import digest_file
 from avow.verdict import Verdict
@@ -49,8 +49,7 @@ class Discrepancy:
 
 
 def audit(
-    records: Iterable[Entry],
-    damage: Iterable[Damage],
+    ledger: Ledger,
     root: Path,
     *,
     system: str | None = None,
@@ -59,8 +58,8 @@ def audit(
 ) -> tuple[Discrepancy, ...]:
     """Every discrepancy, the ledger's own first. `root` is the workspace; `obligations` maps ids to digests as computed
     now, and `keys` (obligation id, method) to the key as of now, where the caller knows them."""
-    entries = tuple(records)
-    found = [Discrepancy(Fault.LEDGER, f"line {d.line}", f"ledger line {d.line} {d.reason}") for d in damage]
+    entries = ledger.records()
+    found = [Discrepancy(Fault.LEDGER, f"line {d.line}", f"ledger line {d.line} {d.reason}") for d in ledger.damage]
     found += _misplaced(entries, system, obligations or {}, keys or {})
     found += _impossible(entries)
     found += _files(entries, root, keys)

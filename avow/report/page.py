@@ -1,0 +1,184 @@
+"""The HTML report: one file, no network, readable without a script, printable."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from avow.assurance.argument import Argument, Element, build_argument
+from avow.assurance.model import Case, ObligationView
+from avow.assurance.naming import short
+from avow.assurance.policy import techniques
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status, weigh
+from avow.report import picture, wording
+
+KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.WELL_FORMED)
+_OPEN_AT_ONCE = 60
+"""So many rows of a long list are shown at once; the rest is folded."""
+
+
+@cache
+def environment() -> Environment:
+    """Strict: a name that a template does not get is an error; every text is escaped."""
+    found = Environment(
+        loader=PackageLoader("avow.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    found.globals |= {
+        "MARKS": wording.MARKS,
+        "MEANINGS": wording.MEANINGS,
+        "Status": Status,
+        "anchor": wording.anchor,
+        "bound_text": wording.bound_text,
+        "count": wording.count,
+        "mutation": wording.mutation,
+        "outline": wording.outline,
+        "rerun": wording.rerun,
+        "short": short,
+        "tone": wording.tone,
+        "tool_command": wording.tool_command,
+        "weigh": weigh,
+    }
+    return found
+
+
+def render_page(case: Case) -> str:
+    """The whole page. Deterministic: same case, same bytes."""
+    argument = build_argument(case)
+    views = sorted(case.obligations, key=_reading_order(case))
+    return (
+        environment()
+        .get_template("report.html.j2")
+        .render(
+            case=case,
+            line=wording.verdict_line(case),
+            style=Markup(_asset("style.css")),  # our own files, in the package
+            script=Markup(_asset("script.js")),
+            arrows=Markup(picture.ARROWS),
+            views=views,
+            known={view.id for view in case.obligations},
+            counts=_counts(case.obligations),
+            matrix=_matrix(case),
+            pictures=_pictures(case, argument),
+            outline_of=_outlines(argument),
+            graph=_graph(case),
+            failed=[gate for gate in case.gates if not gate.passed],
+            open_items=[item for item in case.open_items if not item.advice],
+            advice=[item for item in case.open_items if item.advice],
+            single=[view for view in case.obligations if view.id in set(case.single_method)],
+            justified=_justified(case),
+            nodes=list(dict.fromkeys(view.obligation.node for view in views)),
+            used_methods=_used_methods(case),
+            statuses=[s for s in Status if any(view.standing is s for view in views)],
+            levels=techniques() if case.policy.name.startswith("sil") else (),
+            kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in views)],
+            open_at_once=_OPEN_AT_ONCE,
+            has_claim=lambda claim: claim in {v.id for v in case.obligations},
+        )
+    )
+
+
+@cache
+def _asset(name: str) -> str:
+    return resources.files("avow.report").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+def _reading_order(case: Case) -> Any:
+    nodes = {node.name: at for at, node in enumerate(case.nodes)}
+    kinds = {kind: at for at, kind in enumerate(KINDS)}
+    order = {view.id: at for at, view in enumerate(case.obligations)}
+    return lambda view: (nodes.get(view.obligation.node, len(nodes)), kinds[view.obligation.kind], order[view.id])
+
+
+def _counts(views: Sequence[ObligationView]) -> list[tuple[Kind, list[tuple[Status, int]], int]]:
+    """GNATprove's table: for each kind of claim, how many stand where."""
+    table = []
+    for kind in KINDS:
+        of_kind = [view.status for view in views if view.obligation.kind is kind]
+        if of_kind:
+            table.append((kind, [(s, of_kind.count(s)) for s in Status if s in of_kind], len(of_kind)))
+    return table
+
+
+def _used_methods(case: Case) -> list[str]:
+    """Method ids that answer for guarantees, or should, in the plan's order."""
+    planned = [name for view in case.obligations if view.obligation.kind is Kind.GUARANTEE for name, _ in view.planned]
+    in_plan = [name for node in case.nodes for name, _ in node.methods if name in planned]
+    return list(dict.fromkeys((*in_plan, *planned)))
+
+
+def _matrix(case: Case) -> list[tuple[str, str, list[tuple[ObligationView, list[Status | None]]]]]:
+    """Node by node: each guarantee with the status that each method gives it (None: the method is not used for it)."""
+    methods = _used_methods(case)
+    rows: dict[str, list[tuple[ObligationView, list[Status | None]]]] = {}
+    for view in case.obligations:
+        if view.obligation.kind is Kind.GUARANTEE:
+            rows.setdefault(view.obligation.node, []).append((view, [_cell(view, method) for method in methods]))
+    levels = {node.name: node.criticality for node in case.nodes}
+    return [(node, levels.get(node, ""), found) for node, found in rows.items()]
+
+
+def _cell(view: ObligationView, method: str) -> Status | None:
+    from avow.evidence.status import roll_up
+
+    mine = [item for item in view.evidence if item.entry.evidence.method == method]
+    if not mine and method not in dict(view.planned):
+        return None
+    return roll_up((item.entry.evidence for item in mine if item.counts), outdated=bool(mine))
+
+
+def _pictures(case: Case, argument: Argument) -> list[tuple[str, Markup]]:
+    def link(element: Element) -> str | None:
+        return f"#{wording.anchor(element.claim)}" if element.claim else None
+
+    drawn = []
+    for requirement, start in argument.goals:
+        label = f"Argument for {requirement}, as a goal structure; the same as a list follows"
+        drawn.append((requirement, Markup(picture.draw(argument, start, link, label))))  # escaped in picture.py
+    return drawn
+
+
+def _outlines(argument: Argument) -> dict[str, list[tuple[int, Element]]]:
+    """Each requirement's argument as an indented list: (depth, element), for those who do not look at pictures."""
+    known = {element.id: element for element in argument.elements}
+    found = {}
+    for requirement, start in argument.goals:
+        rows: list[tuple[int, Element]] = []
+        seen: set[str] = set()
+        stack = [(0, start)]
+        while stack and len(rows) < 2000:
+            depth, name = stack.pop()
+            if name in seen:
+                continue
+            seen.add(name)
+            element = known[name]
+            rows.append((min(depth, 12), element))
+            stack += [(depth + 1, child) for child in reversed((*element.in_context_of, *element.supported_by))]
+        found[requirement] = rows
+    return found
+
+
+def _graph(case: Case) -> str:
+    """The dataflow picture as an image: whatever it contains, it cannot run."""
+    if not case.graph_svg:
+        return ""
+    return "data:image/svg+xml;base64," + base64.b64encode(case.graph_svg.encode("utf-8", "replace")).decode()
+
+
+def _justified(case: Case) -> list[tuple[ObligationView, Any]]:
+    return [
+        (view, item.entry.evidence)
+        for view in case.obligations
+        for item in view.counting
+        if weigh(item.entry.evidence).support is Status.JUSTIFIED
+    ]

@@ -1,0 +1,102 @@
+"use strict";
+(() => {
+  const all = (selector, root = document) => Array.from(root.querySelectorAll(selector));
+  // Dark or light: the system's choice, until a reader makes one.
+  const theme = document.getElementById("theme");
+  if (theme) {
+    theme.hidden = false;
+    theme.addEventListener("click", () => {
+      const dark = document.documentElement.dataset.theme
+        ? document.documentElement.dataset.theme === "dark"
+        : matchMedia("(prefers-color-scheme: dark)").matches;
+      document.documentElement.dataset.theme = dark ? "light" : "dark";
+    });
+  }
+  // A deep link opens what it points at.
+  const reveal = () => {
+    const name = location.hash.slice(1);
+    let place = name && document.getElementById(name);
+    if (!place) return;
+    if (place.classList.contains("off")) { all("#filter [data-by]").forEach((e) => { e.value = ""; }); sieve(); }
+    for (let up = place; up; up = up.parentElement) if (up.tagName === "DETAILS") up.open = true;
+    place.scrollIntoView({ block: "start" });
+  };
+  // The filter.
+  const form = document.getElementById("filter");
+  const rows = all("#list > .ob");
+  const texts = rows.map((row) => row.firstElementChild.textContent.toLowerCase());
+  const shown = document.getElementById("shown");
+  const sieve = () => {
+    const wanted = {};
+    all("[data-by]", form).forEach((e) => { wanted[e.dataset.by] = e.value.trim(); });
+    const words = (wanted.words || "").toLowerCase().split(/\s+/).filter(Boolean);
+    let n = 0;
+    rows.forEach((row, i) => {
+      const on = ["node", "kind", "status"].every((by) => !wanted[by] || row.dataset[by] === wanted[by])
+        && (!wanted.methods || row.dataset.methods.split(" ").includes(wanted.methods))
+        && words.every((word) => texts[i].includes(word));
+      row.classList.toggle("off", !on);
+      if (on) n += 1;
+    });
+    shown.textContent = n === rows.length ? "" : n + " of " + rows.length;
+  };
+  if (form) {
+    form.hidden = false;
+    let pending = 0;
+    form.addEventListener("input", () => { clearTimeout(pending); pending = setTimeout(sieve, 80); });
+    form.addEventListener("submit", (event) => event.preventDefault());
+    const unfold = document.getElementById("unfold");
+    unfold.addEventListener("click", () => {
+      const visible = rows.filter((row) => !row.classList.contains("off"));
+      const open = !visible.every((row) => row.open);
+      visible.forEach((row) => { row.open = open; });
+      unfold.textContent = open ? "fold all" : "unfold all";
+    });
+  }
+  // Pictures pan with the mouse and the arrow keys, and zoom with plus, minus and Ctrl and the wheel.
+  all(".pan").forEach((box) => {
+    const picture = box.querySelector("svg");
+    const width = picture.viewBox.baseVal.width, height = picture.viewBox.baseVal.height;
+    let scale = 1;
+    const zoom = (factor) => {
+      scale = Math.min(3, Math.max(0.25, scale * factor));
+      picture.setAttribute("width", width * scale);
+      picture.setAttribute("height", height * scale);
+    };
+    if (width > box.clientWidth) zoom(Math.max(0.72, (box.clientWidth - 24) / width));
+    box.addEventListener("keydown", (event) => {
+      if (event.key === "+" || event.key === "=") zoom(1.2);
+      else if (event.key === "-") zoom(1 / 1.2);
+      else if (event.key === "0") zoom(1 / scale);
+    });
+    box.addEventListener("wheel", (event) => {
+      if (!event.ctrlKey) return;
+      event.preventDefault();
+      zoom(event.deltaY < 0 ? 1.1 : 1 / 1.1);
+    }, { passive: false });
+    let from = null, moved = false;
+    box.addEventListener("pointerdown", (event) => {
+      if (event.pointerType === "mouse" && event.button === 0) from = [event.clientX + box.scrollLeft, event.clientY + box.scrollTop];
+      moved = false;
+    });
+    addEventListener("pointermove", (event) => {
+      if (!from) return;
+      const x = from[0] - event.clientX, y = from[1] - event.clientY;
+      if (Math.abs(x - box.scrollLeft) + Math.abs(y - box.scrollTop) > 3) { moved = true; box.classList.add("drag"); }
+      box.scrollLeft = x;
+      box.scrollTop = y;
+    });
+    addEventListener("pointerup", () => { from = null; box.classList.remove("drag"); });
+    box.addEventListener("click", (event) => { if (moved) { event.preventDefault(); event.stopPropagation(); } }, true);
+    picture.addEventListener("dragstart", (event) => event.preventDefault());
+  });
+  // Paper has no folds.
+  let folded = [];
+  addEventListener("beforeprint", () => {
+    folded = all("details:not([open])");
+    if (folded.length < 3000) folded.forEach((d) => { d.open = true; });
+  });
+  addEventListener("afterprint", () => { folded.forEach((d) => { d.open = false; }); folded = []; });
+  addEventListener("hashchange", reveal);
+  reveal();
+})();

@@ -1,0 +1,161 @@
+"""Words, marks and names that all formats share, so that a claim looks and reads the same everywhere."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import quote
+
+from avow.assurance.model import Case, EvidenceView, ObligationView
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind
+from avow.evidence.record import Evidence
+from avow.evidence.status import Status
+
+MARKS = {
+    Status.PROVED: "✔",
+    Status.CHECKED: "✔",
+    Status.TESTED: "◐",
+    Status.MONITORED: "◐",
+    Status.REVIEWED: "◔",
+    Status.JUSTIFIED: "◔",
+    Status.LINKED: "↳",
+    Status.VACUOUS: "∅",
+    Status.UNKNOWN: "?",
+    Status.NOT_RUN: "–",
+    Status.ERROR: "!",
+    Status.STALE: "⟲",
+    Status.MISSING: "·",
+    Status.UNSUPPORTED: "▽",
+    Status.CIRCULAR: "↻",
+    Status.REFUTED: "✘",
+    Status.CONTRADICTORY: "⚡",
+}
+"""A mark for each status: colour is never the only sign."""
+
+MEANINGS = {
+    Status.PROVED: "for all behaviours and inputs, by a sound method",
+    Status.CHECKED: "exhaustively, within a finite scenario",
+    Status.TESTED: "on a number of cases",
+    Status.MONITORED: "on a recorded or live trace",
+    Status.REVIEWED: "by a person who said what was read and concluded",
+    Status.JUSTIFIED: "a person's dated reason, in place of evidence",
+    Status.LINKED: "a person says that what stands below it, which holds, amounts to it",
+    Status.VACUOUS: "it passed, but its trigger was never met: it supports nothing",
+    Status.UNKNOWN: "the method gave up",
+    Status.NOT_RUN: "the tool is not here",
+    Status.ERROR: "the tool failed, or its answer could not be read",
+    Status.STALE: "there was evidence, but what it was about has changed since",
+    Status.MISSING: "nobody has tried",
+    Status.UNSUPPORTED: "nothing speaks against it, but something that it rests on fails",
+    Status.CIRCULAR: "it would support itself: refused",
+    Status.REFUTED: "false: there is a counterexample",
+    Status.CONTRADICTORY: "one tool proves it, another refutes it: one of them is wrong",
+}
+
+_GOOD = frozenset({Status.PROVED, Status.CHECKED})
+_BAD = frozenset({Status.REFUTED, Status.CONTRADICTORY, Status.CIRCULAR})
+
+
+def tone(status: Status) -> str:
+    """``good``, ``fair``, ``open`` or ``bad``: the four colours."""
+    if status in _GOOD:
+        return "good"
+    if status in _BAD:
+        return "bad"
+    return "fair" if status.supports else "open"
+
+
+def anchor(claim: str) -> str:
+    """A fragment for a claim: readable, and safe in an attribute whatever the claim is called."""
+    return quote(claim, safe="/._-")
+
+
+def rerun(view: ObligationView, evidence: Evidence) -> str:
+    """The command that asks this method again, from the workspace's folder."""
+    o = view.obligation
+    match o.kind:
+        case Kind.SANITY:
+            task = f"sanity:{o.system}:{o.node}"
+        case Kind.COMPOSITION | Kind.REQUIREMENT:
+            task = f"compose:{o.system}"
+        case Kind.WELL_FORMED:
+            task = f"check:{o.system}"
+        case Kind.GUARANTEE:
+            task = f"discharge:{o.system}:{o.node}:{evidence.method}"
+    return f"AVOW_FRESH=1 doit {shlex.quote(task)}"
+
+
+def tool_command(evidence: Evidence) -> str:
+    """The exact command that was run, quoted for a shell; empty where the method runs within Avow."""
+    return shlex.join(evidence.command)
+
+
+def where(view: ObligationView) -> str:
+    span = view.obligation.span
+    return f"{span.file}:{span.line}" if span else ""
+
+
+_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def clean(text: str) -> str:
+    """The text without characters that XML cannot hold (a counterexample's string may have any)."""
+    return _NO_XML.sub("\ufffd", text)
+
+
+def verdict_line(case: Case) -> str:
+    """The case in a sentence."""
+    failed = sum(not gate.passed for gate in case.gates)
+    if not failed:
+        return f"All {len(case.gates)} gates of the policy pass."
+    return f"{failed} of {len(case.gates)} gates of the policy fail{'s' if failed == 1 else ''}."
+
+
+def bound_text(bound: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} {_number(value)}" for name, value in bound.items())
+
+
+def mutation(evidence: Evidence) -> str:
+    """How sharp the tests are, where the method measured it (details: ``mutation``): ``46 of 50 mutants killed``."""
+    match evidence.details.get("mutation"):
+        case {"killed": int(killed), "mutants": int(mutants)}:
+            return f"{killed} of {mutants} mutants killed"
+        case {"score": int() | float() as score}:
+            return f"mutation score {score:.0%}"
+        case int() | float() as score if not isinstance(score, bool):
+            return f"mutation score {score:.0%}"
+        case str(text):
+            return text
+    return ""
+
+
+def outline(evidence: Evidence) -> str:
+    """A proof outline, where the method left one (details: ``outline`` or ``proof_outline``)."""
+    for key in ("outline", "proof_outline"):
+        match evidence.details.get(key):
+            case str(text):
+                return text
+            case list() as lines if all(isinstance(line, str) for line in lines):
+                return "\n".join(lines)
+    return ""
+
+
+def history(view: ObligationView) -> tuple[EvidenceView, ...]:
+    """Evidence that no longer counts, newest first."""
+    return tuple(item for item in reversed(view.evidence) if not item.counts)
+
+
+def is_system_level(node: str) -> bool:
+    return node == SYSTEM_LEVEL
+
+
+def count(number: int, one: str, many: str = "") -> str:
+    return f"{number:,} {one if number == 1 else many or one + 's'}".replace(",", " ")
+
+
+def _number(value: object) -> str:
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10_000:
+        return f"{value:,}".replace(",", " ")
+    return str(value)
