@@ -13,7 +13,8 @@ from avow.language.checker import Checker
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
 from avow.language.environment import of_contract
-from avow.language.lexer import tokens
+from avow.language.lexer import Token, tokens
+from avow.language.lints import LintedFile, lint
 from avow.language.nodes import check_node, check_ports
 from avow.language.outline import FileSyntax, read
 from avow.language.parser import parse
@@ -110,11 +111,17 @@ def check_sources(
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
     """As `check_paths`, of texts already read. `partial`: other files are missing, so names may be declared there."""
     parsed: list[tuple[FileSyntax, Reports]] = []
+    linted: list[LintedFile] = []
     declarations = Declarations()
     for source in sources:
         reports = Reports(source)
-        syntax = read(tokens(reports), reports)
+        comments: list[Token] = []
+        found = tokens(reports, comments)
+        torn = any(d.code == "RCL103" for d in reports.found)
+        syntax = read(found, Reports(source) if torn else reports)  # half a file: what is missing says nothing
         parsed.append((syntax, reports))
+        first = found[0].start if found else len(source.text)
+        linted.append(LintedFile(syntax, tuple(comments), first, reports))
         declarations.environment.broken.update(syntax.broken)
     for syntax, reports in parsed:
         declarations.add(syntax.declarations, reports)
@@ -122,6 +129,8 @@ def check_sources(
         declarations.environment.broken.add("*")
     declarations.elaborate()
     contract = _contract(parsed, declarations)
+    sound = not partial and not any(reports.failed for _, reports in parsed)
+    lint(linted, contract if sound else None, off)
     diagnostics = [d for _, reports in parsed for d in _sorted(reports)]
     if not any(d.is_error for d in diagnostics):
         return contract, tuple(diagnostics)

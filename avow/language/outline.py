@@ -56,6 +56,8 @@ class FileSyntax:
     declarations: list[Tree] = field(default_factory=list)
     nodes: list[NodeSyntax] = field(default_factory=list)
     broken: set[str] = field(default_factory=set)
+    parts: list[tuple[int, int]] = field(default_factory=list)
+    """Where each declaration, node, and part of a node stands: what a comment before it is about."""
 
 
 def read(tokens: Sequence[Token], reports: Reports) -> FileSyntax:
@@ -196,6 +198,7 @@ class _Reader:
             return
         part = self.tokens[first : self.at]
         tree = parse("declaration", part, self.reports, part[-1].end)
+        self.out.parts.append((part[0].start, part[-1].end))
         if tree is not None:
             self.out.declarations.append(tree)
         else:
@@ -246,15 +249,19 @@ class _Reader:
                 before = section
             seen.setdefault(section, keyword)
             self.read_section(section, node)
+            self.out.parts.append((keyword.start, self.tokens[self.at - 1].end))
         else:
             if brace is not None:
                 message = f"the `{{` of node `{node.name.text}` is never closed"
                 self.reports.error("RCL115", message, brace.start, brace.end, hint="close it with `}`")
         node.end = self.tokens[min(self.at, len(self.tokens)) - 1].end
+        self.out.parts.append((node.start, node.end))
         self.missing(node, seen)
 
     def missing(self, node: NodeSyntax, seen: dict[str, Token]) -> None:
         """Reports the sections that a node must have and does not."""
+        if not node.name.text:
+            return
         where = (node.name.start, node.name.end)
         for section in ("INPUTS", "OUTPUTS", "TOPICS"):
             if section not in seen:
@@ -363,6 +370,8 @@ class _Reader:
         tree = parse("topics" if section == "TOPICS" else "ports", part, self.reports, end)
         if tree is None:
             node.broken.update(t.text for t in part if t.type == "NAME")
+        else:
+            self.out.parts.extend((t.start, t.end) for t in tree.parts)
         match section:
             case "INPUTS":
                 node.inputs = node.inputs or tree

@@ -1,0 +1,116 @@
+"""``avow check``: diagnostics for .rcl files, in milliseconds."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from avow.diagnostics import Diagnostic
+
+
+@click.command()
+@click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="For machines: see avow/language/check.schema.json.")
+@click.option("--sarif", is_flag=True, help="For machines: SARIF 2.1.0.")
+@click.option("--off", "off", multiple=True, metavar="CODE", help="A warning that is not wanted (may be repeated).")
+@click.option("--separately", is_flag=True, help="Each file is a contract of its own, also within one folder.")
+@click.option("--explain", is_flag=True, help="Below each kind of diagnostic found, what it means.")
+@click.option("--colour/--no-colour", default=None, help="By default, colour on a terminal.")
+def command(
+    paths: tuple[Path, ...],
+    as_json: bool,
+    sarif: bool,
+    off: tuple[str, ...],
+    separately: bool,
+    explain: bool,
+    colour: bool | None,
+) -> int:
+    """Check contracts: syntax, names, types, and lints.
+
+    PATHS are .rcl files or systems' folders. Files of one folder are one contract. Code 2 where anything is an error.
+    """
+    from avow import __version__
+    from avow.rendering import render, summary, to_json, to_sarif
+
+    found: list[Diagnostic] = []
+    files = 0
+    for group, group_off in _groups(paths, separately, found):
+        from avow.language.load import check_paths
+
+        files += len(group)
+        found.extend(check_paths(group, off=group_off | frozenset(off))[1])
+    if as_json:
+        click.echo(json.dumps(to_json(found), indent=1, ensure_ascii=False))
+    elif sarif:
+        click.echo(json.dumps(to_sarif(found, version=__version__), indent=1, ensure_ascii=False))
+    else:
+        tint = sys.stdout.isatty() if colour is None else colour
+        if found:
+            click.echo(render(found, colour=tint), color=tint)
+        if explain:
+            _explain(found)
+        click.echo(f"{files} file{'' if files == 1 else 's'}: {summary(found)}")
+    return 2 if any(d.is_error for d in found) else 0
+
+
+def _explain(found: list[Diagnostic]) -> None:
+    from avow.codes import CODES
+
+    for code in sorted({d.code for d in found} & set(CODES)):
+        click.echo(f"{code} ({CODES[code].title}): {CODES[code].explanation}\n")
+
+
+def _groups(
+    paths: tuple[Path, ...], separately: bool, found: list[Diagnostic]
+) -> list[tuple[list[Path], frozenset[str]]]:
+    """The contracts to check, each with its files and the lints that its plan switches off."""
+    by_folder: dict[Path, list[Path]] = {}
+    groups: list[tuple[list[Path], frozenset[str]]] = []
+    for path in dict.fromkeys(paths):
+        if path.is_dir():
+            groups.append(_system(path, found))
+        elif separately:
+            groups.append(([path], _off(path.parent)))
+        else:
+            by_folder.setdefault(path.parent, []).append(path)
+    groups += [(files, _off(folder)) for folder, files in by_folder.items()]
+    return groups
+
+
+def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozenset[str]]:
+    """The contract files of a system's folder; without a plan, every .rcl file in it."""
+    from avow.diagnostics import Diagnostic, Rejected
+    from avow.system.plan_file import read_plan
+
+    plan_file = folder / "plan.yaml"
+    if plan_file.is_file():
+        try:
+            plan, _, faults = read_plan(plan_file)
+        except Rejected as rejected:
+            found.extend(rejected.diagnostics)
+            return [], frozenset()
+        found.extend(faults)
+        return list(plan.contract_files), frozenset(plan.lints_off)
+    files = sorted(folder.glob("*.rcl"))
+    if not files:
+        found.append(Diagnostic("RCL002", f"{folder} holds neither a plan.yaml nor an .rcl file"))
+    return files, frozenset()
+
+
+def _off(folder: Path) -> frozenset[str]:
+    """The lints that the plan beside a file switches off; none where there is no readable plan."""
+    from avow.diagnostics import Rejected
+
+    if not (folder / "plan.yaml").is_file():
+        return frozenset()
+    from avow.system.plan_file import read_plan
+
+    try:
+        return frozenset(read_plan(folder / "plan.yaml")[0].lints_off)
+    except Rejected:
+        return frozenset()

@@ -1,0 +1,295 @@
+"""Warnings: what is allowed and probably not meant. Each has a code (RCL4xx) and can be switched off.
+
+A plan's `lints_off` switches one off for a system. So does a comment ``// avow: allow RCL401``: after code, for its
+line; on a line of its own, for the declaration, node or part of a node that follows; at the head of a file, for all.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from avow.codes import CODES
+from avow.diagnostics import Diagnostic, Severity, Span
+from avow.language.bracketing import misreadings
+from avow.language.contract import Contract, Node
+from avow.language.lexer import Token
+from avow.language.outline import FileSyntax
+from avow.language.sorts import EnumSort, NaturalSort
+from avow.language.source import Reports
+from avow.language.spelling import similar
+from avow.language.terms import (
+    TRUE,
+    And,
+    Compare,
+    EnumValue,
+    Implies,
+    In,
+    Literal,
+    Or,
+    Quantified,
+    Quantifier,
+    Role,
+    SetTerm,
+    Term,
+    Variable,
+    children,
+)
+
+_ALLOW = re.compile(r"\bavow:\s*allow\b([^\n*]*)")
+
+
+@dataclass(frozen=True, slots=True)
+class LintedFile:
+    """A file as the lints want it: its syntax, its comments, and where to report."""
+
+    syntax: FileSyntax
+    comments: tuple[Token, ...]
+    first_token: int
+    reports: Reports
+
+
+def lint(files: Sequence[LintedFile], contract: Contract | None, off: frozenset[str]) -> None:
+    """Report every warning about the files, and (where it is sound) about the contract that they declare."""
+    found: list[Diagnostic] = []
+    for file in files:
+        found.extend(_about_text(file))
+    if contract is not None:
+        for node in contract.nodes:
+            found.extend(_about_node(node))
+        found.extend(_spellings(contract))
+    by_name = {file.reports.source.file: file for file in files}
+    allowances = {name: _allowances(file) for name, file in by_name.items()}
+    for diagnostic in found:
+        if diagnostic.code in off or diagnostic.span is None or diagnostic.span.file not in by_name:
+            continue
+        line = diagnostic.span.line
+        if any(diagnostic.code in codes and a <= line <= b for codes, a, b in allowances[diagnostic.span.file]):
+            continue
+        by_name[diagnostic.span.file].reports.add(diagnostic)
+
+
+def lint_contract(contract: Contract, files: Sequence[Path]) -> list[Diagnostic]:
+    """The warnings about a contract that has been read from these files. They are read again, for their comments and
+    parentheses, which a checked contract does not have."""
+    from avow.language.load import check_paths  # which uses this module
+
+    del contract
+    return [d for d in check_paths(files)[1] if not d.is_error]
+
+
+def _warning(
+    code: str, message: str, span: Span | None, hint: str | None = None, *notes: tuple[str, Span | None]
+) -> Diagnostic:
+    return Diagnostic(code, message, span, Severity.WARNING, hint, notes)
+
+
+# --- comments that allow ---------------------------------------------------------------------------------------------
+
+
+def _allowances(file: LintedFile) -> list[tuple[frozenset[str], int, int]]:
+    """The codes that comments allow, each with the first and last line for which they do."""
+    source = file.reports.source
+    found = []
+    for comment in file.comments:
+        match = _ALLOW.search(comment.text)
+        if match is None:
+            continue
+        codes = frozenset(re.findall(r"[A-Za-z]+[0-9]+", match.group(1)))
+        for code in sorted(codes):
+            if code not in CODES or not CODES[code].is_lint:
+                file.reports.add(
+                    _warning("RCL410", f"`{code}` is not the code of a lint", source.span(comment.start, comment.end))
+                )
+        line, _ = source.place(comment.start)
+        before = source.text[source.text.rfind("\n", 0, comment.start) + 1 : comment.start]
+        if comment.end <= file.first_token:
+            found.append((codes, 1, 1 << 60))
+        elif before.strip():
+            found.append((codes, line, line))
+        else:
+            following = [part for part in file.syntax.parts if part[0] >= comment.end]
+            start = min((part[0] for part in following), default=None)
+            if start is not None:
+                end = max(part[1] for part in following if part[0] == start)
+                found.append((codes, source.place(start)[0], source.place(end)[0]))
+    return found
+
+
+# --- about the text --------------------------------------------------------------------------------------------------
+
+
+def _about_text(file: LintedFile) -> Iterator[Diagnostic]:
+    source = file.reports.source
+    for node in file.syntax.nodes:
+        for clause in node.clauses:
+            if clause.formula is None:
+                continue
+            for reading in misreadings(clause.formula, source.text):
+                span = source.span(reading.start, reading.end)
+                yield _warning(
+                    "RCL401",
+                    f"`{reading.mixed}` beside `{reading.operator}` without parentheses: another bracketing means "
+                    "something else",
+                    span,
+                    f"it is read as `{reading.shown}`: put the parentheses that you mean",
+                )
+        for topic in node.topics.parts if node.topics is not None else ():
+            _, name, role, matched = topic.parts
+            if matched is not None and role is None:
+                inputs = {p.parts[0].text for p in node.inputs.parts} if node.inputs is not None else set()
+                which = "in" if matched.text in inputs else "out"
+                yield _warning(
+                    "RCL409",
+                    f"the topic `{name.text}` matches a bare `{matched.text}`",
+                    source.span(matched.start, matched.end),
+                    f"write `matches({which}.{matched.text})`",
+                )
+
+
+# --- about a node ----------------------------------------------------------------------------------------------------
+
+
+def _about_node(node: Node) -> Iterator[Diagnostic]:
+    in_clauses = {v for clause in node.clauses for v in _variables(clause.formula)}
+    in_guarantees = {v for clause in node.guarantees for v in _variables(clause.formula)}
+    for port in node.inputs:
+        if (Role.INPUT, port.name) not in in_clauses:
+            message = f"no clause of `{node.name}` speaks of its input `{port.name}`"
+            yield _warning("RCL402", message, port.span, "remove it, or say what the node does with it")
+    for port in node.outputs:
+        if (Role.OUTPUT, port.name) not in in_guarantees:
+            message = f"no guarantee of `{node.name}` speaks of its output `{port.name}`: it may be anything"
+            yield _warning("RCL403", message, port.span, "add a guarantee about it, or remove it")
+    matched = {(t.port.role, t.port.name) for t in node.topics if t.port is not None}
+    ports = (*node.inputs, *node.outputs)
+    for topic in node.topics:
+        if topic.port is None:
+            near = next((p for p in ports if p.name == topic.name), None)
+            hint = f"write `{topic.name} matches({near.role}.{near.name})`" if near is not None else None
+            message = f"no variable of `{node.name}` matches the topic `{topic.name}`"
+            yield _warning("RCL404", message, topic.span, hint or "write `matches(in.…)` or `matches(out.…)`")
+    silent = [p for p in ports if (p.role, p.name) not in matched]
+    if node.topics:
+        for port in silent:
+            message = f"no topic of `{node.name}` carries `{port.role}.{port.name}`"
+            yield _warning("RCL405", message, port.span, "list its topic, with `matches(…)`")
+    elif silent:
+        names = ", ".join(f"`{p.role}.{p.name}`" for p in silent[:6]) + (", …" if len(silent) > 6 else "")
+        yield _warning("RCL405", f"`{node.name}` has no topics: nothing carries {names}", silent[0].span)
+    for clause in node.assumptions:
+        if clause.formula != TRUE and _always(clause.formula):
+            message = f"the assumption `{clause.name}` says nothing: the types of the inputs make it true"
+            yield _warning("RCL408", message, clause.formula.span, "leave it out, or say what was meant")
+    for clause in node.clauses:
+        for unused in _unused(clause.formula):
+            message = f"`{unused.name}` is quantified and never used"
+            yield _warning("RCL407", message, unused.span, "remove it, or tie it to what was meant")
+
+
+def _walk(term: Term) -> Iterator[Term]:
+    stack = [term]
+    while stack:
+        part = stack.pop()
+        yield part
+        stack.extend(reversed(children(part)))
+
+
+def _variables(term: Term) -> set[tuple[Role, str]]:
+    return {(t.role, t.name) for t in _walk(term) if isinstance(t, Variable)}
+
+
+def _unused(term: Term) -> Iterator[Variable]:
+    for part in _walk(term):
+        if isinstance(part, Quantified):
+            used = {name for role, name in _variables(part.body) if role is Role.BOUND}
+            yield from (v for v in part.variables if v.name not in used)
+
+
+def _always(term: Term) -> bool:
+    """Whether the sorts alone make the formula true; False where that is not plain."""
+    match term:
+        case Literal(value=True):
+            return True
+        case In(item=item, collection=SetTerm(items=items)):
+            if items and item in items:
+                return True
+            sort = item.sort
+            names = {i.name for i in items if isinstance(i, EnumValue)}
+            return isinstance(sort, EnumSort) and names >= set(sort.members)
+        case Compare(operator="==" | "<=" | ">=", left=left, right=right) if left == right:
+            return True
+        case Compare(operator=">=", left=left, right=Literal(value=value)) if value == 0:
+            return isinstance(left.sort, NaturalSort)
+        case Compare(operator="<=", left=Literal(value=value), right=right) if value == 0:
+            return isinstance(right.sort, NaturalSort)
+        case And(items=items):
+            return all(map(_always, items))
+        case Or(items=items):
+            return any(map(_always, items)) or _covers(items)
+        case Implies(right=right):
+            return _always(right)
+        case Quantified(quantifier=Quantifier.FORALL, body=body):
+            return _always(body)
+    return False
+
+
+def _covers(items: Sequence[Term]) -> bool:
+    """``s == red or s == orange or s == green``, all values of the type; or ``b or not b`` written as comparisons."""
+    seen: dict[Term, set[str]] = {}
+    for item in items:
+        match item:
+            case Compare(operator="==", left=left, right=EnumValue(name=name, sort=sort)):
+                seen.setdefault(left, set()).add(name)
+                if seen[left] >= set(sort.members):
+                    return True
+            case Compare(operator="==", left=left, right=Literal(value=bool() as value)):
+                seen.setdefault(left, set()).add(str(value))
+                if len(seen[left]) == 2:
+                    return True
+    return False
+
+
+# --- spellings -------------------------------------------------------------------------------------------------------
+
+
+def _spellings(contract: Contract) -> Iterator[Diagnostic]:
+    packages: dict[str, Span | None] = {}
+    types: dict[str, Span | None] = {}
+    topics: dict[str, Span | None] = {}
+    ports: dict[str, Span | None] = {}
+    together: set[frozenset[str]] = set()
+    for node in contract.nodes:
+        for topic in node.topics:
+            package, slash, name = topic.ros_type.partition("/")
+            if slash:
+                packages.setdefault(package, topic.span)
+                types.setdefault(name, topic.span)
+            topics.setdefault(topic.name, topic.span)
+        here = (*node.inputs, *node.outputs)
+        for port in here:
+            ports.setdefault(port.name, port.span)
+        together.update(frozenset((p.name, q.name)) for p in here[:200] for q in here[:200] if p.name != q.name)
+        names = [t.name for t in node.topics][:200]
+        together.update(frozenset((a, b)) for a in names for b in names if a != b)
+    for what, table, apart in (
+        ("package", packages, set[frozenset[str]]()),
+        ("message type", types, set[frozenset[str]]()),
+        ("topic", topics, together),
+        ("variable", ports, together),
+    ):
+        yield from _alike(what, table, apart)
+
+
+def _alike(what: str, table: Mapping[str, Span | None], apart: Iterable[frozenset[str]]) -> Iterator[Diagnostic]:
+    """Names of one kind that look like one name; `apart` are pairs that one node uses side by side, so that they are
+    different things."""
+    distinct = set(apart)
+    for earlier, later in similar(list(table)):
+        if frozenset((earlier, later)) in distinct:
+            continue
+        message = f"the {what}s `{earlier}` and `{later}` differ in a letter or two"
+        note = (f"`{earlier}` is here", table[earlier])
+        yield _warning("RCL406", message, table[later], "if one thing is meant, write it one way", note)
