@@ -176,7 +176,9 @@ class _Builder:
         return self.obligation(view)
 
     def obligation(self, view: ObligationView) -> str:
-        goal = self.add(Shape.GOAL, short(view.id), view.obligation.claim, view.standing, view.id)
+        o = view.obligation
+        title = short(o.id) if o.kind is Kind.GUARANTEE else o.name
+        goal = self.add(Shape.GOAL, title, o.claim, view.standing, o.id)
         self.by_claim[view.id] = goal
         solutions = tuple(self.solution(view, item) for item in _one_a_method(view.counting))
         # a guarantee's other supports (its contract's sanity) are drawn only where they fail: an argument, no inventory

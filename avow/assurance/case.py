@@ -242,7 +242,7 @@ def _obligation(
         rests_on=rests_on,
         below=standing.below,
         hypotheses=standing.hypotheses,
-        link=standing.link,
+        link=_link(tuple(v.entry for v in evidence if v.counts)),
         handled=handled,
     )
     return replace(view, suggestion=suggestion_for(view, facts, facts.today))
@@ -269,13 +269,17 @@ def _requirement(
         hypotheses=standing.hypotheses,
         link=standing.link,
         obligations=tuple(names.own.get(requirement.id, ())),
-        answer=_answer(requirement, standing, unknown, statuses),
+        answer=_answer(requirement, standing, unknown, statuses, names.own.get(requirement.id, ())),
         span=requirement.span,
     )
 
 
 def _answer(
-    requirement: Requirement, standing: Standing, unknown: tuple[str, ...], statuses: Mapping[str, Status]
+    requirement: Requirement,
+    standing: Standing,
+    unknown: tuple[str, ...],
+    statuses: Mapping[str, Status],
+    own_obligations: Sequence[str],
 ) -> str:
     if unknown:
         return f"Not shown: {', '.join(unknown)} under supported_by stands for nothing."
@@ -288,7 +292,8 @@ def _answer(
         rest = f", on {hypotheses} hypothes{'is' if hypotheses == 1 else 'es'}" if hypotheses else ""
         return f"{how}{rest}; the weakest link is {short(name)}, {status}."
     if standing.direct and standing.status is not Status.MISSING:
-        where = ", ".join(short(name) for name in standing.below) or "its evidence"
+        own = [name for name in own_obligations if name in standing.below]
+        where = ", ".join(short(name) for name in own or standing.below) or "its evidence"
         return f"{standing.status.value.capitalize()}: see {where}."
     if standing.below:
         causes = [f"{short(name)} is {statuses.get(name, 'not shown')}" for name in standing.below]
@@ -338,6 +343,8 @@ def _grade(facts: Facts, views: Sequence[ObligationView]) -> tuple[Grade, str]:
         return Grade.CHECKED, f"the audit found {serious} discrepanc{'y' if serious == 1 else 'ies'}"
     if not facts.run.fresh:
         cached = sum(1 for view in views for v in view.counting if v.entry.evidence.run != facts.run.id)
+        if not cached:
+            return Grade.CHECKED, "every answer is of this run, but the ledger was believed (see `avow verify --fresh`)"
         return Grade.CHECKED, f"{cached} answer{'' if cached == 1 else 's'} from earlier runs, with unchanged inputs"
     unanswered = sum(
         1

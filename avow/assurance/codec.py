@@ -62,7 +62,7 @@ def evidence_schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "https://avow.invalid/schemas/evidence-1",
         "title": "A line of Avow's evidence ledger",
-        "description": "hash is the SHA-256 of the line's canonical JSON without hash; prev is the hash of the line before.",
+        "description": "hash: SHA-256 of the line's canonical JSON without it; prev: the hash of the line before.",
         "type": "object",
         "properties": {
             "evidence": {"$ref": "#/$defs/Evidence"},

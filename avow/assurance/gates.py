@@ -138,11 +138,12 @@ def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: se
         yield _gate(
             facts,
             f"guarantees-{criticality}",
-            f"Guarantees of {criticality} criticality: {demand.text()}",
+            f"Guarantees of {criticality} criticality",
             failing,
             excused,
             lambda view, lacking=lacking: lacking[view.id] or "",  # type: ignore[misc]
             f"{len(of_kind)} of {len(of_kind)} meet it",
+            demand.text(),
         )
 
 
@@ -168,6 +169,7 @@ def _derivations(
         names,
         (),
         let_off,
+        "",
         bool(bad) and all(_tool_only(d.below, views) for d in bad),
     )
 
@@ -189,6 +191,7 @@ def _requirements(
         tuple(requirement_claim(r.id) for r in bad),
         tuple(suggestions.values())[:10],
         let_off,
+        "",
         bool(bad) and all(_tool_only(r.below, views) for r in bad),
     )
 
@@ -208,6 +211,7 @@ def _gate(
     excused: set[str],
     why: Callable[[ObligationView], str],
     good: str,
+    asks: str = "",
 ) -> Gate:
     bad = [view for view in failing if view.id not in excused]
     let_off = tuple(view.id for view in failing if view.id in excused)
@@ -228,6 +232,7 @@ def _gate(
         tuple(view.id for view in bad),
         tuple(sorted(suggestions.values(), key=lambda s: (s.cost, s.text)))[:10],
         let_off,
+        asks,
         bool(bad) and all(view.status in _TOOL for view in bad),
     )
 

@@ -257,6 +257,8 @@ class Gate:
     claims: tuple[str, ...] = ()
     suggestions: tuple[Suggestion, ...] = ()
     excused: tuple[str, ...] = ()
+    asks: str = ""
+    """What the policy asks here, as a phrase, where the title does not say it all."""
     tool_failure: bool = False
     """It fails only because a tool is missing or broke (exit code 3)."""
 

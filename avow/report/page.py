@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from avow.assurance.argument import Argument, Element, build_argument
 from avow.assurance.model import Case, ObligationView
@@ -39,6 +40,7 @@ def environment() -> Environment:
         "MEANINGS": wording.MEANINGS,
         "Status": Status,
         "anchor": wording.anchor,
+        "ticks": _ticks,
         "bound_text": wording.bound_text,
         "count": wording.count,
         "mutation": wording.mutation,
@@ -86,6 +88,11 @@ def render_page(case: Case) -> str:
             has_claim=lambda claim: claim in {v.id for v in case.obligations},
         )
     )
+
+
+def _ticks(text: str) -> Markup:
+    """A sentence of ours with its `commands` set as code; everything in it is escaped first."""
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 @cache

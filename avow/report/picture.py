@@ -15,9 +15,10 @@ from avow.report.wording import MARKS, clean, tone
 
 LIMIT = 400
 _LINE, _PAD, _GAP, _COLUMN_GAP, _RADIUS = 15.0, 9.0, 14.0, 46.0, 39.0
-_WIDTH = {Shape.GOAL: 232.0, Shape.STRATEGY: 206.0, Shape.SOLUTION: 2 * _RADIUS}
+_WIDTH = {Shape.GOAL: 244.0, Shape.STRATEGY: 206.0, Shape.SOLUTION: 2 * _RADIUS}
 _ASIDE_WIDTH = 206.0
 _CHARACTER = 6.35
+_BOLD = 7.5
 _MOST_LINES = 5
 
 
@@ -26,6 +27,9 @@ class _Box:
     element: Element
     depth: int
     lines: list[str]
+    title: str
+    named_apart: bool
+    """The title is too long to stand beside the status: it has a line of its own."""
     width: float
     height: float
     asides: list[_Box] = field(default_factory=list)
@@ -75,7 +79,7 @@ def _tree(argument: Argument, start: str) -> tuple[list[_Box], int, list[tuple[_
         box = stack.pop()
         for name in box.element.in_context_of:
             if name not in placed and drawn < LIMIT:
-                placed[name] = _aside(known[name])
+                placed[name] = _box(known[name], 0)
                 box.asides.append(placed[name])
                 drawn += 1
         for name in box.element.supported_by:
@@ -103,23 +107,27 @@ def _tree(argument: Argument, start: str) -> tuple[list[_Box], int, list[tuple[_
 def _box(element: Element, depth: int) -> _Box:
     width = _WIDTH.get(element.shape, _ASIDE_WIDTH)
     if element.shape is Shape.SOLUTION:
-        return _Box(element, depth, [_cut(element.title, 11), str(element.status or "")], width, width)
-    lines = _wrap(element.text, width - 2 * _PAD - (16 if element.shape is Shape.STRATEGY else 0))
-    return _Box(element, depth, lines, width, 2 * _PAD + _LINE * (1 + len(lines)))
+        return _Box(element, depth, [], _cut(element.title, 11), False, width, width)
+    inner = width - 2 * _inset(element)
+    taken = len(element.id) + len(element.status or "") + 4
+    apart = len(element.title) * _BOLD > inner - taken * _CHARACTER
+    lines = _wrap(element.text, inner)
+    if element.shape not in (Shape.GOAL, Shape.STRATEGY):
+        lines = lines[:4]
+    height = 2 * _PAD + _LINE * (1 + apart + len(lines))
+    return _Box(element, depth, lines, _cut(element.title, int(inner / _BOLD)), apart, width, height)
 
 
-def _aside(element: Element) -> _Box:
-    lines = _wrap(element.text, _ASIDE_WIDTH - 2 * _PAD - 22)[:4]
-    return _Box(element, 0, lines, _ASIDE_WIDTH, 2 * _PAD + _LINE * (1 + len(lines)))
+def _inset(element: Element) -> float:
+    return _PAD if element.shape is Shape.GOAL else _PAD + 10
 
 
 def _measure(boxes: list[_Box]) -> None:
     for box in reversed(boxes):
-        own = box.height + sum(aside.height + _GAP for aside in box.asides) + (10 if box.element.undeveloped else 0)
         below = sum(child.tall for child in box.children) + _GAP * max(0, len(box.children) - 1)
         rows = (len(box.row) + 2) // 3
         solutions = rows * (2 * _RADIUS + 6)
-        box.tall = max(own, below + solutions + (_GAP if box.children and box.row else 0))
+        box.tall = max(_own(box), below + solutions + (_GAP if box.children and box.row else 0))
 
 
 def _place(boxes: list[_Box], root: _Box) -> None:
@@ -130,30 +138,38 @@ def _place(boxes: list[_Box], root: _Box) -> None:
     for depth in range(max(columns) + 2):
         at[depth] = x
         x += columns.get(depth, 0.0) + _COLUMN_GAP
-    root.y = 4.0
-    for box in boxes:  # parents first; box.y is the top of the subtree until it is settled
-        top = box.y
-        box.x = at[box.depth]
-        y = top
+    tops = {id(root): 4.0}
+    for box in boxes:  # parents first: where each subtree begins
+        y = tops[id(box)]
         for child in box.children:
-            child.y = y
+            tops[id(child)] = y
             y += child.tall + _GAP
+    for box in reversed(boxes):  # children first: a parent stands in the middle of what it rests on
+        top, own = tops[id(box)], _own(box)
+        box.x = at[box.depth]
+        rows = (len(box.row) + 2) // 3
+        solutions = rows * (2 * _RADIUS + 6)
+        if box.children:
+            start = top + sum(child.tall + _GAP for child in box.children)
+        else:
+            start = top if box.asides else top + max(0.0, box.tall - solutions) / 2
         for number, solution in enumerate(box.row):
             row, column = divmod(number, 3)
             solution.x = at[box.depth + 1] + column * (2 * _RADIUS + 8)
-            solution.y = y + row * (2 * _RADIUS + 6)
-        own = box.height + sum(aside.height + _GAP for aside in box.asides) + (10 if box.element.undeveloped else 0)
-        first = box.row[0] if box.row and not box.children and len(box.row) <= 3 else None
-        if first is not None and own <= box.tall:
-            box.y = top + (box.tall - own) / 2
-            for solution in box.row:
-                solution.y = top + (box.tall - 2 * _RADIUS) / 2 if not box.asides else box.y + box.height / 2 - _RADIUS
-        else:
-            box.y = top + (max(0.0, box.tall - own) / 2 if len(box.children) > 1 else 0.0)
-        below = box.y + box.height + (10 if box.element.undeveloped else 0)
+            solution.y = start + row * (2 * _RADIUS + 6)
+        middles = [child.y + child.height / 2 for child in box.children]
+        middles += [box.row[0].y + _RADIUS, box.row[-1].y + _RADIUS] if box.row else []
+        wanted = (min(middles) + max(middles)) / 2 - box.height / 2 if middles else top
+        box.y = min(max(wanted, top), top + box.tall - own)
+        y = box.y + box.height + (10 if box.element.undeveloped else 0)
         for aside in box.asides:
-            aside.x, aside.y = box.x, below + _GAP
-            below = aside.y + aside.height
+            aside.x, aside.y = box.x, y + _GAP
+            y = aside.y + aside.height
+
+
+def _own(box: _Box) -> float:
+    """The height of a box with what stands below it."""
+    return box.height + sum(aside.height + _GAP for aside in box.asides) + (10 if box.element.undeveloped else 0)
 
 
 def _all(boxes: list[_Box]) -> Iterator[_Box]:
@@ -226,29 +242,26 @@ def _shape(box: _Box, link: Callable[[Element], str | None]) -> str:
 
 def _text(box: _Box) -> str:
     element = box.element
+    status = f"{MARKS[element.status]} {element.status}" if element.status else ""
+    name = f'<tspan class="name">{escape(box.title)}</tspan>'
     if element.shape is Shape.SOLUTION:
         x, y = box.x + _RADIUS, box.y + _RADIUS
-        mark = MARKS[element.status] if element.status else ""
         return (
             f'<text class="id middle" x="{x:.0f}" y="{y - 14:.1f}">{escape(element.id)}</text>'
-            f'<text class="middle" x="{x:.0f}" y="{y + 2:.1f}">{escape(box.lines[0])}</text>'
-            f'<text class="status middle" x="{x:.0f}" y="{y + 18:.1f}">{mark} {escape(box.lines[1])}</text>'
+            f'<text class="middle" x="{x:.0f}" y="{y + 2:.1f}">{escape(box.title)}</text>'
+            f'<text class="status middle" x="{x:.0f}" y="{y + 18:.1f}">{status}</text>'
         )
-    inset = _PAD + (10 if element.shape not in (Shape.GOAL,) else 0)
-    x, y = box.x + inset, box.y + _PAD + 11
-    status = f"{MARKS[element.status]} {element.status}" if element.status else ""
     letter = element.shape.value if element.shape in (Shape.ASSUMPTION, Shape.JUSTIFICATION) else ""
-    room = box.width - 2 * inset - _CHARACTER * (len(element.id) + len(status) + len(letter) + 3)
-    title = _cut(element.title, max(4, int(room / _CHARACTER)))
-    named = f'<tspan class="id">{escape(element.id)}</tspan> <tspan class="name">{escape(title)}</tspan>'
-    parts = [f'<text x="{x:.0f}" y="{y:.1f}">{named}</text>']
-    end = box.x + box.width - inset
+    x, y = box.x + _inset(element), box.y + _PAD + 11
+    end = box.x + box.width - _inset(element)
+    beside = "" if box.named_apart else f" {name}"
+    parts = [f'<text x="{x:.0f}" y="{y:.1f}"><tspan class="id">{escape(element.id)}</tspan>{beside}</text>']
     if status or letter:
         look = "status" if status else "id"
-        parts.append(f'<text class="{look} end" x="{end:.0f}" y="{y:.1f}">{escape(status or letter)}</text>')
-    for line in box.lines:
+        parts.append(f'<text class="{look} end" x="{end:.0f}" y="{y:.1f}">{status or letter}</text>')
+    for line in ([name] if box.named_apart else []) + [escape(line) for line in box.lines]:
         y += _LINE
-        parts.append(f'<text x="{x:.0f}" y="{y:.1f}">{escape(line)}</text>')
+        parts.append(f'<text x="{x:.0f}" y="{y:.1f}">{line}</text>')
     return "".join(parts)
 
 
