@@ -1,4 +1,4 @@
-"""Our own monitor: the clauses of one node over events, judged exactly; cost for each event does not grow with the trace.
+"""Our own monitor: the clauses of one node over events, judged exactly. The cost of an event does not grow with them.
 
 A snapshot maps each variable to its latest value. A clause is judged when an event brings a value of one of its outputs
 (the node has answered), a clause about inputs when it brings any of them, by the values then known; until every
@@ -16,9 +16,9 @@ from typing import Any
 from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
 from avow.backends.rosmonitoring.options import Setup, same_topic
 from avow.backends.rosmonitoring.reading import MappingError, Reader, reader
-from avow.backends.rosmonitoring.rules import Choice, Constant, Fields, InOrder, Previous
+from avow.backends.rosmonitoring.rules import Choice, Constant, Fields, Hold, InOrder, Previous
 from avow.language.contract import Clause, ClauseKind
-from avow.language.terms import Implies, Quantified, Quantifier, Role, Term
+from avow.language.terms import Implies, Quantified, Quantifier, Role, Term, Variable
 from avow.logic.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
 from avow.logic.judge import judge
 from avow.logic.values import Value, show
@@ -90,6 +90,7 @@ class Monitor:
     relevant: int = 0
     tallies: dict[str, Tally] = field(default_factory=dict)
     values: dict[str, Value] = field(default_factory=dict)
+    _seen: set[str] = field(default_factory=set)
     _versions: dict[str, int] = field(default_factory=dict)
     _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
     _previous: list[tuple[str, str]] = field(default_factory=list)
@@ -128,11 +129,15 @@ class Monitor:
         found: list[Violation] = []
         updated: list[str] = []
         for name, read in readers:
+            self._seen.add(name)
             old = self.values.get(name)
             try:
                 new = read(event, old)
             except MappingError as error:
                 found.append(self._violation(Fault.MAPPING, name, event, str(error)))
+                # Its value is now unknown: what needs it waits for the next good message.
+                if getattr(self.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
+                    self._forget(name)
                 continue
             updated.append(name)
             if old is None or new != old:
@@ -146,10 +151,17 @@ class Monitor:
                     self._judge(watched, event, found)
         for name, source in self._previous:
             value = self.values.get(source)
-            if value is not None and self.values.get(name) is not value:
+            if value is None:
+                if source in self._seen and name in self.values:
+                    self._forget(name)
+            elif self.values.get(name) is not value:
                 self.values[name] = value
                 self._versions[name] += 1
         return found
+
+    def _forget(self, name: str) -> None:
+        self._versions[name] += 1
+        self.values.pop(name, None)
 
     def _start(self, name: str, initial: Value | None) -> None:
         if initial is not None:
@@ -256,7 +268,7 @@ class Monitor:
 
 def _trigger(formula: Term) -> Term | None:
     """What must hold somewhere for the formula to say anything: the antecedent, over all its variables."""
-    variables = []
+    variables: list[Variable] = []
     while isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL:
         variables.extend(formula.variables)
         formula = formula.body

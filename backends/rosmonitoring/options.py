@@ -296,7 +296,7 @@ class _Work:
         return None
 
 
-_KEYS = frozenset(("topic", "constructor", "arguments", "values", "initial"))
+_KEYS = frozenset(("topic", "type", "constructor", "arguments", "values", "initial"))
 
 
 def _mapping(options: Located | None) -> Mapping[str, Any]:

@@ -71,6 +71,7 @@ SCHEMA: dict[str, Any] = {
                         "type": "object",
                         "properties": {
                             "topic": {"type": "string", "description": "a topic's name, if not the contract's"},
+                            "type": {"type": "string", "description": "the topic's ROS type, if not in the contract"},
                             "field": _PATH,
                             "fields": {"type": "array", "items": _PATH, "minItems": 1},
                             "each": {"type": "string", "description": "a field that holds a list of tuples"},

@@ -1,0 +1,295 @@
+"""RML specifications as data, and their text. What is written here is read back by our own grammar (`rml_reader`)."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+KEYWORDS = frozenset(
+    [
+        "not",
+        "matches",
+        "with",
+        "empty",
+        "all",
+        "var",
+        "let",
+        "if",
+        "else",
+        "abs",
+        "sin",
+        "cos",
+        "tan",
+        "min",
+        "max",
+        "true",
+        "false",
+        "null",
+        "any",
+        "none",
+    ]
+)
+LOWER = re.compile(r"[a-z][A-Za-z0-9_]*\Z")
+STRING = re.compile(r"[A-Za-z0-9_./ -]*\Z")
+
+
+class NotRml(Exception):  # noqa: N818 - it says what a text or a formula is
+    """Something that RML cannot say; the text says what, for people."""
+
+
+# -- numbers and conditions --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    value: Fraction
+
+
+@dataclass(frozen=True, slots=True)
+class Calculation:
+    operator: str
+    left: Numeric
+    right: Numeric
+
+
+Numeric = Name | Number | Calculation
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    operator: str
+    left: Numeric
+    right: Numeric
+
+
+@dataclass(frozen=True, slots=True)
+class Every:
+    """Conjunction; empty: true."""
+
+    items: tuple[Condition, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Some:
+    """Disjunction; empty: false."""
+
+    items: tuple[Condition, ...] = ()
+
+
+Condition = Comparison | Every | Some
+TRUE, FALSE = Every(), Some()
+
+_OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
+
+
+def compare(operator: str, left: Numeric, right: Numeric) -> Condition:
+    """A comparison, decided at once where both sides are numbers."""
+    if isinstance(left, Number) and isinstance(right, Number):
+        a, b = left.value, right.value
+        holds = {"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b, "==": a == b, "!=": a != b}[operator]
+        return TRUE if holds else FALSE
+    if left == right:
+        return TRUE if operator in ("<=", ">=", "==") else FALSE
+    return Comparison(operator, left, right)
+
+
+def every(items: list[Condition] | tuple[Condition, ...]) -> Condition:
+    return _join(items, Every, FALSE)
+
+
+def some(items: list[Condition] | tuple[Condition, ...]) -> Condition:
+    return _join(items, Some, TRUE)
+
+
+def _join(
+    items: list[Condition] | tuple[Condition, ...], kind: type[Every] | type[Some], absorbing: Condition
+) -> Condition:
+    flat: dict[Condition, None] = {}
+    for item in items:
+        if item == absorbing:
+            return absorbing
+        for part in item.items if isinstance(item, kind) else (item,):
+            flat[part] = None
+    return next(iter(flat)) if len(flat) == 1 else kind(tuple(flat))
+
+
+def opposite(condition: Condition) -> Condition:
+    match condition:
+        case Comparison(operator=operator, left=left, right=right):
+            return Comparison(_OPPOSITE[operator], left, right)
+        case Every(items=items):
+            return some([opposite(item) for item in items])
+        case Some(items=items):
+            return every([opposite(item) for item in items])
+
+
+def size(condition: Condition) -> int:
+    return 1 if isinstance(condition, Comparison) else 1 + sum(map(size, condition.items))
+
+
+def names_in(condition: Condition | Numeric) -> frozenset[str]:
+    match condition:
+        case Name(name=name):
+            return frozenset((name,))
+        case Number():
+            return frozenset()
+        case Calculation(left=left, right=right) | Comparison(left=left, right=right):
+            return names_in(left) | names_in(right)
+        case Every(items=items) | Some(items=items):
+            return frozenset[str]().union(*map(names_in, items))
+
+
+# -- specifications ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class EventType:
+    """``name(parameters) matches pattern | pattern with condition;`` - each pattern is text that `Pattern` wrote."""
+
+    name: str
+    parameters: tuple[str, ...]
+    patterns: tuple[str, ...]
+    condition: Condition = TRUE
+
+
+@dataclass(frozen=True, slots=True)
+class Derived:
+    """``name matches other | another;``"""
+
+    name: str
+    parents: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One side of an equation: an event of a type, then the equation again with these arguments."""
+
+    event: str
+    arguments: tuple[str, ...]
+    binds: tuple[str, ...]
+    then: tuple[Numeric, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """``Name<parameters> = (empty \\/ step \\/ …);`` started with `initial`, seeing the events of type `relevant`."""
+
+    name: str
+    parameters: tuple[str, ...]
+    steps: tuple[Step, ...]
+    initial: tuple[Numeric, ...]
+    relevant: str
+
+
+@dataclass(frozen=True, slots=True)
+class Specification:
+    comments: tuple[str, ...]
+    events: tuple[EventType | Derived, ...]
+    machines: tuple[Machine, ...]
+    notes: dict[str, str] = field(default_factory=dict)
+    """Machine or event type → a comment that goes before it."""
+
+
+def string(text: str) -> str:
+    """A quoted constant. Raises NotRml where the text has characters that RML's strings lack."""
+    if not STRING.match(text):
+        raise NotRml(f"RML has no string constant for {text!r}")
+    return f"'{text}'"
+
+
+def key(text: str) -> str:
+    """A field's name. Raises NotRml."""
+    if not LOWER.match(text) or text in KEYWORDS:
+        raise NotRml(f"RML has no field name {text!r}")
+    return text
+
+
+def comment(text: str) -> str:
+    """One line of comment, whatever the text holds."""
+    clean = "".join(c if c.isprintable() else " " for c in text)
+    return f"// {clean}"
+
+
+def number(value: Fraction) -> str:
+    """A non-negative decimal. Raises NotRml where no finite decimal is the number."""
+    if value.denominator == 1:
+        return str(value.numerator)
+    digits = 0
+    while (value * 10**digits).denominator != 1:
+        digits += 1
+        if digits > 15:
+            raise NotRml(f"{value} is no decimal of fifteen digits")
+    whole = f"{(value * 10**digits).numerator:0{digits + 1}d}"
+    return f"{whole[:-digits]}.{whole[-digits:]}"
+
+
+def numeric(value: Numeric) -> str:
+    match value:
+        case Name(name=name):
+            return name
+        case Number(value=amount):
+            return number(amount) if amount >= 0 else f"(0 - {number(-amount)})"
+        case Calculation(operator=operator, left=left, right=right):
+            return f"({numeric(left)} {operator} {numeric(right)})"
+
+
+def condition_text(condition: Condition) -> str:
+    match condition:
+        case Comparison(operator=operator, left=left, right=right):
+            return f"{numeric(left)} {operator} {numeric(right)}"
+        case Every(items=()):
+            return "0 == 0"
+        case Some(items=()):
+            return "0 == 1"
+        case Every(items=items):
+            return f"({' && '.join(map(condition_text, items))})"
+        case Some(items=items):
+            return f"({' || '.join(map(condition_text, items))})"
+
+
+def write(specification: Specification) -> str:
+    """The file's text. Raises NotRml."""
+    lines = [comment(text) if text else "" for text in specification.comments]
+    for event in specification.events:
+        if event.name in specification.notes:
+            lines += ["", comment(specification.notes[event.name])]
+        lines.append(_event_text(event))
+    lines.append("")
+    for machine in specification.machines:
+        if machine.name in specification.notes:
+            lines.append(comment(specification.notes[machine.name]))
+        lines += [_machine_text(machine), ""]
+    parts = [f"({m.relevant} >> {_call(m.name, m.initial)})" for m in specification.machines]
+    main = parts[0] if len(parts) == 1 else f"({' /\\ '.join(parts)})" if parts else "any*"
+    lines.append(f"Main = {main};")
+    return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def _event_text(event: EventType | Derived) -> str:
+    if isinstance(event, Derived):
+        return f"{event.name} matches {' | '.join(event.parents)};"
+    head = event.name + (f"({', '.join(event.parameters)})" if event.parameters else "")
+    guard = "" if event.condition == TRUE else f"\n  with {condition_text(event.condition)}"
+    return f"{head} matches {' | '.join(event.patterns)}{guard};"
+
+
+def _machine_text(machine: Machine) -> str:
+    head = machine.name + (f"<{', '.join(machine.parameters)}>" if machine.parameters else "")
+    sides = "".join(f"\n  \\/ {_step_text(machine.name, step)}" for step in machine.steps)
+    return f"{head} = (empty{sides});"
+
+
+def _step_text(machine: str, step: Step) -> str:
+    event = step.event + (f"({', '.join(step.arguments)})" if step.arguments else "")
+    body = f"{event} {_call(machine, step.then)}"
+    return f"{{let {', '.join(step.binds)}; {body}}}" if step.binds else f"({body})"
+
+
+def _call(name: str, arguments: tuple[Numeric, ...]) -> str:
+    return name + (f"<{', '.join(map(numeric, arguments))}>" if arguments else "")

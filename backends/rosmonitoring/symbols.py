@@ -1,0 +1,159 @@
+"""A contract variable as the fixed number of numbers that an RML equation can carry.
+
+An enumeration's element is a code (1, 2, …), a truth value 0 or 1, an algebraic value its constructor's code and the
+arguments of every constructor; a relation that holds of the latest message's tuple is a flag and that tuple. The
+scenario's tables are known beforehand. Anything else (a relation that holds of all tuples seen) is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from avow.backends.rosmonitoring.rml import FALSE, TRUE, Condition, Name, NotRml, Number, Numeric, compare, every, some
+from avow.backends.rosmonitoring.rules import Constant, Fields, Hold, InOrder, Previous, Rule
+from avow.language.sorts import (
+    BOOL,
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
+    Sort,
+)
+from avow.logic.values import Data, Element, FunctionValue, Value
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A number, a code, or a truth value as a number."""
+
+    number: Numeric
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """An algebraic value: the constructor's code, and for each constructor its arguments."""
+
+    tag: Numeric
+    arguments: tuple[tuple[Symbol, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """A relation that holds of these tuples, each on a condition."""
+
+    tuples: tuple[tuple[Condition, tuple[Symbol, ...]], ...]
+
+
+Symbol = Scalar | Variant | Points
+
+
+def code(sort: EnumSort | DataSort, name: str) -> int:
+    """The number that stands for an element or a constructor; 0 stands for none."""
+    names = sort.members if isinstance(sort, EnumSort) else tuple(c.name for c in sort.constructors)
+    return names.index(name) + 1
+
+
+def constant(value: Value, sort: Sort) -> Symbol:
+    """A known value. Raises NotRml."""
+    match value:
+        case bool():
+            return Scalar(Number(Fraction(value)))
+        case int() | Fraction():
+            return Scalar(Number(Fraction(value)))
+        case Element(name=name) if isinstance(sort, EnumSort):
+            return Scalar(Number(Fraction(code(sort, name))))
+        case Data(constructor=name, arguments=arguments) if isinstance(sort, DataSort):
+            chosen = sort.constructor(name)
+            parts = tuple(constant(a, s) for a, s in zip(arguments, chosen.parameters, strict=True))
+            others = tuple(
+                parts if c.name == name else tuple(blank(p) for p in c.parameters) for c in sort.constructors
+            )
+            return Variant(Number(Fraction(code(sort, name))), others)
+        case FunctionValue(table=table, default=False) if isinstance(sort, FunctionSort):
+            points = [k for k, v in table.items() if v is True]
+            tuples = tuple(
+                (TRUE, tuple(constant(a, s) for a, s in zip(k, sort.parameters, strict=True))) for k in points
+            )
+            return Points(tuples)
+        case _:
+            raise NotRml("a value that RML's equations cannot carry")
+
+
+def blank(sort: Sort) -> Symbol:
+    """What stands in the places of a value that is not there."""
+    match sort:
+        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | EnumSort():
+            return Scalar(Number(Fraction(0)))
+        case _:
+            raise NotRml("an argument of a constructor that is no number, truth value or enumeration")
+
+
+def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
+    """The symbol of an observed variable, with names for its parts that begin with `prefix`. Raises NotRml."""
+    if isinstance(rule, Constant):
+        return constant(rule.value, rule.variable.sort)
+    source = rules.get(rule.source) if isinstance(rule, Previous) else rule
+    name = rule.variable.qualified
+    sort = rule.variable.sort
+    if isinstance(sort, FunctionSort):
+        if isinstance(source, Fields | InOrder) and (source.hold is Hold.SEEN or getattr(source, "each", None)):
+            raise NotRml(
+                f"{name} may hold of any number of tuples, and an RML equation carries a fixed number of values"
+            )
+        if sort.result != BOOL:
+            raise NotRml(f"{name} is a function with a result")
+        parts = tuple(_named(s, f"{prefix}_{k}", name) for k, s in enumerate(sort.parameters, start=1))
+        return Points(((compare("==", Name(f"{prefix}_p"), Number(Fraction(1))), parts),))
+    return _named(sort, prefix, name)
+
+
+def _named(sort: Sort, prefix: str, name: str) -> Symbol:
+    match sort:
+        case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | EnumSort():
+            return Scalar(Name(prefix))
+        case DataSort(constructors=constructors):
+            arguments = []
+            for at, constructor in enumerate(constructors, start=1):
+                row: list[Symbol] = []
+                for k, parameter in enumerate(constructor.parameters, start=1):
+                    blank(parameter)
+                    row.append(Scalar(Name(f"{prefix}_{at}_{k}")))
+                arguments.append(tuple(row))
+            return Variant(Name(f"{prefix}_t"), tuple(arguments))
+        case _:
+            raise NotRml(f"{name} is of a sort that RML's equations cannot carry")
+
+
+def equal(left: Symbol, right: Symbol) -> Condition:
+    """When two symbols of one sort stand for the same value. Raises NotRml."""
+    match left, right:
+        case Scalar(number=one), Scalar(number=other):
+            return compare("==", one, other)
+        case Variant(), Variant():
+            same = compare("==", left.tag, right.tag)
+            cases = []
+            for at, (mine, theirs) in enumerate(zip(left.arguments, right.arguments, strict=True), start=1):
+                other_tag = compare("!=", left.tag, Number(Fraction(at)))
+                parts = every([equal(a, b) for a, b in zip(mine, theirs, strict=True)])
+                cases.append(some([other_tag, parts]))
+            return every([same, *cases])
+        case _:
+            raise NotRml("an equation between relations")
+
+
+def components(symbol: Symbol) -> tuple[str, ...]:
+    """The names of the parts that an equation carries for it, in order."""
+    match symbol:
+        case Scalar(number=Name(name=name)):
+            return (name,)
+        case Variant(tag=Name(name=name), arguments=arguments):
+            return (name, *(part for row in arguments for a in row for part in components(a)))
+        case Points(tuples=((condition, parts),)) if condition not in (TRUE, FALSE):
+            flag = condition.left.name if hasattr(condition, "left") else ""
+            return (flag, *(part for p in parts for part in components(p)))
+        case _:
+            return ()
