@@ -103,8 +103,8 @@ class Model:
 
     def _function(self, variable: Variable, sort: FunctionSort) -> FunctionValue:
         interpretation = self.z3_model[self.translator.function(variable)]
-        if interpretation is None:
-            return FunctionValue({}, default_value(sort.result))
+        if not isinstance(interpretation, z3.FuncInterp) or not interpretation.f:
+            return FunctionValue({}, default_value(sort.result))  # the model leaves it open: any function will do
         table: dict[tuple[Value, ...], Value] = {}
         for k in range(interpretation.num_entries()):
             entry = interpretation.entry(k)

@@ -100,6 +100,27 @@ def realizable(
     return Realizability(Verdict.PROVED, needed=ordered, engine=", ".join(dict.fromkeys(engines)) or "z3")
 
 
+def unrealizable(
+    inputs: Sequence[Variable],
+    outputs: Sequence[Variable],
+    assumptions: Formulas,
+    guarantees: Formulas,
+    *,
+    timeout_ms: int = 2_000,
+    seed: int = 0,
+) -> Realizability | None:
+    """Only look for inputs without an output; None if none are found in time."""
+    for group in groups(guarantees, outputs):
+        search = Search(inputs, group, assumptions, {}, timeout_ms, seed)
+        try:
+            answer = search.refute((), timeout_ms) if group.outputs else search.decide()
+        except (Unsupported, z3.Z3Exception):
+            continue
+        if answer is not None and answer.verdict is Verdict.REFUTED:
+            return answer
+    return None
+
+
 class Search:
     """One group's question, with the witnesses found so far."""
 

@@ -44,6 +44,8 @@ __all__ = [
 
 Status = OneOf["sat", "unsat", "unknown"]
 
+Engine = OneOf["smt", "qsat"]
+
 DEFAULT_TIMEOUT_MS = 10_000
 
 
@@ -102,15 +104,19 @@ def check(
     timeout_ms: int = DEFAULT_TIMEOUT_MS,
     seed: int = 0,
     tracked: Iterable[tuple[str, Expr]] = (),
+    engine: Engine = "smt",
 ) -> Answer:
     """Are the assertions satisfiable together? With `unsat`, `core` is a minimal set of tracked labels (each is needed,
-    as far as the solver can tell in time). Crashes of the solver are `unknown`."""
+    as far as the solver can tell in time). Crashes of the solver are `unknown`.
+
+    The engine `qsat` decides quantified linear arithmetic, where the usual one mostly gives up; it knows no functions.
+    """
     start = time.monotonic()
     assertions, tracked = list(assertions), list(tracked)
     try:
-        status, model, core, reason = _ask(translator, assertions, tracked, timeout_ms, seed)
+        status, model, core, reason = _ask(translator, assertions, tracked, timeout_ms, seed, engine)
         if status == "unsat" and len(core) > 1:
-            core = _minimal(translator, assertions, tracked, core, timeout_ms, seed)
+            core = _minimal(translator, assertions, tracked, core, timeout_ms, seed, engine)
     except z3.Z3Exception as error:
         status, model, core, reason = "unknown", None, (), f"Z3: {error}"
     found = Model(translator, model) if model is not None else None
@@ -119,8 +125,15 @@ def check(
 
 
 def _ask(
-    translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]], timeout_ms: int, seed: int
+    translator: Translator,
+    assertions: Sequence[Expr],
+    tracked: Sequence[tuple[str, Expr]],
+    timeout_ms: int,
+    seed: int,
+    engine: Engine,
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
+    if engine == "qsat":
+        return _ask_qsat(translator, assertions, tracked, timeout_ms)
     solver = z3.Solver(ctx=translator.context)
     solver.set("timeout", max(1, int(timeout_ms)))
     solver.set("random_seed", seed)
@@ -138,6 +151,40 @@ def _ask(
     return "unknown", None, (), str(solver.reason_unknown())
 
 
+def _ask_qsat(
+    translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]], timeout_ms: int
+) -> tuple[Status, object | None, tuple[str, ...], str]:
+    solver = z3.TryFor(z3.Tactic("qsat", ctx=translator.context), max(1, int(timeout_ms))).solver()
+    everything = [*assertions, *(expr for _, expr in tracked)]
+    solver.add(*everything)
+    result = solver.check()
+    if result == z3.sat:
+        return "sat", solver.model(), (), ""
+    if result == z3.unsat and _arithmetic_only(everything):
+        return "unsat", None, tuple(label for label, _ in tracked), ""
+    return "unknown", None, (), str(solver.reason_unknown())
+
+
+def _arithmetic_only(exprs: Iterable[Expr]) -> bool:
+    """Whether only numbers and truth values occur: where qsat is complete, and its `unsat` taken."""
+    seen: set[int] = set()
+    stack = list(exprs)
+    while stack:
+        expr = stack.pop()
+        if expr.get_id() in seen:
+            continue
+        seen.add(expr.get_id())
+        if z3.is_quantifier(expr):
+            stack.append(expr.body())
+        elif not (z3.is_bool(expr) or z3.is_arith(expr)):
+            return False
+        elif z3.is_app(expr):
+            if expr.num_args() and expr.decl().kind() == z3.Z3_OP_UNINTERPRETED:
+                return False
+            stack.extend(expr.children())
+    return True
+
+
 def _minimal(
     translator: Translator,
     assertions: Sequence[Expr],
@@ -145,12 +192,13 @@ def _minimal(
     core: tuple[str, ...],
     timeout_ms: int,
     seed: int,
+    engine: Engine,
 ) -> tuple[str, ...]:
     """Drop what is not needed, one label at a time."""
     kept = list(core)
     for label in core:
         rest = [(name, expr) for name, expr in tracked if name in kept and name != label]
-        status, _, smaller, _ = _ask(translator, assertions, rest, min(timeout_ms, 2_000), seed)
+        status, _, smaller, _ = _ask(translator, assertions, rest, min(timeout_ms, 2_000), seed, engine)
         if status == "unsat":
             kept = [name for name in kept if name in smaller]
     return tuple(kept)
@@ -235,8 +283,15 @@ def replay(formulas: Iterable[Term], values: Mapping[Variable, Value], *, timeou
         facts = [*translator.background(values, meanings), *(translator.term(f, meanings) for f in formulas)]
         known = translator.opaque_facts()
         whole = z3.And(facts) if facts else translator.true()
-        if check(translator, [*known, z3.Not(whole)], timeout_ms=timeout_ms).status == "unsat":
-            return True
+        quick, slow = min(500, timeout_ms), timeout_ms
+        denied = [*known, z3.Not(whole)]
+        attempts: tuple[tuple[Engine, int], ...] = (("smt", quick), ("qsat", slow), ("smt", slow))
+        for engine, limit in attempts:
+            status = check(translator, denied, timeout_ms=limit, engine=engine).status
+            if status == "unsat":
+                return True
+            if status == "sat" and limit == slow:
+                break
         if check(translator, [*known, whole], timeout_ms=timeout_ms).status == "unsat":
             return False
     except (Unsupported, z3.Z3Exception):
@@ -274,7 +329,7 @@ def _solve(
     reason = ""
     spent = 0.0
     for stage in _STAGES:
-        limit = int(timeout_ms * (stage - spent) / (2 if functions else 1))
+        limit = int(timeout_ms * (stage - spent) / 2)
         spent = stage
         answer = check(translator, background, timeout_ms=limit, seed=seed, tracked=tracked)
         if answer.status == "unsat":
@@ -285,6 +340,13 @@ def _solve(
             if values is not None and simple and replay(labelled.values(), {**values, **given}):
                 return Solution("sat", values)
         reason = answer.reason
+        if not functions:
+            answer = check(translator, background, timeout_ms=limit, tracked=tracked, engine="qsat")
+            if answer.status == "unsat":
+                return Solution("unsat", core=answer.core, engine="z3, qsat")
+            values = _read(answer.model, free) if answer.model is not None else None
+            if values is not None and replay(labelled.values(), {**values, **given}):
+                return Solution("sat", values, engine="z3, qsat")
         if functions:
             found = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=seed)
             if found is not None and replay(labelled.values(), {**found, **given}):
@@ -293,7 +355,7 @@ def _solve(
             values = _read(answer.model, free)
             if values is not None and replay(labelled.values(), {**values, **given}):
                 return Solution("sat", values)
-            return Solution("unknown", reason="the solver's model could not be replayed")
+            reason = "the solver's model could not be replayed"
     return Solution("unknown", reason=reason or "no answer in time")
 
 
@@ -369,7 +431,10 @@ def _with_tables(
         parts[variable] = (points, default)
     facts.extend(translator.background(ordinary))
     facts.extend(build(meanings))
-    answer = check(translator, facts, timeout_ms=timeout_ms, seed=seed)
+    # The usual engine first: its numbers are smaller.
+    answer = check(translator, facts, timeout_ms=timeout_ms // 3, seed=seed)
+    if answer.status == "unknown":
+        answer = check(translator, facts, timeout_ms=timeout_ms * 2 // 3, engine="qsat")
     if answer.model is None:
         return None
     model = answer.model
