@@ -5,12 +5,13 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib import resources
 from typing import Any
 
 from avow.diagnostics import Diagnostic
+from avow.system.plan import Located
 from avow.system.strict_yaml import Piece
 
 
@@ -24,11 +25,36 @@ def plan_schema() -> dict[str, Any]:
 
 def check_shape(piece: Piece) -> tuple[Diagnostic, ...]:
     """Everything in which the plan departs from the schema, in the order of the file."""
+    return _faults(piece, plan_schema())
+
+
+def violations(options: Located, schema: Mapping[str, Any]) -> tuple[Diagnostic, ...]:
+    """Everything in which a part of a plan departs from a schema of its own, such as a backend's for its options."""
+    return _faults(_piece(options, ()), schema)
+
+
+def _faults(piece: Piece, schema: Mapping[str, Any]) -> tuple[Diagnostic, ...]:
     from jsonschema import Draft202012Validator, validators  # slow to import
 
-    validator = validators.extend(Draft202012Validator, {"pattern": _pattern})(plan_schema())  # type: ignore[no-untyped-call]
+    validator = validators.extend(Draft202012Validator, {"pattern": _pattern})(schema)  # type: ignore[no-untyped-call]
     found = [d for error in validator.iter_errors(piece.data) for d in _explain(error, piece)]
     return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0)))
+
+
+def _piece(options: Located, path: tuple[str | int, ...]) -> Piece:
+    """The options as the reader of YAML saw them; the place of a key is that of its value."""
+    data = options.data
+    for step in path:
+        data = data[step]
+    span = options.at(*path)
+    match data:
+        case dict():
+            entries = {str(key): _piece(options, (*path, key)) for key in data}
+            return Piece(span, entries=entries, keys={key: piece.span for key, piece in entries.items()})
+        case list():
+            return Piece(span, items=[_piece(options, (*path, place)) for place in range(len(data))])
+        case _:
+            return Piece(span, data)
 
 
 def suggest(word: str, known: Iterable[str]) -> str | None:
