@@ -365,7 +365,7 @@ class _Analysis:
             if answer.status == "sat":
                 values = {v: value for v, value in {**answer.values, **given}.items() if v.role is not Role.BOUND}
                 text = f"the guarantees allow both values of out.{name}"
-                shown = Counterexample(show_values(values), text)
+                shown = Counterexample(show_values(values))
                 because = self._if_refuted(f"unconstrained-{name}")
                 return _Finding(Verdict.REFUTED, text, counterexample=shown, because=because, engine=answer.engine)
         return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)

@@ -299,9 +299,9 @@ def replay(formulas: Iterable[Term], values: Mapping[Variable, Value], *, timeou
     return None
 
 
-_STAGES = (0.05, 0.25, 1.0)
-"""Parts of the time allowed: a question is asked in short rounds of different methods before any gets long."""
-
+_ROUNDS = ((0.025, 0.1), (0.1, 0.2), (0.275, 0.3))
+"""Parts of the time allowed, for the solver's own methods and for functions as tables: short rounds of different
+methods before any gets long."""
 
 _PATIENT_MS = 5_000
 """From this much time on, another solver is worth its start."""
@@ -327,10 +327,8 @@ def _solve(
         return [*translator.opaque_facts(), *parts]
 
     reason = ""
-    spent = 0.0
-    for stage in _STAGES:
-        limit = int(timeout_ms * (stage - spent) / 2)
-        spent = stage
+    for plain, tables in _ROUNDS:
+        limit = max(1, int(timeout_ms * plain))
         answer = check(translator, background, timeout_ms=limit, seed=seed, tracked=tracked)
         if answer.status == "unsat":
             return Solution("unsat", core=answer.core)
@@ -341,6 +339,7 @@ def _solve(
                 return Solution("sat", values)
         reason = answer.reason
         if not functions:
+            limit = max(1, int(timeout_ms * tables))
             answer = check(translator, background, timeout_ms=limit, tracked=tracked, engine="qsat")
             if answer.status == "unsat":
                 return Solution("unsat", core=answer.core, engine="z3, qsat")
@@ -348,6 +347,7 @@ def _solve(
             if values is not None and replay(labelled.values(), {**values, **given}):
                 return Solution("sat", values, engine="z3, qsat")
         if functions:
+            limit = max(1, int(timeout_ms * tables))
             found = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=seed)
             if found is not None and replay(labelled.values(), {**found, **given}):
                 return Solution("sat", found, engine="z3, functions as tables")

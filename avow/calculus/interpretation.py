@@ -1,0 +1,69 @@
+"""The plan's finite scenario as values: which inputs it fixes, and to what."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from avow.language.contract import Node
+from avow.language.sorts import (
+    BoolSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
+    Sort,
+    StringSort,
+)
+from avow.language.terms import Variable
+from avow.logic.values import Element, FunctionValue, Value
+from avow.system.plan import Scenario
+
+
+def interpretation(node: Node, scenario: Scenario | None) -> dict[Variable, Value]:
+    """The inputs of a node that are relations given by the scenario's tables: each holds at the rows and nowhere else.
+
+    A function with another result is not fixed: a table says nothing of its value elsewhere. Cells that are no value of
+    their sort leave the input open, too (the plan's checks report them).
+    """
+    found: dict[Variable, Value] = {}
+    for port in node.inputs:
+        sort = port.sort
+        if scenario is None or not isinstance(sort, FunctionSort) or not isinstance(sort.result, BoolSort):
+            continue
+        for name in (f"{node.name}.in.{port.name}", f"{node.name}.{port.name}", f"in.{port.name}", port.name):
+            if name in scenario.interpret:
+                value = _relation(sort, scenario, *scenario.interpret[name])
+                if value is not None:
+                    found[port.variable] = value
+                break
+    return found
+
+
+def _relation(sort: FunctionSort, scenario: Scenario, table_name: str, columns: tuple[str, ...]) -> Value | None:
+    if len(columns) != len(sort.parameters):
+        return None
+    try:
+        table = scenario.table(table_name)
+        cells = [[_value(t, s) for t in table.column(c)] for c, s in zip(columns, sort.parameters, strict=True)]
+    except (KeyError, ValueError, ZeroDivisionError):
+        return None
+    return FunctionValue(dict.fromkeys(zip(*cells, strict=True), True), False)
+
+
+def _value(text: str, sort: Sort) -> Value:
+    """Raises ValueError."""
+    match sort:
+        case RealSort():
+            return Fraction(text)
+        case IntegerSort():
+            return int(text)
+        case NaturalSort() if int(text) >= 0:
+            return int(text)
+        case StringSort():
+            return text
+        case EnumSort(members=members) if text in members:
+            return Element(text)
+        case BoolSort() if text.lower() in {"true", "false"}:
+            return text.lower() == "true"
+    raise ValueError(text)

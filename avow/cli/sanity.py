@@ -1,0 +1,138 @@
+"""``avow sanity``: is a contract worth verifying against?"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from avow.logic.sanity import SanityResult
+    from avow.verdict import Counterexample
+
+
+@click.command()
+@click.argument("path", type=click.Path(path_type=Path))
+@click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
+@click.option("--json", "as_json", is_flag=True, help="For machines: see docs/schemas/sanity.schema.json.")
+@click.option("--all", "everything", is_flag=True, help="List also what is as it should be.")
+@click.option("--seconds", default=5.0, show_default=True, help="Time for one question to the solver.")
+@click.option("--seed", default=0, show_default=True, help="The solver's seed.")
+def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool, seconds: float, seed: int) -> int:
+    """Ask of every node whether its contract is worth verifying: can its assumptions hold, do its guarantees agree, is
+    there an output for every input that it allows, does every clause say something?
+
+    PATH is a system's folder or an .rcl file. Code 1 where something is refuted that is an error, 2 for bad input.
+    """
+    from avow.calculus.interpretation import interpretation
+    from avow.cli.workspace import system_folder
+    from avow.diagnostics import Diagnostic, Rejected
+    from avow.logic.sanity import Bounds, analyse
+    from avow.system.load import load_path
+
+    system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
+    known = [node.name for node in system.contract.nodes]
+    if unknown := [name for name in nodes if name not in known]:
+        raise Rejected(Diagnostic("CLI003", f"there is no node '{unknown[0]}'", hint=f"known: {', '.join(known)}"))
+    if seconds <= 0:
+        raise Rejected(Diagnostic("CLI004", f"--seconds {seconds}: a time above 0 is wanted"))
+    bounds = Bounds(max(1, int(seconds * 1000)), seed)
+    results: list[SanityResult] = []
+    for node in system.contract.nodes:
+        if nodes and node.name not in nodes:
+            continue
+        scenario = interpretation(node, system.plan.scenario)
+        results.extend(analyse(node, system.contract, scenario=scenario, bounds=bounds))
+    if as_json:
+        click.echo(json.dumps({"results": [to_json(result) for result in results]}, indent=1, ensure_ascii=False))
+    else:
+        _listing(results, everything)
+    return 1 if any(result.fails for result in results) else 0
+
+
+def to_json(result: SanityResult) -> dict[str, Any]:
+    """One result as docs/schemas/sanity.schema.json describes it."""
+    return {
+        "node": result.node,
+        "property": str(result.about),
+        "subject": result.subject,
+        "name": result.name,
+        "claim": result.claim,
+        "verdict": str(result.verdict),
+        "severity": str(result.severity),
+        "clauses": list(result.clauses),
+        "counterexample": _counterexample(result.counterexample),
+        "explanation": result.explanation,
+        "conflicts": [
+            {"clauses": list(clauses), "counterexample": _counterexample(shown)} for clauses, shown in result.conflicts
+        ],
+        "because": result.because,
+        "engine": result.engine,
+        "bounded": result.bounded,
+        "seconds": round(result.seconds, 3),
+        "place": {"file": result.span.file, "line": result.span.line, "column": result.span.column}
+        if result.span
+        else None,
+    }
+
+
+def _counterexample(shown: Counterexample | None) -> dict[str, Any] | None:
+    if shown is None:
+        return None
+    return {"values": dict(shown.values), "explanation": shown.explanation, "text": shown.text()}
+
+
+_COLOURS = {
+    "proved": "green",
+    "checked": "cyan",
+    "unknown": "yellow",
+    "refuted": "red",
+}
+
+
+def _listing(results: list[SanityResult], everything: bool) -> None:
+    from rich.console import Console
+    from rich.padding import Padding
+    from rich.text import Text
+
+    from avow.verdict import Verdict
+
+    console = Console(highlight=False)
+    shown = [r for r in results if everything or (r.verdict is not Verdict.PROVED and not r.because)]
+    node = ""
+    for result in shown:
+        if result.node != node:
+            node = result.node
+            console.print(Text(node, style="bold"))
+        # Text, not markup: names and values come from the contract.
+        line = Text.assemble((f"{result.verdict:9}", _style(result)), result.name)
+        if result.explanation:
+            line.append(f": {result.explanation}")
+        if result.severity != "error" and result.verdict is not Verdict.PROVED:
+            line.append(f" ({result.severity})", style="dim")
+        if result.because:
+            line.append(f" (a consequence of {result.because})", style="dim")
+        console.print(Padding(line, (0, 0, 0, 2)))
+        for example in _examples(result):
+            console.print(Padding(Text(example.text()), (0, 0, 0, 13)))
+    refuted = [r for r in results if r.verdict is Verdict.REFUTED]
+    unknown = sum(r.verdict is Verdict.UNKNOWN for r in results)
+    errors = sum(r.fails for r in refuted)
+    hidden = 0 if everything else sum(bool(r.because) for r in refuted)
+    consequences = f", {hidden} consequences of these not listed" if hidden else ""
+    console.print(
+        f"{len(results)} claims: {len(results) - len(refuted) - unknown} hold, "
+        f"{len(refuted)} refuted ({errors} of them errors{consequences}), {unknown} unknown"
+    )
+
+
+def _style(result: SanityResult) -> str:
+    if result.verdict == "refuted" and result.severity != "error":
+        return "yellow"
+    return _COLOURS.get(str(result.verdict), "")
+
+
+def _examples(result: SanityResult) -> list[Counterexample]:
+    return [example for _, example in result.conflicts] or ([result.counterexample] if result.counterexample else [])
