@@ -7,7 +7,7 @@ acceptance set again and again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from avow.backends.ajpf.psl import (
@@ -211,19 +211,24 @@ def _fold(operator: str, items: list[Nnf]) -> Nnf:
     return result
 
 
-def evaluate(formula: Formula, truth: Mapping[Atom, bool]) -> bool:
-    """A formula without temporal operators, at one state."""
+def compiled(formula: Formula, places: Mapping[Atom, int]) -> Callable[[int], bool]:
+    """A formula without temporal operators as a test of a state's label, a bit set of atoms."""
     match formula:
         case Atom():
-            return truth[formula]
+            bit = 1 << places[formula]
+            return lambda label: bool(label & bit)
         case Truth(value=value):
-            return value
+            return lambda label: value
         case Not(body=body):
-            return not evaluate(body, truth)
+            inner = compiled(body, places)
+            return lambda label: not inner(label)
         case And(items=items):
-            return all(evaluate(i, truth) for i in items)
+            tests = [compiled(i, places) for i in items]
+            return lambda label: all(test(label) for test in tests)
         case Or(items=items):
-            return any(evaluate(i, truth) for i in items)
+            tests = [compiled(i, places) for i in items]
+            return lambda label: any(test(label) for test in tests)
         case Implies(left=left, right=right):
-            return not evaluate(left, truth) or evaluate(right, truth)
+            first, second = compiled(left, places), compiled(right, places)
+            return lambda label: not first(label) or second(label)
     raise AssertionError(formula)

@@ -107,9 +107,7 @@ def rename(rule: Rule, suffix: str) -> Rule:
     """The rule with variables of its own."""
     terms = [rule.head, *(c.term for c in rule.body if c.term is not None)]
     own: Bindings = {name: Var(name + suffix) for term in terms for name in variables(term)}
-    body = tuple(
-        c if c.term is None else Condition(_apply_once(c.term, own), c.positive, c.is_goal) for c in rule.body
-    )
+    body = tuple(c if c.term is None else Condition(_apply_once(c.term, own), c.positive, c.is_goal) for c in rule.body)
     head = _apply_once(rule.head, own)
     assert isinstance(head, Struct)
     return Rule(head, body, rule.span)

@@ -6,9 +6,9 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from avow.backends.ajpf.automaton import Automaton, build, evaluate
+from avow.backends.ajpf.automaton import Automaton, build, compiled
 from avow.backends.ajpf.explore import Graph
-from avow.backends.ajpf.interpreter import NONE, State
+from avow.backends.ajpf.interpreter import NONE, Frame, State
 from avow.backends.ajpf.psl import Atom, Formula, Modality, Not, atoms, conjunction
 from avow.backends.ajpf.structure import Fair, Kripke, Lasso, find_lasso, reduce
 from avow.backends.ajpf.syntax import DeedKind, Sign, Struct, Term, Var, show, unify
@@ -52,11 +52,13 @@ class Checker:
     atoms: tuple[Atom, ...] = ()
     labels: list[int] = field(default_factory=list)
     """For each state: the bits of `atoms`, above them two bits for each fairness assumption (drawn; granted)."""
+    places: dict[Atom, int] = field(default_factory=dict)
     reduced: Kripke = field(init=False)
 
     def __post_init__(self) -> None:
         found = {atom: None for p in self.properties for f in (p.formula, p.trigger, p.goal) if f for atom in atoms(f)}
         self.atoms = tuple(found)
+        self.places = {atom: at for at, atom in enumerate(self.atoms)}
         self.labels = _labels(self.graph, self.atoms)
         self.reduced = reduce(self.whole(self.labels))
 
@@ -88,20 +90,17 @@ class Checker:
 
     def _where(self, formula: Formula) -> frozenset[int]:
         """The labels of reachable states at which the formula holds."""
-        return frozenset(label for label in set(self.reduced.labels) if self._holds(formula, label))
-
-    def _holds(self, formula: Formula, label: int) -> bool:
-        truth = {atom: bool(label >> at & 1) for at, atom in enumerate(self.atoms)}
-        return evaluate(formula, truth)
+        return frozenset(filter(compiled(formula, self.places), set(self.reduced.labels)))
 
     def _projected(self, wanted: Property, labels: Sequence[int]) -> tuple[Automaton, list[Fair], list[int]]:
         automaton = build(Not(wanted.formula))
         low, base = len(automaton.leaves), len(self.atoms)
+        tests = [compiled(leaf, self.places) for leaf in automaton.leaves]
         new: dict[int, int] = {}
         for label in set(labels):
             bits = (label >> base) << low
-            for at, leaf in enumerate(automaton.leaves):
-                if self._holds(leaf, label):
+            for at, test in enumerate(tests):
+                if test(label):
                     bits |= 1 << at
             new[label] = bits
         fair = [
@@ -163,12 +162,9 @@ def _memo(known: dict[int, int], key: int, compute: object) -> int:
     return found
 
 
-def _mental(frames: Iterable[object], wanted: Sequence[tuple[int, Modality, Term]]) -> int:
-    from avow.backends.ajpf.interpreter import Frame
-
+def _mental(frames: Iterable[Frame], wanted: Sequence[tuple[int, Modality, Term]]) -> int:
     bits = 0
     for frame in frames:
-        assert isinstance(frame, Frame)
         is_goal = frame.event.is_goal and frame.event.sign is Sign.ADD
         for bit, modality, term in wanted:
             if modality is Modality.INTENDS_TO_DO:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import time
 from array import array
 from dataclasses import dataclass
@@ -37,9 +38,12 @@ class Graph:
         return len(self.targets)
 
 
-def explore(agent: Agent, *, states: int = MAX_STATES, seconds: float = 60.0) -> Graph:
+def explore(
+    agent: Agent, *, states: int = MAX_STATES, seconds: float = 60.0, megabytes: int = 4096
+) -> Graph:
     """Every reachable state, breadth first. Raises Unfinished (and beliefs.TooDeep)."""
     deadline = time.monotonic() + seconds
+    memory = _memory() + megabytes
     numbers: dict[State, int] = {}
     found: list[State] = []
     offsets, targets = array("q", [0]), array("q")
@@ -62,6 +66,15 @@ def explore(agent: Agent, *, states: int = MAX_STATES, seconds: float = 60.0) ->
         if at & 1023 == 0:
             if len(found) > states:
                 raise Unfinished(f"more than {states} states")
+            if _memory() > memory:
+                raise Unfinished(f"{len(found)} states fill {megabytes} MB")
             if time.monotonic() > deadline:
                 raise Unfinished(f"{at} of at least {len(found)} states explored in {seconds:g} s")
+    if len(found) > states:
+        raise Unfinished(f"more than {states} states")
     return Graph(agent, tuple(found), initial, offsets, targets)
+
+
+def _memory() -> float:
+    """The most memory that this process has had so far, in MB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -63,7 +63,7 @@ def instances(job: Job, setup: Setup) -> Instantiation:
     mapper = Mapper(setup.rows, Decider(job), lambda v: range_of(v, setup.instances, scenario))
     keys: set[str] = set()
     claims = tuple(_claim(job.clause(o), mapper, setup, keys) for o in job.obligations)
-    extras = tuple((extra, _extra(extra, setup, keys)) for extra in setup.extras)
+    extras = tuple((extra, _extra(extra, keys)) for extra in setup.extras)
     unused = tuple(row.text for row in setup.rows if row.text not in mapper.used)
     return Instantiation(claims, extras, unused)
 
@@ -114,12 +114,16 @@ def _instantiate(clause: Clause, mapper: Mapper, keys: set[str]) -> Claim:
         for choice in product(*domains):
             values_now = dict(zip(used, choice, strict=True))
             said = ", ".join(f"{v.name} = {n}" for v, n in values_now.items())
-            made = list(_properties(substituted(antecedent, values_now), substituted(consequent, values_now), others, mapper))
+            made = list(
+                _properties(substituted(antecedent, values_now), substituted(consequent, values_now), others, mapper)
+            )
             for trigger, goal in made:
                 if trigger == psl.FALSE:
                     settled.append(f"{said or 'the guarantee'}: the scenario rules the trigger out")
                     continue
-                formula = Always(Implies(trigger, Eventually(goal))) if goal != psl.FALSE else Always(psl.negation(trigger))
+                formula = (
+                    Always(Implies(trigger, Eventually(goal))) if goal != psl.FALSE else Always(psl.negation(trigger))
+                )
                 if formula not in found:
                     found[formula] = Property("", formula, trigger, goal if goal != psl.FALSE else None)
                     about[formula] = []
@@ -208,10 +212,9 @@ def _alternatives(trigger: Formula) -> Sequence[Formula]:
     return [psl.conjunction(row) for row in rows]
 
 
-def _extra(extra: Extra, setup: Setup, keys: set[str]) -> tuple[Property, ...]:
-    domains = [setup.instances[name] for name in extra.indices]
+def _extra(extra: Extra, keys: set[str]) -> tuple[Property, ...]:
     found = []
-    for choice in product(*domains):
+    for choice in product(*extra.indices.values()):
         values: Mapping[str, int] = dict(zip(extra.indices, choice, strict=True))
         said = ", ".join(f"{n} = {v}" for n, v in values.items())
         formula = instantiate(extra.formula, values)
@@ -255,4 +258,3 @@ def _merged(about: Sequence[str]) -> str:
     if all(len(s) == 2 and s[0] == split[0][0] and s[1].isdigit() for s in split):
         return f"{split[0][0]} = {_span([int(s[1]) for s in split])}"
     return "; ".join(about)
-

@@ -116,9 +116,7 @@ class Table(Generic[T]):
 class Agent:
     """A program in its environment. `start` and `successors` span the state graph."""
 
-    def __init__(
-        self, program: Program, environment: Environment, semantics: Semantics, *, fine: bool = False
-    ) -> None:
+    def __init__(self, program: Program, environment: Environment, semantics: Semantics, *, fine: bool = False) -> None:
         """`fine` observes also the moment between the choice of a plan and its first deed, for claims on intentions."""
         self.fine = fine
         self.program = program

@@ -262,5 +262,3 @@ def clauses(mapped: Mapped, limit: int = 64) -> list[tuple[Unit, ...]]:
 def substituted(term: Term, values: Mapping[Variable, int]) -> Term:
     """The formula with numbers for index variables."""
     return substitute(term, {v: Literal(n, v.sort) for v, n in values.items()}) if values else term
-
-

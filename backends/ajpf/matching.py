@@ -73,7 +73,9 @@ def choose(
                 yield final, (at, *(p if p < at else p + 1 for p in places))
 
 
-def _match_all(patterns: Sequence[Term], terms: Sequence[Term], names: frozenset[str], binding: Binding) -> Iterator[Binding]:
+def _match_all(
+    patterns: Sequence[Term], terms: Sequence[Term], names: frozenset[str], binding: Binding
+) -> Iterator[Binding]:
     if not patterns:
         yield binding
         return
@@ -81,7 +83,9 @@ def _match_all(patterns: Sequence[Term], terms: Sequence[Term], names: frozenset
         yield from _match_all(patterns[1:], terms[1:], names, found)
 
 
-def _match_quantified(pattern: Quantified, term: Quantified, names: frozenset[str], binding: Binding) -> Iterator[Binding]:
+def _match_quantified(
+    pattern: Quantified, term: Quantified, names: frozenset[str], binding: Binding
+) -> Iterator[Binding]:
     """The pattern's bound variables become pattern variables that must stand for the term's, one to one."""
     if pattern.quantifier is not term.quantifier or len(pattern.variables) != len(term.variables):
         return
@@ -91,9 +95,7 @@ def _match_quantified(pattern: Quantified, term: Quantified, names: frozenset[st
     for found in match(pattern.body, term.body, names | inner, hidden):
         values = [found.get(name) for name in inner]
         stands_for = {v.name for v in values if isinstance(v, Variable) and v.role is Role.BOUND}
-        escaped = any(
-            isinstance(v, Variable) and v.name in theirs for name, v in found.items() if name not in inner
-        )
+        escaped = any(isinstance(v, Variable) and v.name in theirs for name, v in found.items() if name not in inner)
         if stands_for == theirs and not escaped:
             outer = {name: value for name, value in found.items() if name not in inner}
             yield {**outer, **{name: value for name, value in binding.items() if name in inner}}

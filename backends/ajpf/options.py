@@ -29,6 +29,12 @@ MAX_INSTANCES = 1_000
 DEFAULT_STATES = 1_000_000
 
 _TEXT = {"type": "string"}
+_RANGES: dict[str, Any] = {
+    "type": "object",
+    "additionalProperties": {
+        "anyOf": [_TEXT, {"type": "integer"}, {"type": "array", "items": {"type": ["integer", "string"]}, "minItems": 1}]
+    },
+}
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     "type": "object",
@@ -42,11 +48,8 @@ SCHEMA: dict[str, Any] = {
             "description": "RCL pattern → BDI formula; free variables of the pattern stand for terms",
         },
         "instances": {
-            "type": "object",
+            **_RANGES,
             "description": "index variable → its finite range: '1..12', 'table.column' or a list of numbers",
-            "additionalProperties": {
-                "anyOf": [_TEXT, {"type": "array", "items": {"type": ["integer", "string"]}, "minItems": 1}]
-            },
         },
         "variables": {
             "type": "object",
@@ -62,7 +65,13 @@ SCHEMA: dict[str, Any] = {
                     _TEXT,
                     {
                         "type": "object",
-                        "properties": {"psl": _TEXT, "guarantee": _TEXT, "because": _TEXT},
+                        "properties": {
+                            "psl": _TEXT,
+                            "guarantee": {**_TEXT, "description": "whose verdict it belongs to"},
+                            "counts": {"type": "boolean", "description": "false: listed only; default true"},
+                            "instances": {**_RANGES, "description": "narrower ranges than the method's"},
+                            "because": _TEXT,
+                        },
                         "required": ["psl"],
                         "additionalProperties": False,
                     },
@@ -86,9 +95,11 @@ class Extra:
     name: str
     formula: Formula
     guarantee: str | None
+    counts: bool
+    """Whether the guarantee's verdict depends on it."""
     because: str
-    indices: tuple[str, ...]
-    """Index variables that it is instantiated over."""
+    indices: Mapping[str, tuple[int, ...]]
+    """Index variables that it is instantiated over, with their ranges."""
     span: Span
 
 
@@ -139,6 +150,8 @@ class _Reader:
         environment, environment_path = self.file("environment", read_environment)
         if program is not None:
             self.agent(program)
+        if self.options.get("engine") == "ajpf":
+            self.engine()
         instances = self.instances()
         rows = self.rows(program)
         extras = self.extras(program, instances)
@@ -179,20 +192,33 @@ class _Reader:
 
     def agent(self, program: Program) -> None:
         if program.name in KEYWORDS or not AGENT_NAME.match(program.name):
-            why = "is a word of AJPF's property language" if program.name in KEYWORDS else "must start with a small letter"
+            why = (
+                "is a word of AJPF's property language"
+                if program.name in KEYWORDS
+                else "must start with a small letter"
+            )
             message = f"an agent cannot be called '{program.name}': the name {why}"
             self.faults.append(Diagnostic("AJPF104", message, program.name_span))
         wanted = self.options.get("agent", program.name)
         if wanted != program.name:
             self.fault("AJPF121", f"agent: the program's agent is called '{program.name}', not {wanted!r}", "agent")
 
+    def engine(self) -> None:
+        if "environment_class" not in self.options:
+            message = "engine: AJPF needs environment_class, the Java class of the environment"
+            self.fault("AJPF126", message, "engine")
+        if self.options.get("semantics", "mcapl") != "mcapl":
+            self.fault("AJPF126", "semantics: AJPF has its own, 'mcapl'", "semantics")
+
     def instances(self) -> dict[str, tuple[int, ...]]:
-        given = self.options.get("instances", {})
+        return self.ranges(self.options.get("instances", {}), "instances")
+
+    def ranges(self, given: Mapping[str, object], *path: str) -> dict[str, tuple[int, ...]]:
         result = {}
         for name, value in given.items():
             found = self.range_of(value)
             if isinstance(found, str):
-                self.fault("AJPF122", f"instances.{name}: {found}", "instances", name)
+                self.fault("AJPF122", f"{'.'.join(path)}.{name}: {found}", *path, name)
             else:
                 result[name] = found
         return result
@@ -294,16 +320,18 @@ class _Reader:
                 message = f"properties.{name}: there is no guarantee '{guarantee}'"
                 self.fault("AJPF125", message, "properties", name, "guarantee")
                 continue
-            indices = tuple(sorted(index_names(formula) & set(instances)))
+            data = {} if isinstance(entry, str) else entry
+            ranges = {**instances, **self.ranges(data.get("instances", {}), "properties", name, "instances")}
+            indices = {i: ranges[i] for i in sorted(index_names(formula) & set(ranges))}
             try:
-                for choice in product(*(instances[i] for i in indices)):
+                for choice in product(*indices.values()):
                     instantiate(formula, dict(zip(indices, choice, strict=True)))
             except Malformed as error:
                 self.fault("AJPF124", f"properties.{name}: {error.reason}", "properties", name)
                 continue
-            because = "" if isinstance(entry, str) else entry.get("because", "")
             span = self.job.method.options.at("properties", name)
-            found.append(Extra(name, formula, guarantee, because, indices, span))
+            counts = guarantee is not None and data.get("counts", True)
+            found.append(Extra(name, formula, guarantee, counts, data.get("because", ""), indices, span))
         return tuple(found)
 
 

@@ -95,7 +95,14 @@ def parse_program(text: str, file: str) -> Program:
 @functools.cache
 def _grammar() -> Lark:
     text = Path(__file__).with_name("gwendolen.lark").read_text(encoding="utf-8")
-    return Lark(text, start=["start", "struct"], parser="lalr", lexer="contextual", propagate_positions=True, maybe_placeholders=True)
+    return Lark(
+        text,
+        start=["start", "struct"],
+        parser="lalr",
+        lexer="contextual",
+        propagate_positions=True,
+        maybe_placeholders=True,
+    )
 
 
 def _at(file: str, line: int, column: int, width: int = 1) -> Span:
@@ -111,7 +118,9 @@ def _unexpected(error: UnexpectedInput, text: str, file: str) -> Diagnostic:
     if isinstance(error, UnexpectedCharacters):
         character = text[error.pos_in_stream] if error.pos_in_stream < len(text) else ""
         wanted = _wanted(error.allowed or set())
-        return Diagnostic("AJPF102", f"unexpected {_quote(character)}", _at(file, error.line, error.column), hint=wanted)
+        return Diagnostic(
+            "AJPF102", f"unexpected {_quote(character)}", _at(file, error.line, error.column), hint=wanted
+        )
     lines = text.split("\n")
     expected = error.expected if isinstance(error, UnexpectedEOF | UnexpectedToken) else set()
     span = _at(file, len(lines), len(lines[-1]) + 1)

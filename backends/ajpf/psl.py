@@ -188,3 +188,8 @@ def show_term(term: Term) -> str:
     if isinstance(term, Var):
         return "_"
     return f"{term.functor}({', '.join(map(show_term, term.args))})" if term.args else term.functor
+
+
+def show_template(formula: Formula) -> str:
+    """For people: index terms as the plan writes them."""
+    return re.sub(r"([+-])\((\w+), (\w+)\)", r"\2 \1 \3", show(formula))

@@ -59,7 +59,9 @@ def parse_psl(text: str) -> Formula:
     parser = _Parser(_tokens(text))
     formula = parser.property(0)
     if parser.now.text:
-        raise Malformed(f"unexpected {parser.now.text!r} after the formula; AJPF would ignore the rest", parser.now.offset)
+        raise Malformed(
+            f"unexpected {parser.now.text!r} after the formula; AJPF would ignore the rest", parser.now.offset
+        )
     return formula
 
 
@@ -133,7 +135,8 @@ class _Parser:
         allowed = {"~": (), "<>": ("~",), "E": ("~",), "[]": ("<>", "E", "~"), "A": ("<>", "E", "~")}[token.text]
         if inner.text in make and inner.text not in allowed:
             raise Malformed(
-                f"'{token.text}{inner.text}' loses an operator in AJPF: write {token.text}({inner.text} …)", inner.offset
+                f"'{token.text}{inner.text}' loses an operator in AJPF: write {token.text}({inner.text} …)",
+                inner.offset,
             )
         return make[token.text](self.unary(depth))
 

@@ -48,7 +48,9 @@ class Decider:
         return value if isinstance(value, bool) else None
 
 
-def range_of(variable: Variable, instances: Mapping[str, tuple[int, ...]], scenario: Scenario | None) -> Sequence[int] | None:
+def range_of(
+    variable: Variable, instances: Mapping[str, tuple[int, ...]], scenario: Scenario | None
+) -> Sequence[int] | None:
     """The finite range of an index variable: the plan's instances, else the scenario's domain of its sort."""
     plain = variable.name.rstrip("'")
     for name in (variable.name, plain):
@@ -77,7 +79,9 @@ def _interpretations(node: Node, scenario: Scenario) -> dict[str, Value]:
     return found
 
 
-def _function(sort: FunctionSort, scenario: Scenario, table_name: str, columns: tuple[str, ...]) -> FunctionValue | None:
+def _function(
+    sort: FunctionSort, scenario: Scenario, table_name: str, columns: tuple[str, ...]
+) -> FunctionValue | None:
     """A relation holds at the table's rows; another function takes its last column as value there."""
     relation = isinstance(sort.result, BoolSort)
     sorts = [*sort.parameters, *(() if relation else (sort.result,))]

@@ -173,7 +173,10 @@ def find_lasso(graph: Kripke, automaton: Automaton, fair: Sequence[Fair] = ()) -
         return result
 
     roots = [
-        state * width + node for state in graph.initial for node in automaton.initial if node in nodes(graph.labels[state])
+        state * width + node
+        for state in graph.initial
+        for node in automaton.initial
+        if node in nodes(graph.labels[state])
     ]
     cache: dict[int, list[int]] = {}
 

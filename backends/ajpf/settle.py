@@ -1,0 +1,176 @@
+"""From results for properties to one outcome for each guarantee, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from avow.backends.ajpf import psl
+from avow.backends.ajpf.checker import Property
+from avow.backends.ajpf.instances import Claim, Instantiation
+from avow.backends.ajpf.options import Extra, Setup
+from avow.evidence.obligation import Obligation
+from avow.verdict import Counterexample, Link, Outcome, Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """What is known of one property. `verdict` is checked, refuted, unknown, error or not-run."""
+
+    verdict: Verdict
+    reason: str = ""
+    vacuous: bool = False
+    immediate: bool = False
+    opinions: Mapping[str, str] = field(default_factory=dict)
+    """Other engines' answers: ``{"Spin 6.5.2": "holds"}``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What all outcomes of a method have in common."""
+
+    setup: Setup
+    made: Instantiation
+    results: Mapping[str, Settled]
+    counterexamples: Mapping[str, Counterexample]
+    """For some of the refuted properties, by key."""
+    engine: str
+    bound: Mapping[str, object]
+
+
+def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
+    """The verdict is checked only if every property of the guarantee is."""
+    hypotheses = (
+        "the plan's table says truly which agent formulas stand for which contract formulas",
+        *frame.setup.environment.describe(),
+        f"percepts become events as in '{frame.setup.semantics}' percept semantics, in the order of their groups",
+    )
+    attached = [(e, ps) for e, ps in frame.made.extras if e.guarantee in (claim.guarantee, None)]
+    details: dict[str, object] = {"engine": frame.engine, "percept_semantics": str(frame.setup.semantics)}
+    if claim.not_covered is not None:
+        summary = f"not covered: {claim.not_covered}"
+        return Outcome(obligation.id, Verdict.UNKNOWN, summary, details=details, link=Link.MAPPED)
+    counted = [*claim.properties, *(p for e, ps in attached if e.counts for p in ps)]
+    verdict = _worst(frame.results[p.key].verdict for p in counted)
+    own = [p for p in claim.properties if p.trigger is not None]
+    vacuous = [p for p in own if frame.results[p.key].vacuous]
+    details["properties"] = [_entry(p, frame.results[p.key]) for p in claim.properties]
+    if claim.settled:
+        details["settled_by_the_scenario"] = list(claim.settled)
+    if attached:
+        details["further_properties"] = [
+            {"name": e.name, "counts": e.counts, "because": e.because}
+            | {"properties": [_entry(p, frame.results[p.key]) for p in ps]}
+            for e, ps in attached
+        ]
+    counterexample = None
+    if verdict is Verdict.REFUTED:
+        shown = (p for p in counted if frame.results[p.key].verdict is Verdict.REFUTED)
+        counterexample = next((frame.counterexamples[p.key] for p in shown if p.key in frame.counterexamples), None)
+    return Outcome(
+        obligation.id,
+        verdict,
+        _summary(claim, counted, vacuous, attached, verdict, frame),
+        counterexample,
+        hypotheses,
+        {**frame.bound, "properties": len(counted), "indices": list(claim.indices)},
+        details,
+        Link.MAPPED,
+        vacuous=verdict is Verdict.CHECKED and len(vacuous) == len(own),
+    )
+
+
+_ORDER = (Verdict.REFUTED, Verdict.ERROR, Verdict.NOT_RUN, Verdict.UNKNOWN)
+
+
+def _worst(verdicts: Iterable[Verdict]) -> Verdict:
+    found = set(verdicts)
+    return next((v for v in _ORDER if v in found), Verdict.CHECKED)
+
+
+def _summary(
+    claim: Claim,
+    counted: Sequence[Property],
+    vacuous: Sequence[Property],
+    attached: Sequence[tuple[Extra, Sequence[Property]]],
+    verdict: Verdict,
+    frame: Frame,
+) -> str:
+    results = frame.results
+    by_verdict = {v: [p for p in counted if results[p.key].verdict is v] for v in (*_ORDER, Verdict.CHECKED)}
+    parts = []
+    if not counted:
+        parts.append("nothing to check: the plan's scenario alone settles every instance")
+    elif verdict is Verdict.CHECKED:
+        parts.append(f"{_count(counted)} {'holds' if len(counted) == 1 else 'hold'} in every reachable state")
+    elif verdict is Verdict.REFUTED:
+        failing = by_verdict[Verdict.REFUTED]
+        parts.append(f"{len(failing)} of {_count(counted)} fail{'s' if len(failing) == 1 else ''}{_which(failing)}")
+    else:
+        failing = by_verdict[verdict]
+        parts.append(f"{len(failing)} of {_count(counted)}: {verdict}: {results[failing[0].key].reason}")
+    if vacuous:
+        every = len(vacuous) == len([p for p in claim.properties if p.trigger is not None])
+        if every:
+            parts.append("but no trigger is ever met, so that nothing is shown")
+        else:
+            parts.append(f"the trigger{_which(vacuous)} is never met, so that nothing is shown there")
+    at_once = [p for p in claim.properties if results[p.key].immediate and results[p.key].verdict is Verdict.CHECKED]
+    if at_once:
+        parts.append(f"{len(at_once)} hold{'s' if len(at_once) == 1 else ''} at once, the goal coming with the trigger")
+    for extra, properties in attached:
+        failing = [p for p in properties if results[p.key].verdict is Verdict.REFUTED]
+        if failing and not extra.counts:
+            parts.append(f"'{extra.name}' (listed, not counted) fails{_which(failing)}")
+    if claim.indices:
+        parts.append(", ".join(claim.indices))
+    parts.append(f"{frame.engine}, {frame.setup.semantics} percepts")
+    states = frame.bound.get("states")
+    if isinstance(states, int):
+        parts[-1] += f", {states} states"
+    return "; ".join(parts)
+
+
+def _count(properties: Sequence[Property]) -> str:
+    return "the property" if len(properties) == 1 else f"{len(properties)} properties"
+
+
+def _which(properties: Sequence[Property]) -> str:
+    """`` for i = 2, 3, 5`` as far as that helps."""
+    names = [p.about or p.key for p in properties]
+    shown = list(dict.fromkeys(names))
+    split = [name.split(" = ") for name in shown]
+    if len(shown) > 1 and all(len(s) == 2 and s[0] == split[0][0] for s in split):
+        return f" for {split[0][0]} = {_runs([s[1] for s in split])}"
+    return f" for {'; '.join(shown[:6])}{' …' if len(shown) > 6 else ''}"
+
+
+def _runs(values: Sequence[str]) -> str:
+    if not all(v.isdigit() for v in values):
+        return ", ".join(values)
+    numbers = sorted(map(int, values))
+    groups: list[list[int]] = []
+    for n in numbers:
+        if groups and groups[-1][-1] == n - 1:
+            groups[-1].append(n)
+        else:
+            groups.append([n])
+    return ", ".join(f"{g[0]}…{g[-1]}" if len(g) > 2 else ", ".join(map(str, g)) for g in groups)
+
+
+def _entry(p: Property, result: Settled) -> dict[str, object]:
+    entry: dict[str, object] = {
+        "key": p.key,
+        "instance": p.about,
+        "property": psl.show(p.formula),
+        "verdict": str(result.verdict),
+    }
+    if p.trigger is not None:
+        entry["vacuous"] = result.vacuous
+    if result.immediate:
+        entry["immediate"] = True
+    if result.reason:
+        entry["reason"] = result.reason
+    if result.opinions:
+        entry["second_opinions"] = dict(result.opinions)
+    return entry

@@ -1,0 +1,140 @@
+"""A second opinion from Spin: the explored state graph as a Promela model, the properties in Spin's own LTL.
+
+Spin sees the graph before our reductions, and translates and checks the properties by itself. What it shares with the
+first opinion is the exploration of the agent.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from avow.backend import Tool
+from avow.backends.ajpf import psl
+from avow.backends.ajpf.checker import Checker, Property
+from avow.files import write
+from avow.process import ToolMissing, run
+
+_ERRORS = re.compile(r"errors: (\d+)")
+
+
+class NoOpinion(Exception):  # noqa: N818 - it names a state, not a fault
+    """Spin did not answer; `reason` is a clause for people."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+@functools.cache
+def version() -> str | None:
+    if shutil.which("gcc") is None:
+        return None
+    try:
+        said = run(["spin", "-V"], seconds=10)
+    except ToolMissing:
+        return None
+    found = re.search(r"Spin Version (\S+)", said.stdout + said.stderr)
+    return found[1] if found else None
+
+
+def tool() -> Tool:
+    return Tool("spin", version(), shutil.which("spin"), "apt-get install spin gcc")
+
+
+def opinions(checker: Checker, properties: Sequence[Property], folder: Path, seconds: float) -> dict[str, bool]:
+    """Key → whether the property holds, says Spin. Raises NoOpinion."""
+    if version() is None:
+        raise NoOpinion("spin or gcc is not installed")
+    write(folder / "graph.h", _tables(checker))
+    write(folder / "agent.pml", _model(checker, properties))
+    for command in (["spin", "-a", "agent.pml"], ["gcc", "-O1", "-w", "-DNOREDUCE", "-o", "pan", "pan.c"]):
+        try:
+            done = run(command, cwd=folder, seconds=seconds)
+        except ToolMissing as error:
+            raise NoOpinion(str(error)) from None
+        if done.code != 0:
+            raise NoOpinion(f"{command[0]} failed: {(done.stdout + done.stderr).strip()[:300]}")
+    depth = 20 * len(checker.graph) + 10_000
+    return {p.key: _verdict(folder, f"c{number}", depth, seconds) for number, p in enumerate(properties)}
+
+
+def _verdict(folder: Path, claim: str, depth: int, seconds: float) -> bool:
+    done = run(["./pan", "-a", "-n", f"-m{depth}", "-w18", "-N", claim], cwd=folder, seconds=seconds)
+    text = done.stdout + done.stderr
+    found = _ERRORS.search(text)
+    if done.timed_out or found is None or "too small" in text or "Search not completed" in text and found[1] == "0":
+        raise NoOpinion(f"pan gave no answer: {text.strip()[:200]}")
+    return found[1] == "0"
+
+
+def _model(checker: Checker, properties: Sequence[Property]) -> str:
+    degrees = [checker.graph.offsets[s + 1] - checker.graph.offsets[s] for s in range(len(checker.graph))]
+    most = max([*degrees, len(checker.graph.initial)])
+    lines = ['c_decl {\n\\#include \"graph.h\"\n}', "int s = 0;", ""]
+    atoms = len(checker.atoms)
+    fair = len(checker.graph.agent.environment.fair)
+    for bit in range(atoms + 2 * fair):
+        lines.append(f"#define a{bit} (c_expr {{ (label[now.s * WORDS + {bit // 32}] >> {bit % 32}) & 1 }})")
+    lines += ["", "active proctype agent() {", "end: do"]
+    for way in range(most):
+        step = f"c_code {{ now.s = target[offset[now.s] + {way}]; }}"
+        lines.append(f"  :: atomic {{ c_expr {{ offset[now.s + 1] - offset[now.s] > {way} }} -> {step} }}")
+    lines += ["  od", "}", ""]
+    premise = [
+        f"((<> ([] (!a{atoms + 2 * at}))) || ([] (<> a{atoms + 2 * at + 1})))" for at in range(fair)
+    ]
+    for number, p in enumerate(properties):
+        formula = _ltl(p.formula, checker.places)
+        whole = f"(!({' && '.join(premise)})) || ({formula})" if premise else formula
+        lines.append(f"ltl c{number} {{ {whole} }}")
+    return "\n".join(lines) + "\n"
+
+
+def _tables(checker: Checker) -> str:
+    """State 0 stands before the initial states, with their label: stuttering, as they must all have the same one."""
+    graph = checker.graph
+    first = {checker.labels[s] for s in graph.initial}
+    if len(first) != 1:
+        raise NoOpinion("the initial states differ in what the properties look at")
+    words = max(1, (len(checker.atoms) + 2 * len(graph.agent.environment.fair) + 31) // 32)
+    labels = [next(iter(first)), *checker.labels]
+    cells = [label >> (32 * w) & 0xFFFFFFFF for label in labels for w in range(words)]
+    offsets = [0, *(o + len(graph.initial) for o in graph.offsets)]
+    targets = [s + 1 for s in (*graph.initial, *graph.targets)]
+    return "\n".join(
+        [
+            f"#define WORDS {words}",
+            f"static const unsigned int label[] = {{ {', '.join(f'{c}u' for c in cells)} }};",
+            f"static const int offset[] = {{ {', '.join(map(str, offsets))} }};",
+            f"static const int target[] = {{ {', '.join(map(str, targets))} }};",
+            "",
+        ]
+    )
+
+
+def _ltl(formula: psl.Formula, places: Mapping[psl.Atom, int]) -> str:
+    match formula:
+        case psl.Atom():
+            return f"a{places[formula]}"
+        case psl.Truth(value=value):
+            return "true" if value else "false"
+        case psl.Not(body=body):
+            return f"(! {_ltl(body, places)})"
+        case psl.And(items=items):
+            return f"({' && '.join(_ltl(i, places) for i in items)})"
+        case psl.Or(items=items):
+            return f"({' || '.join(_ltl(i, places) for i in items)})"
+        case psl.Implies(left=left, right=right):
+            return f"({_ltl(left, places)} -> {_ltl(right, places)})"
+        case psl.Always(body=body):
+            return f"([] {_ltl(body, places)})"
+        case psl.Eventually(body=body):
+            return f"(<> {_ltl(body, places)})"
+        case psl.Until(left=left, right=right):
+            return f"({_ltl(left, places)} U {_ltl(right, places)})"
+        case psl.Release(left=left, right=right):
+            return f"({_ltl(left, places)} V {_ltl(right, places)})"
