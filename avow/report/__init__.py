@@ -1,7 +1,8 @@
 """The assurance report: every format rendered from one `avow.assurance.model.Case`, so that they cannot disagree.
 
     render_all(case, folder)            writes index.html report.json report.md report.pdf report.sarif findings.sarif
-                                        junit.xml attestation.jsonl gsn.yaml gsn.svg traceability.html/.csv report.tex
+                                        junit.xml attestation.jsonl gsn.yaml gsn.svg traceability.html traceability.csv
+                                        report.tex
     write_index(cases, folder)          writes <folder>/index.html over all systems, with the trend over runs
 
 Both are idempotent and write each file in one step. They return what they wrote, and what they left out and why.
@@ -9,11 +10,12 @@ Both are idempotent and write each file in one step. They return what they wrote
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from avow.assurance.model import Case
+from avow.files import write
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,9 +28,66 @@ class Rendered:
 
 def render_all(case: Case, folder: Path) -> Rendered:
     """Write every format of one case into `folder`. Raises OSError."""
-    raise NotImplementedError
+    written, left_out = [], []
+    for name, content in formats(case):
+        if isinstance(content, LeftOut):
+            left_out.append((name, content.reason))
+            (folder / name).unlink(missing_ok=True)  # an older run's must not stand beside this one's
+        else:
+            write(folder / name, content)
+            written.append(folder / name)
+    return Rendered(tuple(written), tuple(left_out))
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """A format that cannot be rendered here."""
+
+    reason: str
+
+
+def formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
+    """Every format by its file name. Same case, same bytes."""
+    from avow.assurance.argument import Element, build_argument
+    from avow.assurance.traceability import to_csv, trace
+    from avow.report import exchange, latex, markdown, page, picture, wording
+
+    argument = build_argument(case)
+
+    def link(element: Element) -> str | None:
+        return f"index.html#{wording.anchor(element.claim)}" if element.claim else None
+
+    rows = trace(case)
+    yield "report.json", exchange.render_json(case)
+    yield "index.html", page.render_page(case)
+    yield "report.md", markdown.render_markdown(case)
+    yield "report.sarif", exchange.render_sarif(case)
+    yield "findings.sarif", exchange.render_sarif(case, findings_only=True)
+    yield "junit.xml", exchange.render_junit(case)
+    yield "attestation.jsonl", exchange.render_attestation(case)
+    yield "gsn.yaml", exchange.render_gsn(argument, case)
+    yield "gsn.svg", picture.draw(argument, argument.root, link, f"The argument for {case.title}", alone=True)
+    yield "traceability.csv", to_csv(rows)
+    yield "traceability.html", page.render_traceability(case, rows)
+    yield "report.tex", latex.render_latex(case)
+    yield "report.pdf", _pdf(case)
+
+
+def _pdf(case: Case) -> bytes | LeftOut:
+    from avow.report.pdf import NoTypst, render_pdf
+
+    try:
+        return render_pdf(case)
+    except NoTypst as missing:
+        return LeftOut(str(missing))
+    except Exception as error:  # typst's own exception types differ between versions
+        return LeftOut(f"typst failed: {str(error).splitlines()[0] if str(error) else type(error).__name__}")
 
 
 def write_index(cases: Sequence[Case], folder: Path) -> Rendered:
     """Write the page over all systems, `folder`/index.html; a system's own page is `folder`/<system>/index.html."""
-    raise NotImplementedError
+    from avow.report.page import render_index
+
+    path = folder / "index.html"
+    write(path, render_index(cases))
+    return Rendered((path,))

@@ -8,14 +8,17 @@ from collections.abc import Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
+from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from avow.assurance.argument import Argument, Element, build_argument
 from avow.assurance.model import Case, ObligationView
-from avow.assurance.naming import short
+from avow.assurance.naming import is_advice, short
 from avow.assurance.policy import techniques
+from avow.assurance.traceability import COLUMNS, Row
+from avow.assurance.trend import trend
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.report import picture, wording
@@ -95,6 +98,31 @@ def _ticks(text: str) -> Markup:
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
+def render_traceability(case: Case, rows: Sequence[Row]) -> str:
+    """The traceability matrix as a page, orphans first told."""
+    return (
+        environment()
+        .get_template("traceability.html.j2")
+        .render(
+            case=case,
+            rows=rows,
+            orphans=[row for row in rows if row.remark],
+            columns=COLUMNS,
+            style=Markup(_asset("style.css")),
+        )
+    )
+
+
+def render_index(cases: Sequence[Case]) -> str:
+    """The page over all systems."""
+    rows = [(case, wording.verdict_line(case), _tones(case), trend(case)) for case in cases]
+    return (
+        environment()
+        .get_template("index.html.j2")
+        .render(rows=rows, good=all(case.good for case in cases), style=Markup(_asset("style.css")), quote=quote)
+    )
+
+
 @cache
 def _asset(name: str) -> str:
     return resources.files("avow.report").joinpath("templates", name).read_text(encoding="utf-8")
@@ -115,6 +143,13 @@ def _counts(views: Sequence[ObligationView]) -> list[tuple[Kind, list[tuple[Stat
         if of_kind:
             table.append((kind, [(s, of_kind.count(s)) for s in Status if s in of_kind], len(of_kind)))
     return table
+
+
+def _tones(case: Case) -> list[tuple[str, str, int]]:
+    """(colour, word, number) of claims that hold, are open, are wrong."""
+    found = [wording.tone(view.standing) for view in case.obligations if not is_advice(view.obligation)]
+    holding = found.count("good") + found.count("fair")
+    return [("good", "hold", holding), ("open", "open", found.count("open")), ("bad", "wrong", found.count("bad"))]
 
 
 def _used_methods(case: Case) -> list[str]:

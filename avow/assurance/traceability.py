@@ -1,0 +1,145 @@
+"""Traceability: requirement ↔ derived property ↔ guarantee ↔ obligation ↔ evidence, with orphans both ways."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from avow.assurance.model import Case, ObligationView
+from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.evidence.obligation import Kind
+
+COLUMNS = (
+    "requirement",
+    "derived property",
+    "guarantee",
+    "obligation",
+    "obligation status",
+    "method",
+    "verdict",
+    "link",
+    "tool",
+    "evidence",
+    "remark",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One path from a requirement to a piece of evidence; an orphan has gaps, and a remark that says so."""
+
+    requirement: str = ""
+    derivation: str = ""
+    guarantee: str = ""
+    obligation: str = ""
+    status: str = ""
+    method: str = ""
+    verdict: str = ""
+    link: str = ""
+    tool: str = ""
+    evidence: str = ""
+    remark: str = ""
+
+    def cells(self) -> tuple[str, ...]:
+        return (
+            self.requirement,
+            self.derivation,
+            self.guarantee,
+            self.obligation,
+            self.status,
+            self.method,
+            self.verdict,
+            self.link,
+            self.tool,
+            self.evidence,
+            self.remark,
+        )
+
+
+def trace(case: Case) -> tuple[Row, ...]:
+    """Every path, requirement by requirement; then the orphans: guarantees and derivations that serve no requirement,
+    evidence of claims that no longer exist."""
+    rows: list[Row] = []
+    reached: set[str] = set()
+    derivations = {derivation_claim(d.derivation.name): d for d in case.derivations}
+    requirements = {requirement_claim(r.id): r for r in case.requirements}
+    views = {view.id: view for view in case.obligations}
+    for requirement in case.requirements:
+        before = len(rows)
+        seen: set[str] = set()
+        stack = [(claim, "") for claim in reversed(requirement.rests_on)]
+        while stack:
+            claim, through = stack.pop()
+            if claim in seen:
+                continue
+            seen.add(claim)
+            reached.add(claim)
+            if claim in derivations:
+                name = derivations[claim].derivation.name
+                path = f"{through} / {name}" if through else name
+                stack += [(below, path) for below in reversed(derivations[claim].rests_on)]
+            elif claim in requirements:
+                stack += [(below, through) for below in reversed(requirements[claim].rests_on)]
+            elif claim in views:
+                rows += _rows(views[claim], requirement.id, through)
+            else:
+                rows.append(Row(requirement.id, through, obligation=claim, remark="orphan: no such claim"))
+        if len(rows) == before:
+            rows.append(Row(requirement.id, remark="orphan: nothing supports this requirement"))
+        rows += [
+            Row(requirement.id, remark=f"orphan: '{name}' stands for nothing") for name in requirement.unknown_names
+        ]
+    for view in case.obligations:
+        if view.obligation.kind is Kind.GUARANTEE and view.id not in reached:
+            rows += _rows(view, "", "", "orphan: serves no requirement")
+    rows += [
+        Row(derivation=d.derivation.name, status=d.status.value, remark="orphan: serves no requirement")
+        for claim, d in derivations.items()
+        if claim not in reached
+    ]
+    rows += [
+        Row(
+            obligation=entry.evidence.obligation,
+            method=entry.evidence.method,
+            verdict=entry.evidence.verdict.value,
+            evidence=entry.hash[:12],
+            remark="orphan: evidence of a claim that no longer exists",
+        )
+        for entry in case.orphans
+    ]
+    return tuple(rows)
+
+
+def _rows(view: ObligationView, requirement: str, derivation: str, remark: str = "") -> Iterable[Row]:
+    o = view.obligation
+    guarantee = short(o.id) if o.kind is Kind.GUARANTEE else ""
+    start = Row(requirement, derivation, guarantee, o.id, view.standing.value, remark=remark)
+    if not view.counting:
+        missing = "orphan: no evidence"
+        yield replace(start, remark=f"{remark}; {missing}" if remark else missing)
+    for item in view.counting:
+        record = item.entry.evidence
+        tool = f"{record.tool} {record.tool_version}".strip()
+        yield replace(
+            start,
+            method=record.method,
+            verdict=record.verdict.value,
+            link=record.link.value,
+            tool=tool,
+            evidence=item.entry.hash[:12],
+        )
+
+
+def to_csv(rows: Iterable[Row]) -> str:
+    """As CSV (RFC 4180). A cell that a spreadsheet would take for a formula gets an apostrophe before it."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\r\n")
+    writer.writerow(COLUMNS)
+    writer.writerows([[_harmless(cell) for cell in row.cells()] for row in rows])
+    return out.getvalue()
+
+
+def _harmless(cell: str) -> str:
+    return "'" + cell if cell[:1] in ("=", "+", "-", "@", "\t", "\r") else cell

@@ -1,0 +1,252 @@
+"""The case for other programs: JSON, JUnit XML, SARIF 2.1.0, in-toto statements, gsn2x YAML."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import Any
+from urllib.parse import quote
+from xml.sax.saxutils import escape, quoteattr
+
+import yaml
+
+from avow.assurance.argument import Argument, Shape
+from avow.assurance.codec import to_json
+from avow.assurance.model import Case, ObligationView
+from avow.assurance.naming import is_advice, sanity_property, short
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
+from avow.files import digest
+from avow.report.wording import MEANINGS, clean, tone
+
+
+def render_json(case: Case) -> str:
+    """The whole case (schema: docs/schemas/case.schema.json)."""
+    return json.dumps(to_json(case), indent=1, ensure_ascii=True) + "\n"
+
+
+def headline(view: ObligationView) -> str:
+    """An obligation's state in a line: what refutes it first, else the newest evidence, else that there is none."""
+    counting = [item.entry.evidence for item in view.counting]
+    for record in counting:
+        if record.verdict.value == "refuted":
+            example = record.counterexample.text() if record.counterexample else ""
+            return f"{record.method}: {example or record.summary}"
+    if counting:
+        return f"{counting[-1].method}: {counting[-1].summary}"
+    return MEANINGS[view.status]
+
+
+# -- JUnit XML ------------------------------------------------------------------------------------------------------
+
+
+def render_junit(case: Case) -> str:
+    """A suite for the gates and one a node. What is refuted fails; what is merely not shown is skipped, never passed:
+    whether that matters is for the gates to say."""
+    suites = [_gates_suite(case)]
+    nodes = dict.fromkeys(view.obligation.node for view in case.obligations)
+    suites += [_suite(case, node, [v for v in case.obligations if v.obligation.node == node]) for node in nodes]
+    total = [sum(numbers) for numbers in zip(*(suite[1] for suite in suites), strict=True)]
+    head = f"<testsuites name={_attribute(case.system)} {_numbers(total)}>"
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + head + "\n" + "".join(s[0] for s in suites) + "</testsuites>\n"
+
+
+def _gates_suite(case: Case) -> tuple[str, list[int]]:
+    rows, failures = [], 0
+    for gate in case.gates:
+        inside = ""
+        if not gate.passed:
+            failures += 1
+            inside = f'<failure type="gate" message={_attribute(gate.reason)}>{escape(clean(gate.reason))}</failure>'
+        rows.append(_testcase(f"{case.system}.gates", gate.title, 0.0, inside))
+    counts = [len(rows), failures, 0, 0]
+    return f'<testsuite name="gates" {_numbers(counts)}>\n{"".join(rows)}</testsuite>\n', counts
+
+
+def _suite(case: Case, node: str, views: Iterable[ObligationView]) -> tuple[str, list[int]]:
+    rows = []
+    counts = [0, 0, 0, 0]
+    for view in views:
+        message = f"{view.standing}: {headline(view)}"
+        text = escape(clean(message))
+        inside = ""
+        if tone(view.status) == "bad" and not view.handled and not is_advice(view.obligation):
+            counts[1] += 1
+            inside = f"<failure type={_attribute(view.status)} message={_attribute(message)}>{text}</failure>"
+        elif view.status is Status.ERROR:
+            counts[2] += 1
+            inside = f'<error type="error" message={_attribute(message)}>{text}</error>'
+        elif not view.standing.supports:
+            counts[3] += 1
+            handled = f"{view.handled}; " if view.handled else ""
+            inside = f"<skipped message={_attribute(handled + message)}/>"
+        counts[0] += 1
+        seconds = sum(item.entry.evidence.seconds for item in view.counting)
+        o = view.obligation
+        rows.append(_testcase(f"{case.system}.{o.node}.{o.kind}", o.name, seconds, inside))
+    return f"<testsuite name={_attribute(node)} {_numbers(counts)}>\n{''.join(rows)}</testsuite>\n", counts
+
+
+def _testcase(group: str, name: str, seconds: float, inside: str) -> str:
+    head = f'<testcase classname={_attribute(group)} name={_attribute(name)} time="{seconds:.3f}"'
+    return f"{head}>{inside}</testcase>\n" if inside else f"{head}/>\n"
+
+
+def _numbers(counts: list[int]) -> str:
+    names = ("tests", "failures", "errors", "skipped")
+    return " ".join(f'{name}="{number}"' for name, number in zip(names, counts, strict=True))
+
+
+def _attribute(text: str) -> str:
+    return quoteattr(clean(str(text)).replace("\n", " ").replace("\r", " ").replace("\t", " "))
+
+
+# -- SARIF ----------------------------------------------------------------------------------------------------------
+
+
+def render_sarif(case: Case, *, findings_only: bool = False) -> str:
+    """SARIF 2.1.0, with locations in the contract. `findings_only` leaves out what holds."""
+    views = [v for v in case.obligations if not findings_only or not v.standing.supports]
+    rules = {_rule(view): _rule_text(view) for view in views}
+    names = list(rules)
+    run = {
+        "tool": {
+            "driver": {
+                "name": "Avow",
+                "version": case.run.avow_version,
+                "informationUri": "https://avow.invalid/",
+                "rules": [
+                    {"id": name, "shortDescription": {"text": text}, "defaultConfiguration": {"level": "error"}}
+                    for name, text in rules.items()
+                ],
+            }
+        },
+        "automationDetails": {"id": f"avow/{quote(case.system)}/{quote(case.run.id)}"},
+        "columnKind": "unicodeCodePoints",
+        "invocations": [{"executionSuccessful": case.exit_code != 3, "exitCode": case.exit_code}],
+        "results": [_result(view, case, names) for view in views],
+        "properties": {"system": case.system, "grade": case.grade.value, "ledgerHead": case.ledger_head},
+    }
+    schema = "https://json.schemastore.org/sarif-2.1.0.json"
+    return json.dumps({"$schema": schema, "version": "2.1.0", "runs": [run]}, indent=1, ensure_ascii=True) + "\n"
+
+
+def _rule(view: ObligationView) -> str:
+    o = view.obligation
+    return f"{o.kind}/{sanity_property(o)}" if o.kind is Kind.SANITY else o.kind.value
+
+
+def _rule_text(view: ObligationView) -> str:
+    texts = {
+        Kind.WELL_FORMED: "The contract parses and is well-typed",
+        Kind.SANITY: f"The contract is worth verifying: {sanity_property(view.obligation)}",
+        Kind.COMPOSITION: "The nodes' contracts may be composed",
+        Kind.GUARANTEE: "The node meets its guarantee",
+        Kind.REQUIREMENT: "The system meets its requirement",
+    }
+    return texts[view.obligation.kind]
+
+
+def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any]:
+    o = view.obligation
+    kind, level = _sarif_level(view)
+    result: dict[str, Any] = {
+        "ruleId": _rule(view),
+        "ruleIndex": rules.index(_rule(view)),
+        "kind": kind,
+        "level": level,
+        "message": {"text": f"{short(o.id)} is {view.standing}. {o.claim}. {headline(view)}"},
+        "partialFingerprints": {"avowObligation/v1": digest(o.id)},
+        "properties": {
+            "obligation": o.id,
+            "digest": o.digest,
+            "status": view.status.value,
+            "standing": view.standing.value,
+        },
+    }
+    location: dict[str, Any] = {"logicalLocations": [{"fullyQualifiedName": o.id, "kind": "declaration"}]}
+    if o.span:
+        region = {
+            "startLine": max(1, o.span.line),
+            "startColumn": max(1, o.span.column),
+            "endLine": max(1, o.span.end_line),
+            "endColumn": max(1, o.span.end_column),
+        }
+        uri = quote(o.span.file, safe="/._-~")
+        location["physicalLocation"] = {"artifactLocation": {"uri": uri}, "region": region}
+    result["locations"] = [location]
+    if view.handled:
+        finding = next(f for f in case.findings if view.id in f.obligations and f.how == view.handled and not f.expired)
+        said = f"{finding.how}: {finding.reason or finding.pattern}" + (f" ({finding.who})" if finding.who else "")
+        result["suppressions"] = [{"kind": "external", "status": "accepted", "justification": said}]
+    return result
+
+
+def _sarif_level(view: ObligationView) -> tuple[str, str]:
+    if view.standing.supports:
+        return "pass", "none"
+    if is_advice(view.obligation):
+        return "informational", "none"
+    if tone(view.status) == "bad":
+        return "fail", "error"
+    if view.status in (Status.VACUOUS, Status.ERROR) or view.standing is Status.UNSUPPORTED:
+        return "fail", "warning"
+    return "open", "none"
+
+
+# -- in-toto --------------------------------------------------------------------------------------------------------
+
+
+def render_attestation(case: Case) -> str:
+    """in-toto statements (v1) with test-result predicates (v0.1): one for the system, then one for each node."""
+    every = [_statement(case, "", list(case.obligations), "PASSED" if case.good else "FAILED")]
+    nodes = dict.fromkeys(view.obligation.node for view in case.obligations)
+    for node in nodes:
+        views = [view for view in case.obligations if view.obligation.node == node and not is_advice(view.obligation)]
+        good = all(view.standing.supports for view in views)
+        bad = any(tone(view.status) == "bad" and not view.handled for view in views)
+        every.append(_statement(case, node, views, "PASSED" if good else "FAILED" if bad else "WARNED"))
+    return "".join(json.dumps(statement, ensure_ascii=True, sort_keys=True) + "\n" for statement in every)
+
+
+def _statement(case: Case, node: str, views: list[ObligationView], result: str) -> dict[str, Any]:
+    subjects = dict(case.digests)
+    if node:
+        subjects |= {p: m for view in views for item in view.counting for p, m in item.entry.evidence.inputs.items()}
+    if not subjects:
+        subjects = {f"ledger/{case.system}": case.ledger_head}
+    groups: dict[str, list[str]] = {"passedTests": [], "warnedTests": [], "failedTests": []}
+    for view in views:
+        bad = tone(view.status) == "bad" and not view.handled and not is_advice(view.obligation)
+        groups["passedTests" if view.standing.supports else "failedTests" if bad else "warnedTests"].append(view.id)
+    return {
+        "_type": "https://in-toto.io/Statement/v1",
+        "subject": [{"name": name, "digest": {"sha256": mark}} for name, mark in sorted(subjects.items())],
+        "predicateType": "https://in-toto.io/attestation/test-result/v0.1",
+        "predicate": {
+            "result": result,
+            "configuration": [{"name": f"ledger/{case.system}", "digest": {"sha256": case.ledger_head}}],
+            **groups,
+        },
+    }
+
+
+# -- GSN ------------------------------------------------------------------------------------------------------------
+
+
+def render_gsn(argument: Argument, case: Case) -> str:
+    """The goal structure as gsn2x reads it."""
+    levels: dict[str, Any] = {
+        "module": {"name": clean(case.system), "brief": clean(case.title)},
+    }
+    for element in argument.elements:
+        status = f" [{element.status}]" if element.status else ""
+        body: dict[str, Any] = {"text": clean(f"{element.title}{status}\n{element.text}".strip())}
+        if element.supported_by:
+            body["supportedBy"] = list(element.supported_by)
+        if element.in_context_of:
+            body["inContextOf"] = list(element.in_context_of)
+        if element.shape in (Shape.GOAL, Shape.STRATEGY) and not element.supported_by:
+            body["undeveloped"] = True
+        levels[element.id] = body
+    return yaml.safe_dump(levels, sort_keys=False, allow_unicode=True, width=110)

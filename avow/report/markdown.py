@@ -1,0 +1,81 @@
+"""The case as a Markdown summary: for pull requests, and for people without a browser."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from avow.assurance.model import Case, ObligationView
+from avow.assurance.naming import short
+from avow.evidence.obligation import Kind
+from avow.report.wording import clean, verdict_line, where
+
+_MARKDOWN = re.compile(r"([\\`*_{}\[\]()#+!|<>~&$-])")
+_LONG = 200
+"""Rows of a table in the summary; all of them are in report.json."""
+
+
+def render_markdown(case: Case) -> str:
+    """The summary: the answer, the gates, the open items, the table, what is not shown."""
+    parts = [
+        f"# {_md(case.title)}: assurance report",
+        f"**{_md(verdict_line(case))}** Grade {case.grade}: {_md(case.grade_reason)}.",
+        _origin(case),
+        _table(("file", "SHA-256"), ((_md(path), f"`{mark}`") for path, mark in case.digests)),
+        "## Requirements",
+        _table(
+            ("requirement", "status", "answer"),
+            ((f"**{_md(r.id)}** {_md(r.text)}", r.status.value, _md(r.answer)) for r in case.requirements),
+        ),
+        "## Gates",
+        _table(
+            ("gate", "", "why"),
+            ((_md(g.title), "passes" if g.passed else "**fails**", _md(g.reason)) for g in case.gates),
+        ),
+        "## Open items",
+        _table(
+            ("", "claim", "what", "next"),
+            ((i.kind, _md(short(i.claim)), _md(i.text), _md(i.suggestion)) for i in case.open_items if not i.advice),
+        ),
+        "## Guarantees",
+        _table(("guarantee", "criticality", "status", "evidence", "at"), (_row(view) for view in _guarantees(case))),
+        "## Hypotheses and environment",
+        "\n".join(f"- {_md(h.text)} ({_md(', '.join(map(short, h.claims[:6])))})" for h in case.hypotheses) or "None.",
+        _table(
+            ("environment input", "assumed", "because"),
+            ((_md(e.port), _md(e.assume), _md(e.because)) for e in case.environment),
+        ),
+        "## What is not shown",
+        "\n".join(f"- {_md(line)}" for line in case.not_shown),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _origin(case: Case) -> str:
+    run = f"run `{_code(case.run.id)}`, ledger `{case.ledger_head}`"
+    return f"System `{_code(case.system)}`, policy {_md(case.policy.name)}, {case.today}, {run}."
+
+
+def _guarantees(case: Case) -> list[ObligationView]:
+    return [view for view in case.obligations if view.obligation.kind is Kind.GUARANTEE]
+
+
+def _row(view: ObligationView) -> tuple[str, ...]:
+    methods = ", ".join(f"{i.entry.evidence.method} {i.entry.evidence.verdict}" for i in view.counting)
+    return _md(short(view.id)), _md(view.criticality), view.standing.value, _md(methods), _md(where(view))
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(row) + " |" for row in rows]
+    if not lines:
+        return "None." if len(head) > 2 else ""
+    more = f"\n\nand {len(lines) - _LONG} more: see report.json" if len(lines) > _LONG else ""
+    return "\n".join(["| " + " | ".join(head) + " |", "|" + " --- |" * len(head), *lines[:_LONG]]) + more
+
+
+def _md(text: str) -> str:
+    return _MARKDOWN.sub(r"\\\1", " ".join(clean(text).split()))
+
+
+def _code(text: str) -> str:
+    return " ".join(clean(text).split()).replace("`", "'")

@@ -1,0 +1,151 @@
+"""The case as PDF, set by Typst (extra ``avow[pdf]``): offline, with its own fonts, same bytes every time."""
+
+from __future__ import annotations
+
+import json
+from importlib import resources
+from typing import Any
+
+from avow.assurance.model import Case, ObligationView
+from avow.assurance.naming import short
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
+from avow.report.wording import MARKS, bound_text, clean, tone, verdict_line
+
+_MOST = 1500
+"""Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
+
+
+class NoTypst(Exception):  # noqa: N818 - it says what is missing
+    """The extra is not installed."""
+
+
+def render_pdf(case: Case) -> bytes:
+    """Raises NoTypst where the extra is missing, RuntimeError where Typst fails."""
+    try:
+        import typst
+    except ImportError as error:
+        raise NoTypst("typst is not installed: pip install 'avow[pdf]'") from error
+    source = resources.files("avow.report").joinpath("templates/report.typ").read_bytes()
+    data: bytes = typst.compile(
+        source, format="pdf", sys_inputs={"case": json.dumps(_data(case))}, ignore_system_fonts=True, timestamp=0
+    )
+    return data
+
+
+def _data(case: Case) -> dict[str, Any]:
+    views = case.obligations[:_MOST]
+    levels = {node.name: node.criticality for node in case.nodes}
+    nodes = dict.fromkeys(v.obligation.node for v in views if v.obligation.kind is Kind.GUARANTEE)
+    facts = [("system", case.system), ("grade", f"{case.grade}: {case.grade_reason}"), ("policy", case.policy.name)]
+    facts += [("date", case.today), ("run", case.run.id), ("ledger", case.ledger_head)]
+    left_out = len(case.obligations) - len(views)
+    more = [f"{left_out} obligations are left out of this document: see report.json."] if left_out else []
+    found: dict[str, Any] = {
+        "title": case.title,
+        "good": case.good,
+        "grade": str(case.grade),
+        "line": verdict_line(case),
+        "facts": [*facts, *case.digests],
+        "requirements": [
+            {"id": r.id, "text": r.text or r.formula or r.temporal, "answer": r.answer, "status": _chip(r.status)}
+            for r in case.requirements
+        ],
+        "gates": [
+            {
+                "title": g.title,
+                "reason": g.reason,
+                "status": {"word": "passes" if g.passed else "fails", "tone": "good" if g.passed else "bad"},
+            }
+            for g in case.gates
+        ],
+        "open": [
+            {"claim": short(i.claim), "text": i.text, "next": i.suggestion, "status": _word(i.kind)}
+            for i in case.open_items[:_MOST]
+            if not i.advice
+        ],
+        "matrix": [
+            {
+                "name": node,
+                "criticality": f"{levels.get(node, '')} criticality",
+                "rows": [_row(v) for v in views if v.obligation.node == node and v.obligation.kind is Kind.GUARANTEE],
+            }
+            for node in nodes
+        ],
+        "derivations": [
+            {
+                "name": d.derivation.name,
+                "rule": d.derivation.rule,
+                "text": d.derivation.text,
+                "conclusion": d.derivation.conclusion,
+                "conditions": "; ".join(c.text for c in d.derivation.side_conditions),
+                "status": _chip(d.status),
+            }
+            for d in case.derivations
+        ],
+        "obligations": [_obligation(view) for view in views],
+        "hypotheses": [f"{h.text} ({', '.join(map(short, h.claims[:6]))})" for h in case.hypotheses],
+        "environment": [(e.port, e.assume or "nothing is assumed", e.because) for e in case.environment],
+        "findings": [
+            f"{f.how}: {f.pattern} {f.verdict}. {f.reason} {f.who} {f.date}".strip()
+            + (" (expired)" if f.expired else "")
+            for f in case.findings
+        ],
+        "single": [short(name) for name in case.single_method],
+        "limits": [*case.limits[:400]],
+        "not_shown": [*more, *case.not_shown],
+    }
+    plain: dict[str, Any] = _clean(found)
+    return plain
+
+
+def _obligation(view: ObligationView) -> dict[str, Any]:
+    evidence = [item.entry.evidence for item in view.counting]
+    return {
+        "name": short(view.id),
+        "claim": view.obligation.claim,
+        "formula": view.obligation.formula,
+        "status": _chip(view.standing),
+        "evidence": [
+            {
+                "status": _chip(Status(e.verdict)),
+                "method": e.method,
+                "tool": f"{e.tool} {e.tool_version}",
+                "summary": e.summary,
+                "bound": bound_text(e.bound),
+                "counter": e.counterexample.text() if e.counterexample else "",
+            }
+            for e in evidence
+        ],
+    }
+
+
+def _row(view: ObligationView) -> dict[str, Any]:
+    methods = [
+        {
+            "word": f"{i.entry.evidence.method}: {i.entry.evidence.verdict}",
+            "tone": tone(Status(i.entry.evidence.verdict)),
+        }
+        for i in view.counting
+    ]
+    return {"name": view.obligation.name, "status": _chip(view.standing), "methods": methods}
+
+
+def _chip(status: Status) -> dict[str, str]:
+    return {"word": str(status), "tone": tone(status)}
+
+
+def _word(kind: str) -> dict[str, str]:
+    return _chip(Status(kind)) if kind in MARKS else {"word": kind, "tone": "bad"}
+
+
+def _clean(value: Any) -> Any:
+    match value:
+        case str():
+            return clean(value)
+        case dict():
+            return {key: _clean(item) for key, item in value.items()}
+        case list() | tuple():
+            return [_clean(item) for item in value]
+        case _:
+            return value
