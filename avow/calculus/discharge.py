@@ -13,9 +13,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from avow.calculus.derivation import Case, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
+from avow.calculus.entailment import implied
 from avow.calculus.variables import Frame
 from avow.language.terms import Term
-from avow.logic.smt import entails
+from avow.logic.formula import free_variables
 from avow.system.graph import components, cycle_in
 from avow.verdict import Verdict
 
@@ -80,10 +81,10 @@ class _Solver:
         allowed = self.selected if allowed is None else allowed
         direct = [p for p in condition.providers if p in allowed]
         last: Settled | None = None
-        for same, before in self.attempts(condition, direct, allowed):
+        for number, (same, before) in enumerate(self.attempts(condition, direct, allowed)):
             split = bool(before) or condition.delayed
             phases = (Phase.INITIAL, Phase.LATER) if split else (Phase.SAME_STEP,)
-            cases = tuple(self.case(condition, phase, same, before) for phase in phases)
+            cases = tuple(self.case(condition, phase, same, before, wide=number > 0) for phase in phases)
             answer = _settled(condition, cases)
             if answer.verdict is Verdict.PROVED:
                 return answer
@@ -130,16 +131,19 @@ class _Solver:
                     stack.append(provider)
         return tuple(found)
 
-    def case(self, condition: SideCondition, phase: Phase, same: tuple[str, ...], before: tuple[str, ...]) -> Case:
+    def case(
+        self, condition: SideCondition, phase: Phase, same: tuple[str, ...], before: tuple[str, ...], *, wide: bool
+    ) -> Case:
+        goal = self.frame.clause(condition.consumer, condition.clause)
         hypotheses = self.contracts(same, 0)
-        hypotheses |= self.frame.environment(0)
+        around = self.frame.environment(0)
         if phase is Phase.LATER:
             hypotheses |= self.contracts(before, 1)
-            hypotheses |= self.frame.environment(1)
+            around |= self.frame.environment(1)
         elif phase is Phase.INITIAL:
-            hypotheses |= self.frame.initials(frozenset(self.selected))
-        goal = self.frame.clause(condition.consumer, condition.clause)
-        answer = entails(hypotheses, goal, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed)
+            around |= self.frame.initials(self.selected)
+        hypotheses |= _about(around, [goal, *hypotheses.values()], direct=not wide)
+        answer = implied(hypotheses, goal, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed)
         return Case(
             phase,
             answer.verdict,
@@ -158,6 +162,23 @@ class _Solver:
             for node in nodes
             for clause in self.frame.node(node).clauses
         }
+
+
+def _about(facts: Hypotheses, terms: Iterable[Term], *, direct: bool) -> Hypotheses:
+    """The facts that share a variable with the terms, or (unless `direct`) with one another down to the terms.
+
+    What shares none cannot help a proof, and may keep the solver busy for long.
+    """
+    known = {variable for term in terms for variable in free_variables(term)}
+    variables = {label: free_variables(fact) for label, fact in facts.items()}
+    found: Hypotheses = {}
+    growing = True
+    while growing:
+        near = [label for label in facts if label not in found and variables[label] & known]
+        found |= {label: facts[label] for label in near}
+        known.update(*(variables[label] for label in near))
+        growing = bool(near) and not direct
+    return found
 
 
 def _settled(condition: SideCondition, cases: tuple[Case, ...]) -> Settled:

@@ -86,7 +86,7 @@ def dataflow(system: System) -> Graph:
     started = [(e.source.node, e.target.node) for e in edges if not (e.delayed and e.initial is not None)]
     selves = {source for source, target in started if source == target}
     loops = [c for c in components(names, started) if len(c) > 1 or c[0] in selves]
-    deadlocks = tuple(cycle_in(component, started) for component in loops)
+    deadlocks = tuple(cycle for component in loops for cycle in cycles_in(component, started))
     spans = {node.name: node.span for node in nodes}
     faults += [_deadlock(cycle, edges, spans) for cycle in deadlocks]
     by_consumer: dict[str, list[Edge]] = defaultdict(list)
@@ -233,18 +233,25 @@ def components(nodes: Iterable[str], arcs: Iterable[tuple[str, str]]) -> tuple[t
 
 
 def cycle_in(component: Sequence[str], arcs: Iterable[tuple[str, str]]) -> tuple[str, ...]:
-    """A shortest cycle within a component, or an empty tuple where there is none."""
+    """A cycle within a component, or an empty tuple where there is none."""
+    return next(iter(cycles_in(component, arcs)), ())
+
+
+def cycles_in(component: Sequence[str], arcs: Iterable[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
+    """Short cycles within a component, so many that every node that is on one is on one of these; shortest first."""
     inside = set(component)
     successors: dict[str, list[str]] = {name: [] for name in component}
     for source, target in arcs:
         if source in inside and target in inside and target not in successors[source]:
             successors[source].append(target)
-    best: tuple[str, ...] = ()
-    for start in component[:50]:
-        path = _shortest(start, successors)
-        if path and (not best or len(path) < len(best)):
-            best = path
-    return best
+    found: list[tuple[str, ...]] = []
+    covered: set[str] = set()
+    for start in component:
+        path = _shortest(start, successors) if start not in covered and len(found) < 50 else ()
+        if path:
+            found.append(path)
+            covered.update(path)
+    return tuple(sorted(found, key=len))
 
 
 def _shortest(start: str, successors: Mapping[str, Sequence[str]]) -> tuple[str, ...]:

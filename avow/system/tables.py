@@ -17,7 +17,8 @@ MAX_CELLS = 1_000_000
 MAX_VALUES = 100_000
 
 _COLUMNS_OF = re.compile(r"\s*([^\s(),]+)\s*\(\s*([^()]*)\)\s*\Z")
-_RANGE = re.compile(r"\s*(-?[0-9]{1,9})\s*\.\.\s*(-?[0-9]{1,9})\s*\Z")
+_CELL = re.compile(r"\b([A-Za-z_][A-Za-z0-9_-]*)\.([A-Za-z_][A-Za-z0-9_]*)")
+_RANGE =  re.compile(r"\s*(-?[0-9]{1,9})\s*\.\.\s*(-?[0-9]{1,9})\s*\Z")
 
 
 def read_csv(name: str, path: Path, span: Span) -> tuple[Table | None, tuple[Diagnostic, ...]]:
@@ -102,9 +103,16 @@ def interpretation(text: str, tables: dict[str, Table]) -> tuple[str, tuple[str,
 
 def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
     """``table.column``, ``low..high``, a value or a list of values → the values as text, or what is wrong."""
-    if piece.items is not None:
-        return tuple(dict.fromkeys(cell_text(item) for item in piece.items))
+        if piece.items is not None:
+        found: dict[str, None] = {}
+        for item in piece.items:
+            values = _each_row(cell_text(item), tables)
+            if isinstance(values, str):
+                return values
+            found.update(dict.fromkeys(values))
+        return tuple(found)
     text = cell_text(piece)
+
     span = _RANGE.match(text)
     if span:
         low, high = int(span[1]), int(span[2])
@@ -113,13 +121,28 @@ def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
         if high - low >= MAX_VALUES:
             return f"the range {text} has more than {MAX_VALUES} values"
         return tuple(str(number) for number in range(low, high + 1))
-    name, dot, column = text.partition(".")
-    if dot and name in tables:
-        table = tables[name]
-        if column not in table.columns:
-            return f"the table {name} has no column {column!r}; {suggest(column, table.columns)}"
-        return tuple(dict.fromkeys(table.column(column)))
-    return (text,)
+        return _each_row(text, tables)
+
+
+def _each_row(text: str, tables: dict[str, Table]) -> tuple[str, ...] | str:
+    """``waypoints.id`` or ``move(waypoints.x, waypoints.y)`` with every row's cells; other text as it stands."""
+    places = [found for found in _CELL.finditer(text) if found[1] in tables]
+    if not places:
+        return (text,)
+    names = {found[1] for found in places}
+    if len(names) > 1:
+        return f"{text!r} draws on several tables: {', '.join(sorted(names))}"
+    table = tables[names.pop()]
+    for found in places:
+        if found[2] not in table.columns:
+            return f"the table {table.name} has no column {found[2]!r}; {suggest(found[2], table.columns)}"
+    at = {column: k for k, column in enumerate(table.columns)}
+    rows = (
+        _CELL.sub(lambda found, row=row: row[at[found[2]]] if found[1] == table.name else found[0], text)  # type: ignore[misc]
+        for row in table.rows
+    )
+    return tuple(dict.fromkeys(rows))
+
 
 
 def plain(value: Any) -> str:

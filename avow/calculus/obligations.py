@@ -1,0 +1,315 @@
+"""Composition and requirement obligations: what has to be shown for the system's derivations to stand.
+
+Pure generation here (`composition_obligations`, `requirement_obligations`); the questions are put to the solver in
+`discharge`. Each obligation is made from a `Task`, which says how it is settled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from avow.calculus import answers
+from avow.calculus.composition import Composition, argument, compose
+from avow.calculus.derivation import Goal, Rule, SideCondition
+from avow.calculus.discharge import Bounds
+from avow.calculus.requirements import requirement_question
+from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
+from avow.calculus.variables import Frame
+from avow.diagnostics import Span
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
+from avow.files import digest as sha256
+from avow.language.printer import show_term
+from avow.logic.claims import triggers
+from avow.logic.formula import digest
+from avow.system.formulas import ports_of
+from avow.system.graph import components
+from avow.system.plan import Endpoint, Requirement, System
+from avow.verdict import Outcome
+
+
+class TimeLimits(Protocol):
+    """What of `avow.backend.Limits` is used here."""
+
+    @property
+    def seconds(self) -> float: ...
+
+    @property
+    def seed(self) -> int: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """An obligation, and the question that settles it."""
+
+    obligation: Obligation
+    ask: answers.Question
+
+
+def composition_obligations(system: System) -> tuple[Obligation, ...]:
+    """Every composition obligation of a system. Pure. Raises Rejected for a plan whose formulas are wrong."""
+    return tuple(task.obligation for task in _tasks(compose(system)))
+
+
+def requirement_obligations(system: System) -> tuple[Obligation, ...]:
+    """An obligation for each requirement that has a formula or a temporal property; one in prose has none: it is
+    linked, and the assurance case shows it as linked. Raises Rejected for a formula that is wrong."""
+    return tuple(task.obligation for task in _requirements(compose(system)))
+
+
+def discharge(system: System, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
+    """Settle obligations made by the two functions above, one outcome for each, in their order."""
+    composition = compose(system)
+    bounds = Bounds(int(limits.seconds * 1000), limits.seed)
+    tasks = {task.obligation.id: task for task in (*_tasks(composition), *_requirements(composition))}
+    outcomes: list[Outcome] = []
+    for obligation in obligations:
+        task = tasks.get(obligation.id)
+        if task is None:
+            outcomes.append(answers.vanished(obligation.id))
+            continue
+        outcomes.append(task.ask(composition, bounds).outcome(obligation.id))
+    return tuple(outcomes)
+
+
+# -- generation --------------------------------------------------------------------------------------------------------
+
+
+def _tasks(composition: Composition) -> Iterator[Task]:
+    for goal in composition.goals:
+        yield from _goal_tasks(composition, goal)
+    yield from _environment_tasks(composition)
+    yield from _start_tasks(composition)
+    yield from _joint_tasks(composition)
+
+
+def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
+    frame, meanings = composition.frame, composition.meanings
+    selected = frozenset(goal.nodes)
+    plan = next((g for g in frame.system.plan.compose if g.name == goal.name), None)
+    span = plan.span if plan else None
+    for condition in goal.conditions:
+        clause = frame.node(condition.consumer).clause(condition.clause)
+        givers = [f"{name}.{g.name}" for name in condition.providers for g in frame.node(name).guarantees]
+        yield Task(
+            _obligation(
+                frame.system,
+                f"{goal.name}.{condition.consumer}.{condition.clause}",
+                f"{goal.name}: {_sources(condition)} what {condition.consumer} assumes in {condition.clause}",
+                _implication(frame, condition),
+                sha256(
+                    "side\n"
+                    + "\n".join(
+                        [
+                            meanings.cone(condition.consumer, selected),
+                            meanings.environment(),
+                            digest(clause.formula),
+                        ]
+                    )
+                ),
+                (str(condition.about), *givers),
+                clause.span,
+            ),
+            answers.SideQuestion(goal.name, condition),
+        )
+    for part in goal.root.walk():
+        if part.rule is Rule.R4:
+            yield Task(
+                _obligation(
+                    frame.system,
+                    f"{goal.name}.loop.{_joined(part.nodes)}",
+                    f"{goal.name}: the assumptions around the loop of {_listed(part.nodes)} do not hold up one another",
+                    "",
+                    sha256(f"loop\n{meanings.all(selected)}\n{argument(composition, goal.name, 'entered')}"),
+                    tuple(str(c.about) for c in part.side_conditions),
+                    span,
+                ),
+                answers.LoopQuestion(goal.name, part.nodes, argument(composition, goal.name, "entered")),
+            )
+    if goal.needs_persistence:
+        listed = _listed(goal.nodes)
+        wiring = sha256("\n".join(sorted(meanings.cone(node, selected) for node in goal.nodes)))
+        for key, name, text in (("persistence", "persistence", PERSISTENCE), ("one_output", "one-output", ONE_OUTPUT)):
+            reason = argument(composition, goal.name, key)
+            yield Task(
+                _obligation(
+                    frame.system,
+                    f"{goal.name}.{name}",
+                    f"{goal.name}: {text.format(listed)}",
+                    "",
+                    sha256(f"{key}\n{wiring}\n{reason}"),
+                    (),
+                    span,
+                ),
+                answers.ArgumentQuestion(key, reason, goal.name),
+            )
+
+
+def _environment_tasks(composition: Composition) -> Iterator[Task]:
+    frame = composition.frame
+    for assumed in frame.assumed:
+        entry = next(e for e in frame.system.plan.environment if e.port == assumed.port)
+        yield Task(
+            _obligation(
+                frame.system,
+                f"environment.{assumed.port}",
+                f"the environment gives {assumed.port} as assumed",
+                show_term(assumed.formula),
+                sha256(f"environment\n{composition.meanings.environment([assumed.port])}\n{assumed.because}"),
+                (),
+                entry.span,
+            ),
+            answers.ArgumentQuestion("because", assumed.because, "environment"),
+        )
+    reasons = {entry.port: entry.because for entry in frame.system.plan.environment}
+    for name in composition.whole.root.assumed:
+        node = frame.node(name.node)
+        clause = node.clause(name.clause)
+        ports = [v.name for v in ports_of(clause.formula)]
+        if not ports or any(Endpoint(name.node, port) in frame.graph.by_target for port in ports):
+            continue
+        given = [reasons.get(f"{name.node}.{port}") or reasons.get(f"in.{port}") or "" for port in ports]
+        because = "; ".join(dict.fromkeys(given)) if all(given) else ""
+        yield Task(
+            _obligation(
+                frame.system,
+                f"environment.{name}",
+                f"the environment meets what {name.node} assumes in {name.clause}",
+                show_term(clause.formula),
+                sha256(f"environment\n{digest(frame.clause(name.node, name.clause))}\n{because}"),
+                (str(name),),
+                clause.span,
+            ),
+            answers.ArgumentQuestion("environment", because, "environment"),
+        )
+
+
+def _start_tasks(composition: Composition) -> Iterator[Task]:
+    frame = composition.frame
+    arcs = [(e.source.node, e.target.node) for e in frame.graph.edges]
+    selves = {source for source, target in arcs if source == target}
+    everything = frozenset(frame.graph.nodes)
+    for group in components(frame.graph.nodes, arcs):
+        if len(group) > 1 or group[0] in selves:
+            yield Task(
+                _obligation(
+                    frame.system,
+                    f"start.{_joined(group)}",
+                    f"the loop of {', '.join(group)} has a first element",
+                    "",
+                    sha256(f"start\n{composition.meanings.cone(group[0], everything)}"),
+                    (),
+                    frame.node(group[0]).span,
+                ),
+                answers.StartQuestion(group),
+            )
+
+
+def _joint_tasks(composition: Composition) -> Iterator[Task]:
+    """Guarantees linked at one instant in a circle may leave each other no room; where values flow one way only, each
+    node answers to what it gets, and its own realizability (a sanity obligation) is enough."""
+    frame = composition.frame
+    arcs = [(e.source.node, e.target.node) for e in frame.graph.edges if not e.delayed]
+    for group in components(frame.graph.nodes, arcs):
+        if len(group) < 2:
+            continue
+        meaning = sha256("\n".join([*(composition.meanings.node(name) for name in group), *map(str, sorted(arcs))]))
+        for name in group:
+            for clause in frame.node(name).guarantees:
+                situations = triggers(frame.clause(name, clause.name))
+                if not situations:
+                    continue
+                yield Task(
+                    _obligation(
+                        frame.system,
+                        f"joint.{name}.{clause.name}",
+                        f"{', '.join(group)}, taken together at one instant, do not exclude what "
+                        f"{name}.{clause.name} is about",
+                        " and ".join(show_term(situation) for situation in situations),
+                        sha256(
+                            "\n".join(["joint", meaning, composition.meanings.environment(), *map(digest, situations)])
+                        ),
+                        (f"{name}.{clause.name}",),
+                        clause.span,
+                    ),
+                    answers.JointQuestion(group, name, clause.name),
+                )
+
+
+def _requirements(composition: Composition) -> Iterator[Task]:
+    frame = composition.frame
+    everything = frozenset(frame.graph.nodes)
+    for requirement in frame.system.plan.requirements:
+        question = requirement_question(frame, requirement)
+        if question is None:
+            continue
+        scenario = frame.system.plan.scenario
+        yield Task(
+            Obligation(
+                frame.system.name,
+                SYSTEM_LEVEL,
+                Kind.REQUIREMENT,
+                requirement.id,
+                requirement.text,
+                question.text,
+                sha256(
+                    "\n".join(
+                        [
+                            "requirement",
+                            question.digest,
+                            composition.meanings.all(everything),
+                            scenario.digest if scenario and requirement.temporal else "",
+                        ]
+                    )
+                ),
+                supports(composition, requirement),
+                requirement.span,
+            ),
+            question,
+        )
+
+
+def supports(composition: Composition, requirement: Requirement) -> tuple[str, ...]:
+    """The guarantees that a requirement names as its support, directly, by node or by derivation."""
+    found: dict[str, None] = {}
+    for name in requirement.supported_by:
+        owner, dot, _ = name.partition(".")
+        goal = next((g for g in composition.goals if g.name == name), None)
+        if goal is not None:
+            nodes: tuple[str, ...] = goal.root.guaranteed
+        elif dot:
+            found[name] = None
+            continue
+        else:
+            nodes = (owner,)
+        found.update({f"{n}.{g.name}": None for n in nodes for g in composition.frame.node(n).guarantees})
+    return tuple(found)
+
+
+def _obligation(
+    system: System, name: str, claim: str, formula: str, meaning: str, clauses: tuple[str, ...], span: Span | None
+) -> Obligation:
+    return Obligation(system.name, SYSTEM_LEVEL, Kind.COMPOSITION, name, claim, formula, meaning, clauses, span)
+
+
+def _sources(condition: SideCondition) -> str:
+    if condition.providers:
+        verb = "guarantees" if len(condition.providers) == 1 else "guarantee"
+        return f"{' and '.join(condition.providers)} {verb}"
+    return "the environment gives" if condition.environment else "it is always so,"
+
+
+def _implication(frame: Frame, condition: SideCondition) -> str:
+    goal = show_term(frame.clause(condition.consumer, condition.clause))
+    given = [f"{p}.{c.name}" for p in condition.providers for c in frame.node(p).clauses]
+    given += [f"environment {port}" for port in condition.environment]
+    return f"{' ∧ '.join(given)} ⇒ {goal}" if given else goal
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) if len(names) <= 12 else f"{len(names)} nodes"
+
+
+def _joined(names: Sequence[str]) -> str:
+    return "-".join(names) if len(names) <= 6 else f"{names[0]}-and-{len(names) - 1}-more"

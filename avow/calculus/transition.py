@@ -1,0 +1,385 @@
+"""Composed contracts as a transition system: which steps a system may take, judged by its contracts alone.
+
+In a step the environment gives values, and the nodes answer in the order in which values flow: with any outputs that
+meet their guarantees (any at all where an assumption is broken). What delayed edges carry is the memory between steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Any
+
+import z3
+
+from avow.calculus.scenario import CannotRun, Point, World, key
+from avow.language.contract import Clause, Node, Port
+from avow.language.sorts import FunctionSort
+from avow.language.terms import Apply, Iff, Quantified, Quantifier, Role, Term, Variable
+from avow.logic.evaluate import NotEvaluable, compile_term
+from avow.logic.formula import free_variables
+from avow.logic.models import Model
+from avow.logic.translation import Translator, Unsupported
+from avow.logic.values import FunctionValue, Value, show
+from avow.system.formulas import initial_condition, ports_of
+from avow.system.graph import components, cycles_in
+from avow.system.plan import Endpoint
+
+MAX_ANSWERS = 4_000
+"""Answers of one node to one input; with more, a search is not exhaustive."""
+
+Values = dict[str, Value]
+Holds = Callable[[Mapping[str, Value]], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step: the value of every system variable (``agent.command``, ``in.r``, ``agent.command@before``)."""
+
+    values: Mapping[str, Value] = field(hash=False)
+    memory: tuple[object, ...]
+    """The key of the memory that it leaves."""
+    broken: tuple[str, ...] = ()
+    """Assumptions that do not hold at this step."""
+
+    def shown(self, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
+        return tuple((name, show(self.values[name])) for name in names if name in self.values)
+
+
+@dataclass(frozen=True, slots=True)
+class Stuck:
+    """A node to whose inputs no output answers. `genuine`: by its contract, not only among the scenario's values."""
+
+    node: str
+    inputs: tuple[tuple[str, str], ...]
+    clauses: tuple[str, ...]
+    genuine: bool
+
+    def text(self) -> str:
+        given = ", ".join(f"{name} = {value}" for name, value in self.inputs)
+        if not self.genuine:
+            return f"no value of the scenario meets the guarantees of {self.node} at {given}"
+        return f"no output of {self.node} meets {', '.join(self.clauses)} at {given}"
+
+
+@dataclass(slots=True)
+class _Solver:
+    """One node: its clauses compiled, its answers remembered."""
+
+    node: Node
+    world: World
+    relations: tuple[tuple[Port, tuple[Point, ...]], ...]
+    plain: tuple[tuple[Port, tuple[Value, ...]], ...]
+    assumptions: tuple[tuple[str, Holds], ...]
+    guarantees: tuple[tuple[str, Holds], ...]
+    read: tuple[str, ...]
+    """Inputs that the guarantees mention."""
+    answers: dict[object, tuple[Values, ...]] = field(default_factory=dict)
+    complete: bool = True
+
+
+class Machine:
+    """The transition system of a composed system over its scenario. Raises CannotRun where it has none."""
+
+    def __init__(self, world: World, seed: int = 0) -> None:
+        self.world = world
+        self.frame = world.frame
+        self.graph = world.frame.graph
+        self.seed = seed
+        self.incomplete: set[str] = set()
+        """Why a search through this machine is not exhaustive, if it is not."""
+        self.order = self._order()
+        self.solvers = {name: self._solver(self.frame.node(name)) for name in self.order}
+        self.environment = self._environment()
+        self.memory = tuple(dict.fromkeys(edge.source for edge in self.graph.edges if edge.delayed))
+        self.memories: dict[tuple[object, ...], Values] = {}
+        self.stuck: dict[tuple[object, ...], Stuck] = {}
+        self._steps: dict[tuple[object, ...], tuple[Step, ...]] = {}
+
+    # -- set-up --------------------------------------------------------------------------------------------------------
+
+    def _order(self) -> tuple[str, ...]:
+        arcs = [(e.source.node, e.target.node) for e in self.graph.edges if not e.delayed]
+        groups = components(self.graph.nodes, arcs)
+        for group in groups:
+            cycles = cycles_in(group, arcs)
+            if cycles:
+                shown = " → ".join((*cycles[0], cycles[0][0]))
+                raise CannotRun(f"start-up deadlock: {shown} wait for one another within one step")
+        return tuple(name for group in groups for name in group)
+
+    def _solver(self, node: Node) -> _Solver:
+        relations = tuple(
+            (p, self.world.points(node.name, p)) for p in node.outputs if isinstance(p.sort, FunctionSort)
+        )
+        plain = tuple(
+            (p, self.world.candidates(node.name, p)) for p in node.outputs if not isinstance(p.sort, FunctionSort)
+        )
+        mentioned = {v.name for clause in node.guarantees for v in ports_of(clause.formula) if v.role is Role.INPUT}
+        return _Solver(
+            node,
+            self.world,
+            relations,
+            plain,
+            tuple((clause.name, self.judge(clause.formula)) for clause in node.assumptions),
+            tuple((clause.name, self.judge(clause.formula)) for clause in node.guarantees),
+            tuple(p.name for p in node.inputs if p.name in mentioned),
+        )
+
+    def judge(self, formula: Term, *, finite: bool = False) -> Holds:
+        """Whether a formula holds: exactly if that can be had, else with quantifiers over the scenario's values.
+        `finite`: over the scenario's values in any case."""
+        domains = self.world.domains
+        exact = None if finite else compile_term(formula)
+        bounded = compile_term(formula, domains=domains)
+
+        def holds(values: Mapping[str, Value]) -> bool:
+            if exact is not None:
+                try:
+                    return bool(exact(values))
+                except NotEvaluable:
+                    pass
+            try:
+                return bool(bounded(values))
+            except NotEvaluable as reason:
+                raise CannotRun(f"a formula cannot be evaluated: {reason.reason}") from None
+
+        return holds
+
+    def _environment(self) -> tuple[Values, ...]:
+        """Every combination of what the environment may give at a step."""
+        names: dict[str, tuple[Value, ...]] = {}
+        for endpoint in self.graph.environment:
+            variable = self.frame.input(endpoint.node, endpoint.port)
+            port = self.frame.node(endpoint.node).input(endpoint.port)
+            names.setdefault(variable.qualified, self.world.choices(endpoint.node, port))
+        facts = [self.judge(term) for term in self.frame.environment().values()]
+        found = [dict(zip(names, combination, strict=True)) for combination in product(*names.values())]
+        allowed = tuple(values for values in found if all(fact(values) for fact in facts))
+        if not allowed:
+            raise CannotRun("no value of the scenario is as the plan assumes of the environment")
+        return allowed
+
+    # -- memory --------------------------------------------------------------------------------------------------------
+
+    def initial(self) -> tuple[tuple[object, ...], ...]:
+        """The memories before the first step."""
+        ranges: list[tuple[Value, ...]] = []
+        for endpoint in self.memory:
+            edge = next(e for e in self.graph.edges if e.delayed and e.source == endpoint)
+            condition = initial_condition(self.frame.system, edge)
+            port = self.frame.node(endpoint.node).output(endpoint.port)
+            ranges.append(self._initial_values(endpoint, port, condition))
+        return tuple(
+            self._remember(dict(zip(map(str, self.memory), values, strict=True))) for values in product(*ranges)
+        )
+
+    def _initial_values(self, endpoint: Endpoint, port: Port, condition: Term | None) -> tuple[Value, ...]:
+        if isinstance(port.sort, FunctionSort):
+            points = self.world.points(endpoint.node, port)
+            constraints = [] if condition is None else [condition]
+            answers, complete = _search(((port, points),), (), constraints, {}, self.seed)
+            if not complete:
+                self.incomplete.add(f"too many initial values of {endpoint}")
+            found = tuple(answer[port.name] for answer in answers)
+        else:
+            candidates = self.world.candidates(endpoint.node, port)
+            holds = self.judge(condition) if condition is not None else None
+            found = tuple(v for v in candidates if holds is None or holds({f"out.{port.name}": v}))
+        if not found:
+            raise CannotRun(f"no value of the scenario is an initial value of {endpoint}")
+        return found
+
+    def _remember(self, values: Values) -> tuple[object, ...]:
+        found = tuple(key(values[str(endpoint)]) for endpoint in self.memory)
+        self.memories.setdefault(found, {str(endpoint): values[str(endpoint)] for endpoint in self.memory})
+        return found
+
+    # -- steps ---------------------------------------------------------------------------------------------------------
+
+    def steps(self, memory: tuple[object, ...]) -> tuple[Step, ...]:
+        """Every step from a memory; none if some node cannot answer (see `stuck`)."""
+        if memory not in self._steps:
+            self._steps[memory] = tuple(self._all_steps(memory))
+        return self._steps[memory]
+
+    def _all_steps(self, memory: tuple[object, ...]) -> Iterator[Step]:
+        before = {f"{name}@before": value for name, value in self.memories[memory].items()}
+        for given in self.environment:
+            partial: list[tuple[Values, tuple[str, ...]]] = [({**before, **given}, ())]
+            for name in self.order:
+                extended: list[tuple[Values, tuple[str, ...]]] = []
+                for values, broken in partial:
+                    answers, faults = self._answers(name, values, memory)
+                    extended += [
+                        ({**values, **{f"{name}.{port}": v for port, v in answer.items()}}, broken + faults)
+                        for answer in answers
+                    ]
+                partial = extended
+            for values, broken in partial:
+                yield Step(values, self._remember(values), broken)
+
+    def _answers(
+        self, name: str, values: Values, memory: tuple[object, ...]
+    ) -> tuple[tuple[Values, ...], tuple[str, ...]]:
+        solver = self.solvers[name]
+        inputs = {f"in.{port.name}": values[self.frame.input(name, port.name).qualified] for port in solver.node.inputs}
+        broken = tuple(f"{name}.{clause}" for clause, holds in solver.assumptions if not holds(inputs))
+        index = (bool(broken), *(key(inputs[f"in.{port}"]) for port in solver.read))
+        if index not in solver.answers:
+            solver.answers[index] = self._solve(solver, inputs, free=bool(broken))
+        answers = solver.answers[index]
+        if not answers and memory not in self.stuck:
+            self.stuck[memory] = self._why_stuck(solver, inputs)
+        return answers, broken
+
+    def _solve(self, solver: _Solver, inputs: Values, *, free: bool) -> tuple[Values, ...]:
+        """Every output that meets the guarantees (all of them, where an assumption is broken)."""
+        guarantees = () if free else solver.guarantees
+        defined, searched = self._defined(solver, inputs) if not free else ({}, list(solver.relations))
+        if searched:
+            constraints = [] if free else [clause.formula for clause in solver.node.guarantees]
+            known = inputs | {f"out.{name}": value for name, value in defined.items()}
+            answers, complete = _search(
+                searched, solver.plain, constraints, _by_variable(solver.node, known), self.seed
+            )
+            if not complete:
+                self.incomplete.add(f"{solver.node.name} has more than {MAX_ANSWERS} answers to one input")
+            return tuple({**defined, **answer} for answer in answers)
+        found: list[Values] = []
+        names = [port.name for port, _ in solver.plain]
+        for combination in product(*(values for _, values in solver.plain)):
+            outputs = {**defined, **dict(zip(names, combination, strict=True))}
+            valuation = inputs | {f"out.{name}": value for name, value in outputs.items()}
+            if all(holds(valuation) for _, holds in guarantees):
+                found.append(outputs)
+                if len(found) >= MAX_ANSWERS:
+                    self.incomplete.add(f"{solver.node.name} has more than {MAX_ANSWERS} answers to one input")
+                    break
+        return tuple(found)
+
+    def _defined(self, solver: _Solver, inputs: Values) -> tuple[Values, list[tuple[Port, tuple[Point, ...]]]]:
+        """Relations that a guarantee defines point by point, computed; and those that have to be searched for."""
+        defined: Values = {}
+        searched: list[tuple[Port, tuple[Point, ...]]] = []
+        for port, points in solver.relations:
+            definition = _definition(solver.node.guarantees, port)
+            if definition is None:
+                searched.append((port, points))
+                continue
+            variables, body = definition
+            holds = self.judge(body)
+            table = {
+                point: True
+                for point in points
+                if holds(inputs | {v.name: x for v, x in zip(variables, point, strict=True)})
+            }
+            defined[port.name] = FunctionValue(table, False)
+        return defined, searched
+
+    def _why_stuck(self, solver: _Solver, inputs: Values) -> Stuck:
+        """Is there really no output, or only none in the scenario? Z3 knows the contract without the scenario."""
+        node = solver.node
+        shown = tuple((name, show(value)) for name, value in inputs.items() if name[3:] in solver.read)
+        constants = _by_variable(node, inputs)
+        translator = Translator()
+        z3_solver = z3.Solver(ctx=translator.context)
+        z3_solver.set("timeout", 5_000)
+        names = tuple(clause.name for clause in node.guarantees)
+        try:
+            meanings = {v: translator.value(value, v.sort) for v, value in constants.items()}
+            z3_solver.add(*translator.background([p.variable for p in node.outputs]))
+            switches = []
+            for clause in node.guarantees:
+                switch = z3.Bool(f"use {clause.name}", translator.context)
+                z3_solver.add(z3.Implies(switch, translator.term(clause.formula, meanings)))
+                switches.append(switch)
+            if z3_solver.check(*switches) == z3.unsat:
+                core = {str(switch) for switch in z3_solver.unsat_core()}
+                needed = tuple(name for name in names if f"use {name}" in core)
+                return Stuck(node.name, shown, needed or names, True)
+        except (Unsupported, z3.Z3Exception):
+            pass
+        return Stuck(node.name, shown, names, False)
+
+
+def _by_variable(node: Node, values: Values) -> dict[Variable, Value]:
+    ports = {p.variable.qualified: p.variable for p in (*node.inputs, *node.outputs)}
+    return {ports[name]: value for name, value in values.items() if name in ports}
+
+
+def _definition(guarantees: Sequence[Clause], port: Port) -> tuple[tuple[Variable, ...], Term] | None:
+    """``forall(x | out.p(x) <=> body)`` gives x and body, if body does not speak of outputs."""
+    for clause in guarantees:
+        formula = clause.formula
+        if not (isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL):
+            continue
+        if not isinstance(formula.body, Iff):
+            continue
+        for head, body in ((formula.body.left, formula.body.right), (formula.body.right, formula.body.left)):
+            applied = isinstance(head, Apply) and head.function == port.variable
+            if applied and isinstance(head, Apply) and head.arguments == formula.variables:
+                if all(v.role is not Role.OUTPUT for v in free_variables(body)):
+                    return formula.variables, body
+    return None
+
+
+def _search(
+    relations: Sequence[tuple[Port, tuple[Point, ...]]],
+    plain: Sequence[tuple[Port, tuple[Value, ...]]],
+    constraints: Sequence[Term],
+    known: Mapping[Variable, Value],
+    seed: int,
+) -> tuple[list[Values], bool]:
+    """Every choice of outputs that meets the constraints: a bit for each point of a relation, found by Z3.
+
+    Says too whether these are all. Raises CannotRun where Z3 cannot decide.
+    """
+    translator = Translator()
+    solver = z3.Solver(ctx=translator.context)
+    solver.set("timeout", 10_000)
+    solver.set("random_seed", seed)
+    try:
+        meanings: dict[Variable, Any] = {v: translator.value(value, v.sort) for v, value in known.items()}
+        bits: list[tuple[Port, Point, Any]] = []
+        for port, points in relations:
+            assert isinstance(port.sort, FunctionSort)
+            rows = []
+            for k, point in enumerate(points):
+                bit = z3.Bool(f"{port.name}#{k}", translator.context)
+                bits.append((port, point, bit))
+                rows.append(([translator.value(x, s) for x, s in zip(point, port.sort.parameters, strict=True)], bit))
+            meanings[port.variable] = translator.table(rows, z3.BoolVal(False, translator.context))
+        chosen = []
+        for port, values in plain:
+            constant = translator.variable(port.variable)
+            solver.add(z3.Or([constant == translator.value(value, port.sort) for value in values]))
+            chosen.append((port, constant))
+        solver.add(*(translator.term(constraint, meanings) for constraint in constraints))
+        found: list[Values] = []
+        while True:
+            status = solver.check()
+            if status == z3.unsat:
+                return found, True
+            if status != z3.sat:
+                raise CannotRun(f"the solver cannot decide which outputs are allowed: {solver.reason_unknown()}")
+            if len(found) >= MAX_ANSWERS:
+                return found, False
+            model = solver.model()
+            reader = Model(translator, model)
+            answer: Values = {port.name: reader.read(constant, port.sort) for port, constant in chosen}
+            literals = [constant != model.eval(constant, model_completion=True) for _, constant in chosen]
+            tables: dict[str, dict[tuple[Value, ...], Value]] = {port.name: {} for port, _ in relations}
+            for port, point, bit in bits:
+                truth = z3.is_true(model.eval(bit, model_completion=True))
+                literals.append(z3.Not(bit) if truth else bit)
+                if truth:
+                    tables[port.name][point] = True
+            answer.update({name: FunctionValue(table, False) for name, table in tables.items()})
+            found.append(answer)
+            solver.add(z3.Or(literals) if literals else z3.BoolVal(False, translator.context))
+    except Unsupported as what:
+        raise CannotRun(f"Avow cannot express {what.what} for the solver") from None
+    except z3.Z3Exception as error:
+        raise CannotRun(f"Z3: {error}") from None
