@@ -1,0 +1,70 @@
+"""Property-based tests of a Python function, generated from a node's contract and run with Hypothesis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from avow.backend import Job, Limits, Report, Tool
+from avow.diagnostics import Diagnostic, Rejected
+from avow.verdict import Link, Verdict
+
+_SUBJECT = {
+    "type": "string",
+    "pattern": "^.+:[^:]+$",
+    "description": "file.py:function, relative to the system's folder",
+}
+_CASES = {"type": "integer", "minimum": 1, "maximum": 1_000_000, "default": 500, "description": "how many cases"}
+
+
+class HypothesisBackend:
+    """See `docs/backends/hypothesis.md`."""
+
+    name = "hypothesis"
+    title = "Property-based tests of a Python function, generated from the contract"
+    version = "1"
+    strength = Verdict.TESTED
+    link = Link.GENERATED
+    options_schema: Mapping[str, Any] = {
+        "type": "object",
+        "properties": {"subject": _SUBJECT, "cases": _CASES, "seed": {"type": "integer", "minimum": 0}},
+        "required": ["subject"],
+        "additionalProperties": False,
+    }
+    green_means = (
+        "On so many generated inputs that meet the assumptions the function returned outputs that meet the guarantee, "
+        "and the guarantee's condition was met in some of them. It says nothing certain of other inputs; the bound on "
+        "failures is about inputs drawn as these were."
+    )
+
+    def tools(self) -> tuple[Tool, ...]:
+        version = metadata.version("hypothesis")
+        return (Tool("hypothesis", version, None, "pip install hypothesis", optional=False),)
+
+    def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        from avow.backends.hypothesis.backend import problems
+
+        return problems(job)
+
+    def files(self, job: Job) -> tuple[Path, ...]:
+        from avow.backends.hypothesis.subject import locate
+
+        try:
+            return (locate(job).path,)
+        except Rejected:
+            return ()
+
+    def export(self, job: Job) -> Mapping[str, str]:
+        from avow.backends.hypothesis.backend import files
+
+        return files(job)
+
+    def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+        from avow.backends.hypothesis.backend import settle
+
+        return settle(job, folder, limits)
+
+
+BACKEND = HypothesisBackend()

@@ -1,0 +1,170 @@
+"""Running the generated test in a process of its own, and reading its answer."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import secrets
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from avow.backend import Job, Limits, Report
+from avow.backends.hypothesis import export, wire
+from avow.backends.hypothesis.subject import subject
+from avow.diagnostics import Diagnostic, Rejected
+from avow.evidence.obligation import Obligation
+from avow.process import Completed, ToolMissing, run
+from avow.verdict import Counterexample, Outcome, Verdict
+
+CONFIDENCE = 0.95
+
+RARE = 20
+"""Rejected cases for each one that was tried, beyond which the assumptions are too rarely met to say anything."""
+
+
+def problems(job: Job) -> tuple[Diagnostic, ...]:
+    try:
+        export.files(job, subject(job))
+    except Rejected as rejected:
+        return rejected.diagnostics
+    except wire.TooDeep:
+        return (Diagnostic("HYPO105", "a formula of this node is nested too deeply to be tested", job.node.span),)
+    return ()
+
+
+def files(job: Job) -> Mapping[str, str]:
+    try:
+        return export.files(job, subject(job))
+    except (Rejected, wire.TooDeep):
+        return {}
+
+
+def settle(job: Job, folder: Path, limits: Limits) -> Report:
+    """One outcome for each obligation."""
+    version = f"hypothesis {metadata.version('hypothesis')}"
+    found = problems(job)
+    if found:
+        why = "; ".join(f"{d.span}: {d.message}" for d in found)
+        return Report(tuple(Outcome(o.id, Verdict.ERROR, why) for o in job.obligations), "hypothesis", version)
+    with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
+        # what was exported is written afresh: a file changed in between would be tested in place of the contract
+        place = Path(scratch)
+        for name, text in files(job).items():
+            (place / name).write_text(text, encoding="utf-8")
+        done, answer = _run(job, place, limits)
+    command = (Path(sys.executable).name, *done.command[1:3]) if done else ()
+    logs = {"hypothesis.log": done.stdout + done.stderr} if done and (done.stdout + done.stderr).strip() else {}
+    if answer is None:
+        why = _silence(done, limits)
+        verdict = Verdict.UNKNOWN if done is not None and done.timed_out else Verdict.ERROR
+        failed = tuple(Outcome(o.id, verdict, why) for o in job.obligations)
+        return Report(failed, "hypothesis", version, command, logs)
+    outcomes = tuple(_outcome(o, answer, limits.seed) for o in job.obligations)
+    logs["result.json"] = json.dumps(answer, indent=1) + "\n"
+    return Report(outcomes, "hypothesis", version, command, logs)
+
+
+def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, dict[str, Any] | None]:
+    """The test's own report, if it wrote one that is of this run."""
+    nonce = secrets.token_hex(16)
+    result = place / "result.json"
+    seconds = max(1.0, limits.seconds * 0.8)
+    test = export.test_name(job)
+    try:
+        done = run(
+            [sys.executable, "-P", test, str(result), str(seconds), str(limits.seed)],
+            cwd=place,
+            seconds=limits.seconds,
+            megabytes=limits.megabytes,
+            env={
+                "AVOW_SYSTEM_ROOT": str(job.root.resolve()),
+                "HYPOTHESIS_STORAGE_DIRECTORY": str(place / ".hypothesis"),
+                "PYTHONDONTWRITEBYTECODE": "1",
+                "PYTHONHASHSEED": "0",
+                "PYTHONPATH": os.environ.get("PYTHONPATH", ""),
+            },
+            stdin=nonce,
+        )
+    except ToolMissing:
+        return None, None
+    if done.code != 0 or not result.is_file():
+        return done, None
+    try:
+        answer = json.loads(result.read_text(encoding="utf-8"))
+    except ValueError:
+        return done, None
+    if not isinstance(answer, dict) or answer.get("nonce") != nonce:
+        return done, None
+    return done, {key: value for key, value in answer.items() if key != "nonce"}
+
+
+def _silence(done: Completed | None, limits: Limits) -> str:
+    if done is None:
+        return "Python could not be started"
+    if done.timed_out:
+        return f"the test did not end within {limits.seconds:g} s"
+    last = done.stderr.strip().splitlines()[-1:] or ["no message"]
+    return f"the test ended without a result (code {done.code}): {last[0][:300]}"
+
+
+def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Outcome:
+    own = answer["guarantees"][obligation.name]
+    valid, rejected, wanted = answer["valid"], answer["rejected"], answer["wanted"]
+    bound: dict[str, object] = {"cases": valid, "rejected": rejected, "seed": seed}
+    triggers = [{"trigger": t, "met": n} for t, n in zip(own["triggers"], own["hits"], strict=True)]
+    details: dict[str, object] = {"triggers": triggers}
+    outcome = Outcome(obligation.id, Verdict.UNKNOWN, "", bound=bound, details=details)
+    if own["failure"] is not None:
+        values = tuple((str(name), str(value)) for name, value in own["failure"])
+        shown = Counterexample(values, f"guarantee {obligation.name} does not hold of these")
+        return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
+    if answer["crash"] is not None:
+        pairs, why = answer["crash"]
+        shown = Counterexample(tuple((str(n), str(v)) for n, v in pairs), str(why))
+        return replace(outcome, verdict=Verdict.ERROR, summary=str(why), counterexample=shown)
+    why = _doubt(answer, own, valid, rejected, wanted)
+    if why:
+        return replace(outcome, summary=why)
+    unmet = [t["trigger"] for t in triggers if not t["met"]]
+    if unmet:
+        why = f"in none of {valid} cases was its condition met: {unmet[0]}"
+        return replace(outcome, summary=why, vacuous=True)
+    least = min((n for n in own["hits"]), default=valid)
+    bound["confidence"] = CONFIDENCE
+    bound["failure_probability_below"] = round(failure_bound(valid), 6)
+    if own["hits"]:
+        bound["triggered"] = least
+        bound["failure_probability_when_triggered_below"] = round(failure_bound(least), 6)
+    details["meaning"] = (
+        "if the cases were independent: with this confidence, a case drawn as these were fails with a probability "
+        "below the bound; it is no probability about the robot's own inputs"
+    )
+    summary = f"{valid} cases, none breaks it (seed {seed}; 95 %: below {failure_bound(least):.2g} of such cases fail)"
+    if valid < wanted:
+        summary += f"; the generator has no more than these, of {wanted} wanted"
+    return replace(outcome, verdict=Verdict.TESTED, summary=summary)
+
+
+def _doubt(answer: Mapping[str, Any], own: Mapping[str, Any], valid: int, rejected: int, wanted: int) -> str:
+    """Why the cases do not count, if they do not."""
+    if answer["stopped"].startswith("no values"):
+        return f"inputs cannot be generated: {answer['stopped'].partition(': ')[2]}"
+    if valid == 0 or answer["stopped"] == "assumptions" or (valid < wanted and rejected > RARE * valid):
+        return f"the assumptions are met too rarely: {valid} of {valid + rejected} generated inputs"
+    if answer["stopped"] == "time":
+        return f"only {valid} of {wanted} cases in the time given"
+    if own["undecided"] or answer["undecided"]:
+        return f"{own['undecided'] or answer['undecided']} of {valid} cases could not be judged"
+    return ""
+
+
+def failure_bound(cases: int) -> float:
+    """With 95 % confidence, no more than this part of such cases fails, none of so many having failed (1 - 0.05^(1/n);
+    "rule of three": about 3/n)."""
+    return 1.0 if cases == 0 else 1 - math.pow(1 - CONFIDENCE, 1 / cases)

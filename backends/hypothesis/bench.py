@@ -1,0 +1,317 @@
+"""What a generated test stands on: it draws inputs, asks the subject, and judges the outputs against the contract.
+
+The subject runs in a process of its own (`host`); its answers are data. Judging is exact: evaluation over finite
+tables, and Z3 where that cannot answer; what neither can tell is counted as undecided, never as passed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from hypothesis import HealthCheck, Phase, assume, given, seed, settings
+from hypothesis import strategies as st
+from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
+
+from avow.backends.hypothesis import wire
+from avow.backends.hypothesis.convention import Malformed, outputs
+from avow.backends.hypothesis.generate import Generator, Impossible, Inputs
+from avow.backends.hypothesis.judging import guarantee, judged
+from avow.backends.hypothesis.pools import parse_cell, pools
+from avow.backends.hypothesis.process import PATIENCE, Subject, SubjectFailed
+from avow.language.sorts import FunctionSort, Sort
+from avow.logic.evaluate import NotEvaluable
+from avow.logic.values import Value, show
+
+Case = tuple[Inputs, dict[str, Value]]
+
+
+class OutOfTime(BaseException):
+    """The time for the whole is over; Hypothesis passes this through."""
+
+
+class Bench:
+    """One node's contract, a subject, and the counts of what was tried."""
+
+    def __init__(self, data: Mapping[str, Any], folder: Path) -> None:
+        self.data = data
+        self.node: str = data["node"]
+        self.cases: int = data["cases"]
+        self.seed: int = data["seed"]
+        self.inputs_sorts: dict[str, Sort] = {p["name"]: wire.decode(p["sort"]) for p in data["inputs"]}
+        self.output_sorts: dict[str, Sort] = {p["name"]: wire.decode(p["sort"]) for p in data["outputs"]}
+        self.assumptions = tuple(judged(c) for c in data["assumptions"])
+        self.guarantees = {c["name"]: guarantee(judged(c)) for c in data["guarantees"]}
+        formulas = [j.formula for j in (*self.assumptions, *(g.judged for g in self.guarantees.values()))]
+        self.generator = Generator(self.inputs_sorts, pools(formulas, self._rows()))
+        self.subject = Subject(_find(data, folder), data["subject"]["function"], PATIENCE)
+        self.valid = self.rejected = self.undecided = 0
+        self.crash: tuple[Inputs, str] | None = None
+        self.end: float | None = None
+
+    @classmethod
+    def load(cls, path: Path) -> Bench:
+        """From the generated ``contract.json``."""
+        return cls(json.loads(path.read_text(encoding="utf-8")), path.parent)
+
+    # -- for the generated test ----------------------------------------------------------------------------------------
+
+    @property
+    def inputs(self) -> st.SearchStrategy[Inputs]:
+        """Inputs that meet the assumptions, mostly: `check` rejects the others."""
+
+        @st.composite
+        def drawn(draw: Any) -> Inputs:
+            return self.generator.case(draw, self._blamed)
+
+        return drawn()
+
+    def configured(self, test: Callable[..., None]) -> Callable[..., None]:
+        """As many cases as the plan wants, from the plan's seed, without Hypothesis' own database or deadline."""
+        return seed(self.seed)(self._configuration(tuple(Phase))(test))
+
+    def check(self, name: str, inputs: Inputs) -> None:
+        """The guarantee holds of what the subject makes of the inputs. Raises AssertionError, in contract words."""
+        assume(self._assumed(inputs))
+        found = self.run(inputs)
+        held = self.guarantees[name].judged.holds(valuation(inputs, found))
+        if held is None:
+            raise AssertionError(f"{name} cannot be judged of {told(inputs, found)}")
+        if not held:
+            raise AssertionError(f"{name} is broken: {told(inputs, found)}")
+
+    def run(self, inputs: Inputs) -> dict[str, Value]:
+        """The subject's outputs. Raises SubjectFailed."""
+        try:
+            return outputs(self.subject.ask(inputs), self.output_sorts)
+        except Malformed as error:
+            raise SubjectFailed(str(error)) from error
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            raise SubjectFailed("the subject's answer cannot be read") from error
+
+    # -- for Avow ------------------------------------------------------------------------------------------------------
+
+    def main(self) -> int:
+        """``python test_….py RESULT SECONDS SEED CASES``: all guarantees, and the counts, into a file."""
+        result, seconds, self.seed = Path(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3])
+        nonce = sys.stdin.read().strip()
+        self.end = time.monotonic() + seconds
+        self.subject.patience = min(PATIENCE, max(1.0, seconds / 4))
+        try:
+            stopped = self._sweep()
+            smaller = {name: self._shrunk(name) for name, g in self.guarantees.items() if g.failure is not None}
+            if self.crash is not None:
+                self.crash = self._shrunk_crash()
+        finally:
+            self.subject.close()
+        report = {"nonce": nonce, **self._report(stopped, smaller)}
+        temporary = result.with_suffix(".part")
+        temporary.write_text(json.dumps(report), encoding="utf-8")
+        temporary.replace(result)
+        return 0
+
+    def _sweep(self) -> str:
+        """One pass for all guarantees; why it stopped early, if it did."""
+
+        @seed(self.seed)
+        @self._configuration((Phase.generate,))
+        @given(self.inputs)
+        def every(inputs: Inputs) -> None:
+            if self.end is not None and time.monotonic() > self.end:
+                raise OutOfTime
+            if not self._assumed(inputs):
+                self.rejected += 1
+                assume(False)
+            self._try(inputs)
+
+        try:
+            every()
+        except OutOfTime:
+            return "time"
+        except _Enough:
+            return "enough"
+        except (Unsatisfiable, FailedHealthCheck):
+            return "assumptions"
+        except Impossible as error:
+            return f"no values: {error}"
+        return ""
+
+    def _try(self, inputs: Inputs) -> None:
+        try:
+            found = self.run(inputs)
+        except SubjectFailed as error:
+            self.crash = (inputs, str(error))
+            raise _Enough from error
+        self.valid += 1
+        values = valuation(inputs, found)
+        for each in self.guarantees.values():
+            for k, trigger in enumerate(each.triggers):
+                each.hits[k] += trigger.holds(values) is True
+            if each.failure is not None:
+                continue
+            held = each.judged.holds(values)
+            if held is None:
+                each.undecided += 1
+            elif not held:
+                each.failure = (inputs, found)
+        if all(g.failure is not None for g in self.guarantees.values()):
+            raise _Enough
+
+    def _shrunk(self, name: str) -> Case:
+        """The simplest case that breaks a guarantee, as far as Hypothesis finds it in time."""
+        each = self.guarantees[name]
+        assert each.failure is not None
+
+        def broken(inputs: Inputs) -> Case | None:
+            try:
+                found = self.run(inputs)
+            except SubjectFailed:
+                return None
+            return (inputs, found) if each.judged.holds(valuation(inputs, found)) is False else None
+
+        return self._smallest(each.failure, broken)
+
+    def _shrunk_crash(self) -> tuple[Inputs, str]:
+        assert self.crash is not None
+        said = [self.crash[1]]
+
+        def broken(inputs: Inputs) -> Case | None:
+            try:
+                self.run(inputs)
+            except SubjectFailed as error:
+                said[0] = str(error)
+                return (inputs, {})
+            return None
+
+        if "within" in said[0]:  # each further try would cost the whole patience
+            return self.crash
+        inputs, _ = self._smallest((self.crash[0], {}), broken)
+        return inputs, said[0]
+
+    def _smallest(self, first: Case, broken: Callable[[Inputs], Case | None]) -> Case:
+        best = [first]
+        limit = min(self.end or float("inf"), time.monotonic() + 5.0)
+
+        @seed(self.seed)
+        @self._configuration((Phase.generate, Phase.shrink))
+        @given(self.inputs)
+        def one(inputs: Inputs) -> None:
+            if time.monotonic() > limit:
+                raise OutOfTime
+            assume(self._assumed(inputs))
+            case = broken(inputs)
+            if case is not None:
+                best[0] = case
+                raise _Broken
+
+        with contextlib.suppress(_Broken, OutOfTime, Flaky, Unsatisfiable, FailedHealthCheck):
+            one()
+        return best[0]
+
+    def _report(self, stopped: str, smaller: Mapping[str, Case]) -> dict[str, Any]:
+        return {
+            "valid": self.valid,
+            "rejected": self.rejected,
+            "undecided": self.undecided,
+            "wanted": self.cases,
+            "stopped": stopped,
+            "crash": [_pairs(self.crash[0], {}), self.crash[1]] if self.crash else None,
+            "guarantees": {
+                name: {
+                    "hits": each.hits,
+                    "triggers": [t.text for t in each.triggers],
+                    "undecided": each.undecided,
+                    "failure": _pairs(*smaller[name]) if name in smaller else None,
+                }
+                for name, each in self.guarantees.items()
+            },
+        }
+
+    # -- assumptions ---------------------------------------------------------------------------------------------------
+
+    def _assumed(self, inputs: Inputs) -> bool:
+        values = valuation(inputs, {})
+        for assumption in self.assumptions:
+            held = assumption.holds(values)
+            if held is None:
+                self.undecided += 1
+            if not held:
+                return False
+        return True
+
+    def _blamed(self, inputs: Inputs) -> tuple[str, ...] | None:
+        values = valuation(inputs, {})
+        for assumption in self.assumptions:
+            if assumption.evaluator is None:
+                continue
+            try:
+                if not assumption.evaluator(values) and assumption.ports:
+                    return assumption.ports
+            except NotEvaluable:
+                continue
+        return None
+
+    def _configuration(self, phases: tuple[Phase, ...]) -> settings:
+        return settings(
+            max_examples=self.cases,
+            database=None,
+            deadline=None,
+            derandomize=False,
+            phases=phases,
+            report_multiple_bugs=False,
+            print_blob=False,
+            suppress_health_check=list(HealthCheck),
+        )
+
+    def _rows(self) -> dict[str, tuple[tuple[Value, ...], ...]]:
+        """The scenario's rows for the ports that it interprets, as values; a row that does not fit is left out."""
+        found: dict[str, tuple[tuple[Value, ...], ...]] = {}
+        for name, table in self.data["scenario"].items():
+            sort = self.inputs_sorts.get(name)
+            if isinstance(sort, FunctionSort):
+                read = [
+                    tuple(parse_cell(cell, s) for cell, s in zip(row, sort.parameters, strict=False)) for row in table
+                ]
+                fitting = [row for row in read if len(row) == len(sort.parameters) and None not in row]
+                found[name] = tuple(tuple(v for v in row if v is not None) for row in fitting)
+        return found
+
+
+class _Enough(BaseException):
+    """Nothing more can be learnt."""
+
+
+class _Broken(Exception):  # noqa: N818 - it is what Hypothesis shrinks
+    """The guarantee that is looked at fails."""
+
+
+def valuation(inputs: Inputs, found: Mapping[str, Value]) -> dict[str, Value]:
+    """Qualified names to values."""
+    return {f"in.{n}": v for n, v in inputs.items()} | {f"out.{n}": v for n, v in found.items()}
+
+
+def told(inputs: Inputs, found: Mapping[str, Value]) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in _pairs(inputs, found))
+
+
+def _pairs(inputs: Inputs, found: Mapping[str, Value]) -> list[tuple[str, str]]:
+    return [(name, show(value)) for name, value in valuation(inputs, found).items()]
+
+
+def _find(data: Mapping[str, Any], folder: Path) -> Path:
+    """The subject's file: the system's folder is known from the environment, or lies beside the artifacts."""
+    name: str = data["subject"]["file"]
+    root = os.environ.get("AVOW_SYSTEM_ROOT")
+    if root:
+        return Path(root) / name
+    for parent in folder.resolve().parents:
+        candidate: Path = parent / "contracts" / str(data["folder"]) / name
+        if candidate.is_file():
+            return candidate
+    return folder / name

@@ -1,0 +1,185 @@
+"""Between the contract's values and what a subject gets and returns (`host` has the Python side of it)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+from avow.language.printer import show_sort
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
+from avow.logic.values import Data, Element, FunctionValue, Opaque, Value
+from avow.logic.values import Sequence as SequenceValue
+
+
+class Malformed(Exception):  # noqa: N818 - it names what is wrong
+    """The subject returned something that is no value of the output's type."""
+
+
+def sent(value: Value) -> Any:
+    """A value as JSON data for the host."""
+    match value:
+        case bool() | str():
+            return value
+        case int():
+            return value
+        case Fraction():
+            return {"q": [value.numerator, value.denominator]}
+        case Element(name=name):
+            return name
+        case Opaque():
+            return str(value)
+        case Data(constructor=constructor, arguments=arguments):
+            return {"t": [constructor, *map(sent, arguments)]}
+        case SequenceValue(items=items):
+            return {"t": [sent(item) for item in items]}
+        case FunctionValue(table=table, default=default):
+            return {"f": [[[sent(a) for a in point], sent(v)] for point, v in table.items()], "d": sent(default)}
+        case tuple():
+            return {"t": [sent(item) for item in value]}
+
+
+def received(data: Any, sort: Sort, what: str) -> Value:
+    """The value of the sort that the host's data stands for. Raises Malformed, in terms of `what`."""
+    match sort, data:
+        case BoolSort(), bool():
+            return data
+        case ((IntegerSort() | NaturalSort() | RealSort()), {"q": [numerator, denominator]}):
+            number = Fraction(int(numerator), int(denominator))
+            if isinstance(sort, RealSort):
+                return number
+            if number.denominator == 1 and (number >= 0 or isinstance(sort, IntegerSort)):
+                return int(number)
+        case StringSort(), str():
+            return data
+        case EnumSort(members=members), str() if data in members:
+            return Element(data)
+        case OpaqueSort(name=name), str() if data.startswith(f"{name}#") and data[len(name) + 1 :].isdecimal():
+            return Opaque(name, int(data[len(name) + 1 :]))
+        case DataSort(), _:
+            made = _data(data, sort, what)
+            if made is not None:
+                return made
+        case TupleSort(items=items), {"t": parts} if len(parts) == len(items):
+            return tuple(received(part, item, what) for part, item in zip(parts, items, strict=True))
+        case SequenceSort(item=item), {"t": parts}:
+            return SequenceValue(tuple(received(part, item, what) for part in parts))
+        case FunctionSort(), _:
+            table = _function(data, sort, what)
+            if table is not None:
+                return table
+        case SetSort(), _:
+            pass
+    raise Malformed(f"{what} is {told(data)}, which is no value of {show_sort(sort)}")
+
+
+def _data(data: Any, sort: DataSort, what: str) -> Value | None:
+    name, arguments = (data, []) if isinstance(data, str) else _head(data)
+    for constructor in sort.constructors:
+        if constructor.name == name and len(constructor.parameters) == len(arguments):
+            pairs = zip(arguments, constructor.parameters, strict=True)
+            return Data(constructor.name, tuple(received(a, p, what) for a, p in pairs))
+    return None
+
+
+def _head(data: Any) -> tuple[str | None, list[Any]]:
+    match data:
+        case {"t": [str(name), *arguments]}:
+            return name, arguments
+        case _:
+            return None, []
+
+
+def _function(data: Any, sort: FunctionSort, what: str) -> Value | None:
+    """A Table; a set of points, for a relation; a dict from points, with `...` for the default."""
+    relation = isinstance(sort.result, BoolSort)
+    rows: list[tuple[Any, Any]]
+    match data:
+        case {"f": points, "d": rest}:
+            rows, default = [({"t": point}, value) for point, value in points], rest
+        case {"s": points} if relation:
+            rows, default = [(point, True) for point in points], False
+        case {"t": points} if relation:
+            rows, default = [(point, True) for point in points], False
+        case {"m": pairs}:
+            given = [value for point, value in pairs if point == {"...": True}]
+            if not given and not relation:
+                raise Malformed(f"{what} is a dict without a default (the key ...)")
+            rows = [(point, value) for point, value in pairs if point != {"...": True}]
+            default = given[0] if given else False
+        case _:
+            return None
+    other = received(default, sort.result, f"{what}'s default")
+    table: dict[tuple[Value, ...], Value] = {}
+    for point, value in rows:
+        table[_point(point, sort.parameters, what)] = received(value, sort.result, f"{what} at a point")
+    return FunctionValue({p: v for p, v in table.items() if v != other}, other)
+
+
+def _point(data: Any, parameters: Sequence[Sort], what: str) -> tuple[Value, ...]:
+    place = f"a point of {what}"
+    match data:
+        case {"t": parts} if len(parts) == len(parameters):
+            try:
+                return tuple(received(part, sort, place) for part, sort in zip(parts, parameters, strict=True))
+            except Malformed:
+                if len(parameters) != 1:
+                    raise
+    if len(parameters) == 1:
+        return (received(data, parameters[0], place),)
+    raise Malformed(f"{place} is {told(data)}; it needs {len(parameters)} values")
+
+
+def told(data: Any) -> str:
+    """What the subject returned, for people."""
+    match data:
+        case {"?": what}:
+            return str(what)
+        case {"q": [numerator, denominator]}:
+            return str(Fraction(int(numerator), int(denominator)))
+        case {"t": parts}:
+            return f"({', '.join(map(told, parts))})"
+        case {"s": parts}:
+            return f"{{{', '.join(map(told, parts))}}}"
+        case {"m": _}:
+            return "a dict"
+        case {"f": _}:
+            return "a table"
+        case _:
+            return repr(data)
+
+
+def outputs(data: Any, ports: Mapping[str, Sort]) -> dict[str, Value]:
+    """Every output from what the subject returned: a dict by name, or the one output itself. Raises Malformed."""
+    found: dict[str, Any] = {}
+    names = set(ports)
+    match data:
+        case {"m": pairs} if all(isinstance(key, str) for key, _ in pairs) and (
+            len(names) != 1 or {key for key, _ in pairs} == names
+        ):
+            found = dict(pairs)
+        case _ if len(names) == 1:
+            found = {next(iter(names)): data}
+        case _:
+            listed = ", ".join(sorted(names))
+            raise Malformed(f"the subject returned {told(data)}; it has to return a dict of {listed}")
+    if set(found) != names:
+        missing, extra = sorted(names - set(found)), sorted(set(found) - names)
+        parts = [f"lacks {', '.join(missing)}"] if missing else []
+        parts += [f"has {', '.join(map(repr, extra))}, which the node has not"] if extra else []
+        raise Malformed(f"the dict that the subject returned {' and '.join(parts)}")
+    return {name: received(found[name], sort, f"out.{name}") for name, sort in ports.items()}

@@ -1,0 +1,96 @@
+"""Clauses ready to be judged of many cases, and the triggers without which a guarantee says nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from avow.backends.hypothesis import wire
+from avow.backends.hypothesis.generate import Inputs
+from avow.language.printer import show_term
+from avow.language.terms import And, Implies, Not, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.logic.evaluate import Evaluator, NotEvaluable, compile_term
+from avow.logic.formula import conjunction, free_variables
+from avow.logic.judge import judge
+from avow.logic.values import Value
+
+
+@dataclass(slots=True)
+class Judged:
+    """A formula, ready to be judged of many cases."""
+
+    name: str
+    formula: Term
+    text: str
+    evaluator: Evaluator | None
+    ports: tuple[str, ...]
+    """Inputs that it speaks of."""
+
+    def holds(self, valuation: Mapping[str, Value]) -> bool | None:
+        if self.evaluator is not None:
+            try:
+                return bool(self.evaluator(valuation))
+            except NotEvaluable:
+                pass
+        return judge(self.formula, valuation, timeout_ms=2000)
+
+
+@dataclass(slots=True)
+class Guarantee:
+    """A guarantee and the triggers that it has: each has to be met by some case."""
+
+    judged: Judged
+    triggers: tuple[Judged, ...]
+    hits: list[int] = field(default_factory=list)
+    undecided: int = 0
+    failure: tuple[Inputs, dict[str, Value]] | None = None
+
+
+def judged(clause: Mapping[str, Any]) -> Judged:
+    return _ready(clause["name"], wire.decode(clause["formula"]), clause["text"])
+
+
+def _ready(name: str, formula: Term, text: str) -> Judged:
+    try:
+        evaluator: Evaluator | None = compile_term(formula)
+    except NotEvaluable:
+        evaluator = None
+    ports = sorted(v.name for v in free_variables(formula) if v.role is Role.INPUT)
+    return Judged(name, formula, text, evaluator, tuple(ports))
+
+
+def guarantee(clause: Judged) -> Guarantee:
+    found = tuple(
+        _ready(clause.name, formula, show_term(formula, "unicode").replace("\n", " "))
+        for formula in triggers(clause.formula)
+    )
+    return Guarantee(clause, found, [0] * len(found))
+
+
+def triggers(formula: Term) -> tuple[Term, ...]:
+    """What has to be met for the formula to say anything: the antecedent of every implication that it is made of."""
+    found: list[Term] = []
+    stack: list[tuple[Term, tuple[Variable, ...], tuple[Term, ...]]] = [(formula, (), ())]
+    while stack:
+        part, outer, conditions = stack.pop()
+        match part:
+            case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
+                stack.append((body, (*outer, *variables), conditions))
+            case And(items=items):
+                stack.extend((item, outer, conditions) for item in reversed(items))
+            case Implies(left=left, right=right):
+                stack.append((right, outer, (*conditions, left)))
+            case Or(items=items) if any(isinstance(item, Not) for item in items):
+                denied = tuple(item.body for item in items if isinstance(item, Not))
+                rest = tuple(item for item in items if not isinstance(item, Not))
+                if rest:
+                    stack.append((Or(rest) if len(rest) > 1 else rest[0], outer, (*conditions, *denied)))
+            case _ if conditions:
+                met = conjunction(conditions)
+                free = free_variables(met)
+                bound = tuple(v for v in outer if v in free)
+                found.append(Quantified(Quantifier.EXISTS, bound, met) if bound else met)
+            case _:
+                pass
+    return tuple(dict.fromkeys(found))

@@ -1,0 +1,132 @@
+"""Where generated values come from: the formulas' constants and their neighbours, the scenario, small numbers."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from avow.language.sorts import (
+    INTEGER,
+    NATURAL,
+    REAL,
+    STRING,
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    Sort,
+)
+from avow.language.terms import Literal, Term
+from avow.logic.traversal import subterms
+from avow.logic.values import Element, Value
+
+STEP = Fraction(1, 1000)
+"""How close to a threshold a value is tried on either side."""
+
+SMALL = 4
+"""Identifiers and coordinates are drawn from so few that relations meet."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pools:
+    """`scalars` are values for a number or string that stands alone; `near` for parameters of functions and values,
+    which have to coincide; `rows` are the scenario's rows of a port's relation."""
+
+    scalars: Mapping[Sort, tuple[Value, ...]]
+    near: Mapping[Sort, tuple[Value, ...]]
+    rows: Mapping[str, tuple[tuple[Value, ...], ...]] = field(default_factory=dict)
+
+
+def pools(formulas: Iterable[Term], rows: Mapping[str, tuple[tuple[Value, ...], ...]]) -> Pools:
+    """From the constants in the formulas and from the scenario's rows."""
+    numbers: set[Fraction] = set()
+    strings: set[str] = {""}
+    for formula in formulas:
+        for part in subterms(formula):
+            if isinstance(part, Literal) and not isinstance(part.value, bool):
+                if isinstance(part.value, str):
+                    strings |= {part.value, part.value + "x"}
+                else:
+                    numbers.add(Fraction(part.value))
+    around = _around(numbers)
+    whole = tuple(int(n) for n in around if n.denominator == 1)
+    small = tuple(range(SMALL))
+    inside = tuple(int(n) for n in sorted(numbers) if n.denominator == 1 and n not in small)
+    texts = tuple(sorted(strings, key=lambda s: (len(s), s)))
+    scalars: dict[Sort, tuple[Value, ...]] = {
+        REAL: around,
+        INTEGER: whole,
+        NATURAL: tuple(n for n in whole if n >= 0),
+        STRING: texts,
+    }
+    near: dict[Sort, tuple[Value, ...]] = {
+        REAL: (*map(Fraction, small), *(n for n in _simple(numbers) if n not in small)),
+        INTEGER: (*small, -1, *inside),
+        NATURAL: (*small, *(n for n in inside if n >= 0)),
+        STRING: texts,
+    }
+    return Pools(scalars, near, rows)
+
+
+def _around(numbers: Iterable[Fraction]) -> tuple[Fraction, ...]:
+    """The numbers, what lies close on either side, what lies between them, and what lies well beyond."""
+    ordered = sorted({*numbers, Fraction(0)})
+    values = {Fraction(-1), Fraction(1), ordered[0] - 100, 2 * ordered[-1] + 100}
+    for number in ordered:
+        values |= {number, number - STEP, number + STEP, number - 1, number + 1}
+    values |= {(a + b) / 2 for a, b in itertools.pairwise(ordered)}
+    return _simple(values)
+
+
+def _simple(numbers: Iterable[Fraction]) -> tuple[Fraction, ...]:
+    """The simplest first: what a failing case is shrunk towards."""
+    return tuple(sorted(set(numbers), key=lambda n: (n.denominator, n < 0, abs(n))))
+
+
+def parse_cell(text: str, sort: Sort) -> Value | None:
+    """A cell of a scenario's table as a value of the sort; None where it is none."""
+    text = text.strip()
+    try:
+        number = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        number = None
+    if sort == REAL:
+        return number
+    if sort in (INTEGER, NATURAL):
+        whole = number is not None and number.denominator == 1 and (sort == INTEGER or number >= 0)
+        return int(number) if whole and number is not None else None
+    match sort:
+        case EnumSort(members=members):
+            return Element(text) if text in members else None
+        case BoolSort():
+            return {"TRUE": True, "FALSE": False}.get(text.upper())
+    return text if sort == STRING else None
+
+
+def runs(parameters: tuple[Sort, ...]) -> tuple[tuple[Sort, ...], ...]:
+    """Parameters grouped by equal neighbours: (REAL, REAL, NATURAL) is a place and a number."""
+    return tuple(tuple(group) for _, group in itertools.groupby(parameters))
+
+
+def scenario_runs(
+    rows: Mapping[str, tuple[tuple[Value, ...], ...]], sorts: Mapping[str, Sort]
+) -> dict[tuple[Sort, ...], tuple[tuple[Value, ...], ...]]:
+    """The parts of the scenario's rows, by the sorts of which they are: places, numbers."""
+    found: dict[tuple[Sort, ...], dict[tuple[Value, ...], None]] = {}
+    for port, table in rows.items():
+        sort = sorts.get(port)
+        if not isinstance(sort, FunctionSort):
+            continue
+        for row in table:
+            at = 0
+            for run in runs(sort.parameters):
+                found.setdefault(run, {})[row[at : at + len(run)]] = None
+                at += len(run)
+    return {run: tuple(parts) for run, parts in found.items()}
+
+
+def is_recursive(sort: DataSort) -> bool:
+    """Whether a value of the sort can hold another of some data type."""
+    return any(isinstance(p, DataSort) for c in sort.constructors for p in c.parameters)

@@ -1,0 +1,97 @@
+"""The subject's process, from the judge's side: questions and answers as lines of JSON, with bounded patience."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from avow.backends.hypothesis.convention import sent
+from avow.backends.hypothesis.generate import Inputs
+
+PATIENCE = 10.0
+"""Seconds that a subject may take for one answer."""
+
+
+class SubjectFailed(Exception):  # noqa: N818 - it names what happened
+    """The subject raised, ended, hung, or returned what is no value of the output's type."""
+
+
+class Subject:
+    """The process that holds the subject. Started at the first question."""
+
+    def __init__(self, path: Path, function: str, patience: float) -> None:
+        self.path, self.function, self.patience = path, function, patience
+        self.process: subprocess.Popen[bytes] | None = None
+        self._to = self._from = -1
+        self._buffer = b""
+
+    def ask(self, inputs: Inputs) -> Any:
+        """What the subject returned, as the host's data. Raises SubjectFailed."""
+        if self.process is None:
+            self._start()
+        if self._buffer:
+            raise SubjectFailed("the subject's process answers out of turn")
+        request = json.dumps({name: sent(value) for name, value in inputs.items()}).encode() + b"\n"
+        try:
+            while request:
+                request = request[os.write(self._to, request) :]
+        except OSError as error:
+            raise SubjectFailed("the subject's process has ended") from error
+        reply = self._line()
+        if "error" in reply:
+            raise SubjectFailed(f"the subject raised {reply['error']}")
+        return reply.get("value")
+
+    def close(self) -> None:
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait()
+            os.close(self._to)
+            os.close(self._from)
+            self.process, self._buffer = None, b""
+
+    def _start(self) -> None:
+        there, self._to = os.pipe()
+        self._from, back = os.pipe()
+        host = Path(__file__).with_name("host.py")
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", str(host), str(self.path), self.function, str(there), str(back)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            pass_fds=(there, back),
+        )
+        os.close(there)
+        os.close(back)
+        ready = self._line()
+        if not ready.get("ready"):
+            raise SubjectFailed(f"the subject cannot be loaded: {ready.get('error', 'no reason given')}")
+
+    def _line(self) -> dict[str, Any]:
+        end = time.monotonic() + self.patience
+        while b"\n" not in self._buffer:
+            left = end - time.monotonic()
+            if left <= 0 or not select.select([self._from], [], [], left)[0]:
+                self.close()
+                raise SubjectFailed(f"the subject does not answer within {self.patience:g} s")
+            part = os.read(self._from, 1 << 16)
+            if not part or len(self._buffer) > 4_000_000:
+                self.close()
+                raise SubjectFailed(
+                    "the subject's process has ended" if not part else "the subject's answer has no end"
+                )
+            self._buffer += part
+        line, _, self._buffer = self._buffer.partition(b"\n")
+        try:
+            reply = json.loads(line)
+        except ValueError as error:
+            raise SubjectFailed("the subject's answer is no data") from error
+        if not isinstance(reply, dict):
+            raise SubjectFailed("the subject's answer is no data")
+        return reply
