@@ -95,7 +95,9 @@ def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozense
             found.extend(rejected.diagnostics)
             return [], frozenset()
         found.extend(faults)
-        return list(plan.contract_files), frozenset(plan.lints_off)
+        given = Path.cwd() / folder
+        names = [folder / f.relative_to(given) if f.is_relative_to(given) else f for f in plan.contract_files]
+        return names, frozenset(plan.lints_off)
     files = sorted(folder.glob("*.rcl"))
     if not files:
         found.append(Diagnostic("RCL002", f"{folder} holds neither a plan.yaml nor an .rcl file"))

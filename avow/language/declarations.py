@@ -164,7 +164,7 @@ class Declarations:
             case "named_type":
                 return self.named(tree, reports)
             case "unspecified_type":
-                return OpaqueSort(name)
+                return OpaqueSort(self.free_name(name))
             case "set_type":
                 return self.set_of(tree, reports, name)
             case "tuple_type":
@@ -244,13 +244,15 @@ class Declarations:
         return found if isinstance(found, EnumSort) else None
 
     def free_name(self, name: str) -> str:
-        """`name` itself for a declaration; a set written in place gets one that nothing else has."""
-        if name in self.declared or (self.environment.sort(name) is None and name not in self.environment.elements):
+        """`name` itself for the declaration being elaborated; a set written in place gets one that nothing else has."""
+        declared = self.declared.get(name)
+        if declared is not None and declared.state == "open":
             return name
-        number = 2
-        while f"{name}{number}" in self.declared or self.environment.sort(f"{name}{number}") is not None:
+        environment, free, number = self.environment, name, 1
+        while free in self.declared or environment.sort(free) is not None or free in environment.elements:
             number += 1
-        return f"{name}{number}"
+            free = f"{name}{number}"
+        return free
 
     def introduce(self, sort: EnumSort | DataSort, names: Sequence[Token], reports: Reports) -> Sort | None:
         """The sort, its elements made known; or the sort that an equal set was before."""

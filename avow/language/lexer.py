@@ -108,6 +108,7 @@ _PATTERN = re.compile(
     r"(?P<space>[ \t\r\n\f]+)"
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_']*)"
     r"|(?P<comment>//[^\n]*|/\*[^*]*\*+(?:[^/*][^*]*\*+)*/)"
+    r"|(?P<open_comment>/\*)"
     r"|(?P<not_in>!\s*in(?![A-Za-z0-9_']))"
     r"|(?P<empty><[ \t]*>)"
     r"|(?P<ne>!=)"
@@ -117,7 +118,6 @@ _PATTERN = re.compile(
     rf"|(?P<symbol>{_SYMBOLS})"
     r"|(?P<number>[0-9]+(?:\.[0-9]+)?)(?P<tail>[A-Za-z0-9_'.]*)"
     r'|(?P<string>"(?:[^"\\\n]|\\[^\n])*")'
-    r"|(?P<open_comment>/\*)"
     r'|(?P<open_string>"[^\n]*)'
     r"|(?P<junk>[^\x00-\x7f\s]+|.)",
     re.DOTALL,

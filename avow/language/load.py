@@ -61,7 +61,7 @@ def check_text(
     text: str, file: str, *, off: frozenset[str] = frozenset()
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
     """The contract that a text declares, or None where it has errors; and all errors and lints."""
-    found = _clean(text, file)
+    found = clean_text(text, file)
     if isinstance(found, Diagnostic):
         return None, (found,)
     return check_sources([found], off=off)
@@ -91,10 +91,11 @@ def read_source(path: Path) -> Source | Diagnostic:
             hint = "this looks like UTF-16: save the file as UTF-8"
         message = f"the file is not UTF-8: the byte 0x{data[error.start]:02X} cannot stand here"
         return Diagnostic("RCL004", message, Span(file, line, column, line, column + 1), hint=hint)
-    return _clean(text, file)
+    return clean_text(text, file)
 
 
-def _clean(text: str, file: str) -> Source | Diagnostic:
+def clean_text(text: str, file: str) -> Source | Diagnostic:
+    """A text as the lexer wants it: without byte order mark, with plain line ends; or why it is none."""
     if len(text) > MAX_BYTES:
         return Diagnostic("RCL003", f"the text is larger than {MAX_BYTES // 1_000_000} MB", Span(file, 1, 1, 1, 1))
     text = text.removeprefix("\ufeff").replace("\r\n", "\n")

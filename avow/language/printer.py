@@ -133,6 +133,8 @@ class _Style:
     braces: Callable[[str], str]
     tight_quantifier: bool
     """Whether a quantifier closes itself, so that it never needs parentheses."""
+    careful: bool = False
+    """Whether `and` and `or` stand in parentheses beside `->` and `<=>`, though they need none."""
 
 
 class _Printer:
@@ -202,13 +204,18 @@ class _Printer:
             case Or(items=items):
                 return words["or"].join(self.show(i, AND) for i in items), OR
             case Implies(left=left, right=right):
-                return f"{self.show(left, OR)}{words['->']}{self.show(right, IMPLIES)}", IMPLIES
+                return f"{self.side(left, OR)}{words['->']}{self.side(right, IMPLIES)}", IMPLIES
             case Iff(left=left, right=right):
-                return f"{self.show(left, IFF)}{words['<=>']}{self.show(right, IMPLIES)}", IFF
+                return f"{self.side(left, IFF)}{words['<=>']}{self.side(right, IMPLIES)}", IFF
             case Quantified():
                 return self.quantified(term)
             case Widen(term=inner):
                 return self.form(inner, real)
+
+    def side(self, term: Term, place: int) -> str:
+        """A side of `->` or `<=>`. RCL has parentheses round `and` and `or` there, as the lint RCL401 asks for."""
+        level = self.form(term, False)[1] if self.style.careful and isinstance(term, And | Or) else ATOM
+        return self.show(term, ATOM if level in (AND, OR) else place)
 
     def literal(self, term: Literal, real: bool) -> tuple[str, int]:
         value = term.value
@@ -332,8 +339,12 @@ def _bare(term: Term) -> Term:
 
 
 def latex_escape(text: str) -> str:
-    """Any text as LaTeX text."""
-    return "".join(_LATEX_TEXT.get(c, c) for c in text)
+    """Any text as LaTeX text that every pdflatex can set; what it has no sign for is shown by its number."""
+    return "".join(_LATEX_TEXT.get(c) or (c if " " <= c <= "ÿ" and c.isprintable() else _code_point(c)) for c in text)
+
+
+def _code_point(character: str) -> str:
+    return rf"\texttt{{U+{ord(character):04X}}}"
 
 
 _LATEX_TEXT = {
@@ -349,17 +360,36 @@ _LATEX_TEXT = {
     "~": r"\textasciitilde{}",
     "<": r"\textless{}",
     ">": r"\textgreater{}",
+    "|": r"\textbar{}",
     '"': r"\textquotedbl{}",
     "\n": " ",
     "\t": " ",
+    "\u00a0": "~",
+    "–": "--",
+    "—": "---",
+    "“": "``",
+    "”": "''",
+    "‘": "`",
+    "’": "'",
+    "…": r"\ldots{}",
+    "≤": r"$\leq$",
+    "≥": r"$\geq$",
+    "≠": r"$\neq$",
+    "→": r"$\rightarrow$",
+    "∈": r"$\in$",
+    "∀": r"$\forall$",
+    "∃": r"$\exists$",
+    "∧": r"$\land$",
+    "∨": r"$\lor$",
 }
 
 
-def _latex_name(name: str) -> str:
+def latex_name(name: str) -> str:
+    """A name for mathematics mode."""
     body = name.rstrip("'")
-    shown = body.replace("_", r"\_").replace("'", r"\textquotesingle{}")
-    if len(body) == 1:
+    if len(body) == 1 and body.isalpha():
         return name
+    shown = body.replace("_", r"\_").replace("'", r"\textquotesingle{}")
     return rf"\mathit{{{shown}}}{name[len(body) :]}"
 
 
@@ -388,6 +418,7 @@ _STYLES: dict[StyleName, _Style] = {
         string=quote,
         braces=lambda inner: f"{{{inner}}}",
         tight_quantifier=True,
+        careful=True,
     ),
     "unicode": _Style(
         words={
@@ -473,9 +504,9 @@ _STYLES: dict[StyleName, _Style] = {
             "FALSE": r"\mathit{FALSE}",
         },
         quantifiers={
-            Quantifier.FORALL: (r"\forall ", r" \cdot ", ""),
-            Quantifier.EXISTS: (r"\exists ", r" \cdot ", ""),
-            Quantifier.UNIQUE: (r"\exists!\, ", r" \cdot ", ""),
+            Quantifier.FORALL: (r"\forall ", r" \bullet ", ""),
+            Quantifier.EXISTS: (r"\exists ", r" \bullet ", ""),
+            Quantifier.UNIQUE: (r"\exists!\, ", r" \bullet ", ""),
         },
         sorts={
             "BOOL": r"\mathbb{B}",
@@ -486,9 +517,9 @@ _STYLES: dict[StyleName, _Style] = {
         },
         times=r" \times ",
         arrow=r" \rightarrow ",
-        unspecified=r"\emptyset",
+        unspecified=r"\text{(unspecified)}",
         sequence=(r"\langle ", r"\rangle "),
-        name=_latex_name,
+        name=latex_name,
         string=lambda value: rf"\text{{``{latex_escape(value)}''}}",
         braces=lambda inner: rf"\{{{inner}\}}",
         tight_quantifier=False,

@@ -1,0 +1,78 @@
+"""``avow fmt``: the canonical layout of .rcl files."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from avow.diagnostics import Diagnostic
+
+
+@click.command()
+@click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path, allow_dash=True))
+@click.option("--check", is_flag=True, help="Change nothing; code 1 where a file is not in the canonical layout.")
+@click.option("--diff", is_flag=True, help="Change nothing; show what would change.")
+def command(paths: tuple[Path, ...], check: bool, diff: bool) -> int:
+    """Put contracts into the canonical layout, in place. Comments are kept, and the meaning.
+
+    PATHS are .rcl files, folders of them, or - for the standard input. A file with a syntax error stays as it is.
+    """
+    from avow.diagnostics import Rejected
+    from avow.files import write
+    from avow.language.format import format_text
+    from avow.language.load import read_source
+    from avow.language.source import Source
+    from avow.rendering import render
+
+    faults: list[Diagnostic] = []
+    changed = 0
+    for path in _files(paths):
+        if str(path) == "-":
+            source: Source | Diagnostic = Source("<stdin>", sys.stdin.read())
+        else:
+            source = read_source(path)
+        if not isinstance(source, Source):
+            faults.append(source)
+            continue
+        try:
+            formatted = format_text(source.text, source.file)
+        except Rejected as rejected:
+            faults.extend(rejected.diagnostics)
+            continue
+        if str(path) == "-" and not (check or diff):
+            click.echo(formatted, nl=False)
+            continue
+        before = source.text if str(path) == "-" else path.read_bytes().decode("utf-8")
+        if formatted == before:
+            continue
+        changed += 1
+        if diff:
+            _show_diff(before, formatted, source.file)
+        elif check:
+            click.echo(f"{path} is not in the canonical layout")
+        else:
+            write(path, formatted)
+            click.echo(f"formatted {path}")
+    if faults:
+        click.echo(render(faults), err=True)
+        return 2
+    return 1 if changed and (check or diff) else 0
+
+
+def _show_diff(before: str, after: str, file: str) -> None:
+    import difflib
+
+    lines = difflib.unified_diff(before.splitlines(True), after.splitlines(True), file, f"{file} (formatted)")
+    click.echo("".join(lines), nl=False)
+
+
+def _files(paths: tuple[Path, ...]) -> list[Path]:
+    found: dict[Path, None] = {}
+    for path in paths:
+        for file in sorted(path.rglob("*.rcl")) if path.is_dir() else (path,):
+            found[file] = None
+    return list(found)

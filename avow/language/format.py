@@ -1,0 +1,313 @@
+"""``avow fmt``: the canonical layout of a file. Comments are kept, the meaning is unchanged, formatting twice changes
+nothing.
+
+The layout is made from the surface syntax, so every parenthesis, number and name stays as it was written; `A` and `G`
+are spelled out, and a quantifier's `;` becomes `|`. A part with a comment inside it keeps its own lines, re-indented.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from avow.diagnostics import Diagnostic, Rejected
+from avow.language.lexer import Token, tokens
+from avow.language.load import clean_text
+from avow.language.outline import FileSyntax, read
+from avow.language.source import Reports, Source
+from avow.language.syntax import Tree
+
+WIDTH = 120
+_STEP = 2
+
+
+def format_text(text: str, file: str) -> str:
+    """The text in the canonical layout. Raises `Rejected` where its syntax has errors (its types may have)."""
+    found = clean_text(text, file)
+    if isinstance(found, Diagnostic):
+        raise Rejected(found)
+    reports = Reports(found)
+    comments: list[Token] = []
+    stream = tokens(reports, comments)
+    syntax = read(stream, reports)
+    errors = tuple(d for d in reports.found if d.is_error)
+    if errors:
+        raise Rejected(*errors)
+    return _Layout(found, stream, comments, syntax).file()
+
+
+class _Layout:
+    """Writes the file from left to right: each part in canonical form, after the comments that precede it."""
+
+    def __init__(self, source: Source, stream: Sequence[Token], comments: Sequence[Token], syntax: FileSyntax) -> None:
+        self.text = source.text
+        self.stream = stream
+        self.comments = comments
+        self.next_comment = 0
+        self.at = 0
+        self.lines: list[str] = []
+        self.trees: dict[int, Tree] = {tree.start: tree for tree in syntax.declarations}
+        for node in syntax.nodes:
+            for tree in (node.inputs, node.outputs, node.topics):
+                if tree is not None:
+                    self.trees[tree.start] = tree
+            for clause in node.clauses:
+                if clause.formula is not None:
+                    self.trees[clause.formula.start] = clause.formula
+
+    def kind(self) -> str:
+        return self.stream[self.at].type if self.at < len(self.stream) else "$END"
+
+    # --- comments and blank lines ------------------------------------------------------------------------------------
+
+    def blank(self) -> None:
+        if self.lines and self.lines[-1] and not self.lines[-1].endswith("{"):
+            self.lines.append("")
+
+    def blank_before(self, start: int) -> bool:
+        """Whether the text has an empty line before this place."""
+        gap = self.text[:start]
+        return gap[len(gap.rstrip(" \t\r\n\f")) :].count("\n") > 1
+
+    def flush(self, until: int, indent: int, *, apart: bool = False) -> None:
+        """Write the comments before `until`; `apart`: an empty line before them, or where there are none, now."""
+        first, closed = True, False  # closed: the line ends with a `//` comment, and can take no further one
+        while self.next_comment < len(self.comments) and self.comments[self.next_comment].start < until:
+            comment = self.comments[self.next_comment]
+            self.next_comment += 1
+            line_start = self.text.rfind("\n", 0, comment.start) + 1
+            shown = self.relaid(comment.text, indent, 1)
+            if self.text[line_start : comment.start].strip() and self.lines and self.lines[-1] and first and not closed:
+                closed = comment.text.startswith("//")
+                self.lines[-1] += "  " + shown[0]
+                self.lines.extend(shown[1:])
+                continue
+            if (apart and first) or self.blank_before(comment.start):
+                self.blank()
+            first = False
+            self.lines.append(" " * indent + shown[0])
+            self.lines.extend(shown[1:])
+        if first and apart:
+            self.blank()
+
+    def relaid(self, text: str, indent: int, further: int) -> list[str]:
+        """The lines of a piece kept as it is: the first without indentation, the others moved to `indent + further`."""
+        first, *rest = [line.rstrip() for line in text.split("\n")]
+        rest = [line[: len(line) - len(line.lstrip())].expandtabs(4) + line.lstrip() for line in rest]
+        least = min((len(line) - len(line.lstrip()) for line in rest if line), default=0)
+        return [first, *(" " * (indent + further) + line[least:] if line else "" for line in rest)]
+
+    def has_comment(self, start: int, end: int) -> bool:
+        at = self.next_comment
+        return at < len(self.comments) and self.comments[at].start < end and self.comments[at].start > start
+
+    # --- the file ----------------------------------------------------------------------------------------------------
+
+    def file(self) -> str:
+        while self.at < len(self.stream):
+            self.flush(self.stream[self.at].start, 0, apart=True)
+            if self.blank_before(self.stream[self.at].start):
+                self.blank()
+            head = self.stream[self.at].text
+            if self.kind() == "NODE":
+                self.at += 1
+                head += " " + self.stream[self.at].text
+            self.at += 2
+            self.lines.append(head + " {")
+            while self.kind() != "RBRACE":
+                self.part(head == "context")
+            self.flush(self.stream[self.at].start, _STEP)
+            while self.lines and not self.lines[-1]:
+                self.lines.pop()
+            self.lines.append("}")
+            self.at += 1
+        self.flush(len(self.text) + 1, 0)
+        return "\n".join(self.lines) + "\n"
+
+    def part(self, is_declaration: bool) -> None:
+        first = self.at
+        depth = 0
+        while True:  # to the end of the part: `;` for a declaration, else the closing parenthesis
+            kind = self.kind()
+            depth += (kind in ("LPAR", "LBRACE")) - (kind in ("RPAR", "RBRACE"))
+            self.at += 1
+            if depth == 0 and (kind == "SEMICOLON" if is_declaration else kind == "RPAR"):
+                break
+        own = self.stream[first : self.at]
+        start, end = own[0].start, own[-1].end
+        self.flush(start, _STEP)
+        if self.blank_before(start):
+            self.blank()
+        if self.has_comment(start, end):
+            while self.has_comment(start, end):
+                self.next_comment += 1
+            kept = self.relaid(self.text[start:end], _STEP, _STEP)
+        elif is_declaration:
+            kept = self.declaration(self.trees[start])
+        else:
+            kept = self.section(own)
+        self.lines.append(" " * _STEP + kept[0])
+        self.lines.extend(kept[1:])
+
+    def declaration(self, tree: Tree) -> list[str]:
+        sign = " :" if tree.kind == "type" else " ="
+        head = f"{tree.parts[0].text}{sign} "
+        lines = _broken_set(tree.parts[1], _STEP + len(head), WIDTH - 1) or _lay(tree.parts[1], _STEP + 2, WIDTH - 1)
+        return [head + lines[0], *lines[1:-1], lines[-1] + ";"] if len(lines) > 1 else [head + lines[0] + ";"]
+
+    def section(self, own: Sequence[Token]) -> list[str]:
+        keyword = {"A": "assume", "G": "guarantee"}.get(own[0].text, own[0].text)
+        head = keyword
+        at = 1
+        while own[at].type != "LPAR":
+            head += " " + own[at].text
+            at += 1
+        tree = self.trees.get(own[at + 1].start) if at + 1 < len(own) - 1 else None
+        if tree is None:
+            return [head + "()"]
+        if keyword in ("inputs", "outputs", "topics"):
+            items = [_flat(part) for part in tree.parts]
+            line = f"{head}( {', '.join(items)} )"
+            if _STEP + len(line) <= WIDTH:
+                return [line]
+            pad = " " * (_STEP + len(head) + 2)
+            return [f"{head}( {items[0]}," if len(items) > 1 else f"{head}( {items[0]} )"] + [
+                f"{pad}{item}{' )' if i == len(items) - 1 else ','}" for i, item in enumerate(items) if i
+            ]
+        line = f"{head}( {_flat(tree)} )"
+        if own[at - 1].type != "STRING" and _STEP + len(line) <= WIDTH:
+            return [line]
+        lines = _lay(tree, 2 * _STEP + 2, WIDTH - 2)
+        pad = " " * (2 * _STEP)
+        if len(lines) == 1:
+            return [head, f"{pad}( {lines[0]} )"]
+        return [head, f"{pad}( {lines[0]}", *lines[1:-1], f"{lines[-1]} )"]
+
+
+# --- trees to lines --------------------------------------------------------------------------------------------------
+
+
+def _lay(tree: Tree, indent: int, width: int) -> list[str]:
+    """The lines of a formula or type that begins at column `indent`; all but the first carry their indentation."""
+    flat = _flat(tree)
+    if indent + len(flat) <= width:
+        return [flat]
+    match tree.kind:
+        case "parenthesised":
+            return _enclosed("(", _lay(tree.parts[0], indent + 1, width - 1), ")")
+        case "and" | "or":
+            sign = f"{tree.kind} "
+            lines = _lay(tree.parts[0], indent, width)
+            for part in tree.parts[1:]:
+                more = _lay(part, indent + len(sign), width)
+                lines += [" " * indent + sign + more[0], *more[1:]]
+            return lines
+        case "implies" | "iff":
+            sign = " ->" if tree.kind == "implies" else " <=>"
+            deeper = indent + (0 if tree.parts[1].kind == tree.kind else _STEP)
+            left, right = _lay(tree.parts[0], indent, width - len(sign)), _lay(tree.parts[1], deeper, width)
+            left[-1] += sign
+            return [*left, " " * deeper + right[0], *right[1:]]
+        case "not":
+            return _enclosed("not ", _lay(tree.parts[0], indent + 4, width), "")
+        case "quantified":
+            head = f"{tree.parts[0]}({_flat(tree.parts[1])} |"
+            body = _lay(tree.parts[2], indent + _STEP, width - 1)
+            return (
+                [head, " " * (indent + _STEP) + body[0], *body[1:-1], body[-1] + ")"]
+                if len(body) > 1
+                else [
+                    head,
+                    " " * (indent + _STEP) + body[0] + ")",
+                ]
+            )
+    return [flat]
+
+
+def _enclosed(before: str, lines: list[str], after: str) -> list[str]:
+    lines[0] = before + lines[0]
+    lines[-1] += after
+    return lines
+
+
+def _broken_set(tree: Tree, indent: int, width: int) -> list[str] | None:
+    """A long set over several lines, as many elements on each as fit; None where it is short or no set."""
+    flat = _flat(tree)
+    if tree.kind not in ("set_type", "set") or indent + len(flat) <= width:
+        return None
+    lines = ["{"]
+    pad = " " * (_STEP + _STEP)
+    row = ""
+    items = [_flat(part) for part in tree.parts]
+    for i, item in enumerate(items):
+        piece = item + ("," if i < len(items) - 1 else "")
+        if row and len(pad) + len(row) + 1 + len(piece) > width:
+            lines.append(pad + row)
+            row = ""
+        row = f"{row} {piece}".strip()
+    return [*lines, pad + row, " " * _STEP + "}"]
+
+
+def _flat(tree: Tree) -> str:
+    """The tree on one line."""
+    p = tree.parts
+    match tree.kind:
+        case "and" | "or":
+            return f" {tree.kind} ".join(map(_flat, p))
+        case "implies":
+            return f"{_flat(p[0])} -> {_flat(p[1])}"
+        case "iff":
+            return f"{_flat(p[0])} <=> {_flat(p[1])}"
+        case "not":
+            return f"not {_flat(p[0])}"
+        case "comparison":
+            return "".join(_flat(x) if isinstance(x, Tree) else f" {_relation(x)} " for x in p)
+        case "arithmetic":
+            return f"{_flat(p[0])} {p[1]} {_flat(p[2])}"
+        case "negative":
+            inner = _flat(p[0])
+            return f"- {inner}" if inner.startswith("-") else f"-{inner}"
+        case "application":
+            return f"{_flat(p[0])}({', '.join(map(_flat, p[1:]))})"
+        case "parenthesised":
+            return f"({_flat(p[0])})"
+        case "tuple" | "tuple_type":
+            return f"({', '.join(map(_flat, p))})"
+        case "set" | "set_type" | "unspecified_type":
+            return f"{{{', '.join(map(_flat, p))}}}"
+        case "sequence":
+            return f"<{', '.join(map(_flat, p))}>"
+        case "sequence_type":
+            return f"<{_flat(p[0])}>"
+        case "range":
+            return f"<{_flat(p[0])} upto {_flat(p[1])}>"
+        case "quantified":
+            return f"{p[0]}({_flat(p[1])} | {_flat(p[2])})"
+        case "binders":
+            return ", ".join(map(_flat, p))
+        case "binder":
+            return f"{', '.join(n.text for n in p[:-1])} in {_flat(p[-1])}"
+        case "port_name":
+            return f"{p[0]}.{p[1]}"
+        case "node_port":
+            return ".".join(x for x in p if x is not None)
+        case "function_type":
+            return f"{_flat(p[0])} --> {_flat(p[1])}"
+        case "product_type":
+            return " ".join(_flat(x) if isinstance(x, Tree) else x.text for x in p)
+        case "element":
+            return str(p[0].text)
+        case "constructor":
+            return f"{p[0].text}({', '.join(map(_flat, p[1:]))})"
+        case "port":
+            return f"{p[0].text} : {_flat(p[1])}"
+        case "topic":
+            matched = ""
+            if p[3] is not None:
+                matched = f" matches({p[2]}.{p[3].text})" if p[2] is not None else f" matches({p[3].text})"
+            return f"{'/'.join(t.text for t in p[0].parts)} {p[1].text}{matched}"
+        case _:
+            return str(p[0])
+
+
+def _relation(token: Token) -> str:
+    return "!in" if token.type == "NOT_IN" else token.text

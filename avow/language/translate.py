@@ -1,0 +1,229 @@
+"""A contract in other notations: RCL again, plain words, Unicode mathematics, LaTeX, JSON.
+
+Further notations that need more than the language floor (SMT-LIB, a backend's own) are added by the caller:
+`avow.cli.translate` holds the whole table.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+from avow.language.contract import Clause, Contract, Node, Port, Topic
+from avow.language.format import format_text
+from avow.language.latex import to_latex
+from avow.language.lexer import quote
+from avow.language.printer import StyleName, show_sort, show_term, show_type
+from avow.language.sorts import (
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    OpaqueSort,
+    SequenceSort,
+    Sort,
+    TupleSort,
+)
+from avow.language.terms import Term
+
+
+def to_rcl(contract: Contract) -> str:
+    """The contract as an RCL file, which reads back as the equal contract. Constants are expanded in formulas."""
+    out: list[str] = []
+    names = dict(contract.types)
+    constants = dict(contract.constants)
+    declarations = [
+        f"  {name} = {show_type(sort)};" if name in constants else f"  {name} : {_written(sort, names, name)};"
+        for name, sort in contract.types
+    ]
+    declarations += [f"  {name} = {show_term(term, 'rcl')};" for name, term in contract.constants if name not in names]
+    if declarations:
+        out += ["context {", *declarations, "}", ""]
+    for node in contract.nodes:
+        out += [f"node {node.name} {{"]
+        for word, ports in (("inputs", node.inputs), ("outputs", node.outputs)):
+            shown = ", ".join(f"{p.name} : {p.type_name}" for p in ports)
+            out.append(f"  {word}( {shown} )" if shown else f"  {word}()")
+        topics = ",\n          ".join(_topic(t) for t in node.topics)
+        out.append(f"  topics( {topics} )" if topics else "  topics()")
+        for clause in node.clauses:
+            word = "assume" if clause in node.assumptions else "guarantee"
+            out.append(f"  {word}{_head(clause)}( {show_term(clause.formula, 'rcl')} )")
+        out += ["}", ""]
+    return format_text("\n".join(out), "contract.rcl")
+
+
+def _head(clause: Clause) -> str:
+    letter = "A" if clause.kind == "assumption" else "G"
+    name = "" if clause.name == f"{letter}{clause.position}" else f" {clause.name}"
+    return name + (f" {quote(clause.sentence)} " if clause.sentence is not None else "")
+
+
+def _topic(topic: Topic) -> str:
+    matched = f" matches({topic.port.role}.{topic.port.name})" if topic.port is not None else ""
+    return f"{topic.ros_type} {topic.name}{matched}"
+
+
+def _written(sort: Sort, names: Mapping[str, Sort], declared: str | None = None) -> str:
+    """The sort as a type: by its name where the contract declares one, else written out."""
+    match sort:
+        case EnumSort(name=name) | OpaqueSort(name=name) if name in names and name != declared:
+            return name
+        case EnumSort() | OpaqueSort():
+            return show_type(sort)
+        case DataSort(name=name, constructors=constructors):
+            if name in names and name != declared:
+                return name
+            shown = []
+            for c in constructors:
+                arguments = ", ".join(_written(p, names) for p in c.parameters)
+                shown.append(f"{c.name}({arguments})" if arguments else c.name)
+            return f"{{{', '.join(shown)}}}"
+        case FunctionSort(parameters=parameters, result=result):
+            left = " x ".join(_factor(p, names) for p in parameters)
+            return f"{left} --> {_factor(result, names)}"
+        case TupleSort(items=items):
+            return f"({', '.join(_written(i, names) for i in items)})"
+        case SequenceSort(item=item):
+            return f"<{_written(item, names)}>"
+        case _:
+            return show_sort(sort)
+
+
+def _factor(sort: Sort, names: Mapping[str, Sort]) -> str:
+    shown = _written(sort, names)
+    return f"({shown})" if isinstance(sort, FunctionSort) else shown
+
+
+# --- for people ------------------------------------------------------------------------------------------------------
+
+
+def to_text(contract: Contract) -> str:
+    """The contract in words."""
+    return _for_people(contract, "text")
+
+
+def to_unicode(contract: Contract) -> str:
+    """The contract in mathematical signs."""
+    return _for_people(contract, "unicode")
+
+
+def _for_people(contract: Contract, style: StyleName) -> str:
+    out: list[str] = []
+    if contract.types:
+        out.append("Types")
+        out += [f"  {name} : {show_type(sort, style)}" for name, sort in contract.types]
+        out.append("")
+    scalar = [(n, t) for n, t in contract.constants if n not in dict(contract.types)]
+    if scalar:
+        out += ["Constants", *(f"  {name} = {show_term(term, style)}" for name, term in scalar), ""]
+    for node in contract.nodes:
+        out.append(f"Node {node.name}")
+        for word, ports in (("Inputs", node.inputs), ("Outputs", node.outputs)):
+            out.append(f"  {word}: {', '.join(f'{p.name} : {p.type_name}' for p in ports) or 'none'}")
+        if node.topics:
+            out.append("  Topics")
+            out += [f"    {_topic(t)}" for t in node.topics]
+        for word, clauses in (("Assumes", node.assumptions), ("Guarantees", node.guarantees)):
+            if clauses:
+                out.append(f"  {word}")
+            for clause in clauses:
+                out.append(f"    {clause.name}" + (f": {clause.sentence}" if clause.sentence else ""))
+                out.append(f"      {show_term(clause.formula, style)}")
+        out.append("")
+    return "\n".join(out)
+
+
+# --- for machines ----------------------------------------------------------------------------------------------------
+
+
+def to_json(contract: Contract) -> str:
+    """The contract as data: every formula as RCL text and as a tree (`"kind"` names the term, `"sort"` its sort)."""
+    return json.dumps(_contract(contract), indent=1, ensure_ascii=False) + "\n"
+
+
+def _contract(contract: Contract) -> dict[str, Any]:
+    return {
+        "types": [{"name": name, "sort": sort_data(sort)} for name, sort in contract.types],
+        "constants": [
+            {"name": n, "value": show_term(t, "rcl"), "term": term_data(t), "sort": sort_data(t.sort)}
+            for n, t in contract.constants
+        ],
+        "nodes": [_node(node) for node in contract.nodes],
+    }
+
+
+def _node(node: Node) -> dict[str, Any]:
+    return {
+        "name": node.name,
+        "inputs": [_port(p) for p in node.inputs],
+        "outputs": [_port(p) for p in node.outputs],
+        "topics": [
+            {
+                "type": t.ros_type,
+                "name": t.name,
+                "matches": f"{t.port.role}.{t.port.name}" if t.port is not None else None,
+            }
+            for t in node.topics
+        ],
+        "assumptions": [_clause(c) for c in node.assumptions],
+        "guarantees": [_clause(c) for c in node.guarantees],
+    }
+
+
+def _port(port: Port) -> dict[str, Any]:
+    return {"name": port.name, "type": port.type_name, "sort": sort_data(port.sort)}
+
+
+def _clause(clause: Clause) -> dict[str, Any]:
+    return {
+        "name": clause.name,
+        "sentence": clause.sentence,
+        "formula": show_term(clause.formula, "rcl"),
+        "term": term_data(clause.formula),
+    }
+
+
+def sort_data(sort: Sort) -> dict[str, Any]:
+    """A sort as plain data."""
+    data: dict[str, Any] = {"kind": type(sort).__name__.removesuffix("Sort").lower()}
+    for item in dataclasses.fields(sort):
+        data[item.name] = _plain(getattr(sort, item.name))
+    return data
+
+
+def term_data(term: Term) -> dict[str, Any]:
+    """A term as plain data. Sorts are given by name or as they are written; exact fractions as text."""
+    data: dict[str, Any] = {"kind": type(term).__name__.lower()}
+    for item in dataclasses.fields(term):
+        value = getattr(term, item.name)
+        if item.name == "span":
+            continue
+        data[item.name] = show_sort(value) if item.name == "sort" else _plain(value)
+    return data
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Fraction):
+        return str(value)
+    if isinstance(value, tuple):
+        return [_plain(v) for v in value]
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        if hasattr(value, "span"):
+            return term_data(value)  # type: ignore[arg-type]
+        if type(value).__name__ == "Constructor":
+            return {"name": value.name, "parameters": [sort_data(p) for p in value.parameters]}  # type: ignore[attr-defined]
+        return sort_data(value)  # type: ignore[arg-type]
+    return str(value) if not isinstance(value, bool | int | str) and value is not None else value
+
+
+FORMATS: dict[str, Callable[[Contract], str]] = {
+    "rcl": to_rcl,
+    "text": to_text,
+    "unicode": to_unicode,
+    "latex": to_latex,
+    "json": to_json,
+}
+"""The notations of this floor."""
