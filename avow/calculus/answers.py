@@ -252,7 +252,7 @@ class JointQuestion:
         for situation in triggers(frame.clause(self.node, self.clause)):
             answer = implied(hypotheses, negation(situation), timeout_ms=bounds.milliseconds, seed=bounds.seed)
             details: dict[str, object] = {"needed": list(answer.needed), "situation": show_term(situation)}
-                        own = all(label.startswith(f"{self.node}.") for label in answer.needed)
+            own = all(label.startswith(f"{self.node}.") for label in answer.needed)
             if answer.verdict is Verdict.PROVED and own and not answer.vacuous:
                 shown.append("its own contract excludes it already (a sanity finding): composing adds nothing to that")
                 continue

@@ -124,9 +124,8 @@ def requirement_question(frame: Frame, requirement: Requirement) -> FormulaQuest
     if requirement.formula is not None:
         term = parse_state(requirement.formula, contract, requirement.span)
         support = tuple(name for entry in requirement.supported_by for name in _expand(frame, entry))
-        return FormulaQuestion(
-            requirement.id, term, show_term(system_term(frame, term)), digest(term), tuple(dict.fromkeys(support))
-        )
+        shown = show_term(system_term(frame, term))
+        return FormulaQuestion(requirement.id, term, shown, digest(term), tuple(dict.fromkeys(support)))
     if requirement.temporal is not None:
         formula = parse_property(requirement.temporal, contract, requirement.span)
         return TemporalQuestion(requirement.id, formula, show_property(formula), sha256(_meaning(formula)))

@@ -110,12 +110,9 @@ class Machine:
         return tuple(name for group in groups for name in group)
 
     def _solver(self, node: Node) -> _Solver:
-        relations = tuple(
-            (p, self.world.points(node.name, p)) for p in node.outputs if isinstance(p.sort, FunctionSort)
-        )
-        plain = tuple(
-            (p, self.world.candidates(node.name, p)) for p in node.outputs if not isinstance(p.sort, FunctionSort)
-        )
+        functions = [p for p in node.outputs if isinstance(p.sort, FunctionSort)]
+        relations = tuple((p, self.world.points(node.name, p)) for p in functions)
+        plain = tuple((p, self.world.candidates(node.name, p)) for p in node.outputs if p not in functions)
         mentioned = {v.name for clause in node.guarantees for v in ports_of(clause.formula) if v.role is Role.INPUT}
         return _Solver(
             node,
@@ -171,9 +168,8 @@ class Machine:
             condition = initial_condition(self.frame.system, edge)
             port = self.frame.node(endpoint.node).output(endpoint.port)
             ranges.append(self._initial_values(endpoint, port, condition))
-        return tuple(
-            self._remember(dict(zip(map(str, self.memory), values, strict=True))) for values in product(*ranges)
-        )
+        names = [str(endpoint) for endpoint in self.memory]
+        return tuple(self._remember(dict(zip(names, values, strict=True))) for values in product(*ranges))
 
     def _initial_values(self, endpoint: Endpoint, port: Port, condition: Term | None) -> tuple[Value, ...]:
         if isinstance(port.sort, FunctionSort):
@@ -241,9 +237,8 @@ class Machine:
         if searched:
             constraints = [] if free else [clause.formula for clause in solver.node.guarantees]
             known = inputs | {f"out.{name}": value for name, value in defined.items()}
-            answers, complete = _search(
-                searched, solver.plain, constraints, _by_variable(solver.node, known), self.seed
-            )
+            given = _by_variable(solver.node, known)
+            answers, complete = _search(searched, solver.plain, constraints, given, self.seed)
             if not complete:
                 self.incomplete.add(f"{solver.node.name} has more than {MAX_ANSWERS} answers to one input")
             return tuple({**defined, **answer} for answer in answers)
@@ -318,10 +313,9 @@ def _definition(guarantees: Sequence[Clause], port: Port) -> tuple[tuple[Variabl
         if not isinstance(formula.body, Iff):
             continue
         for head, body in ((formula.body.left, formula.body.right), (formula.body.right, formula.body.left)):
-            applied = isinstance(head, Apply) and head.function == port.variable
-            if applied and isinstance(head, Apply) and head.arguments == formula.variables:
-                if all(v.role is not Role.OUTPUT for v in free_variables(body)):
-                    return formula.variables, body
+            applied = isinstance(head, Apply) and head.function == port.variable and head.arguments == formula.variables
+            if applied and all(v.role is not Role.OUTPUT for v in free_variables(body)):
+                return formula.variables, body
     return None
 
 

@@ -18,7 +18,7 @@ MAX_VALUES = 100_000
 
 _COLUMNS_OF = re.compile(r"\s*([^\s(),]+)\s*\(\s*([^()]*)\)\s*\Z")
 _CELL = re.compile(r"\b([A-Za-z_][A-Za-z0-9_-]*)\.([A-Za-z_][A-Za-z0-9_]*)")
-_RANGE =  re.compile(r"\s*(-?[0-9]{1,9})\s*\.\.\s*(-?[0-9]{1,9})\s*\Z")
+_RANGE = re.compile(r"\s*(-?[0-9]{1,9})\s*\.\.\s*(-?[0-9]{1,9})\s*\Z")
 
 
 def read_csv(name: str, path: Path, span: Span) -> tuple[Table | None, tuple[Diagnostic, ...]]:
@@ -103,7 +103,7 @@ def interpretation(text: str, tables: dict[str, Table]) -> tuple[str, tuple[str,
 
 def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
     """``table.column``, ``low..high``, a value or a list of values → the values as text, or what is wrong."""
-        if piece.items is not None:
+    if piece.items is not None:
         found: dict[str, None] = {}
         for item in piece.items:
             values = _each_row(cell_text(item), tables)
@@ -142,7 +142,6 @@ def _each_row(text: str, tables: dict[str, Table]) -> tuple[str, ...] | str:
         for row in table.rows
     )
     return tuple(dict.fromkeys(rows))
-
 
 
 def plain(value: Any) -> str:
