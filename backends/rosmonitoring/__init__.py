@@ -1,0 +1,7 @@
+"""Runtime monitors: ROSMonitoring configurations, RML, and an engine of our own."""
+
+from __future__ import annotations
+
+from avow.backends.rosmonitoring.backend import RosMonitoringBackend
+
+BACKEND = RosMonitoringBackend()

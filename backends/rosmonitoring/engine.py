@@ -74,7 +74,7 @@ class _Watched:
     trigger: Callable[[Mapping[str, Value]], Value] | None
     witness: Callable[[Mapping[str, Value]], dict[str, Value] | None]
     tally: Tally
-    key: tuple[int, ...] = ()
+    key: tuple[int, ...] | None = None
     truth: bool | None = None
 
 
@@ -96,6 +96,8 @@ class Monitor:
     _previous: list[tuple[str, str]] = field(default_factory=list)
     _clauses: dict[str, list[_Watched]] = field(default_factory=dict)
     _assumptions: list[_Watched] = field(default_factory=list)
+    _constant: list[_Watched] = field(default_factory=list)
+    """Clauses that no message changes: judged once, at the first event."""
 
     def __post_init__(self) -> None:
         for name, rule in self.setup.rules.items():
@@ -144,6 +146,8 @@ class Monitor:
                 self.values[name] = new
                 self._versions[name] += 1
         done: set[int] = set()
+        while self._constant:
+            self._judge(self._constant.pop(), event, found)
         for name in updated:
             for watched in self._clauses.get(name, ()):
                 if id(watched) not in done:
@@ -188,8 +192,11 @@ class Monitor:
             tally.reason = error.reason
             return
         tally.triggered = trigger is None
-        for name in self._triggers(names):
+        triggers = self._triggers(names)
+        for name in triggers:
             self._clauses.setdefault(name, []).append(watched)
+        if not triggers:
+            self._constant.append(watched)
         if clause.kind is ClauseKind.ASSUMPTION:
             self._assumptions.append(watched)
 

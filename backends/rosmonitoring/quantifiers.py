@@ -100,8 +100,8 @@ class Eliminator:
             case Compare():
                 return self._compare(term, bound)
             case In(item=item, collection=SetTerm(items=items) | SequenceTerm(items=items)):
-                value = self._value(item, bound)
-                return some([equal(value, self._value(each, bound)) for each in items])
+                left_side = self._value(item, bound)
+                return some([equal(left_side, self._value(each, bound)) for each in items])
             case Apply():
                 return self._apply(term, bound)
             case Variable(sort=BoolSort()):
@@ -264,7 +264,7 @@ class Eliminator:
         match part.term:
             case Apply(function=Variable(role=Role.INPUT | Role.OUTPUT)) if part.positive:
                 points = self._points(part.term)
-                cases = []
+                cases: list[tuple[Condition, list[Part], Bound]] = []
                 for holds, values in points.tuples:
                     matched = self._match(tuple(zip(part.term.arguments, values, strict=True)), free, bound)
                     if matched is None:

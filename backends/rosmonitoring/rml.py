@@ -7,28 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 KEYWORDS = frozenset(
-    [
-        "not",
-        "matches",
-        "with",
-        "empty",
-        "all",
-        "var",
-        "let",
-        "if",
-        "else",
-        "abs",
-        "sin",
-        "cos",
-        "tan",
-        "min",
-        "max",
-        "true",
-        "false",
-        "null",
-        "any",
-        "none",
-    ]
+    "not matches with empty all var let if else abs sin cos tan min max true false null any none".split()  # noqa: SIM905
 )
 LOWER = re.compile(r"[a-z][A-Za-z0-9_]*\Z")
 STRING = re.compile(r"[A-Za-z0-9_./ -]*\Z")
@@ -266,7 +245,8 @@ def write(specification: Specification) -> str:
             lines.append(comment(specification.notes[machine.name]))
         lines += [_machine_text(machine), ""]
     parts = [f"({m.relevant} >> {_call(m.name, m.initial)})" for m in specification.machines]
-    main = parts[0] if len(parts) == 1 else f"({' /\\ '.join(parts)})" if parts else "any*"
+    both = " /\\ ".join(parts)
+    main = "any*" if not parts else both if len(parts) == 1 else f"({both})"
     lines.append(f"Main = {main};")
     return "\n".join(lines).lstrip("\n") + "\n"
 

@@ -10,7 +10,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from avow.backends.rosmonitoring.rml import FALSE, TRUE, Condition, Name, NotRml, Number, Numeric, compare, every, some
+from avow.backends.rosmonitoring.rml import (
+    TRUE,
+    Comparison,
+    Condition,
+    Name,
+    NotRml,
+    Number,
+    Numeric,
+    compare,
+    every,
+    some,
+)
 from avow.backends.rosmonitoring.rules import Constant, Fields, Hold, InOrder, Previous, Rule
 from avow.language.sorts import (
     BOOL,
@@ -152,8 +163,7 @@ def components(symbol: Symbol) -> tuple[str, ...]:
             return (name,)
         case Variant(tag=Name(name=name), arguments=arguments):
             return (name, *(part for row in arguments for a in row for part in components(a)))
-        case Points(tuples=((condition, parts),)) if condition not in (TRUE, FALSE):
-            flag = condition.left.name if hasattr(condition, "left") else ""
+        case Points(tuples=((Comparison(left=Name(name=flag)), parts),)):
             return (flag, *(part for p in parts for part in components(p)))
         case _:
             return ()

@@ -1,0 +1,119 @@
+"""``avow monitor``: judge a recorded trace against assumptions and guarantees, or serve as ROSMonitoring's oracle."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from avow.backends.rosmonitoring.session import Session
+    from avow.backends.rosmonitoring.traces import Recorded
+    from avow.system.plan import System
+
+SHOWN = 50
+"""Violations shown without --all."""
+
+
+@click.command()
+@click.argument("system")
+@click.argument("trace", required=False)
+@click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
+@click.option("--json", "as_json", is_flag=True, help="For machines: one JSON object.")
+@click.option("--all", "show_all", is_flag=True, help=f"Show every violation, not only the first {SHOWN}.")
+@click.option("--serve", "port", type=click.IntRange(0, 65535), help="Answer ROSMonitoring's monitors on this port.")
+def command(
+    system: str, trace: str | None, nodes: tuple[str, ...], as_json: bool, show_all: bool, port: int | None
+) -> int:
+    """Judge TRACE against the contracts of SYSTEM (a folder, or a name under contracts/).
+
+    TRACE is JSON lines in ROSMonitoring's shape, a ROS 1 or ROS 2 bag, or - for standard input. Code 1 where something
+    was broken, 2 where an input cannot be used.
+    """
+    from avow.cli.workspace import system_folder
+    from avow.system.load import load_system
+
+    loaded = load_system(system_folder(system))
+    if port is not None:
+        if trace is not None:
+            raise click.UsageError("give a TRACE or --serve, not both")
+        _serve(loaded, nodes, port)
+        return 0
+    if trace is None:
+        raise click.UsageError("give a TRACE, or --serve PORT")
+    return _judge(loaded, nodes, trace, as_json, show_all)
+
+
+def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, show_all: bool) -> int:
+    from avow.backends.rosmonitoring.session import session, violation_json
+    from avow.backends.rosmonitoring.traces import digest_trace
+
+    running = session(system, nodes)
+    shown: list[dict[str, Any]] = []
+    count = 0
+    for recorded in _events(trace):
+        for violation in running.step(recorded.event):
+            count += 1
+            if not show_all and count > SHOWN:
+                continue
+            if as_json:
+                shown.append({**violation_json(violation), "line": recorded.line})
+            else:
+                click.echo(violation.text())
+    if as_json:
+        digest = "" if trace == "-" else digest_trace(Path(trace))
+        whole = {**running.summary(), "trace": trace, "sha256": digest, "violations": shown}
+        click.echo(json.dumps(whole, indent=2, ensure_ascii=False))
+    else:
+        if not show_all and count > SHOWN:
+            click.echo(f"… and {count - SHOWN} more (--all shows them)")
+        _print_summary(running)
+    return 0 if running.clean else 1
+
+
+def _events(trace: str) -> Iterator[Recorded]:
+    from avow.backends.rosmonitoring.traces import read_lines, read_trace
+    from avow.diagnostics import Diagnostic, Rejected
+
+    if trace != "-":
+        return read_trace(Path(trace))
+
+    def lines() -> Iterator[str]:
+        try:
+            yield from click.get_text_stream("stdin", encoding="utf-8", errors="strict")
+        except UnicodeDecodeError:
+            raise Rejected(Diagnostic("MON204", "standard input is not UTF-8 text")) from None
+
+    return read_lines(lines(), "<stdin>")
+
+
+def _print_summary(running: Session) -> None:
+    for monitor, name, kind, tally in running.clauses():
+        words = [f"judged {tally.judged} times"]
+        if tally.broken:
+            words.append(f"broken {tally.broken} times" + (f" ({tally.excused} excused)" if tally.excused else ""))
+        if tally.undecided:
+            words.append(f"undecided {tally.undecided} times")
+        if tally.judged and not tally.triggered:
+            words.append("its antecedent was never met")
+        if tally.reason:
+            words.append(tally.reason)
+        click.echo(f"  {monitor.setup.node.name}.{name} ({kind}): {', '.join(words)}")
+    faults = ", ".join(f"{count} × {fault}" for fault, count in running.counts.items())
+    click.echo(f"{running.events} events: {faults or 'nothing broken'}")
+
+
+def _serve(system: System, nodes: tuple[str, ...], port: int) -> None:
+    from avow.backends.rosmonitoring.serve import HOST, serve
+    from avow.backends.rosmonitoring.session import session
+
+    session(system, nodes)  # a fault of the plan is told now, not at the first connection
+
+    def ready(server: Any) -> None:
+        click.echo(f"the oracle of {system.name} listens on ws://{HOST}:{server.socket.getsockname()[1]}")
+
+    serve(lambda: session(system, nodes), port, ready)

@@ -1,0 +1,230 @@
+"""The backend: exports a configuration and an RML file for a node, and judges recorded traces with our own engine."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from avow.backend import Job, Limits, Report, Tool
+from avow.backends.rosmonitoring.schema import SCHEMA
+from avow.diagnostics import Diagnostic, Rejected, Severity
+from avow.system.paths import inside
+from avow.verdict import Counterexample, Link, Outcome, Verdict
+
+if TYPE_CHECKING:
+    from avow.backends.rosmonitoring.engine import Monitor, Violation
+
+KEPT = 200
+"""Violations of one trace that are written to the log; all are counted."""
+
+
+class RosMonitoringBackend:
+    """See `docs/backends/rosmonitoring.md`."""
+
+    name = "rosmonitoring"
+    title = "runtime monitors, and recorded traces judged by them"
+    version = "1"
+    strength = Verdict.MONITORED
+    link = Link.MAPPED
+    options_schema: Mapping[str, Any] = SCHEMA
+    green_means = (
+        "On the recorded events the guarantee held at every judgement, by exact evaluation. It shows nothing of other "
+        "runs; that the mapping reads the messages rightly is a person's judgement."
+    )
+
+    def tools(self) -> tuple[Tool, ...]:
+        return ()
+
+    def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        from avow.backends.rosmonitoring.options import setup
+
+        found, faults = setup(job.system, job.node, job.method.options)
+        problems = list(faults)
+        for at, name in enumerate(_traces(job)):
+            path = inside(job.root, name)
+            if path is None or not path.exists():
+                span = job.method.options.at("traces", at)
+                problems.append(Diagnostic("MON102", f"traces: there is no file {name!r} in the system's folder", span))
+        for obligation in job.obligations:
+            clause = job.clause(obligation)
+            for variable, reason in found.hidden.items():
+                if _mentions(clause.formula, variable) and not faults:
+                    message = f"{clause.name} cannot be monitored: {reason}"
+                    span = job.method.options.at("mapping")
+                    problems.append(Diagnostic("MON103", message, span, Severity.WARNING))
+                    break
+        return tuple(problems)
+
+    def files(self, job: Job) -> tuple[Path, ...]:
+        found: list[Path] = []
+        for name in _traces(job):
+            path = inside(job.root, name)
+            if path is not None and path.is_dir():
+                found += sorted(p for p in path.rglob("*") if p.is_file())
+            elif path is not None:
+                found.append(path)
+        scenario = job.system.plan.scenario
+        found += [t.path for t in scenario.tables if t.path is not None] if scenario else []
+        return tuple(found)
+
+    def export(self, job: Job) -> Mapping[str, str]:
+        from avow.backends.rosmonitoring.configuration import configuration, identifier
+        from avow.backends.rosmonitoring.options import setup
+        from avow.backends.rosmonitoring.rml_translate import translate
+
+        found, faults = setup(job.system, job.node, job.method.options)
+        if faults:
+            raise Rejected(*faults)
+        made = translate(found, [job.clause(o) for o in job.obligations])
+        stem = identifier("", job.node.name)
+        report = {
+            "node": job.node.name,
+            "not_in_rml": made.refused,
+            "not_observed": dict(found.hidden),
+        }
+        return {
+            f"{stem}.yaml": configuration(found, job.options),
+            f"{stem}.rml": made.text,
+            f"{stem}_monitor.json": json.dumps(report, indent=2, ensure_ascii=False) + "\n",
+        }
+
+    def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+        from avow import __version__
+        from avow.backends.rosmonitoring.options import setup
+
+        found, faults = setup(job.system, job.node, job.method.options)
+        if faults:
+            outcomes = tuple(
+                Outcome(o.id, Verdict.ERROR, "; ".join(f.message for f in faults)) for o in job.obligations
+            )
+            return Report(outcomes, "avow monitor", __version__)
+        if not _traces(job):
+            outcomes = tuple(
+                Outcome(o.id, Verdict.NOT_RUN, "monitor generated; the plan names no trace to judge")
+                for o in job.obligations
+            )
+            return Report(outcomes, "avow monitor", __version__)
+        from avow.backends.rosmonitoring.engine import Monitor
+
+        deadline = time.monotonic() + limits.seconds
+        runs: list[_Run] = []
+        for name in _traces(job):
+            monitor = Monitor(found, [o.name for o in job.obligations])
+            runs.append(_judge(job, name, monitor, deadline))
+        logs = {f"trace-{k}.log": run.log() for k, run in enumerate(runs, start=1)}
+        outcomes = tuple(_outcome(o.id, o.name, runs) for o in job.obligations)
+        return Report(outcomes, "avow monitor", __version__, (), logs)
+
+
+class _Run:
+    """What one trace showed."""
+
+    def __init__(self, name: str, monitor: Monitor) -> None:
+        self.name = name
+        self.monitor = monitor
+        self.digest = ""
+        self.trouble = ""
+        self.unknown = ""
+        self.violations: list[Violation] = []
+        self.first: dict[str, Violation] = {}
+        self.mapping_faults = 0
+
+    def log(self) -> str:
+        lines = [f"trace {self.name}: {self.monitor.events} events, {self.monitor.relevant} of this node's topics"]
+        lines.append(f"sha256 {self.digest}")
+        lines += [line for line in (self.trouble, self.unknown) if line]
+        lines += [v.text() for v in self.violations]
+        for name, tally in self.monitor.tallies.items():
+            line = f"{name}: judged {tally.judged} times, broken {tally.broken} (excused {tally.excused})"
+            lines.append(line + (f", undecided {tally.undecided}" if tally.undecided else ""))
+        return "\n".join(lines) + "\n"
+
+
+def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
+    from avow.backends.rosmonitoring.engine import Fault
+    from avow.backends.rosmonitoring.traces import digest_trace, read_trace
+
+    run = _Run(name, monitor)
+    path = inside(job.root, name)
+    if path is None:
+        run.trouble = f"{name} is not in the system's folder"
+        return run
+    try:
+        run.digest = digest_trace(path)
+        for recorded in read_trace(path):
+            for violation in monitor.step(recorded.event):
+                run.mapping_faults += violation.fault is Fault.MAPPING
+                run.first.setdefault(f"{violation.fault.name}/{violation.clause}", violation)
+                if len(run.violations) < KEPT:
+                    run.violations.append(violation)
+            if recorded.index % 256 == 0 and time.monotonic() > deadline:
+                run.unknown = f"{name}: time was up after {monitor.events} events"
+                break
+    except Rejected as error:
+        run.trouble = f"{name}: {'; '.join(f'{d.span or name}: {d.message}' for d in error.diagnostics)}"
+    except OSError as error:
+        run.trouble = f"{name}: {error.strerror or error}"
+    return run
+
+
+def _outcome(obligation: str, name: str, runs: list[_Run]) -> Outcome:
+    from avow.backends.rosmonitoring.engine import Fault
+
+    tallies = [run.monitor.tallies[name] for run in runs]
+    judged = sum(t.judged for t in tallies)
+    events = sum(run.monitor.events for run in runs)
+    bound: dict[str, object] = {"events": events, "judged": judged, "traces": {run.name: run.digest for run in runs}}
+    for run in runs:
+        broken = run.first.get(f"{Fault.GUARANTEE.name}/{name}")
+        if broken is not None:
+            shown = Counterexample((*broken.bindings, *broken.values), broken.text())
+            summary = f"broken at event {broken.index} of {run.name}: {broken.explanation}"
+            return Outcome(obligation, Verdict.REFUTED, summary, shown, bound=bound)
+
+    def answer(verdict: Verdict, summary: str) -> Outcome:
+        return Outcome(obligation, verdict, summary, bound=bound)
+
+    trouble = next((run.trouble for run in runs if run.trouble), "")
+    if trouble:
+        return answer(Verdict.ERROR, trouble)
+    unreadable = next((v for run in runs for v in run.violations if v.fault is Fault.MAPPING), None)
+    if unreadable is not None:
+        return answer(Verdict.UNKNOWN, f"a message could not be read: {unreadable.text()}")
+    late = next((run.unknown for run in runs if run.unknown), "")
+    undecided = sum(t.undecided for t in tallies)
+    reason = next((t.reason for t in tallies if t.reason), "")
+    if late or undecided or (reason and not judged):
+        text = late or (f"undecided at {undecided} of {judged} judgements: {reason}" if undecided else reason)
+        return answer(Verdict.UNKNOWN, f"not monitorable: {text}" if not undecided and not late else text)
+    if not judged:
+        return answer(Verdict.UNKNOWN, "the traces never gave all the values that it speaks of")
+    excused = sum(t.excused for t in tallies)
+    if excused == judged:
+        return answer(Verdict.UNKNOWN, "every judgement fell while an assumption was broken")
+    summary = f"held at all {judged} judgements over {events} events"
+    if excused:
+        summary = f"held at {judged - excused} of {judged} judgements; at the others an assumption was broken"
+    vacuous = not any(t.triggered for t in tallies)
+    if vacuous:
+        summary += "; but its antecedent was never met"
+    return Outcome(obligation, Verdict.MONITORED, summary, bound=bound, vacuous=vacuous)
+
+
+def _traces(job: Job) -> list[str]:
+    found = job.options.get("traces")
+    return [t for t in found if isinstance(t, str)] if isinstance(found, list) else []
+
+
+def _mentions(formula: Any, qualified: str) -> bool:
+    from avow.language.terms import Variable, children
+
+    stack = [formula]
+    while stack:
+        term = stack.pop()
+        if isinstance(term, Variable) and term.qualified == qualified:
+            return True
+        stack.extend(children(term))
+    return False

@@ -1,0 +1,59 @@
+"""ROSMonitoring's oracle protocol over a WebSocket: our engine where the RML oracle stands.
+
+One text frame an event, one reply each: the event with a `verdict`. A reply without one would be read as a final
+"true", and a final verdict ends the monitoring, so the answers are always ``currently_true`` or ``currently_false``.
+Each connection has monitors of its own, that begin with it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+from avow.backends.rosmonitoring.session import Session, violation_json
+from avow.backends.rosmonitoring.traces import MAX_LINE, parse_event
+from avow.diagnostics import Diagnostic, Rejected
+
+HOST = "127.0.0.1"
+
+
+def answer(session: Session, frame: str | bytes) -> str:
+    """The reply to one frame. Never raises for what the frame holds."""
+    try:
+        text = frame.decode() if isinstance(frame, bytes) else frame
+        event = parse_event(text)
+        reply: dict[str, Any] = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        return json.dumps({"verdict": "currently_false", "error": f"this is no event: {error}"})
+    found = list(session.step(event))
+    reply["verdict"] = "currently_false" if found else "currently_true"
+    if found:
+        reply["violations"] = [violation_json(v) for v in found]
+    return json.dumps(reply)
+
+
+def serve(make: Callable[[], Session], port: int, ready: Callable[[Any], None] | None = None) -> None:
+    """Serve until interrupted. `ready` is given the server (its `socket` has the port). Raises Rejected."""
+    try:
+        from websockets.exceptions import ConnectionClosed
+        from websockets.sync.server import serve as listen
+    except ImportError:
+        hint = "pip install 'avow[monitor]'"
+        raise Rejected(Diagnostic("MON301", "serving an oracle needs the package websockets", hint=hint)) from None
+
+    def talk(connection: Any) -> None:
+        session = make()
+        try:
+            for frame in connection:
+                connection.send(answer(session, frame))
+        except ConnectionClosed:
+            return
+
+    try:
+        with listen(talk, HOST, port, max_size=MAX_LINE) as server:
+            if ready is not None:
+                ready(server)
+            server.serve_forever()
+    except OSError as error:
+        raise Rejected(Diagnostic("MON302", f"cannot listen on {HOST}:{port}: {error.strerror or error}")) from None

@@ -1,0 +1,101 @@
+"""Monitors for several nodes at once, and what they found as data for people and machines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from avow.backends.rosmonitoring.engine import Fault, Monitor, Tally, Violation
+from avow.backends.rosmonitoring.options import NAME, setup
+from avow.diagnostics import Diagnostic, Rejected
+from avow.language.contract import ClauseKind
+from avow.system.plan import System
+from avow.system.schema import suggest
+
+
+@dataclass(slots=True)
+class Session:
+    """The monitors of some nodes; feed it events with `step`."""
+
+    system: System
+    monitors: tuple[Monitor, ...]
+    events: int = 0
+    counts: dict[Fault, int] = field(default_factory=dict)
+
+    def step(self, event: Mapping[str, Any]) -> Iterator[Violation]:
+        self.events += 1
+        for monitor in self.monitors:
+            for violation in monitor.step(event):
+                self.counts[violation.fault] = self.counts.get(violation.fault, 0) + 1
+                yield violation
+
+    @property
+    def clean(self) -> bool:
+        """No guarantee or assumption was broken, and every message could be read."""
+        return not self.counts
+
+    def clauses(self) -> Iterator[tuple[Monitor, str, ClauseKind, Tally]]:
+        for monitor in self.monitors:
+            for clause in monitor.setup.node.clauses:
+                if clause.name in monitor.tallies:
+                    yield monitor, clause.name, clause.kind, monitor.tallies[clause.name]
+
+    def summary(self) -> dict[str, Any]:
+        """As JSON; its schema is in `docs/backends/rosmonitoring.md`."""
+        nodes = []
+        for monitor in self.monitors:
+            clauses = [
+                {
+                    "name": clause.name,
+                    "kind": str(clause.kind),
+                    "judged": tally.judged,
+                    "broken": tally.broken,
+                    "excused": tally.excused,
+                    "undecided": tally.undecided,
+                    "antecedent_met": tally.triggered,
+                    "reason": tally.reason,
+                }
+                for clause in monitor.setup.node.clauses
+                if (tally := monitor.tallies.get(clause.name)) is not None
+            ]
+            nodes.append({"node": monitor.setup.node.name, "relevant": monitor.relevant, "clauses": clauses})
+        counts = {fault.name.lower(): count for fault, count in self.counts.items()}
+        return {
+            "system": self.system.name,
+            "events": self.events,
+            "clean": self.clean,
+            "faults": counts,
+            "nodes": nodes,
+        }
+
+
+def session(system: System, nodes: Sequence[str] = ()) -> Session:
+    """Monitors for the named nodes, by default all, with the plan's mappings. Raises Rejected."""
+    known = {node.name: node for node in system.contract.nodes}
+    faults: list[Diagnostic] = []
+    monitors: list[Monitor] = []
+    for name in nodes or known:
+        if name not in known:
+            raise Rejected(Diagnostic("MON104", f"there is no node '{name}'", hint=suggest(name, known)))
+        methods = [m for m in system.plan.node(name).methods if m.backend == NAME]
+        found, problems = setup(system, known[name], methods[0].options if methods else None)
+        faults += problems
+        if not problems:
+            monitors.append(Monitor(found))
+    if faults:
+        raise Rejected(*faults)
+    return Session(system, tuple(monitors))
+
+
+def violation_json(violation: Violation) -> dict[str, Any]:
+    return {
+        "fault": violation.fault.name.lower(),
+        "node": violation.node,
+        "clause": violation.clause,
+        "event": violation.index,
+        "time": violation.time,
+        "bindings": dict(violation.bindings),
+        "values": dict(violation.values),
+        "explanation": violation.explanation,
+    }
