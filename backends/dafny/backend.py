@@ -1,0 +1,189 @@
+"""The Dafny backend: the contract as a specification that a hand-written implementation refines, verified by Dafny."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from avow import process
+from avow.backend import Job, Limits, Report, Tool
+from avow.backends.dafny.judge import Settled, settle
+from avow.backends.dafny.modules import Generated, generate, lines_map
+from avow.backends.dafny.printer import NotExpressible
+from avow.backends.dafny.runner import INSTALL, dafny
+from avow.backends.dafny.scanner import Scan, scan
+from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.system.paths import inside
+from avow.system.schema import suggest
+from avow.verdict import Link, Outcome, Verdict
+
+SCHEMA: dict[str, Any] = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    "type": "object",
+    "properties": {
+        "implementation": {
+            "type": "string",
+            "description": "the Dafny file that refines the generated specification, relative to the system's folder",
+        },
+        "id": {"type": "string", "description": "tells several methods of one node apart"},
+        "guarantees": {
+            "type": ["array", "string"],
+            "items": {"type": "string"},
+            "description": "the guarantees to verify (default: all of the node's)",
+        },
+    },
+    "required": ["implementation"],
+    "additionalProperties": False,
+}
+
+MAX_BYTES = 2_000_000
+
+
+class DafnyBackend:
+    """See `docs/backends/dafny.md`."""
+
+    name = "dafny"
+    title = "a Dafny implementation, verified against the contract"
+    version = "1"
+    strength = Verdict.PROVED
+    link = Link.GENERATED
+    options_schema: Mapping[str, Any] = SCHEMA
+    green_means = (
+        "Dafny proved that the implementation's Step meets this guarantee for all inputs that meet the assumptions "
+        "(and Env, where it says more), that it always ends, and that such inputs exist. "
+        "That the robot runs this program is not shown."
+    )
+
+    def tools(self) -> tuple[Tool, ...]:
+        return (dafny(),)
+
+    def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        options = job.method.options
+        found = [
+            Diagnostic(
+                "DFY101",
+                f"'{key}' is no option of dafny",
+                options.at(key),
+                hint=suggest(str(key), SCHEMA["properties"]),
+            )
+            for key in job.options
+            if key not in SCHEMA["properties"]
+        ]
+        try:
+            path, text = _implementation(job)
+        except Rejected as error:
+            return (*found, *error.diagnostics)
+        try:
+            generated = _generate(job)
+        except NotExpressible as problem:
+            # The contract is in order; it is this backend that cannot treat it. The outcome says so, too.
+            message = f"node '{job.node.name}' cannot be put into Dafny: {problem.what}"
+            return (*found, Diagnostic("DFY104", message, problem.span or job.node.span, Severity.WARNING))
+        scanned = _scan(text, generated)
+        for line, what in (*scanned.problems, *scanned.hypotheses):
+            place = Span(str(path), line, 1, line + 1, 1)
+            found.append(Diagnostic("DFY103", what, place, Severity.WARNING))
+        return tuple(found)
+
+    def files(self, job: Job) -> tuple[Path, ...]:
+        name = job.options.get("implementation")
+        path = inside(job.root, name) if isinstance(name, str) else None
+        return (path,) if path is not None else ()
+
+    def export(self, job: Job) -> Mapping[str, str]:
+        """Types, contract, specification, the map from `ensures` to guarantees, and a skeleton to start from."""
+        try:
+            generated = _generate(job)
+        except NotExpressible as problem:
+            return {"NOT-COVERED.txt": f"{_unprintable(problem.what)}\n"}
+        return {
+            **_specification(generated),
+            "guarantees.json": lines_map(generated),
+            f"skeleton/{generated.impl_file}": generated.skeleton,
+        }
+
+    def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+        tool = dafny()
+        version = tool.version or ""
+
+        def all_alike(verdict: Verdict, summary: str) -> Report:
+            outcomes = tuple(Outcome(o.id, verdict, summary, link=Link.GENERATED) for o in job.obligations)
+            return Report(outcomes, "dafny", version)
+
+        try:
+            path, text = _implementation(job)
+            generated = _generate(job)
+        except Rejected as error:
+            return all_alike(Verdict.ERROR, "; ".join(d.message for d in error.diagnostics))
+        except NotExpressible as problem:
+            return all_alike(Verdict.UNKNOWN, f"not covered: Dafny's counterpart is missing for {problem.what}")
+        if not tool.present:
+            return all_alike(Verdict.NOT_RUN, f"dafny is not on this machine; install it with: {INSTALL}")
+        scanned = _scan(text, generated)
+        try:
+            settled = settle(generated, scanned, path.name, limits)
+        except (process.ToolMissing, OSError) as error:
+            return all_alike(Verdict.ERROR, f"dafny could not be run: {error}")
+        uncovered = dict(generated.uncovered)
+        outcomes = []
+        for obligation in job.obligations:
+            reason = uncovered.get(obligation.name)
+            if reason is not None:
+                what = f"not covered: Dafny's counterpart is missing for {reason}"
+                outcomes.append(Outcome(obligation.id, Verdict.UNKNOWN, what, link=Link.GENERATED))
+            else:
+                outcomes.append(_outcome(obligation.id, settled.verdicts[obligation.name]))
+        return Report(tuple(outcomes), "dafny", version, settled.command, settled.logs)
+
+
+def _outcome(obligation: str, settled: Settled) -> Outcome:
+    return Outcome(
+        obligation,
+        settled.verdict,
+        settled.summary,
+        hypotheses=settled.hypotheses,
+        details=dict(settled.details),
+        link=Link.GENERATED,
+    )
+
+
+def _implementation(job: Job) -> tuple[Path, str]:
+    """The hand-written file. Raises Rejected."""
+    name = job.options.get("implementation")
+    place = job.method.options.at("implementation")
+    if not isinstance(name, str) or not name:
+        raise Rejected(Diagnostic("DFY101", "dafny needs 'implementation': a file of the system's folder", place))
+    path = inside(job.root, name)
+    if path is None:
+        raise Rejected(Diagnostic("DFY101", f"'{name}' is not a file in the system's folder", place))
+    if not path.is_file():
+        hint = "a skeleton is among the exported files"
+        raise Rejected(Diagnostic("DFY102", f"there is no file '{name}' in {job.root.name}/", place, hint=hint))
+    try:
+        data = path.read_bytes()
+        if len(data) > MAX_BYTES:
+            raise Rejected(Diagnostic("DFY102", f"'{name}' has {len(data)} bytes; at most {MAX_BYTES} are read", place))
+        return path, data.decode("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise Rejected(Diagnostic("DFY102", f"'{name}' cannot be read: {error}", place)) from None
+
+
+def _generate(job: Job) -> Generated:
+    return generate(job.node, [o.name for o in job.obligations] or job.method.guarantees)
+
+
+def _scan(text: str, generated: Generated) -> Scan:
+    return scan(text, generated.spec_module, generated.impl_module, tuple(_specification(generated)))
+
+
+def _specification(generated: Generated) -> dict[str, str]:
+    return {
+        generated.types_file: generated.types,
+        generated.contract_file: generated.contract,
+        generated.spec_file: generated.spec,
+    }
+
+
+def _unprintable(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)

@@ -1,0 +1,195 @@
+"""From Dafny's answers to a verdict for each guarantee.
+
+Proved only if all of this holds: the file refines the generated specification and takes nothing for granted (our scan
+and Dafny's own complaints agree); every method and lemma that it declares, and Step and EnvNotEmpty among them, is in
+the answer; everything in the answer is correct; and the printed count of errors is 0. Anything less is not a proof.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from avow.backend import Limits
+from avow.backends.dafny.answer import Member
+from avow.backends.dafny.modules import Generated
+from avow.backends.dafny.runner import Run, audit, verify
+from avow.backends.dafny.scanner import Scan
+from avow.verdict import Verdict
+
+_FINISHED = re.compile(r"Dafny program verifier finished with (\d+) verified, (\d+) errors?(.*)")
+_SHOWN = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    verdict: Verdict
+    summary: str
+    hypotheses: tuple[str, ...] = ()
+    details: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    verdicts: Mapping[str, Settled]
+    """By guarantee; those that are not covered are left out."""
+    command: tuple[str, ...]
+    logs: Mapping[str, str]
+
+
+def settle(generated: Generated, scanned: Scan, shown_name: str, limits: Limits) -> Judgement:
+    """Run Dafny and judge each guarantee. `shown_name` is what the implementation is called in messages.
+
+    Raises ToolMissing, OSError.
+    """
+    guarantees = [name for _, name in generated.ensures]
+    files = _files(generated, scanned, generated.spec)
+    run = verify(files, limits)
+    logs = {"verify.log": run.output}
+
+    def alike(settled: Settled) -> Judgement:
+        return Judgement(dict.fromkeys(guarantees, settled), run.command, logs)
+
+    broken = _broken(run, scanned, generated, shown_name)
+    if broken is not None:
+        return alike(broken)
+    audited = audit(files, limits)
+    logs["audit.log"] = audited.output
+    taken = _taken_for_granted(audited, scanned, generated, shown_name)
+    if taken is None:
+        return alike(Settled(Verdict.ERROR, "Dafny did not say what the implementation leaves open", (), {}))
+    lacking = _lacking(run.members or (), scanned, generated)
+    if lacking:
+        return alike(Settled(Verdict.ERROR, f"missing: {'; '.join(lacking)}", taken))
+    whole = _unproved(run)
+    verdicts: dict[str, Settled] = {}
+    for name in guarantees:
+        unproved = whole
+        if whole and len(guarantees) > 1:
+            # Another guarantee may be the only culprit: ask again with this one alone. Nothing is gained by guessing
+            # from places, as Dafny assumes what it has reported before it goes on.
+            alone = verify(_files(generated, scanned, _only(generated, name)), limits)
+            logs[f"verify-{_safe(name)}.log"] = alone.output
+            fault = _broken(alone, scanned, generated, shown_name)
+            if fault is not None:
+                verdicts[name] = fault
+                continue
+            unproved = _unproved(alone) or tuple(_lacking(alone.members or (), scanned, generated))
+        verdicts[name] = _verdict(unproved, taken, scanned, generated, name)
+    return Judgement(verdicts, run.command, logs)
+
+
+def _verdict(
+    unproved: tuple[str, ...], taken: tuple[str, ...], scanned: Scan, generated: Generated, guarantee: str
+) -> Settled:
+    details: dict[str, object] = {"module": generated.impl_module, "members": [name for _, name in scanned.members]}
+    if unproved:
+        details["not proved"] = list(unproved)
+        return Settled(Verdict.UNKNOWN, f"not proved: {_few(unproved)}", taken, details)
+    if taken:
+        return Settled(
+            Verdict.UNKNOWN, f"proved only if what it takes for granted holds: {_few(taken)}", taken, details
+        )
+    added: tuple[str, ...] = ()
+    summary = f"Step of {generated.impl_module} meets it for all inputs that meet the assumptions"
+    if scanned.environment != "true":
+        added = (f"added assumption of the implementation, Env: {scanned.environment}",)
+        summary += " and Env"
+    return Settled(Verdict.PROVED, summary, added, details)
+
+
+def _broken(run: Run, scanned: Scan, generated: Generated, shown_name: str) -> Settled | None:
+    """A run without an answer."""
+    if run.timed_out:
+        return Settled(Verdict.UNKNOWN, "dafny was stopped at its time limit")
+    printed = _FINISHED.search(run.output)
+    if run.members is not None and printed is not None and run.code in (0, 4):
+        return None
+    errors = [f"{_name(c.file, generated, shown_name)}:{c.line}: {c.message}" for c in run.complaints]
+    count = run.counted or len(errors)
+    problems = [what for _, what in scanned.problems]
+    details: dict[str, object] = {"errors": errors, "problems": problems}
+    if errors:
+        summary = f"Dafny rejects it with {count} error{'s' if count != 1 else ''}: {_few(errors)}"
+    else:
+        last = [line for line in run.output.splitlines() if line.strip()][-1:]
+        summary = f"dafny ended with code {run.code} and without a readable answer: {_few(last)}"
+    return Settled(Verdict.ERROR, "; ".join([summary, *problems[:_SHOWN]]), (), details)
+
+
+def _taken_for_granted(run: Run, scanned: Scan, generated: Generated, shown_name: str) -> tuple[str, ...] | None:
+    """What the implementation assumes, by our scan and by Dafny's own account; None where Dafny gave none."""
+    if run.timed_out or run.code not in (0, 3) or _FINISHED.search(run.output) is None:
+        return None
+    if run.code == 3 and not run.complaints:
+        return None
+    found = [f"{shown_name}:{line}: {what}" for line, what in scanned.hypotheses]
+    # The generated modules leave the partial operations open on purpose (see `modules`).
+    found += [
+        f"{_name(c.file, generated, shown_name)}:{c.line}: {c.message}"
+        for c in run.complaints
+        if c.file not in (generated.types_file, generated.contract_file, generated.spec_file)
+    ]
+    return tuple(dict.fromkeys(found))
+
+
+def _lacking(members: tuple[Member, ...], scanned: Scan, generated: Generated) -> list[str]:
+    """Members that should be in the answer and are not: Dafny is silent of a method without a body."""
+    there = {(m.module, m.name) for m in members if m.kind == "Impl"}
+    names = {m.name for m in members if m.kind == "Impl"}
+    found = [what for _, what in scanned.problems]
+    found += [f"no answer about {n}" for n in ("EnvNotEmpty", "Step") if (generated.impl_module, n) not in there]
+    found += [f"no answer about {kind} {name}" for kind, name in scanned.members if name not in names]
+    if scanned.environment is None:
+        found.append("predicate Env has no body")
+    return list(dict.fromkeys(found))
+
+
+def _unproved(run: Run) -> tuple[str, ...]:
+    """Everything that is not proved, in words; empty only where all is."""
+    found = []
+    for member in run.members or ():
+        if member.outcome == "correct" and not member.failures:
+            continue
+        what = f"{member.module}.{member.name}"
+        if not member.failures:
+            found.append(f"{what}: {member.outcome or 'no outcome'}")
+        for failure in member.failures:
+            found.append(f"{what}, line {failure.line}: {failure.message}")
+    printed = _FINISHED.search(run.output)
+    clean = printed is not None and int(printed[2]) == 0 and not printed[3].strip() and int(printed[1]) > 0
+    if not found and not (clean and run.code == 0):
+        found.append(f"dafny says: {printed[0] if printed else 'nothing'} (code {run.code})")
+    return tuple(found)
+
+
+def _only(generated: Generated, guarantee: str) -> str:
+    """The specification with the `ensures` of one guarantee; every line keeps its number."""
+    lines = generated.spec.split("\n")
+    for number, name in generated.ensures:
+        if name != guarantee:
+            lines[number - 1] = ""
+    return "\n".join(lines)
+
+
+def _files(generated: Generated, scanned: Scan, spec: str) -> dict[str, str]:
+    return {
+        generated.types_file: generated.types,
+        generated.contract_file: generated.contract,
+        generated.spec_file: spec,
+        generated.impl_file: scanned.text,
+    }
+
+
+def _name(file: str, generated: Generated, shown_name: str) -> str:
+    return shown_name if file == generated.impl_file else file
+
+
+def _safe(name: str) -> str:
+    return re.sub(r"\W", "_", name, flags=re.ASCII)
+
+
+def _few(items: tuple[str, ...] | list[str]) -> str:
+    more = f"; and {len(items) - _SHOWN} more" if len(items) > _SHOWN else ""
+    return "; ".join(items[:_SHOWN]) + more

@@ -1,0 +1,335 @@
+"""Typed terms as Dafny expressions.
+
+Every quantifier becomes a call of a named predicate that holds its body: bare nested quantifiers leave Dafny without
+terms to trigger on, and an implementation can name a witness (``assert Contract.exit_ex1(in_map, out_command, x, y)``).
+Partial operations (division by zero, an element beyond a sequence's end) become calls of functions about which nothing
+is known there, so whatever is proved holds however they are read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from avow.backends.dafny.names import Names
+from avow.diagnostics import Span
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
+from avow.language.terms import (
+    And,
+    Apply,
+    Arithmetic,
+    Compare,
+    Construct,
+    EnumValue,
+    Iff,
+    Implies,
+    In,
+    Index,
+    Length,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    SequenceRange,
+    SequenceTerm,
+    SetTerm,
+    Term,
+    TupleTerm,
+    Variable,
+    Widen,
+)
+from avow.logic.formula import free_variables
+from avow.logic.traversal import Steps, run
+
+
+class NotExpressible(Exception):  # noqa: N818 - it names what the term is
+    """A construct without a counterpart here; what needs it is reported as not covered."""
+
+    def __init__(self, what: str, span: Span | None) -> None:
+        super().__init__(what)
+        self.what = what
+        self.span = span
+
+
+@dataclass(frozen=True, slots=True)
+class Predicate:
+    """A generated predicate: a clause, or the body of one of its quantifiers."""
+
+    name: str
+    parameters: tuple[Variable, ...]
+    body: str
+    origin: str
+    """The clause that it comes from."""
+
+
+@dataclass(slots=True)
+class Vocabulary:
+    """The names of one node's export, shared by all that is printed for it."""
+
+    names: Names
+    """Of types, constructors and predicates."""
+    locals: Names
+    """Of ports and bound variables."""
+    ports: tuple[Variable, ...]
+    types: dict[Sort, str] = field(default_factory=dict)
+    """Declared sorts that occur, in order of first use."""
+
+    def local(self, variable: Variable) -> str:
+        wanted = None if variable.role == "bound" else f"{variable.role}_{variable.name}"
+        return self.locals(str(variable.role), variable.name, wanted)
+
+    def declared(self, sort: EnumSort | DataSort | OpaqueSort) -> str:
+        if sort not in self.types:
+            self.types[sort] = self.names.fresh(sort.name)
+        return f"Types.{self.types[sort]}"
+
+    def constructor(self, sort: EnumSort | DataSort, name: str) -> str:
+        prefix = self.declared(sort)
+        return f"{prefix}.{self.names(f'constructor of {prefix}', name)}"
+
+
+def sort_text(sort: Sort, words: Vocabulary) -> str:
+    """The Dafny type of a sort. Raises NotExpressible."""
+    match sort:
+        case BoolSort():
+            return "bool"
+        case RealSort():
+            return "real"
+        case IntegerSort():
+            return "int"
+        case NaturalSort():
+            return "nat"
+        case StringSort():
+            return "string"
+        case EnumSort() | DataSort() | OpaqueSort():
+            return words.declared(sort)
+        case FunctionSort(parameters=parameters, result=result):
+            return f"({', '.join(sort_text(p, words) for p in parameters)}) -> {sort_text(result, words)}"
+        case TupleSort(items=items):
+            if len(items) < 2:
+                raise NotExpressible("a tuple of fewer than two items", None)
+            return f"({', '.join(sort_text(i, words) for i in items)})"
+        case SequenceSort(item=item):
+            return f"seq<{sort_text(item, words)}>"
+        case SetSort():
+            raise NotExpressible("a set outside 'in'", None)
+
+
+def print_clause(name: str, formula: Term, words: Vocabulary) -> tuple[Predicate, ...]:
+    """The predicate of a clause, after those of its quantifiers. Raises NotExpressible."""
+    printer = _Printer(name, words)
+    body, _ = run(printer.term(formula, words.ports))
+    parameters = printer.parameters(formula, words.ports)
+    whole = Predicate(words.names("clause", name), parameters, body, name)
+    return (*printer.made, whole)
+
+
+def call(predicate: Predicate, words: Vocabulary, module: str = "") -> str:
+    """The predicate applied to variables of the names of its parameters."""
+    arguments = ", ".join(words.local(p) for p in predicate.parameters)
+    return f"{module}{predicate.name}({arguments})"
+
+
+_Text = tuple[str, bool]
+"""Text, and whether it can stand as an operand without parentheses."""
+
+_KINDS: Mapping[Quantifier, str] = {
+    Quantifier.FORALL: "all",
+    Quantifier.EXISTS: "ex",
+    Quantifier.UNIQUE: "one",
+}
+
+
+class _Printer:
+    def __init__(self, clause: str, words: Vocabulary) -> None:
+        self.clause = clause
+        self.words = words
+        self.made: list[Predicate] = []
+        self.count = 0
+
+    def parameters(self, term: Term, scope: tuple[Variable, ...]) -> tuple[Variable, ...]:
+        free = free_variables(term)
+        return tuple(variable for variable in scope if variable in free)
+
+    def operand(self, term: Term, scope: tuple[Variable, ...]) -> Steps[str]:
+        text, atomic = yield self.term(term, scope)
+        return text if atomic else f"({text})"
+
+    def list(self, terms: tuple[Term, ...], scope: tuple[Variable, ...]) -> Steps[str]:
+        texts = []
+        for term in terms:
+            text, _ = yield self.term(term, scope)
+            texts.append(text)
+        return ", ".join(texts)
+
+    def infix(self, operator: str, terms: tuple[Term, ...], scope: tuple[Variable, ...]) -> Steps[_Text]:
+        texts = []
+        for term in terms:
+            texts.append((yield self.operand(term, scope)))
+        return f" {operator} ".join(texts), len(texts) == 1
+
+    def term(self, term: Term, scope: tuple[Variable, ...]) -> Steps[_Text]:
+        whole: _Text
+        match term:
+            case Literal():
+                return _literal(term)
+            case EnumValue(name=name, sort=sort):
+                return self.words.constructor(sort, name), True
+            case Variable():
+                return self.words.local(term), True
+            case Construct(constructor=name, arguments=arguments, sort=sort):
+                inner = yield self.list(arguments, scope)
+                made = self.words.constructor(sort, name)
+                return (f"{made}({inner})" if arguments else made), True
+            case Apply(function=function, arguments=arguments):
+                head = yield self.operand(function, scope)
+                inner = yield self.list(arguments, scope)
+                return f"{head}({inner})", True
+            case Index(sequence=sequence, index=index):
+                inner = yield self.list((sequence, index), scope)
+                return f"Types.Nth({inner})", True
+            case Length(sequence=sequence):
+                inner, _ = yield self.term(sequence, scope)
+                return f"|{inner}|", True
+            case Widen(term=inner_term):
+                inner = yield self.operand(inner_term, scope)
+                return f"{inner} as real", False
+            case Negative(term=inner_term, sort=sort):
+                inner = yield self.operand(inner_term, scope)
+                return f"-{inner}", False
+            case Arithmetic(operator="/", left=left, right=right):
+                inner = yield self.list((left, right), scope)
+                return f"Types.Divide({inner})", True
+            case Arithmetic(operator=operator, left=left, right=right):
+                whole = yield self.infix(operator, (left, right), scope)
+                return whole
+            case TupleTerm(items=items):
+                if len(items) < 2:
+                    raise NotExpressible("a tuple of fewer than two items", term.span)
+                inner = yield self.list(items, scope)
+                return f"({inner})", True
+            case SequenceTerm(items=items, sort=sequence_sort):
+                inner = yield self.list(items, scope)
+                if items:
+                    return f"[{inner}]", True
+                # An empty display alone says nothing of its type.
+                return f"(var nothing: {sort_text(sequence_sort, self.words)} := []; nothing)", True
+            case SequenceRange(low=low, high=high):
+                inner = yield self.list((low, high), scope)
+                return f"Types.Upto({inner})", True
+            case SetTerm():
+                raise NotExpressible("a set outside 'in'", term.span)
+            case Compare(operator=operator, left=left, right=right):
+                whole = yield self.infix(operator, (left, right), scope)
+                return whole
+            case In(item=item, collection=collection):
+                whole = yield self.membership(item, collection, scope)
+                return whole
+            case Not(body=body):
+                inner = yield self.operand(body, scope)
+                return f"!{inner}", True
+            case And(items=items):
+                whole = (yield self.infix("&&", items, scope)) if items else ("true", True)
+                return whole
+            case Or(items=items):
+                whole = (yield self.infix("||", items, scope)) if items else ("false", True)
+                return whole
+            case Implies(left=left, right=right):
+                whole = yield self.infix("==>", (left, right), scope)
+                return whole
+            case Iff(left=left, right=right):
+                whole = yield self.infix("<==>", (left, right), scope)
+                return whole
+            case Quantified():
+                whole = yield self.quantified(term, scope)
+                return whole
+
+    def membership(self, item: Term, collection: Term, scope: tuple[Variable, ...]) -> Steps[_Text]:
+        left = yield self.operand(item, scope)
+        if not isinstance(collection, SetTerm):
+            right = yield self.operand(collection, scope)
+            return f"{left} in {right}", False
+        if not collection.items:
+            return "false", True
+        # A disjunction, not a set display: it needs no equality that can be compiled.
+        parts = []
+        for member in collection.items:
+            text = yield self.operand(member, scope)
+            parts.append(f"{left} == {text}")
+        return (f"({parts[0]})", True) if len(parts) == 1 else (" || ".join(parts), False)
+
+    def quantified(self, term: Quantified, scope: tuple[Variable, ...]) -> Steps[_Text]:
+        self.count += 1
+        name = self.words.names.fresh(f"{self.clause}_{_KINDS[term.quantifier]}{self.count}")
+        inner_scope = scope + term.variables
+        body, _ = yield self.term(term.body, inner_scope)
+        outer = self.parameters(term, scope)
+        # Every bound variable is a parameter, used or not: the call is the only term to trigger on.
+        predicate = Predicate(name, outer + term.variables, body, self.clause)
+        self.made.append(predicate)
+        bound = ", ".join(f"{self.words.local(v)}: {sort_text(v.sort, self.words)}" for v in term.variables)
+        applied = call(predicate, self.words)
+        match term.quantifier:
+            case Quantifier.FORALL:
+                return f"forall {bound} :: {applied}", False
+            case Quantifier.EXISTS:
+                return f"exists {bound} :: {applied}", False
+            case Quantifier.UNIQUE:
+                table = self.words.locals.inner()
+                others = {v: table.fresh(f"{self.words.local(v)}_other") for v in term.variables}
+                more = ", ".join(f"{others[v]}: {sort_text(v.sort, self.words)}" for v in term.variables)
+                arguments = [others.get(p, self.words.local(p)) for p in predicate.parameters]
+                same = " && ".join(f"{self.words.local(v)} == {others[v]}" for v in term.variables)
+                unique = f"forall {bound}, {more} :: {applied} && {name}({', '.join(arguments)}) ==> {same}"
+                return f"(exists {bound} :: {applied}) && ({unique})", False
+
+
+def _literal(term: Literal) -> _Text:
+    match term.value, term.sort:
+        case bool() as truth, _:
+            return ("true" if truth else "false"), True
+        case str() as text, _:
+            return _string(text, term.span), True
+        case int() | Fraction() as number, RealSort():
+            return _real(Fraction(number))
+        case number, _:
+            return (str(number), True) if number >= 0 else (f"({number})", True)
+
+
+def _real(value: Fraction) -> _Text:
+    rest = value.denominator
+    for prime in (2, 5):
+        while rest % prime == 0:
+            rest //= prime
+    if rest != 1:
+        return f"({value.numerator}.0 / {value.denominator}.0)", True
+    digits = 1
+    while (value * 10**digits).denominator != 1:
+        digits += 1
+    whole = f"{abs(value * 10**digits).numerator:0{digits + 1}d}"
+    text = f"{whole[:-digits]}.{whole[-digits:]}"
+    return (text, True) if value >= 0 else (f"(-{text})", True)
+
+
+def _string(text: str, span: Span | None) -> str:
+    """Dafny 2.3 and 4.x write other characters differently, so only these are expressible in both."""
+    if not all(" " <= c <= "~" for c in text):
+        raise NotExpressible("a string with other than printable ASCII characters", span)
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -1,0 +1,97 @@
+"""The case study's Dafny implementations, and the paper's listing, through the whole backend."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from avow.backend import Backend, Job, Limits
+from avow.backends.dafny import BACKEND
+from avow.verdict import Link, Outcome, Verdict
+
+CONTRACTS = Path(__file__).resolve().parents[2] / "contracts"
+MakeJob = Callable[..., Job]
+
+
+def settle(job: Job) -> dict[str, Outcome]:
+    report = BACKEND.discharge(job, job.root, Limits(seconds=120))
+    return {o.obligation.rsplit("/", 1)[1]: o for o in report.outcomes}
+
+
+def job_for(make_job: MakeJob, system: str, node: str, file: str) -> Job:
+    root = CONTRACTS / system
+    return make_job(root / "system.rcl", node, root, implementation=file)
+
+
+def test_it_is_a_backend() -> None:
+    assert isinstance(BACKEND, Backend)
+
+
+@pytest.mark.needs_dafny
+def test_the_radiation_sensor_is_proved(make_job: MakeJob) -> None:
+    job = job_for(make_job, "remote_inspection", "radiationSensor", "models/radiation_sensor_impl.dfy")
+    assert BACKEND.check(job) == ()
+    for outcome in settle(job).values():
+        assert outcome.verdict is Verdict.PROVED, outcome
+        assert outcome.link is Link.GENERATED
+        assert outcome.hypotheses == ()
+
+
+@pytest.mark.needs_dafny
+def test_the_agent_is_proved_for_its_map(make_job: MakeJob) -> None:
+    job = job_for(make_job, "remote_inspection", "agent", "models/agent_impl.dfy")
+    assert BACKEND.check(job) == ()
+    outcomes = settle(job)
+    assert len(outcomes) == 5
+    for outcome in outcomes.values():
+        assert outcome.verdict is Verdict.PROVED, outcome
+        assert outcome.hypotheses == ("added assumption of the implementation, Env: IsMap(in_wayP, Map())",)
+
+
+@pytest.mark.needs_dafny
+def test_the_papers_listing_is_not_accepted(make_job: MakeJob) -> None:
+    job = job_for(make_job, "remote_inspection_published", "agent", "models/agent_paper.dfy")
+    outcomes = settle(job)
+    assert len(outcomes) == 3
+    for outcome in outcomes.values():
+        assert outcome.verdict is Verdict.ERROR
+        assert "13 errors" in outcome.summary
+        assert "unresolved identifier" in outcome.summary
+        assert "module AgentImpl refines AgentSpec" in outcome.summary
+
+
+_MUTANTS: tuple[tuple[str, str, str, set[str]], ...] = (
+    ("status != Types.RadStat.green ||", "status == Types.RadStat.red ||", "agent", {"exit_on_danger", "abandon"}),
+    ("here + 1 < |places|", "here + 2 < |places|", "agent", {"next_waypoint", "end_of_mission"}),
+    ("Types.CommandSet.inspect(here)", "Types.CommandSet.inspect(here + 1)", "agent", {"inspect_here"}),
+    ("r >= 120.0", "r > 120.0", "radiationSensor", {"medium"}),
+    ("i == here || in_before(i)", "i == here", "radiationSensor", {"marks_inspected"}),
+)
+
+
+@pytest.mark.needs_dafny
+@pytest.mark.parametrize(("old", "new", "node", "broken"), _MUTANTS)
+def test_a_wrong_implementation_is_not_proved(
+    make_job: MakeJob, tmp_path: Path, old: str, new: str, node: str, broken: set[str]
+) -> None:
+    file = {"agent": "agent_impl.dfy", "radiationSensor": "radiation_sensor_impl.dfy"}[node]
+    text = (CONTRACTS / "remote_inspection/models" / file).read_text()
+    assert old in text
+    (tmp_path / file).write_text(text.replace(old, new))
+    job = make_job(CONTRACTS / "remote_inspection/system.rcl", node, tmp_path, implementation=file)
+    verdicts = {name: outcome.verdict for name, outcome in settle(job).items()}
+    assert all(verdicts[name] is Verdict.UNKNOWN for name in broken), verdicts
+
+
+def test_nothing_is_run_where_dafny_is_missing(make_job: MakeJob, monkeypatch: Any) -> None:
+    from avow.backend import Tool
+    from avow.backends.dafny import backend
+
+    monkeypatch.setattr(backend, "dafny", lambda: Tool("dafny", None, None, "apt-get install dafny"))
+    job = job_for(make_job, "remote_inspection", "radiationSensor", "models/radiation_sensor_impl.dfy")
+    for outcome in settle(job).values():
+        assert outcome.verdict is Verdict.NOT_RUN
+        assert "apt-get install dafny" in outcome.summary
