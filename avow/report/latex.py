@@ -18,16 +18,16 @@ def _read(table: str) -> dict[str, str]:
 
 _SYMBOLS = _read(
     r"""∀ \forall  ∃ \exists  ∧ \land  ∨ \lor  ¬ \lnot  ⇒ \Rightarrow  ⇔ \Leftrightarrow  → \to
-↔ \leftrightarrow  ⟹ \Longrightarrow  ⟺ \Longleftrightarrow  ∈ \in  ∉ \notin  ≤ \le  ≥ \ge  ≠ \ne  ≡ \equiv  ⊤ \top  ⊥ \bot
-⊢ \vdash  ⊨ \models  ◇ \Diamond  □ \Box  ○ \bigcirc  · \cdot  • \bullet  × \times  ÷ \div  − -  ∪ \cup  ∩ \cap
+↔ \leftrightarrow  ⟹ \Longrightarrow  ⟺ \Longleftrightarrow  ∈ \in  ∉ \notin  ≤ \le  ≥ \ge  ≠ \ne
+≡ \equiv  ⊤ \top  ⊥ \bot  ⊢ \vdash  ⊨ \models  ◇ \Diamond  □ \Box  ○ \bigcirc  · \cdot  • \bullet  × \times  ÷ \div  − -  ∪ \cup  ∩ \cap
 ⊆ \subseteq  ∅ \emptyset  ∞ \infty  ⟨ \langle  ⟩ \rangle  ℝ \mathbb{R}  ℕ \mathbb{N}  ℤ \mathbb{Z}  𝔹 \mathbb{B}
 ′ '  ″ ''  ‴ '''  … \ldots  λ \lambda  φ \varphi  ψ \psi  σ \sigma  ⁻ ^{-}  ¹ ^{1}  ₁ _{1}  ₂ _{2}  ₃ _{3}
 ↦ \mapsto  ⊎ \uplus  ∘ \circ  ─ -  — -  – -"""
 )
 """Characters of formulas, set in mathematics."""
 
-_TEXT = _read(r"""\ \textbackslash{}  { \{  } \}  $ \$  & \&  # \#  % \%  _ \_  ^ \textasciicircum{}  ~ \textasciitilde{}
-< \textless{}  > \textgreater{}  | \textbar{}  ` \textasciigrave{}  ’ '  “ ``  ” ''""")
+_TEXT = _read(r"""\ \textbackslash{}  { \{  } \}  $ \$  & \&  # \#  % \%  _ \_  ^ \textasciicircum{}
+~ \textasciitilde{}  < \textless{}  > \textgreater{}  | \textbar{}  ` \textasciigrave{}  ’ '  “ ``  ” ''""")
 _DANGEROUS = re.compile(
     r"\\(?:input|include|write|openout|openin|read|catcode|csname|def|edef|gdef|xdef|let|newcommand|renewcommand"
     r"|immediate|special|loop|usepackage|begin\s*\{document\}|end\s*\{document\}|directlua|ShellEscape"

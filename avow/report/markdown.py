@@ -10,7 +10,7 @@ from avow.assurance.naming import short
 from avow.evidence.obligation import Kind
 from avow.report.wording import clean, verdict_line, where
 
-_MARKDOWN = re.compile(r"([\\`*_{}\[\]()#+!|<>~&$-])")
+_MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
 _LONG = 200
 """Rows of a table in the summary; all of them are in report.json."""
 

@@ -6,14 +6,18 @@ import json
 from importlib import resources
 from typing import Any
 
+from avow.assurance.argument import build_argument
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
+from avow.report import picture
 from avow.report.wording import MARKS, bound_text, clean, tone, verdict_line
 
 _MOST = 1500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
+
+_MOST_IN_A_PICTURE = 90
 
 
 class NoTypst(Exception):  # noqa: N818 - it says what is missing
@@ -72,6 +76,7 @@ def _data(case: Case) -> dict[str, Any]:
             }
             for node in nodes
         ],
+        "pictures": _pictures(case),
         "derivations": [
             {
                 "name": d.derivation.name,
@@ -97,6 +102,17 @@ def _data(case: Case) -> dict[str, Any]:
     }
     plain: dict[str, Any] = _clean(found)
     return plain
+
+
+def _pictures(case: Case) -> list[dict[str, str]]:
+    """The arguments that fit on a page."""
+    argument = build_argument(case)
+    drawn = []
+    for name, start in argument.goals:
+        if len(argument.below(start)) <= _MOST_IN_A_PICTURE:
+            svg = picture.draw(argument, start, lambda _: None, name, alone=True)
+            drawn.append({"name": name, "svg": svg.replace("font:12px system-ui,", "font:12px 'Libertinus Serif',")})
+    return drawn
 
 
 def _obligation(view: ObligationView) -> dict[str, Any]:

@@ -1,0 +1,122 @@
+"""Does a report on disk say what the ledger says?
+
+Three steps, none of which trusts the one before: every record that the report quotes is in the ledger, unchanged, and
+the ledger has no other for its claims; every conclusion follows again from those records (statuses, gates, exit code);
+every other format is, byte for byte, what that case renders to. What the report was made *of* (contract, plan) is
+compared by digest where the files are here. One thing it cannot know: whether the obligations are still those of
+today's contract; that is what `avow verify` is for.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from avow.assurance.case import conclude_again
+from avow.assurance.codec import from_json, to_json
+from avow.assurance.model import Case
+from avow.evidence.encoding import Unreadable
+from avow.evidence.ledger import Ledger
+from avow.files import digest_file
+from avow.report import LeftOut, formats
+
+
+def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tuple[str, ...]:
+    """Every way in which the report in `folder` differs from the ledger, in words; nothing where it agrees.
+
+    Without a ledger only the report's own consistency is checked, and that is said.
+    """
+    try:
+        text = (folder / "report.json").read_text(encoding="utf-8")
+        case = from_json(json.loads(text))
+    except (OSError, ValueError, RecursionError) as error:
+        return (f"report.json cannot be read: {error}",)
+    except Unreadable as error:
+        return (f"report.json is no case: {error}",)
+    found = [*_conclusions(case), *_formats(case, folder)]
+    found += ["there is no ledger to compare with"] if ledger is None else _ledger(case, ledger)
+    if root is not None:
+        found += _sources(case, root)
+    return tuple(found)
+
+
+def _conclusions(case: Case) -> Iterable[str]:
+    try:
+        again = to_json(conclude_again(case))
+    except (ValueError, KeyError, OverflowError) as error:
+        yield f"the case cannot be concluded again: {error}"
+        return
+    stated = to_json(case)
+    for name, value in stated.items():
+        if again[name] != value:
+            yield f"report.json: '{name}' does not follow from the evidence in it{_where(value, again[name])}"
+
+
+def _where(stated: object, again: object) -> str:
+    """The first item of two lists that differs, by its id."""
+    if isinstance(stated, list) and isinstance(again, list):
+        for one, other in zip(stated, again, strict=False):
+            if one != other and isinstance(one, dict) and isinstance(other, dict):
+                parts = [key for key in one if one[key] != other.get(key)]
+                name = one.get("id") or one.get("obligation", {})
+                shown = (
+                    name if isinstance(name, str) else "/".join(str(name.get(k, "")) for k in ("node", "kind", "name"))
+                )
+                detail = ", ".join(f"{key} says {one[key]!r}, but is {other.get(key)!r}" for key in parts[:1])
+                return f": {shown}: {detail}"[:400]
+    if isinstance(stated, str | int | bool) and isinstance(again, str | int | bool):
+        return f": it says {stated!r}, but is {again!r}"
+    return ""
+
+
+def _formats(case: Case, folder: Path) -> Iterable[str]:
+    for name, content in formats(case):
+        path = folder / name
+        if isinstance(content, LeftOut):
+            if path.exists():
+                yield f"{name} cannot be compared here: {content.reason}"
+            continue
+        data = content.encode() if isinstance(content, str) else content
+        try:
+            same = path.read_bytes() == data
+        except OSError as error:
+            yield f"{name} cannot be read: {error.strerror}"
+            continue
+        if not same:
+            yield f"{name} is not what the case in report.json renders to"
+
+
+def _ledger(case: Case, ledger: Ledger) -> Iterable[str]:
+    try:
+        entries = ledger.records()
+    except OSError as error:
+        yield f"the ledger cannot be read: {error.strerror}"
+        return
+    for damage in ledger.damage:
+        yield f"ledger line {damage.line} {damage.reason}"
+    known = {entry.hash: entry for entry in entries}
+    quoted = {item.entry.hash: item.entry for view in case.obligations for item in view.evidence}
+    quoted |= {entry.hash: entry for entry in case.orphans}
+    for mark, entry in quoted.items():
+        where = f"record {entry.number + 1} ({entry.evidence.obligation}, {entry.evidence.method})"
+        if mark not in known:
+            yield f"the report quotes {where}, which the ledger does not hold"
+        elif known[mark] != entry:
+            yield f"the report quotes {where} otherwise than the ledger has it"
+    newer = [entry for mark, entry in known.items() if mark not in quoted]
+    if newer:
+        first = newer[0].evidence
+        what = f"{first.obligation}, {first.method}"
+        yield f"the ledger has {len(newer)} record(s) that the report does not show; first: {what}"
+    if not newer and case.ledger_head != ledger.head:
+        yield "the report names another ledger head than the ledger's"
+
+
+def _sources(case: Case, root: Path) -> Iterable[str]:
+    for path, mark in case.digests:
+        try:
+            if digest_file(root / path) != mark:
+                yield f"{path} has changed since the report was made"
+        except (OSError, ValueError):
+            yield f"{path}, of which the report was made, cannot be read"
