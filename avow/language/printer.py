@@ -171,8 +171,8 @@ class _Printer:
             case Arithmetic():
                 return self.arithmetic(term)
             case Negative(term=inner):
-                shown = self.show(inner, UNARY, real=real)
-                return f"-({shown})" if isinstance(inner, Literal) else f"-{shown}", UNARY
+                shown = self.show(inner, UNARY)
+                return f"-({shown})" if isinstance(inner, Literal) or shown.startswith("-") else f"-{shown}", UNARY
             case TupleTerm(items=items):
                 return f"({self.listed(items, _LOOSEST)})", ATOM
             case SequenceTerm(items=items):
@@ -262,6 +262,8 @@ class _Printer:
         for i, link in enumerate(links):
             neighbours = (link.left, links[i + 1].right) if i + 1 < len(links) else (link.left,)
             real = all(_shows_real(n) for n in neighbours)
+            if i + 1 < len(links) and links[i + 1].left.sort != REAL:
+                real = True  # written as a whole number: it is one for the next comparison
             parts.append(self.style.words[link.operator])
             parts.append(self.show(link.right, SUM, real=real))
         return "".join(parts)
