@@ -21,13 +21,15 @@ from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 
 from avow.backends.hypothesis import wire
 from avow.backends.hypothesis.convention import Malformed, outputs
-from avow.backends.hypothesis.generate import Generator, Impossible, Inputs
-from avow.backends.hypothesis.judging import guarantee, judged
+from avow.backends.hypothesis.generate import Failing, Generator, Impossible, Inputs
+from avow.backends.hypothesis.judging import Trigger, blamed, guarantee, judged
 from avow.backends.hypothesis.pools import parse_cell, pools
 from avow.backends.hypothesis.process import PATIENCE, Subject, SubjectFailed
 from avow.language.sorts import FunctionSort, Sort
-from avow.logic.evaluate import NotEvaluable
 from avow.logic.values import Value, show
+
+BATCH = 50
+"""Cases that are put to the subject at a time."""
 
 Case = tuple[Inputs, dict[str, Value]]
 
@@ -51,6 +53,7 @@ class Bench:
         formulas = [j.formula for j in (*self.assumptions, *(g.judged for g in self.guarantees.values()))]
         self.generator = Generator(self.inputs_sorts, pools(formulas, self._rows()))
         self.subject = Subject(_find(data, folder), data["subject"]["function"], PATIENCE)
+        self._aims = tuple(_aim(t) for g in self.guarantees.values() for t in g.triggers)
         self.valid = self.rejected = self.undecided = 0
         self.crash: tuple[Inputs, str] | None = None
         self.end: float | None = None
@@ -68,7 +71,7 @@ class Bench:
 
         @st.composite
         def drawn(draw: Any) -> Inputs:
-            return self.generator.case(draw, self._blamed)
+            return self.generator.case(draw, self._blamed, self._aims)
 
         return drawn()
 
@@ -88,8 +91,13 @@ class Bench:
 
     def run(self, inputs: Inputs) -> dict[str, Value]:
         """The subject's outputs. Raises SubjectFailed."""
+        return self._outputs(self.subject.ask(inputs))
+
+    def _outputs(self, reply: Any) -> dict[str, Value]:
+        if isinstance(reply, SubjectFailed):
+            raise reply
         try:
-            return outputs(self.subject.ask(inputs), self.output_sorts)
+            return outputs(reply, self.output_sorts)
         except Malformed as error:
             raise SubjectFailed(str(error)) from error
         except (ValueError, TypeError, KeyError, RecursionError) as error:
@@ -118,6 +126,7 @@ class Bench:
 
     def _sweep(self) -> str:
         """One pass for all guarantees; why it stopped early, if it did."""
+        queue: list[Inputs] = []
 
         @seed(self.seed)
         @self._configuration((Phase.generate,))
@@ -128,10 +137,15 @@ class Bench:
             if not self._assumed(inputs):
                 self.rejected += 1
                 assume(False)
-            self._try(inputs)
+            queue.append(inputs)
+            if len(queue) == BATCH:
+                cases = queue[:]
+                queue.clear()
+                self._try(cases)
 
         try:
             every()
+            self._try(queue)
         except OutOfTime:
             return "time"
         except _Enough:
@@ -142,17 +156,24 @@ class Bench:
             return f"no values: {error}"
         return ""
 
-    def _try(self, inputs: Inputs) -> None:
-        try:
-            found = self.run(inputs)
-        except SubjectFailed as error:
-            self.crash = (inputs, str(error))
-            raise _Enough from error
-        self.valid += 1
+    def _try(self, cases: list[Inputs]) -> None:
+        """Ask the subject, and judge each guarantee of each answer."""
+        for inputs, reply in zip(cases, self.subject.ask_all(cases), strict=True):
+            try:
+                found = self._outputs(reply)
+            except SubjectFailed as error:
+                self.crash = (inputs, str(error))
+                raise _Enough from error
+            self.valid += 1
+            self._judge(inputs, found)
+            if all(g.failure is not None for g in self.guarantees.values()):
+                raise _Enough
+
+    def _judge(self, inputs: Inputs, found: dict[str, Value]) -> None:
         values = valuation(inputs, found)
         for each in self.guarantees.values():
             for k, trigger in enumerate(each.triggers):
-                each.hits[k] += trigger.holds(values) is True
+                each.hits[k] += trigger.whole.holds(values) is True
             if each.failure is not None:
                 continue
             held = each.judged.holds(values)
@@ -160,8 +181,6 @@ class Bench:
                 each.undecided += 1
             elif not held:
                 each.failure = (inputs, found)
-        if all(g.failure is not None for g in self.guarantees.values()):
-            raise _Enough
 
     def _shrunk(self, name: str) -> Case:
         """The simplest case that breaks a guarantee, as far as Hypothesis finds it in time."""
@@ -225,7 +244,7 @@ class Bench:
             "guarantees": {
                 name: {
                     "hits": each.hits,
-                    "triggers": [t.text for t in each.triggers],
+                    "triggers": [t.whole.text for t in each.triggers],
                     "undecided": each.undecided,
                     "failure": _pairs(*smaller[name]) if name in smaller else None,
                 }
@@ -246,16 +265,7 @@ class Bench:
         return True
 
     def _blamed(self, inputs: Inputs) -> tuple[str, ...] | None:
-        values = valuation(inputs, {})
-        for assumption in self.assumptions:
-            if assumption.evaluator is None:
-                continue
-            try:
-                if not assumption.evaluator(values) and assumption.ports:
-                    return assumption.ports
-            except NotEvaluable:
-                continue
-        return None
+        return blamed(self.assumptions, valuation(inputs, {}))
 
     def _configuration(self, phases: tuple[Phase, ...]) -> settings:
         return settings(
@@ -289,6 +299,15 @@ class _Enough(BaseException):
 
 class _Broken(Exception):  # noqa: N818 - it is what Hypothesis shrinks
     """The guarantee that is looked at fails."""
+
+
+def _aim(trigger: Trigger) -> Failing:
+    """What to draw again for a trigger to be met; parts that speak of outputs cannot be aimed at."""
+
+    def failing(inputs: Inputs) -> tuple[str, ...] | None:
+        return blamed(trigger.parts, valuation(inputs, {}))
+
+    return failing
 
 
 def valuation(inputs: Inputs, found: Mapping[str, Value]) -> dict[str, Value]:

@@ -7,6 +7,8 @@ drawn again, a few times; what still fails is rejected, and counted.
 
 from __future__ import annotations
 
+import itertools
+import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -35,10 +37,11 @@ from avow.logic.values import Data, Element, FunctionValue, Opaque, Sequence, Va
 Draw = Callable[[st.SearchStrategy[Any]], Any]
 Inputs = dict[str, Value]
 Failing = Callable[[Inputs], tuple[str, ...] | None]
-"""The ports that a failing assumption speaks of; None where all assumptions hold."""
+"""The inputs that a failing assumption, or part of a trigger, speaks of; None where nothing fails."""
 
 ATTEMPTS = 6
 DEEPEST = 4
+_PLAIN = BoolSort | RealSort | IntegerSort | NaturalSort | StringSort | EnumSort
 _BOOL = st.booleans()
 _COUNT = st.integers(0, 4)
 _FEW = st.integers(0, 3)
@@ -61,17 +64,25 @@ class Generator:
     def __post_init__(self) -> None:
         self.shared = scenario_runs(self.pools.rows, self.ports)
 
-    def case(self, draw: Draw, failing: Failing) -> Inputs:
-        """One case's inputs; the assumptions may fail of them."""
+    def case(self, draw: Draw, failing: Failing, aims: tuple[Failing, ...] = ()) -> Inputs:
+        """One case's inputs; the assumptions may fail of them. Most cases aim at one guarantee's trigger."""
         near: dict[tuple[Sort, ...], list[tuple[Value, ...]]] = {}
         inputs = {name: self._port(draw, name, sort, near) for name, sort in self.ports.items()}
+        if aims:
+            aim = draw(self._choice("aim", (None, *aims)))
+            if aim is not None:
+                self._towards(draw, inputs, near, aim)
+        self._towards(draw, inputs, near, failing)
+        return inputs
+
+    def _towards(self, draw: Draw, inputs: Inputs, near: dict[Any, Any], failing: Failing) -> None:
+        """Draw inputs again that are to blame, until none is or the attempts are used up."""
         for _ in range(ATTEMPTS):
             blamed = failing(inputs)
             if not blamed:
-                break
-            name = draw(self._choice(("blamed", blamed), blamed))
+                return
+            name = blamed[0] if len(blamed) == 1 else draw(self._choice(("blamed", blamed), blamed))
             inputs[name] = self._port(draw, name, self.ports[name], near)
-        return inputs
 
     def _choice(self, key: Any, values: tuple[Any, ...]) -> st.SearchStrategy[Any]:
         if key not in self._choices:
@@ -152,11 +163,25 @@ class Generator:
                 near[run] = list(self.shared[run])
             elif len(run) == 1 and isinstance(run[0], NaturalSort | IntegerSort | EnumSort | BoolSort):
                 near[run] = [(value,) for value in self._few(run[0])]
+            elif all(isinstance(s, _PLAIN) for s in run):
+                near[run] = list(draw(self._prepared(run)))
             else:
                 rows = (tuple(self._value(draw, s, near, depth + 1, False) for s in run) for _ in range(3))
                 near[run] = list(dict.fromkeys(rows))
         found: list[tuple[Value, ...]] = near[run]
         return found
+
+    def _prepared(self, run: tuple[Sort, ...]) -> st.SearchStrategy[Any]:
+        """Threes of places, made once: drawing one of these costs much less than drawing each coordinate."""
+        key = ("prepared", run)
+        if key not in self._choices:
+            chance = random.Random(0)
+            pools = [self._few(s) if isinstance(s, EnumSort | BoolSort) else self.pools.near[s] for s in run]
+            every = list(itertools.islice(itertools.product(*(pool[:8] for pool in pools)), 512))
+            size = min(3, len(every))
+            threes = [tuple(every[:size]), *(tuple(chance.sample(every, size)) for _ in range(60))]
+            self._choices[key] = st.sampled_from(threes)
+        return self._choices[key]
 
     def _few(self, sort: Sort) -> tuple[Value, ...]:
         match sort:

@@ -1,6 +1,7 @@
 """Runs the subject, and nothing else, in a process of its own: what it prints, patches or breaks stays here.
 
-A script without imports from Avow. Requests come as JSON lines on one descriptor, answers go as JSON lines on another.
+A script without imports from Avow. Each line of JSON that comes in holds the inputs of some
+cases; a line with an answer for each goes out.
 Values of the contract are given to the subject as plain Python: an element of an enumeration is a string, a REAL is a
 `Fraction`, ``move(1, 2)`` is ``("move", 1, 2)``, a sequence is a tuple, a function or relation is a `Table`.
 """
@@ -160,7 +161,8 @@ def main() -> None:
         if "error" in ready:
             return
         for line in requests:
-            answers.write(json.dumps(answer(subject, known, json.loads(line))) + "\n")
+            replies = [answer(subject, known, request) for request in json.loads(line)]
+            answers.write(json.dumps(replies) + "\n")
             answers.flush()
 
 

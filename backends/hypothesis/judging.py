@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -37,11 +37,19 @@ class Judged:
 
 
 @dataclass(slots=True)
+class Trigger:
+    """A condition that has to be met by some case; `parts` together imply it, where they speak of inputs only."""
+
+    whole: Judged
+    parts: tuple[Judged, ...]
+
+
+@dataclass(slots=True)
 class Guarantee:
     """A guarantee and the triggers that it has: each has to be met by some case."""
 
     judged: Judged
-    triggers: tuple[Judged, ...]
+    triggers: tuple[Trigger, ...]
     hits: list[int] = field(default_factory=list)
     undecided: int = 0
     failure: tuple[Inputs, dict[str, Value]] | None = None
@@ -61,16 +69,31 @@ def _ready(name: str, formula: Term, text: str) -> Judged:
 
 
 def guarantee(clause: Judged) -> Guarantee:
-    found = tuple(
-        _ready(clause.name, formula, show_term(formula, "unicode").replace("\n", " "))
-        for formula in triggers(clause.formula)
-    )
+    """The guarantee with its triggers."""
+    found = tuple(_trigger(clause.name, outer, conditions) for outer, conditions in triggers(clause.formula))
     return Guarantee(clause, found, [0] * len(found))
 
 
-def triggers(formula: Term) -> tuple[Term, ...]:
+def blamed(parts: Iterable[Judged], values: Mapping[str, Value]) -> tuple[str, ...] | None:
+    """The inputs that the first failing part speaks of; None where none fails (or none can be evaluated)."""
+    for part in parts:
+        if part.evaluator is None or not part.ports:
+            continue
+        try:
+            if not part.evaluator(values):
+                return part.ports
+        except NotEvaluable:
+            continue
+    return None
+
+
+_Condition = tuple[tuple[Variable, ...], tuple[Term, ...]]
+"""Variables of the quantifiers around, and what has to hold of them."""
+
+
+def triggers(formula: Term) -> tuple[_Condition, ...]:
     """What has to be met for the formula to say anything: the antecedent of every implication that it is made of."""
-    found: list[Term] = []
+    found: dict[_Condition, None] = {}
     stack: list[tuple[Term, tuple[Variable, ...], tuple[Term, ...]]] = [(formula, (), ())]
     while stack:
         part, outer, conditions = stack.pop()
@@ -87,10 +110,28 @@ def triggers(formula: Term) -> tuple[Term, ...]:
                 if rest:
                     stack.append((Or(rest) if len(rest) > 1 else rest[0], outer, (*conditions, *denied)))
             case _ if conditions:
-                met = conjunction(conditions)
-                free = free_variables(met)
-                bound = tuple(v for v in outer if v in free)
-                found.append(Quantified(Quantifier.EXISTS, bound, met) if bound else met)
+                found.setdefault((outer, conditions))
             case _:
                 pass
-    return tuple(dict.fromkeys(found))
+    return tuple(found)
+
+
+def _trigger(name: str, outer: tuple[Variable, ...], conditions: tuple[Term, ...]) -> Trigger:
+    joined = conjunction(conditions)
+    items = joined.items if isinstance(joined, And) else (joined,)
+    bound = frozenset(outer)
+    alone = [item for item in items if not free_variables(item) & bound]
+    together = conjunction(item for item in items if free_variables(item) & bound)
+    whole = _bound(outer, joined)
+    parts = [_ready(name, part, "") for part in (*alone, _bound(outer, together)) if _of_inputs(part)]
+    return Trigger(_ready(name, whole, show_term(whole, "unicode").replace("\n", " ")), tuple(parts))
+
+
+def _bound(outer: tuple[Variable, ...], formula: Term) -> Term:
+    free = free_variables(formula)
+    used = tuple(v for v in outer if v in free)
+    return Quantified(Quantifier.EXISTS, used, formula) if used else formula
+
+
+def _of_inputs(formula: Term) -> bool:
+    return all(v.role is Role.INPUT for v in free_variables(formula))
