@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -84,7 +85,7 @@ def _events(trace: str) -> Iterator[Recorded]:
 
     def lines() -> Iterator[str]:
         try:
-            yield from click.get_text_stream("stdin", encoding="utf-8", errors="strict")
+            yield from io.TextIOWrapper(click.get_binary_stream("stdin"), encoding="utf-8", newline="\n")
         except UnicodeDecodeError:
             raise Rejected(Diagnostic("MON204", "standard input is not UTF-8 text")) from None
 

@@ -1,0 +1,95 @@
+"""The case study with the monitors' options in its plan, and small systems written on the spot."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from avow.backend import Job
+from avow.evidence.obligation import Kind, Obligation
+from avow.system.load import load_system
+from avow.system.plan import System
+
+ROOT = Path(__file__).parents[2]
+CASE = ROOT / "contracts" / "remote_inspection"
+
+MAPPINGS: dict[str, dict[str, Any]] = {
+    "localisation": {"out.position": ["posX", "posY"]},
+    "navigation": {"in.position": ["posX", "posY"], "out.at": ["posX", "posY"]},
+    "agent": {
+        "in.wayP": {"scenario": True},
+        "out.command": {"constructor": "command", "move": ["posX", "posY"], "inspect": ["id"]},
+        "out.phase": {"topic": "phase", "type": "gazebo_radiation_plugins/Snapshot", "field": "phase"},
+    },
+    "radiationSensor": {
+        "in.r": "radiation",
+        "out.radiationStatus": "level",
+        "out.inspected": {"fields": ["id"], "hold": "seen"},
+    },
+}
+
+
+def write_case(folder: Path, traces: dict[str, list[str]] | None = None) -> Path:
+    """A copy of the case study whose plan has the monitors' method blocks, and no other."""
+    target = folder / "remote_inspection"
+    shutil.copytree(CASE, target)
+    plan = yaml.safe_load((target / "plan.yaml").read_text(encoding="utf-8"))
+    for name, mapping in MAPPINGS.items():
+        options: dict[str, Any] = {"mapping": mapping}
+        if traces is not None:
+            options["traces"] = traces.get(name, ["traces/nominal.jsonl"])
+        plan["nodes"][name]["methods"] = [{"rosmonitoring": options}]
+    plan.pop("expected", None)
+    plan.pop("accepted", None)
+    (target / "plan.yaml").write_text(json.dumps(plan), encoding="utf-8")
+    return target
+
+
+@pytest.fixture(scope="session")
+def case_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_case(tmp_path_factory.mktemp("case"), {})
+
+
+@pytest.fixture(scope="session")
+def case(case_folder: Path) -> System:
+    return load_system(case_folder)
+
+
+@pytest.fixture(scope="session")
+def nominal() -> list[dict[str, Any]]:
+    text = (CASE / "traces" / "nominal.jsonl").read_text(encoding="utf-8")
+    return [json.loads(line) for line in text.splitlines()]
+
+
+@pytest.fixture
+def make_system(tmp_path: Path) -> Callable[..., System]:
+    """``make_system(rcl, mapping={...}, **options)``: a system with one node and its monitor."""
+
+    def make(rcl: str, mapping: dict[str, Any] | None = None, **more: Any) -> System:
+        folder = tmp_path / f"system{len(list(tmp_path.iterdir()))}"
+        folder.mkdir()
+        (folder / "system.rcl").write_text(rcl, encoding="utf-8")
+        plan_parts = more.pop("plan", {})
+        name = rcl.split("node", 1)[1].split("{", 1)[0].strip()
+        options = {**more, "mapping": mapping or {}}
+        plan = {"contract": "system.rcl", "nodes": {name: {"methods": [{"rosmonitoring": options}]}}, **plan_parts}
+        (folder / "plan.yaml").write_text(json.dumps(plan), encoding="utf-8")
+        return load_system(folder)
+
+    return make
+
+
+def job_for(system: System, name: str) -> Job:
+    node = system.contract.node(name)
+    method = system.plan.node(name).methods[0]
+    obligations = tuple(
+        Obligation(system.name, name, Kind.GUARANTEE, g.name, g.sentence or "", g.text, "0" * 64, (f"{name}.{g.name}",))
+        for g in node.guarantees
+    )
+    return Job(system, node, method, obligations)
