@@ -43,7 +43,7 @@ def sanity_property(obligation: Obligation) -> str:
 
 
 def is_advice(obligation: Obligation) -> bool:
-    return obligation.kind is Kind.SANITY and sanity_property(obligation) in ADVICE
+    return obligation.advisory or (obligation.kind is Kind.SANITY and sanity_property(obligation) in ADVICE)
 
 
 def is_foundation(obligation: Obligation) -> bool:

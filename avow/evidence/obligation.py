@@ -40,6 +40,8 @@ class Obligation:
     clauses: tuple[str, ...] = ()
     """``node.clause`` names that the claim is about."""
     span: Span | None = field(default=None, compare=False, repr=False)
+    advisory: bool = False
+    """Worth knowing, but nothing is unsound if the claim is false: no gate asks for it."""
 
     @property
     def id(self) -> str:

@@ -140,12 +140,21 @@ def build(assessment: Assessment) -> Case:
             assessment.run.fresh,
             f"doit verify:{system.name}",
             _revision(workspace),
-            {"seconds for each tool": "60, unless the plan says otherwise", "seed": "0, unless the plan says otherwise"},
+            {
+                "seconds for each tool": "60, unless the plan says otherwise",
+                "seed": "0, unless the plan says otherwise",
+            },
         ),
         derivations=derivation_views(system),
         methods=_methods(assessment),
         tools=_tools(assessment),
-        discrepancies=audit(ledger, workspace.root),
+        discrepancies=audit(
+            ledger,
+            workspace.root,
+            system=system.name,
+            obligations={o.id: o.digest for o in assessment.surveyed.catalogue.obligations},
+            keys=assessment.surveyed.keys,
+        ),
         digests={workspace.relative(path): digest_file(path) for path in texts},
         ledger_head=ledger.head,
         graph_svg=graph_svg(system),
@@ -200,7 +209,7 @@ def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, st
         closes = [s.text for s in g.suggestions[:3]] if explain or not g.passed else []
         gates.append((g.title, g.passed, "; ".join([g.reason, *closes])))
     index = assessment.workspace.relative(assessment.workspace.report(assessment.system) / "index.html")
-    counts = Counter(view.status.value for view in case.obligations)
+    counts = Counter(view.status.value for view in case.obligations if not view.obligation.advisory)
     return Result(case.system, case.exit_code, dict(counts), case.grade.value, index, tuple(gates), left_out)
 
 

@@ -39,9 +39,9 @@ def check(workspace: Workspace, surveyed: Survey) -> None:
 
 def diagnostics(system: System) -> tuple[Diagnostic, ...]:
     """Lints of the contract, and what each backend says of its options."""
-    from avow.language.lints import lint_contract
+    from avow.language.load import check_paths
 
-    found = [d for d in lint_contract(system.contract, system.plan.contract_files) if d.code not in system.plan.lints_off]
+    found = list(check_paths(system.plan.contract_files, off=frozenset(system.plan.lints_off))[1])
     for plan in system.plan.nodes:
         for method in plan.methods:
             found += _method(system, plan.node, method)

@@ -65,4 +65,6 @@ def read_stamp(place: Path) -> dict[str, dict[str, str]] | None:
 def _inside(name: str, work: Work) -> None:
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts:
-        raise Rejected(Diagnostic("BACKEND004", f"the backend '{work.engine}' wants to write outside its folder: {name}"))
+        raise Rejected(
+            Diagnostic("BACKEND004", f"the backend '{work.engine}' wants to write outside its folder: {name}")
+        )

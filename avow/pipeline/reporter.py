@@ -87,7 +87,10 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             write_overview(known())
         if any(name.split(":")[0] == "obligations" for name in self._selected):
             print_obligations(self._selected, self.outstream)
-        broken = sorted({f["task"].name.partition(":")[2] for f in self.failures} - {g.system for g in finished()})
+        broken = sorted(
+            {f["task"].name.split(":")[1] for f in self.failures if ":" in f["task"].name}
+            - {g.system for g in finished()}
+        )
         print_summary(finished(), broken, self._done, time.monotonic() - self._start, self.outstream)
         for message in self.runtime_errors:
             self.outstream.write(message + "\n")

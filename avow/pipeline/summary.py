@@ -20,7 +20,7 @@ def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, s
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(file=out, highlight=False, soft_wrap=True)
+    console = Console(file=out, highlight=False, soft_wrap=True, width=None if out.isatty() else 150)
     shown = [word for word in (*GOOD, *BAD) if any(r.counts.get(word) for r in results)]
     table = Table(box=None, header_style="bold", pad_edge=False)
     table.add_column("system")

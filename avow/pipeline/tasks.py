@@ -70,7 +70,11 @@ def pipeline(root: Path) -> Iterator[Task]:
 def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
     """A system that cannot be read: its stages say so, the other systems go on."""
     for stage in STAGES:
-        action = partial(checking.refuse, rejected) if stage in ("check", "verify") else partial(checking.refuse_quietly, name)
+        action = (
+            partial(checking.refuse, rejected)
+            if stage in ("check", "verify")
+            else partial(checking.refuse_quietly, name)
+        )
         yield {"basename": stage, "name": name, "actions": [action], "uptodate": [False]}
 
 
@@ -81,7 +85,10 @@ def _system(workspace: Workspace, surveyed: Survey) -> Iterator[Task]:
     yield {
         "basename": "check",
         "name": name,
-        "actions": [partial(_act, partial(checking.check, workspace, surveyed)), _discharge(workspace, surveyed.work(LANGUAGE))],
+        "actions": [
+            partial(_act, partial(checking.check, workspace, surveyed)),
+            _discharge(workspace, surveyed.work(LANGUAGE)),
+        ],
         "uptodate": [partial(checking.is_current, workspace, surveyed), _settled(workspace, surveyed.work(LANGUAGE))],
     }
     for work in surveyed.catalogue.works:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from avow import __version__
 from avow.backend import Backend, Job, Limits
+from avow.diagnostics import Severity
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.files import digest, digest_file
 from avow.language.contract import Contract, Node
@@ -73,12 +74,21 @@ def language_work(system: System) -> Work:
 
 def sanity_work(system: System, node: Node) -> Work:
     """Is this node's contract worth verifying? (design: page "Obligations…", kind sanity)"""
-    from avow.logic.sanity import claims, node_key
+    from avow.logic.claims import claims, node_key
 
     meaning = node_key(node)
     obligations = tuple(
         Obligation(
-            system.name, node.name, Kind.SANITY, claim.name, claim.sentence, claim.formula, meaning, claim.clauses, node.span
+            system.name,
+            node.name,
+            Kind.SANITY,
+            claim.name,
+            claim.sentence,
+            claim.formula,
+            meaning,
+            claim.clauses,
+            claim.span,
+            claim.severity is not Severity.ERROR,
         )
         for claim in claims(node)
     )
@@ -96,7 +106,9 @@ def compose_work(system: System) -> Work:
 def method_works(system: System) -> tuple[Work, ...]:
     """One for each method of each node of the plan. Raises Rejected for an unknown backend."""
     return tuple(
-        method_work(system, system.contract.node(plan.node), method) for plan in system.plan.nodes for method in plan.methods
+        method_work(system, system.contract.node(plan.node), method)
+        for plan in system.plan.nodes
+        for method in plan.methods
     )
 
 

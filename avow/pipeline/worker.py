@@ -19,7 +19,7 @@ from avow.diagnostics import Rejected
 from avow.evidence.obligation import Obligation
 from avow.files import write
 from avow.pipeline.wire import report_from_json, report_to_json
-from avow.pipeline.work import COMPOSE, SANITY, Work
+from avow.pipeline.work import Work
 from avow.verdict import Outcome, Verdict
 from avow.workspace import Workspace
 
@@ -76,7 +76,9 @@ def _complete(report: Report, obligations: tuple[Obligation, ...]) -> Report:
             case []:
                 outcomes.append(Outcome(obligation.id, Verdict.ERROR, "the engine gave no answer for this obligation"))
             case _:
-                outcomes.append(Outcome(obligation.id, Verdict.ERROR, "the engine gave several answers for this obligation"))
+                outcomes.append(
+                    Outcome(obligation.id, Verdict.ERROR, "the engine gave several answers for this obligation")
+                )
     return Report(tuple(outcomes), report.tool, report.tool_version, report.command, report.logs)
 
 
@@ -103,15 +105,15 @@ def _execute(request: dict[str, Any]) -> Report:
     wanted = set(request["obligations"])
     match request["engine"]:
         case "sanity":
-            from avow.logic.sanity import discharge as discharge_sanity
+            from avow.pipeline.engines import discharge_sanity
             from avow.pipeline.work import sanity_work
 
             node = system.contract.node(request["node"])
             work = sanity_work(system, node)
             claims = tuple(o for o in work.obligations if o.id in wanted)
-            return discharge_sanity(system, node, claims, limits)
+            return discharge_sanity(node, claims, limits)
         case "compose":
-            from avow.calculus.obligations import discharge as discharge_composition
+            from avow.pipeline.engines import discharge_composition
             from avow.pipeline.work import compose_work
 
             claims = tuple(o for o in compose_work(system).obligations if o.id in wanted)
@@ -138,5 +140,3 @@ if __name__ == "__main__":
         traceback.print_exc()
         code = 1
     sys.exit(code)
-
-__all__ = ["COMPOSE", "SANITY", "run"]

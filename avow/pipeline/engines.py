@@ -1,0 +1,27 @@
+"""The core's own engines, put so that the pipeline can treat them like backends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from avow.backend import Limits, Report
+from avow.evidence.obligation import Obligation
+from avow.language.contract import Node
+from avow.system.plan import System
+
+
+def discharge_sanity(node: Node, obligations: Sequence[Obligation], limits: Limits) -> Report:
+    """Settle sanity claims of one node by the solver."""
+    from avow.logic.sanity import Bounds, outcomes
+    from avow.logic.smt import z3_version
+
+    found = outcomes(node, {o.id: o.name for o in obligations}, bounds=Bounds(seed=limits.seed))
+    return Report(found, "z3", z3_version())
+
+
+def discharge_composition(system: System, obligations: Sequence[Obligation], limits: Limits) -> Report:
+    """Settle side conditions, loops and requirements by the calculus."""
+    from avow.calculus.obligations import discharge
+    from avow.logic.smt import z3_version
+
+    return Report(discharge(system, obligations, limits), "z3", z3_version())
