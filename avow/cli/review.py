@@ -1,0 +1,25 @@
+"""``avow review stamp``: the digests of what a reviewer read."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.group()
+def command() -> None:
+    """Review records."""
+
+
+@command.command()
+@click.argument("system")
+@click.argument("node")
+@click.option("--method", help="The review's id, where the node has several.")
+@click.option("--renewed", metavar="DATE", help="Everything that changed was read again on this date.")
+def stamp(system: str, node: str, method: str | None, renewed: str | None) -> int:
+    """Fill the digests in that the review of NODE in SYSTEM lacks. Never refreshes one by habit: see --renewed."""
+    from avow.backends.review.stamp import stamp as fill
+    from avow.cli.workspace import system_folder
+
+    said = fill(system_folder(system), node, method=method, renewed=renewed)
+    click.echo("\n".join(said) or "nothing to stamp: every digest is as it should be")
+    return 0
