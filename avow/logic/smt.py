@@ -18,12 +18,13 @@ from typing import Literal as OneOf
 
 import z3
 
-from avow.language.sorts import BOOL, FunctionSort
-from avow.language.terms import Term, Variable
+from avow.language.sorts import BOOL, DataSort, FunctionSort, OpaqueSort, SequenceSort, SetSort, Sort, TupleSort
+from avow.language.terms import Quantified, Term, Variable
 from avow.logic.counterexample import show_values
 from avow.logic.formula import free_variables, negation
 from avow.logic.models import Model
 from avow.logic.translation import Expr, Meaning, Translator, Unsupported
+from avow.logic.traversal import subterms
 from avow.logic.values import FunctionValue, Value
 from avow.verdict import Counterexample, Verdict
 
@@ -275,28 +276,73 @@ def entails(
 def replay(formulas: Iterable[Term], values: Mapping[Variable, Value], *, timeout_ms: int = 5_000) -> bool | None:
     """Do the formulas hold of these values, whatever partial operations yield outside their domains?
 
-    True only if that is proved; False if some formula is proved false; None if neither could be shown.
+    True only if that is proved; False if some formula is proved false; None if neither could be shown. An unspecified
+    sort has the elements that the values name, and up to three more if the formulas hold only then.
     """
-    translator = Translator()
+    formulas = tuple(formulas)
+    unspecified = sorted({sort for f in formulas for sort in _opaque_sorts(f)}, key=lambda sort: sort.name)
     try:
-        meanings = {variable: translator.value(value, variable.sort) for variable, value in values.items()}
-        facts = [*translator.background(values, meanings), *(translator.term(f, meanings) for f in formulas)]
-        known = translator.opaque_facts()
-        whole = z3.And(facts) if facts else translator.true()
-        quick, slow = min(500, timeout_ms), timeout_ms
-        denied = [*known, z3.Not(whole)]
-        attempts: tuple[tuple[Engine, int], ...] = (("smt", quick), ("qsat", slow), ("smt", slow))
-        for engine, limit in attempts:
-            status = check(translator, denied, timeout_ms=limit, engine=engine).status
-            if status == "unsat":
-                return True
-            if status == "sat" and limit == slow:
-                break
-        if check(translator, [*known, whole], timeout_ms=timeout_ms).status == "unsat":
-            return False
+        for more in range(4 if unspecified else 1):
+            found = _replay(formulas, values, unspecified, more, timeout_ms)
+            if found or not unspecified:
+                return found
     except (Unsupported, z3.Z3Exception):
         pass
     return None
+
+
+def _replay(
+    formulas: Sequence[Term],
+    values: Mapping[Variable, Value],
+    unspecified: Sequence[OpaqueSort],
+    more: int,
+    timeout_ms: int,
+) -> bool | None:
+    translator = Translator()
+    meanings = {variable: translator.value(value, variable.sort) for variable, value in values.items()}
+    for sort in unspecified:
+        translator.add_elements(sort, more)
+    facts = [*translator.background(values, meanings), *(translator.term(f, meanings) for f in formulas)]
+    known = translator.opaque_facts()
+    whole = z3.And(facts) if facts else translator.true()
+    denied = [*known, z3.Not(whole)]
+    attempts: tuple[tuple[Engine, int], ...] = (
+        ("smt", min(500, timeout_ms)),
+        ("qsat", timeout_ms),
+        ("smt", timeout_ms),
+    )
+    for engine, limit in attempts:
+        status = check(translator, denied, timeout_ms=limit, engine=engine).status
+        if status == "unsat":
+            return True
+        if status == "sat":
+            break
+    if check(translator, [*known, whole], timeout_ms=timeout_ms).status == "unsat":
+        return False
+    return None
+
+
+def _opaque_sorts(formula: Term) -> set[OpaqueSort]:
+    """The unspecified sorts that a formula's terms and bound variables have, or have as parts."""
+    stack: list[Sort] = []
+    for part in subterms(formula):
+        stack.append(part.sort)
+        if isinstance(part, Quantified):
+            stack.extend(variable.sort for variable in part.variables)
+    found: set[OpaqueSort] = set()
+    while stack:
+        match stack.pop():
+            case OpaqueSort() as sort:
+                found.add(sort)
+            case FunctionSort(parameters=parameters, result=result):
+                stack.extend((*parameters, result))
+            case TupleSort(items=items):
+                stack.extend(items)
+            case SequenceSort(item=item) | SetSort(item=item):
+                stack.append(item)
+            case DataSort(constructors=constructors):
+                stack.extend(p for c in constructors for p in c.parameters)
+    return found
 
 
 _ROUNDS = ((0.025, 0.1), (0.1, 0.2), (0.275, 0.3))

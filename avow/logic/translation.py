@@ -521,6 +521,13 @@ class Translator:
                 return self._opaque[key]
         raise Unsupported(f"the value {value} of a {type(sort).__name__}")
 
+    def add_elements(self, sort: OpaqueSort, more: int) -> None:
+        """Name further elements of an unspecified sort: at least one in all, and `more` than the values did."""
+        used = [index for name, index in self._opaque if name == sort.name]
+        first = max(used, default=-1) + 1
+        for index in range(first, first + more + (not used)):
+            self.value(Opaque(sort.name, index), sort)
+
     def opaque_facts(self) -> list[Expr]:
         """That the elements of unspecified sorts named by `value` are different, and all that there are.
 

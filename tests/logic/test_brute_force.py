@@ -1,0 +1,124 @@
+"""The translation, satisfiability, entailment and realizability against enumeration of everything there is."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from avow.language.terms import Not, Term, Variable
+from avow.logic.formula import digest, free_variables, normalise
+from avow.logic.normal import push_negations
+from avow.logic.realizability import realizable
+from avow.logic.smt import entails, replay, solve
+from avow.logic.values import Element, FunctionValue, Value
+from avow.verdict import Verdict
+
+from .contracts import Values, domain, holds
+from .random_formulas import FUNCTION_OUTPUT, INPUTS, OUTPUTS, formulas
+
+few = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+
+
+def situations(variables: tuple[Variable, ...]) -> list[Values]:
+    return [dict(zip(variables, choice, strict=True)) for choice in product(*(domain(v.sort) for v in variables))]
+
+
+def plain(value: Value) -> object:
+    """A solver's value in the brute-force evaluator's terms."""
+    if isinstance(value, Element):
+        return value.name
+    return value
+
+
+def spread(values: dict[Variable, Value]) -> Values:
+    result: Values = {}
+    for variable, value in values.items():
+        if isinstance(value, FunctionValue):
+            points = domain(variable.sort.parameters[0])  # type: ignore[union-attr]
+            result[variable] = {(p,): plain(value(Element(str(p)))) for p in points}
+        else:
+            result[variable] = plain(value)
+    return result
+
+
+def as_value(value: object) -> Value:
+    if isinstance(value, dict):
+        return FunctionValue({tuple(map(as_value, k)): as_value(v) for k, v in value.items()}, False)
+    if isinstance(value, str):
+        return Element(value)
+    assert isinstance(value, bool)
+    return value
+
+
+@few
+@given(formulas())
+def test_satisfiability_is_right_and_models_are_models(term: Term) -> None:
+    free = tuple(sorted(free_variables(term), key=lambda v: v.qualified))
+    expected = any(holds(term, s) for s in situations(free))
+    answer = solve([term], timeout_ms=20_000)
+    assert answer.status == ("sat" if expected else "unsat")
+    if expected:
+        assert holds(term, spread(dict(answer.values))) is True
+
+
+@few
+@given(formulas(), formulas())
+def test_entailment_is_right(left: Term, right: Term) -> None:
+    free = tuple(sorted(free_variables(left) | free_variables(right), key=lambda v: v.qualified))
+    expected = all(holds(right, s) for s in situations(free) if holds(left, s))
+    answer = entails({"H": left}, right, timeout_ms=20_000)
+    assert answer.verdict is (Verdict.PROVED if expected else Verdict.REFUTED)
+    if not expected:
+        values = {**{v: as_value(domain(v.sort)[0]) for v in free}, **answer.values}
+        assert holds(left, spread(values)) is True
+        assert holds(right, spread(values)) is False
+
+
+@few
+@given(formulas(), st.data())
+def test_replay_agrees_with_evaluation(term: Term, data: st.DataObject) -> None:
+    free = tuple(sorted(free_variables(term), key=lambda v: v.qualified))
+    situation = data.draw(st.sampled_from(situations(free)))
+    values = {variable: as_value(value) for variable, value in situation.items()}
+    assert replay([term], values) is bool(holds(term, situation))
+
+
+@few
+@given(formulas())
+def test_normal_forms_keep_the_meaning(term: Term) -> None:
+    free = tuple(sorted(free_variables(term), key=lambda v: v.qualified))
+    for form in (normalise(term), push_negations(term)):
+        assert free_variables(form) <= set(free)
+        assert all(bool(holds(term, s)) == bool(holds(form, s)) for s in situations(free))
+    assert digest(normalise(term)) == digest(term)
+    assert digest(Not(term)) != digest(term)
+
+
+@pytest.mark.parametrize("outputs", [OUTPUTS, (*OUTPUTS, FUNCTION_OUTPUT)], ids=["scalars", "with a function"])
+def test_realizability_is_right(outputs: tuple[Variable, ...]) -> None:
+    verdicts: list[Verdict] = []
+
+    @settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+    @given(formulas(INPUTS), st.lists(formulas(INPUTS + outputs), min_size=1, max_size=3))
+    def check(assumption: Term, guarantees: list[Term]) -> None:
+        def met(inputs: Values) -> bool:
+            return any(all(holds(g, {**inputs, **out}) for g in guarantees) for out in situations(outputs))
+
+        allowed = [inputs for inputs in situations(INPUTS) if holds(assumption, inputs)]
+        expected = all(met(inputs) for inputs in allowed)
+        labelled = {f"G{k}": g for k, g in enumerate(guarantees)}
+        answer = realizable(INPUTS, outputs, {"A": assumption}, labelled, timeout_ms=20_000)
+        verdicts.append(answer.verdict)
+        assert answer.verdict in {Verdict.PROVED if expected else Verdict.REFUTED, Verdict.UNKNOWN}
+        if answer.verdict is Verdict.REFUTED:
+            inputs = spread({v: as_value(domain(v.sort)[0]) for v in INPUTS} | dict(answer.inputs))
+            assert holds(assumption, inputs)
+            assert not met(inputs)
+
+    check()
+    assert verdicts.count(Verdict.UNKNOWN) <= len(verdicts) // 10, "too much is left open"
+    assert Verdict.PROVED in verdicts
+    assert Verdict.REFUTED in verdicts
