@@ -139,11 +139,11 @@ def _components(claims: Mapping[str, Claim]) -> list[tuple[str, ...]]:
                     parent = work[-1][0]
                     low[parent] = min(low[parent], low[name])
                 if low[name] == index[name]:
-                    at = open_names.index(name)
-                    component = tuple(sorted(open_names[at:]))
-                    del open_names[at:]
-                    is_open.difference_update(component)
-                    found.append(component)
+                    members = [open_names.pop()]
+                    while members[-1] != name:
+                        members.append(open_names.pop())
+                    is_open.difference_update(members)
+                    found.append(tuple(sorted(members)))
             elif child not in index:
                 index[child] = low[child] = len(index)
                 open_names.append(child)

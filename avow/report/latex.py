@@ -19,10 +19,11 @@ def _read(table: str) -> dict[str, str]:
 _SYMBOLS = _read(
     r"""∀ \forall  ∃ \exists  ∧ \land  ∨ \lor  ¬ \lnot  ⇒ \Rightarrow  ⇔ \Leftrightarrow  → \to
 ↔ \leftrightarrow  ⟹ \Longrightarrow  ⟺ \Longleftrightarrow  ∈ \in  ∉ \notin  ≤ \le  ≥ \ge  ≠ \ne
-≡ \equiv  ⊤ \top  ⊥ \bot  ⊢ \vdash  ⊨ \models  ◇ \Diamond  □ \Box  ○ \bigcirc  · \cdot  • \bullet  × \times  ÷ \div  − -  ∪ \cup  ∩ \cap
-⊆ \subseteq  ∅ \emptyset  ∞ \infty  ⟨ \langle  ⟩ \rangle  ℝ \mathbb{R}  ℕ \mathbb{N}  ℤ \mathbb{Z}  𝔹 \mathbb{B}
-′ '  ″ ''  ‴ '''  … \ldots  λ \lambda  φ \varphi  ψ \psi  σ \sigma  ⁻ ^{-}  ¹ ^{1}  ₁ _{1}  ₂ _{2}  ₃ _{3}
-↦ \mapsto  ⊎ \uplus  ∘ \circ  ─ -  — -  – -"""
+≡ \equiv  ⊤ \top  ⊥ \bot  ⊢ \vdash  ⊨ \models  ◇ \Diamond  □ \Box  ○ \bigcirc  · \cdot  • \bullet
+× \times  ÷ \div  − -  ∪ \cup  ∩ \cap  ⊆ \subseteq  ∅ \emptyset  ∞ \infty  ⟨ \langle  ⟩ \rangle
+ℝ \mathbb{R}  ℕ \mathbb{N}  ℤ \mathbb{Z}  𝔹 \mathbb{B}  ′ '  ″ ''  ‴ '''  … \ldots  λ \lambda
+φ \varphi  ψ \psi  σ \sigma  ⁻ ^{-}  ¹ ^{1}  ₁ _{1}  ₂ _{2}  ₃ _{3}  ↦ \mapsto  ⊎ \uplus  ∘ \circ
+─ -  — -  – -"""
 )
 """Characters of formulas, set in mathematics."""
 

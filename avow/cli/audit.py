@@ -1,0 +1,71 @@
+"""``avow audit``: is the ledger what was written, and is everything that it refers to still there?"""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+
+@click.command()
+@click.argument("systems", nargs=-1)
+@click.option("--json", "as_json", is_flag=True, help="For machines.")
+@click.option(
+    "--sign", type=click.Path(exists=True, dir_okay=False), help="Sign each ledger's head with this private key."
+)
+@click.option("--key", type=click.Path(exists=True, dir_okay=False), help="Check signatures against this public key.")
+@click.option("--new-key", type=click.Path(dir_okay=False), help="Make a key pair: FILE, and FILE.pub.")
+def command(systems: tuple[str, ...], as_json: bool, sign: str | None, key: str | None, new_key: str | None) -> int:
+    """Re-digest everything that the ledgers of SYSTEMS (all, if none is named) refer to; name each discrepancy.
+
+    Exit code 1 if the ledger or a file behind today's evidence was tampered with; changed inputs are told, but only
+    make evidence stale.
+    """
+    from pathlib import Path
+
+    from avow.cli.ledgers import audit_system, ledger_names
+    from avow.cli.workspace import workspace
+
+    if new_key:
+        from avow.evidence.signing import new_key_pair
+
+        public = new_key_pair(Path(new_key))
+        click.echo(f"private key {new_key} (keep it), public key {public}")
+        return 0
+    place = workspace()
+    found = {name: audit_system(place, name, key) for name in ledger_names(place, systems)}
+    bad = any(d.serious for discrepancies, _ in found.values() for d in discrepancies)
+    if sign and not bad:
+        from avow.cli.ledgers import sign_system
+
+        for name in found:
+            click.echo(f"signed: {sign_system(place, name, Path(sign))}", err=True)
+    if as_json:
+        listed = {
+            name: {"records": count, "discrepancies": [_json(d) for d in discrepancies]}
+            for name, (discrepancies, count) in found.items()
+        }
+        click.echo(json.dumps({"systems": listed}, indent=1))
+    else:
+        for name, (discrepancies, count) in found.items():
+            serious = sum(d.serious for d in discrepancies)
+            click.echo(f"{name}: {count} records, {serious} discrepanc{'y' if serious == 1 else 'ies'}")
+            for d in discrepancies:
+                click.echo(f"  {'✘' if d.serious else '·'} {d.fault}: {d.text}")
+        if not found:
+            click.echo("no ledger yet: run `avow verify`")
+        if sign and bad:
+            click.echo("not signed: there are discrepancies", err=True)
+    return 1 if bad else 0
+
+
+def _json(discrepancy: object) -> dict[str, object]:
+    from avow.evidence.audit import Discrepancy
+
+    assert isinstance(discrepancy, Discrepancy)
+    return {
+        "fault": discrepancy.fault.value,
+        "subject": discrepancy.subject,
+        "text": discrepancy.text,
+        "serious": discrepancy.serious,
+    }

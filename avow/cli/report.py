@@ -1,0 +1,70 @@
+"""``avow report``: render the reports again from the ledger, or check one against it."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+
+@click.command()
+@click.argument("systems", nargs=-1)
+@click.option(
+    "--check",
+    "folder",
+    type=click.Path(exists=True, file_okay=False),
+    help="Does the report in this folder say what the ledger says?",
+)
+@click.option("--json", "as_json", is_flag=True, help="For machines (with --check).")
+def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
+    """Render the reports of SYSTEMS (all, if none is named) from their ledgers; nothing is verified.
+
+    With --check DIR nothing is written: every record that the report in DIR quotes is looked up in the ledger, every
+    conclusion drawn again, every format rendered again and compared.
+    """
+    from pathlib import Path
+
+    if folder is not None:
+        return _check(Path(folder), as_json)
+    import os
+
+    from avow.cli.workspace import workspace
+
+    place = workspace()
+    os.chdir(place.root)
+    from doit.cmd_base import ModuleTaskLoader
+    from doit.doit_cmd import DoitMain
+
+    from avow.pipeline.tasks import config, pipeline
+
+    tasks = {"DOIT_CONFIG": config(place.root), "task_avow": lambda: pipeline(place.root)}
+    wanted = [f"report:{name}" for name in systems] or ["report"]
+    return int(DoitMain(ModuleTaskLoader(tasks)).run(["run", *wanted]))
+
+
+def _check(folder: object, as_json: bool) -> int:
+    from pathlib import Path
+
+    from avow.cli.ledgers import read_case
+    from avow.evidence.ledger import Ledger
+    from avow.report.check import check
+    from avow.workspace import find_workspace
+
+    assert isinstance(folder, Path)
+    place = find_workspace(folder.resolve()) or find_workspace(Path.cwd().resolve())
+    case = read_case(folder)
+    path = place.ledger(case.system) if place else None
+    ledger = Ledger(path) if path is not None and path.is_file() else None
+    found = check(folder, ledger, place.root if place else None)
+    if as_json:
+        click.echo(json.dumps({"system": case.system, "agrees": not found, "differences": list(found)}, indent=1))
+    elif found:
+        click.echo(f"{folder}: the report does not say what the ledger says")
+        for line in found:
+            click.echo(f"  ✘ {line}")
+    else:
+        records = sum(len(view.evidence) for view in case.obligations)
+        click.echo(
+            f"{folder}: agrees with the ledger: {records} records, {len(case.obligations)} obligations, {case.grade}"
+        )
+    return 1 if found else 0

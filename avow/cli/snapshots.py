@@ -1,0 +1,91 @@
+"""Two states of the workspace's cases, from reports, ledgers or git revisions."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import tarfile
+import tempfile
+from collections.abc import Iterator
+from datetime import date
+from pathlib import Path
+
+from avow import __version__
+from avow.assurance.compare import Snapshot, of_case, of_ledger
+from avow.assurance.model import RunInfo
+from avow.cli.ledgers import read_case
+from avow.diagnostics import Diagnostic, Rejected
+from avow.evidence.ledger import Ledger
+from avow.workspace import Workspace
+
+
+def pair(old: str, new: str | None) -> Iterator[tuple[str, Snapshot, Snapshot]]:
+    """(system, before, after) for every system that either side has. Raises Rejected."""
+    before, after = snapshots(old), snapshots(new)
+    if len(before) == len(after) == 1:  # two reports of one system may stand under different names
+        (name, one), (_, other) = next(iter(before.items())), next(iter(after.items()))
+        yield name, one, other
+        return
+    nothing = Snapshot("", {}, {})
+    for name in dict.fromkeys((*before, *after)):
+        if Path(old).exists() and name not in before:
+            continue  # one report or ledger against all of the workspace: only its own system is meant
+        yield name, before.get(name, nothing), after.get(name, nothing)
+
+
+def snapshots(name: str | None) -> dict[str, Snapshot]:
+    """System → its snapshot, from a report, a ledger, a revision, or (None) the workspace as it is. Raises Rejected."""
+    path = Path(name) if name is not None else None
+    if path is not None and path.suffix == ".jsonl" and path.is_file():
+        return {path.stem: of_ledger(path.stem, Ledger(path).records())}
+    if path is not None and (path.is_file() or (path / "report.json").is_file()):
+        case = read_case(path)
+        return {case.system: of_case(case)}
+    from avow.cli.workspace import workspace
+
+    place = workspace()
+    if name is None:
+        return _of_contracts(place, place)
+    with tempfile.TemporaryDirectory() as folder:
+        _checkout(place, name, Path(folder))
+        return _of_contracts(Workspace(Path(folder)), place)
+
+
+def _checkout(place: Workspace, revision: str, folder: Path) -> None:
+    """The contracts as of a revision. Raises Rejected."""
+    if revision.startswith("-"):
+        raise Rejected(Diagnostic("DIFF001", f"'{revision}' is no report, ledger or revision"))
+    command = ["git", "-C", str(place.root), "archive", "--format=tar", revision, "contracts"]
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=60, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise Rejected(Diagnostic("DIFF001", f"git cannot be asked for '{revision}': {error}")) from None
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        why = said[-1] if said else "git failed"
+        raise Rejected(Diagnostic("DIFF001", f"'{revision}' is no report, ledger or revision here: {why}"))
+    with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
+        archive.extractall(folder, filter="data")
+
+
+def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]:
+    from avow.assurance.case import build_case
+    from avow.pipeline.survey import survey
+
+    found = {}
+    for folder in contracts.systems():
+        surveyed = survey(folder)
+        if isinstance(surveyed, Rejected):
+            found[folder.name] = Snapshot(folder.name, {}, {})
+            continue
+        system = surveyed.system
+        case = build_case(
+            system,
+            surveyed.catalogue.obligations,
+            Ledger(place.ledger(system.name)).records(),
+            keys=surveyed.keys,
+            today=date.today(),
+            run=RunInfo("diff", "", 0.0, __version__),
+        )
+        found[system.name] = of_case(case)
+    return found

@@ -1,0 +1,127 @@
+"""Optional signatures (ed25519, offline, extra ``avow[signing]``): who vouches for a ledger up to its newest record.
+
+The signature is over the head's hash and the number of records; through the hash chain that covers every record. It
+stands beside the ledger as ``<ledger>.sig``, and stays valid for the records that it covers when others follow.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from avow.diagnostics import Diagnostic, Rejected
+from avow.evidence.ledger import GENESIS, Ledger
+from avow.files import write
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
+
+_CONTEXT = "avow ledger head 1"
+
+
+def signature_path(ledger: Path) -> Path:
+    return ledger.with_name(ledger.name + ".sig")
+
+
+def new_key_pair(private: Path) -> Path:
+    """Write a new private key (readable by its owner only) and, beside it, the public one. Raises Rejected."""
+    _needs_cryptography()
+    from cryptography.hazmat.primitives import serialization
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+    key = Ed25519PrivateKey.generate()
+    secret = key.private_bytes(
+        serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    )
+    try:
+        handle = os.open(private, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except OSError as error:
+        raise Rejected(Diagnostic("SIGN001", f"{private} cannot be made: {error.strerror}")) from None
+    with os.fdopen(handle, "wb") as file:
+        file.write(secret)
+    public = private.with_name(private.name + ".pub")
+    form = serialization.PublicFormat.SubjectPublicKeyInfo
+    write(public, key.public_key().public_bytes(serialization.Encoding.PEM, form))
+    return public
+
+
+def sign(ledger: Ledger, private: Path) -> Path:
+    """Sign the newest record. Raises Rejected: no records, damage, no such key."""
+    key = _private(private)
+    entries = ledger.records()
+    if not entries or ledger.damage:
+        raise Rejected(Diagnostic("SIGN002", f"{ledger.path.name} has no records, or is damaged: it is not signed"))
+    head, count = entries[-1].hash, entries[-1].number + 1
+    signature = key.sign(_message(ledger.path.stem, head, count))
+    path = signature_path(ledger.path)
+    public = key.public_key().public_bytes_raw().hex()
+    write(path, json.dumps({"hash": head, "public_key": public, "records": count, "signature": signature.hex()}) + "\n")
+    return path
+
+
+def verify_signature(ledger: Ledger, public: Path | None) -> str | None:
+    """What is wrong with a ledger's signature; None if nothing is.
+
+    Without a key of one's own, the signature's own key is believed: then it only shows that nothing was changed since
+    that key was used. Raises Rejected."""
+    _needs_cryptography()
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+    path = signature_path(ledger.path)
+    try:
+        data = json.loads(path.read_text())
+        head, count = str(data["hash"]), int(data["records"])
+        signature, own = bytes.fromhex(data["signature"]), bytes.fromhex(data["public_key"])
+        key = _public(public) if public is not None else Ed25519PublicKey.from_public_bytes(own)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        return f"{path.name} cannot be read as a signature: {error}"
+    try:
+        key.verify(signature, _message(ledger.path.stem, head, count))
+    except InvalidSignature:
+        return f"{path.name} is not a signature of this ledger by that key"
+    entries = {entry.number: entry.hash for entry in ledger.records()}
+    if count and entries.get(count - 1, GENESIS) != head:
+        return f"the {count} records that {path.name} covers are not those in the ledger"
+    return None
+
+
+def _message(system: str, head: str, count: int) -> bytes:
+    return f"{_CONTEXT}\n{system}\n{count}\n{head}\n".encode()
+
+
+def _private(path: Path) -> Ed25519PrivateKey:
+    _needs_cryptography()
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+    try:
+        key = load_pem_private_key(path.read_bytes(), None)
+    except (OSError, ValueError, TypeError) as error:
+        raise Rejected(Diagnostic("SIGN003", f"{path} cannot be read as a private key: {error}")) from None
+    if not isinstance(key, Ed25519PrivateKey):
+        raise Rejected(Diagnostic("SIGN003", f"{path} is no ed25519 key"))
+    return key
+
+
+def _public(path: Path) -> Ed25519PublicKey:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+    from cryptography.hazmat.primitives.serialization import load_pem_public_key
+
+    try:
+        key = load_pem_public_key(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise Rejected(Diagnostic("SIGN003", f"{path} cannot be read as a public key: {error}")) from None
+    if not isinstance(key, Ed25519PublicKey):
+        raise Rejected(Diagnostic("SIGN003", f"{path} is no ed25519 key"))
+    return key
+
+
+def _needs_cryptography() -> None:
+    try:
+        import cryptography  # noqa: F401
+    except ImportError as error:
+        hint = "pip install 'avow[signing]'"
+        raise Rejected(Diagnostic("SIGN004", "signatures need the cryptography package", hint=hint)) from error

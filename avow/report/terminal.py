@@ -1,0 +1,85 @@
+"""A claim on the terminal."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from avow.assurance.model import Case, ObligationView
+from avow.assurance.naming import short
+from avow.evidence.status import Status
+from avow.report.wording import MARKS, MEANINGS, bound_text, history, outline, rerun, tone, tool_command, where
+from avow.verdict import Counterexample
+
+_COLOURS = {"good": "green", "fair": "blue", "open": "yellow", "bad": "red"}
+
+
+def show_obligation(case: Case, view: ObligationView, console: Console | None = None) -> None:
+    """Print all that is known of an obligation."""
+    out = console or Console(highlight=False)
+    o = view.obligation
+    out.print(f"[bold]{escape(view.id)}[/]   {_status(view.standing)} [dim]{MEANINGS[view.standing]}[/]")
+    out.print(escape(o.claim))
+    if o.formula:
+        out.print(f"\n    {escape(o.formula)}\n")
+    place = where(view)
+    at = f"{place}, " if place else ""
+    out.print(f"[dim]{escape(at)}meaning {o.digest[:12]}, criticality {escape(view.criticality)}[/]")
+    if view.below:
+        out.print(f"rests on what fails: {escape(', '.join(map(short, view.below)))}")
+    for item in view.counting:
+        e = item.entry.evidence
+        vacuous = " (vacuous: supports nothing)" if e.vacuous else ""
+        tool = escape(f"({e.tool} {e.tool_version}, link {e.link})")
+        out.print(f"\n{_status(Status(e.verdict))}{vacuous} by [bold]{escape(e.method)}[/] {tool}")
+        out.print(f"  {escape(e.summary)}")
+        if e.bound:
+            out.print(f"  [dim]within: {escape(bound_text(e.bound))}[/]")
+        for hypothesis in e.hypotheses:
+            out.print(f"  on the hypothesis: {escape(hypothesis)}")
+        if e.counterexample:
+            _show_counterexample(e.counterexample, out)
+        if outline(e):
+            out.print(
+                "  [dim]proof outline:[/]\n" + "\n".join(f"    {escape(line)}" for line in outline(e).splitlines())
+            )
+        out.print(f"  again: {escape(rerun(view, e))}")
+        if tool_command(e):
+            out.print(f"  [dim]tool: {escape(tool_command(e))}[/]")
+    if not view.counting:
+        planned = ", ".join(method for method, _ in view.planned)
+        out.print(f"\nno evidence that counts; planned: {escape(planned) or 'nothing'}")
+    old = history(view)
+    if old:
+        out.print(f"\n[dim]{len(old)} older record(s), which no longer count:[/]")
+        for item in old[:10]:
+            e = item.entry.evidence
+            out.print(f"[dim]  {e.started[:16]} {escape(e.method)}: {e.verdict} ({item.currency})[/]")
+    if view.suggestion:
+        out.print(f"\nnext: {escape(view.suggestion.text)}")
+    if view.handled:
+        out.print(f"the plan says of this finding: {view.handled}")
+    needed_by = [r.id for r in case.requirements if view.id in r.rests_on or view.id in r.below]
+    if needed_by:
+        out.print(f"[dim]needed by {escape(', '.join(needed_by))}[/]")
+
+
+def _status(status: Status) -> str:
+    return f"[{_COLOURS[tone(status)]}]{MARKS[status]} {status}[/]"
+
+
+def _show_counterexample(example: Counterexample, out: Console) -> None:
+    out.print(f"  [red]counterexample[/]{': ' + escape(example.explanation) if example.explanation else ''}")
+    for name, value in example.values:
+        out.print(f"    {escape(name)} = {escape(value)}")
+    if example.trace:
+        columns = list(dict.fromkeys(name for step in example.trace for name, _ in step))
+        table = Table("step", *map(escape, columns), box=None, header_style="bold", pad_edge=True)
+        for at, step in enumerate(example.trace[:60]):
+            values = dict(step)
+            mark = " ↺" if at == example.loop else ""
+            table.add_row(f"{at}{mark}", *(escape(values.get(name, "")) for name in columns))
+        out.print(table)
+        if example.loop is not None:
+            out.print(f"    after the last step the run returns to step {example.loop}")

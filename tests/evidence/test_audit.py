@@ -1,0 +1,98 @@
+"""Every kind of tampering that the audit must name, each seeded on purpose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from assurance.sample import evidence, guarantee, key_of
+
+from avow.evidence.audit import Fault, audit
+from avow.evidence.ledger import Ledger
+from avow.files import digest, digest_file
+from avow.verdict import Verdict
+
+
+@pytest.fixture
+def ledger(tmp_path: Path) -> Ledger:
+    for name in ("a.log", "b.log", "prog.imp"):
+        (tmp_path / name).write_text(name)
+    ledger = Ledger(tmp_path / "artifacts/ledger/rover.jsonl")
+
+    def files(*names: str) -> dict[str, str]:
+        return {name: digest_file(tmp_path / name) for name in names}
+
+    ledger.append_all(
+        [
+            evidence("node.a", outputs=files("a.log"), inputs=files("prog.imp")),
+            evidence("node.b", Verdict.REFUTED, outputs=files("b.log")),
+        ]
+    )
+    return ledger
+
+
+def faults(ledger: Ledger, root: Path, **more: object) -> list[tuple[Fault, str, bool]]:
+    return [(d.fault, d.subject, d.serious) for d in audit(Ledger(ledger.path), root, **more)]  # type: ignore[arg-type]
+
+
+def test_an_untouched_workspace_has_no_discrepancy(ledger: Ledger, tmp_path: Path) -> None:
+    assert faults(ledger, tmp_path, system="rover") == []
+
+
+def test_an_edited_log(ledger: Ledger, tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text("all is well")
+    assert faults(ledger, tmp_path) == [(Fault.CHANGED, "a.log", True)]
+
+
+def test_swapped_result_files(ledger: Ledger, tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text("b.log")
+    (tmp_path / "b.log").write_text("a.log")
+    assert faults(ledger, tmp_path) == [(Fault.CHANGED, "a.log", True), (Fault.CHANGED, "b.log", True)]
+
+
+def test_a_deleted_file(ledger: Ledger, tmp_path: Path) -> None:
+    (tmp_path / "b.log").unlink()
+    assert faults(ledger, tmp_path) == [(Fault.GONE, "b.log", True)]
+
+
+def test_a_changed_input_makes_stale_but_is_no_tampering(ledger: Ledger, tmp_path: Path) -> None:
+    (tmp_path / "prog.imp").write_text("x := 1")
+    assert faults(ledger, tmp_path) == [(Fault.OUTDATED, "prog.imp", False)]
+
+
+def test_an_edited_ledger_line(ledger: Ledger, tmp_path: Path) -> None:
+    ledger.path.write_text(ledger.path.read_text().replace('"refuted"', '"proved"'))
+    assert (Fault.LEDGER, "line 2", True) in faults(ledger, tmp_path)
+
+
+def test_a_record_that_points_at_another_obligation(ledger: Ledger, tmp_path: Path) -> None:
+    stolen = evidence("node.b", key=key_of(guarantee("node", "a"), "hoare"))
+    ledger.append(stolen)
+    assert (Fault.MISPLACED, stolen.obligation, True) in faults(ledger, tmp_path)
+
+
+def test_a_poisoned_cache_entry(ledger: Ledger, tmp_path: Path) -> None:
+    """A record with today's key, so that it would be taken from the cache, but of a claim with another meaning."""
+    claim = guarantee("node", "c")
+    ledger.append(evidence(claim, obligation_digest=digest("another claim")))
+    known = {"obligations": {claim.id: claim.digest}, "keys": {(claim.id, "hoare"): key_of(claim, "hoare")}}
+    assert (Fault.MISPLACED, claim.id, True) in faults(ledger, tmp_path, **known)
+
+
+def test_a_record_that_claims_more_than_its_method_can(ledger: Ledger, tmp_path: Path) -> None:
+    record = evidence("node.c", Verdict.PROVED, "hypothesis", strength=Verdict.TESTED)
+    ledger.append(record)
+    assert (Fault.IMPOSSIBLE, record.obligation, True) in faults(ledger, tmp_path)
+
+
+def test_a_record_of_another_system(ledger: Ledger, tmp_path: Path) -> None:
+    ledger.append(evidence(guarantee("node", "a", of="other")))
+    assert (Fault.MISPLACED, "other/node/guarantee/a", True) in faults(ledger, tmp_path, system="rover")
+
+
+def test_files_of_superseded_attempts_are_history(ledger: Ledger, tmp_path: Path) -> None:
+    (tmp_path / "a.log").write_text("second run")
+    ledger.append(evidence("node.a", key="newer", outputs={"a.log": digest("second run")}))
+    assert faults(ledger, tmp_path) == []
+    (tmp_path / "b.log").unlink()
+    assert faults(ledger, tmp_path, keys={}) == [(Fault.GONE, "b.log", False)]

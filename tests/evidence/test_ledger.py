@@ -1,0 +1,241 @@
+"""The ledger on the disk: chain, damage, kills, full disks, two writers at once."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import jsonschema
+import pytest
+from assurance.sample import chain, evidence
+
+from avow.assurance.codec import evidence_schema
+from avow.evidence import ledger as module
+from avow.evidence.encoding import Unreadable, decode, encode
+from avow.evidence.ledger import GENESIS, Ledger
+from avow.evidence.record import Evidence
+from avow.verdict import Counterexample, Verdict
+
+
+def some(number: int) -> list[Evidence]:
+    return [evidence(f"node.g{n}", key=f"k{n}") for n in range(number)]
+
+
+def test_records_survive_and_are_chained(tmp_path: Path) -> None:
+    path = tmp_path / "ledger" / "rover.jsonl"
+    entries = Ledger(path).append_all(some(5))
+    again = Ledger(path)
+    assert again.records() == entries == chain(some(5))
+    assert again.damage == ()
+    assert again.head == entries[-1].hash
+    assert entries[0].previous == GENESIS
+    assert all(b.previous == a.hash for a, b in zip(entries, entries[1:], strict=False))
+
+
+def test_every_line_meets_the_published_schema(tmp_path: Path) -> None:
+    hard = evidence(
+        "node.g",
+        Verdict.REFUTED,
+        counterexample=Counterexample((("in.r", "125"),), "why", (((("a", "1")),), ((("a", "2")),)), 0),
+        bound={"cases": 2000, "p": Fraction(1, 3), "set": {2, 1}, "nan": float("nan")},
+        details={"nested": {"list": [1, (2, None)]}},
+        summary='quote " newline \n unicode ∀ \ud800 nul \x00',
+        seconds=3,
+    )
+    ledger = Ledger(tmp_path / "x.jsonl")
+    ledger.append(hard)
+    assert Ledger(ledger.path).damage == ()
+    line = json.loads(ledger.path.read_text())
+    jsonschema.Draft202012Validator(evidence_schema()).validate(line)
+    assert line["evidence"]["bound"] == {"cases": 2000, "p": "1/3", "set": [1, 2], "nan": "nan"}
+    assert encode(decode(line["evidence"])) == line["evidence"]
+
+
+def test_latest_and_current(tmp_path: Path) -> None:
+    ledger = Ledger(tmp_path / "x.jsonl")
+    old, new = evidence("n.g", key="old"), evidence("n.g", Verdict.UNKNOWN, key="new")
+    ledger.append_all([old, new, evidence("n.g", method="dafny", key="other")])
+    latest = ledger.latest(old.obligation, "hoare")
+    assert latest is not None
+    assert latest.evidence == new
+    assert [e.evidence for e in ledger.current(old.obligation, "old")] == [old]
+    assert ledger.latest(old.obligation, "none") is None
+
+
+def test_the_same_evidence_is_kept_once(tmp_path: Path) -> None:
+    ledger = Ledger(tmp_path / "x.jsonl")
+    first = ledger.append(some(1)[0])
+    assert ledger.append(some(1)[0]) == first
+    assert Ledger(ledger.path).append_all([*some(1), *some(1)]) == (first, first)
+    assert len(Ledger(ledger.path).records()) == 1
+
+
+def test_a_torn_last_line_is_put_aside_and_the_chain_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    Ledger(path).append_all(some(3))
+    whole = path.read_bytes()
+    for cut in (1, 7, 200):
+        path.write_bytes(whole[:-cut])
+        reader = Ledger(path)
+        assert len(reader.records()) == 2  # a reader uses what is whole, and changes nothing
+        writer = Ledger(path)
+        writer.append(evidence("node.g2", key="k2"))
+        assert "torn" in writer.repaired[0]
+        assert path.with_name("x.jsonl.torn").stat().st_size > 0
+        assert len(Ledger(path).records()) == 3
+        assert Ledger(path).damage == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "line", "word"),
+    [
+        (lambda lines: [lines[0], lines[1].replace(b"proved", b"tested"), *lines[2:]], 2, "changed after"),
+        (lambda lines: [lines[0], b"garbage\n", *lines[2:]], 2, "cannot be read"),
+        (lambda lines: [lines[0], *lines[2:]], 2, "does not follow"),
+        (lambda lines: [lines[1], lines[0], *lines[2:]], 1, "does not follow"),
+        (lambda lines: [lines[0], lines[0], *lines[1:]], 2, "does not follow"),
+        (lambda lines: lines[:-1], 4, "cut off"),
+    ],
+    ids=["edited", "garbled", "removed", "swapped", "inserted", "cut off"],
+)
+def test_damage_is_named_and_edited_records_are_not_believed(tmp_path: Path, change, line: int, word: str) -> None:  # type: ignore[no-untyped-def]
+    path = tmp_path / "x.jsonl"
+    entries = Ledger(path).append_all(some(4))
+    path.write_bytes(b"".join(change(path.read_bytes().splitlines(keepends=True))))
+    ledger = Ledger(path)
+    assert any(d.line == line and word in d.reason for d in ledger.damage), ledger.damage
+    assert all(e.evidence in [x.evidence for x in entries] for e in ledger.records())
+
+
+def test_a_ledger_rechained_after_an_edit_is_given_away_by_its_head(tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    Ledger(path).append_all([*some(2), evidence("node.bad", Verdict.REFUTED)])
+    head = path.with_name("x.jsonl.head").read_text()
+    path.unlink()
+    path.with_name("x.jsonl.head").unlink()
+    Ledger(path).append_all([*some(2), evidence("node.bad", Verdict.PROVED)])
+    path.with_name("x.jsonl.head").write_text(head)
+    assert Ledger(path).damage
+
+
+def test_an_append_behind_a_garbled_line_is_itself_whole(tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    Ledger(path).append_all(some(2))
+    path.write_bytes(path.read_bytes() + b"garbage\n")
+    Ledger(path).append(evidence("node.new"))
+    ledger = Ledger(path)
+    assert [d.line for d in ledger.damage] == [3]
+    assert len(ledger.records()) == 3
+
+
+def test_a_full_disk_adds_nothing_and_breaks_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "x.jsonl"
+    ledger = Ledger(path)
+    ledger.append_all(some(2))
+    before = path.read_bytes()
+    really = os.write
+
+    def full(file: int, data: bytes) -> int:
+        if len(data) > 40:
+            return really(file, data[:40])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(module.os, "write", full)
+    with pytest.raises(OSError, match="No space"):
+        ledger.append(evidence("node.new"))
+    monkeypatch.undo()
+    assert path.read_bytes() == before
+    ledger.append(evidence("node.new"))
+    assert len(Ledger(path).records()) == 3
+    assert Ledger(path).damage == ()
+
+
+_WRITER = """
+import sys
+sys.path.insert(0, {tests!r})
+from pathlib import Path
+from assurance.sample import evidence
+from avow.evidence.ledger import Ledger
+ledger = Ledger(Path({path!r}))
+print("ready", flush=True)
+n = 0
+while n < {most}:
+    ledger.append(evidence("node.{name}" + str(n), summary="x" * 3000))
+    n += 1
+"""
+
+
+def start(path: Path, name: str, most: int) -> subprocess.Popen[bytes]:
+    tests = str(Path(__file__).parent.parent)
+    code = _WRITER.format(tests=tests, path=str(path), name=name, most=most)
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    process.stdout.readline()
+    return process
+
+
+def test_kill_9_loses_nothing_that_was_acknowledged(tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    for round_number in range(4):
+        process = start(path, f"r{round_number}x", 100_000)
+        time.sleep(0.05 + 0.03 * round_number)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    ledger = Ledger(path)
+    ledger.append(evidence("node.last"))
+    records = ledger.records()
+    assert Ledger(path).damage == ()
+    names = [e.evidence.obligation for e in records]
+    assert len(names) == len(set(names)) > 4
+    for round_number in range(4):  # no gap: each round's records are 0, 1, 2, …
+        mine = [n for n in names if f"r{round_number}x" in n]
+        assert mine == [f"rover/node/guarantee/r{round_number}x{n}" for n in range(len(mine))]
+
+
+def test_two_runs_at_once_double_nothing_and_lose_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    one, two = start(path, "a", 40), start(path, "b", 40)
+    assert one.wait(60) == two.wait(60) == 0
+    ledger = Ledger(path)
+    assert ledger.damage == ()
+    assert len({e.evidence.obligation for e in ledger.records()}) == len(ledger.records()) == 80
+
+
+def test_a_reader_sees_what_another_process_adds(tmp_path: Path) -> None:
+    path = tmp_path / "x.jsonl"
+    reader = Ledger(path)
+    assert reader.records() == ()
+    Ledger(path).append_all(some(2))
+    assert len(reader.records()) == 2
+    reader.append(evidence("node.mine"))
+    assert Ledger(path).damage == ()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"verdict": "splendid"},
+        {"seconds": "1"},
+        {"command": "rm"},
+        {"inputs": []},
+        {"counterexample": {"values": [["a"]], "explanation": "", "trace": [], "loop": None}},
+        {"vacuous": 1},
+        {"surprise": 1},
+    ],
+)
+def test_ill_typed_records_are_not_read(change: dict[str, object]) -> None:
+    with pytest.raises(Unreadable):
+        decode({**encode(some(1)[0]), **change})
+
+
+def test_encoding_keeps_a_whole_record() -> None:
+    record = replace(some(1)[0], hypotheses=("h",), command=("a", "b c"), inputs={"p": "d"})
+    assert decode(json.loads(json.dumps(encode(record)))) == record
