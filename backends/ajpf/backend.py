@@ -15,7 +15,7 @@ from avow.backends.ajpf.ajpf_tool import Answer, Said
 from avow.backends.ajpf.automaton import TooLarge
 from avow.backends.ajpf.beliefs import TooDeep
 from avow.backends.ajpf.checker import Checker, OutOfTime, Property, explain, needs_fine_steps
-from avow.backends.ajpf.explore import Unfinished, explore
+from avow.backends.ajpf.explore import explore
 from avow.backends.ajpf.files import ail_file, export_files, jpf_file
 from avow.backends.ajpf.instances import Instantiation, diagnose, instances
 from avow.backends.ajpf.interpreter import Agent
@@ -26,6 +26,8 @@ from avow.files import write
 from avow.verdict import Counterexample, Link, Outcome, Verdict
 
 ENGINE = "Avow's own Gwendolen checker"
+GRACE = 0.5
+"""Of the time limit, what may be used beyond it to look for violations in what could be explored."""
 SPIN_SHARE = 0.5
 """Of the time that is left, what Spin may use for its second opinion."""
 
@@ -123,24 +125,25 @@ class _Run:
     # Our own engine
 
     def own(self) -> Checker | None:
-        """Results for every property, unknown where a bound was met."""
+        """Results for every property; where a bound was met, a violation within it still counts. The checker of the
+        whole state space, where that was explored."""
         setup, properties = self.setup, self.made.properties
         agent = Agent(setup.program, setup.environment, setup.semantics, fine=needs_fine_steps(properties))
+        graph = explore(agent, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
+        self.bound |= {"states": len(graph), "transitions": graph.transitions, "exhaustive": graph.unfinished is None}
+        if graph.unfinished is not None:
+            self.bound["unfinished"] = graph.unfinished
+            self.deadline += self.limits.seconds * GRACE
         try:
-            graph = explore(agent, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
-        except (Unfinished, TooDeep, RecursionError) as error:
-            reason = error.reason if isinstance(error, Unfinished) else "the reasoning rules call each other too deeply"
-            self.bound["explored"] = reason
-            self.results = {
-                p.key: Settled(Verdict.UNKNOWN, f"the state space could not be explored: {reason}") for p in properties
-            }
+            checker = Checker(graph, properties)
+        except (TooDeep, RecursionError):
+            reason = "the agent's terms or reasoning rules nest too deeply"
+            self.results = {p.key: Settled(Verdict.UNKNOWN, reason) for p in properties}
             return None
-        self.bound |= {"states": len(graph), "transitions": graph.transitions, "exhaustive": True}
-        checker = Checker(graph, properties)
         for p in properties:
             self.results[p.key] = self.one(checker, p)
         self.explain(checker)
-        return checker
+        return checker if graph.unfinished is None else None
 
     def one(self, checker: Checker, p: Property) -> Settled:
         try:
@@ -149,6 +152,9 @@ class _Run:
             return Settled(Verdict.UNKNOWN, f"no time left of {self.limits.seconds:g} s")
         except (TooLarge, RecursionError):
             return Settled(Verdict.UNKNOWN, "the property's automaton is too large")
+        unfinished = checker.graph.unfinished
+        if result.holds and unfinished is not None:
+            return Settled(Verdict.UNKNOWN, f"not refuted, but the state space is unfinished: {unfinished}")
         verdict = Verdict.CHECKED if result.holds else Verdict.REFUTED
         return Settled(verdict, "", result.vacuous, result.immediate)
 

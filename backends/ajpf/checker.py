@@ -77,7 +77,7 @@ class Checker:
         vacuous = immediate = False
         if wanted.trigger is not None:
             met = self._where(wanted.trigger)
-            vacuous = not met
+            vacuous = not met and self.graph.unfinished is None
             if wanted.goal is not None and met:
                 unmet = conjunction((wanted.trigger, Not(wanted.goal)))
                 immediate = not self._where(unmet)

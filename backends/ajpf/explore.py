@@ -7,28 +7,24 @@ import time
 from array import array
 from dataclasses import dataclass
 
+from avow.backends.ajpf.beliefs import TooDeep
 from avow.backends.ajpf.interpreter import Agent, State
 
 MAX_STATES = 2_000_000
 
 
-class Unfinished(Exception):  # noqa: N818 - it names a state, not a fault
-    """The bounds were met before all states were; `reason` is a clause for people."""
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
-
-
 @dataclass(frozen=True, slots=True)
 class Graph:
-    """States by their numbers. The successors of s are ``targets[offsets[s]:offsets[s + 1]]``, never none."""
+    """States by their numbers. The successors of s are ``targets[offsets[s]:offsets[s + 1]]``."""
 
     agent: Agent
     states: tuple[State, ...]
     initial: tuple[int, ...]
     offsets: array[int]
     targets: array[int]
+    unfinished: str | None = None
+    """Why states are missing: the ones that were not explored any more have no successors. A run that stays within what
+    was explored is still a run of the agent."""
 
     def __len__(self) -> int:
         return len(self.states)
@@ -41,7 +37,7 @@ class Graph:
 def explore(
     agent: Agent, *, states: int = MAX_STATES, seconds: float = 60.0, megabytes: int = 4096
 ) -> Graph:
-    """Every reachable state, breadth first. Raises Unfinished (and beliefs.TooDeep)."""
+    """Every reachable state, breadth first, as far as the bounds let it (`Graph.unfinished`)."""
     deadline = time.monotonic() + seconds
     memory = _memory() + megabytes
     numbers: dict[State, int] = {}
@@ -57,22 +53,28 @@ def explore(
 
     initial = tuple(dict.fromkeys(number(state) for state in agent.start()))
     at = 0
+    unfinished = None
     successors = agent.successors
     while at < len(found):
-        for state in successors(found[at]):
+        if len(found) > states:
+            unfinished = f"more than {states} states"
+        elif at & 1023 == 0 and time.monotonic() > deadline:
+            unfinished = f"{at} of at least {len(found)} states explored in {seconds:g} s"
+        elif at & 1023 == 0 and _memory() > memory:
+            unfinished = f"{len(found)} states fill {megabytes} MB"
+        if unfinished is not None:
+            break
+        try:
+            reached = successors(found[at])
+        except (TooDeep, RecursionError):
+            unfinished = "the agent's terms or reasoning rules nest too deeply"
+            break
+        for state in reached:
             targets.append(number(state))
         offsets.append(len(targets))
         at += 1
-        if at & 1023 == 0:
-            if len(found) > states:
-                raise Unfinished(f"more than {states} states")
-            if _memory() > memory:
-                raise Unfinished(f"{len(found)} states fill {megabytes} MB")
-            if time.monotonic() > deadline:
-                raise Unfinished(f"{at} of at least {len(found)} states explored in {seconds:g} s")
-    if len(found) > states:
-        raise Unfinished(f"more than {states} states")
-    return Graph(agent, tuple(found), initial, offsets, targets)
+    offsets.extend([len(targets)] * (len(found) - at))
+    return Graph(agent, tuple(found), initial, offsets, targets, unfinished)
 
 
 def _memory() -> float:

@@ -29,6 +29,10 @@ MAX_INSTANCES = 1_000
 DEFAULT_STATES = 1_000_000
 
 _TEXT = {"type": "string"}
+_BINDER = re.compile(r"\b(?:forall|exists|exists_unique)\s*\(([^|;]*)[|;]")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*'*")
+"""A pattern's own quantifiers bind names that the clauses use too: these are no free variables of it."""
+
 _RANGES: dict[str, Any] = {
     "type": "object",
     "additionalProperties": {
@@ -282,8 +286,10 @@ class _Reader:
         return tuple(rows)
 
     def pattern(self, text: str, span: Span, sorts: Mapping[str, Sort]) -> Any:
+        bound = {name for binder in _BINDER.findall(text) for name in _NAME.findall(binder)}
+        free_sorts = {name: sort for name, sort in sorts.items() if name not in bound}
         try:
-            term = shape(parse_formula(text, self.job.node, self.job.contract, span, sorts))
+            term = shape(parse_formula(text, self.job.node, self.job.contract, span, free_sorts))
         except Rejected as error:
             self.faults.extend(error.diagnostics)
             return None

@@ -13,7 +13,8 @@ Successors = Callable[[int], Sequence[int]]
 
 @dataclass(frozen=True, slots=True)
 class Kripke:
-    """States by numbers, their successors (never none), and a label for each: a bit set."""
+    """States by numbers, their successors, and a label for each: a bit set. Runs are endless: one that comes to a state
+    without successors is none."""
 
     initial: tuple[int, ...]
     successors: Sequence[Sequence[int]]
