@@ -18,13 +18,23 @@ def export(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") 
     """A script that asks whether the formulas hold together; each is named by its label. Raises Unsupported."""
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
     translator = Translator()
-    solver = z3.Solver(ctx=translator.context)
     free = frozenset(v for formula in labelled.values() for v in free_variables(formula))
-    solver.add(*translator.background(free))
-    solver.add(*(translator.term(formula) for formula in labelled.values()))
-    body = solver.sexpr()
-    header = [*(f"; {line}" for line in comment.splitlines()), "(set-logic ALL)"]
-    return "\n".join([*header, body.rstrip(), "(check-sat)", ""])
+    background = translator.background(free)
+    named = [(label, translator.term(formula)) for label, formula in labelled.items()]
+    solver = z3.Solver(ctx=translator.context)
+    solver.add(*background, *(expr for _, expr in named))
+    # Z3 prints declarations first; the assertions are printed one by one, so that each can bear its name.
+    declarations = solver.sexpr().split("(assert", 1)[0].strip()
+    lines = [f"; {_harmless(line)}" for line in comment.splitlines()]
+    lines += ["(set-logic ALL)", *([declarations] if declarations else [])]
+    lines += [f"(assert {expr.sexpr()})" for expr in background]
+    lines += [f"(assert (! {expr.sexpr()} :named |clause {_harmless(label)}|))" for label, expr in named]
+    return "\n".join([*lines, "(check-sat)", ""])
+
+
+def _harmless(text: str) -> str:
+    """Text for a comment or a quoted symbol: no bars, backslashes or line ends."""
+    return "".join(c if c.isprintable() and c not in "|\\" else "?" for c in text)
 
 
 def ask_cvc5(script: str, *, timeout_ms: int = 10_000) -> str | None:

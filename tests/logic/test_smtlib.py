@@ -1,0 +1,77 @@
+"""The exported text asks the same question: two solvers that read it agree with the answer that Avow got."""
+
+from __future__ import annotations
+
+import pytest
+import z3
+from hypothesis import HealthCheck, given, settings
+
+from avow.language.sorts import STRING
+from avow.language.terms import Compare, Literal, Not, Role, Term, Variable
+from avow.logic.formula import negation
+from avow.logic.smt import solve
+from avow.logic.smtlib import ask_cvc5, export
+
+from .contracts import case_study
+from .random_formulas import formulas
+from .test_smt import FALSE_SOMEWHERE, TRUE_ALWAYS, say
+
+LINEAR = [pair for pair in TRUE_ALWAYS + FALSE_SOMEWHERE if "in.r *" not in pair[0]]
+
+
+def ask_z3(script: str) -> str:
+    solver = z3.Solver(ctx=z3.Context())
+    solver.set("timeout", 5_000)
+    solver.from_string(script)
+    return str(solver.check())
+
+
+@pytest.mark.needs_cvc5
+@pytest.mark.parametrize(("hypothesis", "goal"), LINEAR)
+def test_both_solvers_read_it_and_agree(hypothesis: str, goal: str) -> None:
+    question = {"hypothesis": say(hypothesis), "goal": negation(say(goal))}
+    script = export(question, comment=f"{hypothesis} |- {goal}\n(check-sat)")
+    expected = "unsat" if (hypothesis, goal) in TRUE_ALWAYS else "sat"
+    assert ask_z3(script) in {expected, "unknown"}
+    answer = ask_cvc5(script, timeout_ms=5_000)
+    assert answer in {expected, "unknown"}, "cvc5 must be able to read it, and must not contradict"
+    if expected == "unsat":
+        assert answer == "unsat"
+
+
+@pytest.mark.needs_cvc5
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@given(formulas())
+def test_cvc5_never_contradicts_z3(term: Term) -> None:
+    answer = solve([term], timeout_ms=10_000).status
+    other = ask_cvc5(export([term]), timeout_ms=5_000)
+    assert other in {answer, "unknown"}
+
+
+@pytest.mark.needs_cvc5
+@pytest.mark.parametrize("system", ["remote_inspection", "remote_inspection_published"])
+def test_the_case_study_s_clauses_export(system: str) -> None:
+    for node in case_study(system).nodes:
+        script = export({clause.name: clause.formula for clause in node.clauses}, comment=node.name)
+        assert ask_z3(script) != "unsat"
+        assert ask_cvc5(script, timeout_ms=500) in {"sat", "unknown"}
+        assert all(f"|clause {clause.name}|" in script for clause in node.clauses)
+
+
+@pytest.mark.parametrize("text", ["a|b\\c\n(exit)", "x'", ") (assert false"])
+def test_labels_and_comments_are_data(text: str) -> None:
+    s = Variable(Role.INPUT, "s'", STRING)
+    script = export({text: Compare("==", s, Literal(text, STRING))}, comment=text)
+    assert ask_z3(script) == "sat"
+    both = {text: Compare("==", s, Literal(text, STRING)), "other": Not(Compare("==", s, Literal(text, STRING)))}
+    assert ask_z3(export(both)) == "unsat"
+
+
+def test_the_same_question_gives_the_same_text() -> None:
+    node = case_study("remote_inspection").node("agent")
+    clauses = {clause.name: clause.formula for clause in node.clauses}
+    assert export(clauses) == export(clauses)
+
+
+def test_a_missing_or_puzzled_cvc5_says_nothing() -> None:
+    assert ask_cvc5("(this is no script") is None
