@@ -62,27 +62,21 @@ def settle(generated: Generated, scanned: Scan, shown_name: str, limits: Limits)
     lacking = _lacking(run.members or (), scanned, generated)
     if lacking:
         return alike(Settled(Verdict.ERROR, f"missing: {'; '.join(lacking)}", taken))
-    whole = _unproved(run)
-    verdicts: dict[str, Settled] = {}
-    for name in guarantees:
-        unproved = whole
-        if whole and len(guarantees) > 1:
-            # Another guarantee may be the only culprit: ask again with this one alone. Nothing is gained by guessing
-            # from places, as Dafny assumes what it has reported before it goes on.
-            alone = verify(_files(generated, scanned, _only(generated, name)), limits)
-            logs[f"verify-{_safe(name)}.log"] = alone.output
-            fault = _broken(alone, scanned, generated, shown_name)
-            if fault is not None:
-                verdicts[name] = fault
-                continue
-            unproved = _unproved(alone) or tuple(_lacking(alone.members or (), scanned, generated))
-        verdicts[name] = _verdict(unproved, taken, scanned, generated, name)
+    unproved = dict.fromkeys(guarantees, _unproved(run))
+    spared = _spared(run, generated)
+    if spared:
+        # Only other guarantees failed. Dafny assumes what it has reported before it goes on, so these are asked
+        # again without those.
+        again = verify(_files(generated, scanned, _only(generated, spared)), limits)
+        logs["verify-again.log"] = again.output
+        if _broken(again, scanned, generated, shown_name) is None:
+            left = _unproved(again) or tuple(_lacking(again.members or (), scanned, generated))
+            unproved |= dict.fromkeys(spared, left)
+    verdicts = {name: _verdict(unproved[name], taken, scanned, generated) for name in guarantees}
     return Judgement(verdicts, run.command, logs)
 
 
-def _verdict(
-    unproved: tuple[str, ...], taken: tuple[str, ...], scanned: Scan, generated: Generated, guarantee: str
-) -> Settled:
+def _verdict(unproved: tuple[str, ...], taken: tuple[str, ...], scanned: Scan, generated: Generated) -> Settled:
     details: dict[str, object] = {"module": generated.impl_module, "members": [name for _, name in scanned.members]}
     if unproved:
         details["not proved"] = list(unproved)
@@ -164,11 +158,28 @@ def _unproved(run: Run) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _only(generated: Generated, guarantee: str) -> str:
-    """The specification with the `ensures` of one guarantee; every line keeps its number."""
+def _spared(run: Run, generated: Generated) -> tuple[str, ...]:
+    """The guarantees that may still hold: all failures are `ensures` of Step, and theirs is not among them."""
+    lines = dict(generated.ensures)
+    failed = set()
+    for member in run.members or ():
+        if member.outcome == "correct" and not member.failures:
+            continue
+        if member.outcome != "errors" or (member.module, member.name) != (generated.impl_module, "Step"):
+            return ()
+        for failure in member.failures:
+            places = {line for file, line in failure.related if file == generated.spec_file}
+            if "postcondition" not in failure.message or len(places) != 1 or not places <= set(lines):
+                return ()
+            failed |= {lines[line] for line in places}
+    return tuple(name for name in lines.values() if name not in failed) if failed else ()
+
+
+def _only(generated: Generated, guarantees: tuple[str, ...]) -> str:
+    """The specification with the `ensures` of some guarantees; every line keeps its number."""
     lines = generated.spec.split("\n")
     for number, name in generated.ensures:
-        if name != guarantee:
+        if name not in guarantees:
             lines[number - 1] = ""
     return "\n".join(lines)
 
@@ -184,10 +195,6 @@ def _files(generated: Generated, scanned: Scan, spec: str) -> dict[str, str]:
 
 def _name(file: str, generated: Generated, shown_name: str) -> str:
     return shown_name if file == generated.impl_file else file
-
-
-def _safe(name: str) -> str:
-    return re.sub(r"\W", "_", name, flags=re.ASCII)
 
 
 def _few(items: tuple[str, ...] | list[str]) -> str:

@@ -21,14 +21,15 @@ _CALLABLES = frozenset({"method", "lemma", "colemma", "constructor", "function",
 _MODIFIERS = frozenset(
     {"ghost", "static", "protected", "inductive", "twostate", "least", "greatest", "abstract", "opaque"}
 )
+_DIRECTIVE = re.compile(r"\s*#(?:if|else|elsif|endif)")
 _TOKEN = re.compile(
     r"""
     (?P<space>\s+|//[^\n]*)
   | (?P<string>@"(?:[^"]|"")*"|"(?:[^"\\\n]|\\.)*")
   | (?P<word>[A-Za-z_][\w'?]*)
-  | (?P<number>\d[\w.]*)
+  | (?P<number>0x[\da-fA-F_]+|\d[\d_]*(?:\.\d+)?)
   | (?P<char>'(?:[^'\\\n]|\\[^\n][^'\n]*)')
-  | (?P<sign>\{:|:=|:\||::|=>|==>|<==>|\.\.|.)
+  | (?P<sign>:=|==|!=|<=|>=|:\||::|=>|==>|<==>|\.\.|.)
     """,
     re.VERBOSE | re.DOTALL,
 )
@@ -61,6 +62,8 @@ class Scan:
 
 def scan(text: str, spec_module: str, impl_module: str, generated: Sequence[str]) -> Scan:
     """`generated` are the names of the generated files."""
+    # Dafny reads a lone carriage return as the end of a line, and so of a comment.
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
     return _Scanner(text, spec_module, impl_module, generated).scan()
 
 
@@ -76,7 +79,10 @@ def tokens(text: str) -> list[Token]:
             assert match is not None  # the last alternative takes any character
             end = match.end()
             kind = match.lastgroup or "sign"
-            if kind != "space":
+            if match.group() == ":" and found and found[-1].text == "{":
+                # The start of an attribute, also where it is spread out; nothing else begins like that.
+                found[-1] = Token("sign", "{:", found[-1].line, found[-1].start, end)
+            elif kind != "space":
                 found.append(Token(kind, match.group(), line, position, end))
         line += text.count("\n", position, end)
         position = end
@@ -111,6 +117,9 @@ class _Scanner:
 
     def scan(self) -> Scan:
         blanked = self.text
+        for number, line in enumerate(self.text.split("\n"), 1):
+            if _DIRECTIVE.match(line):  # also within what looks like a comment: it may take the comment away
+                self.hypotheses.append((number, "a preprocessor directive hides text from one reader or the other"))
         for at, token in enumerate(self.tokens):
             match token.text:
                 case "assume" | "expect" if token.kind == "word":
@@ -209,7 +218,9 @@ class _Scanner:
             return
         self.redeclared(name)
         position = self.tokens.index(name) + 1
-        if self.text_at(position) in ("<", "("):
+        if self.text_at(position) == "(":
+            position = self.matching(position) + 1
+        if self.text_at(position) == "<":
             while position < len(self.tokens) and self.text_at(position) not in ("=", "{", "}"):
                 position += 1
         if self.text_at(position) != "=":

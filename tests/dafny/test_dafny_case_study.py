@@ -64,9 +64,7 @@ def test_the_papers_listing_is_not_accepted(make_job: MakeJob) -> None:
 
 
 _MUTANTS: tuple[tuple[str, str, str, set[str]], ...] = (
-    ("status != Types.RadStat.green ||", "status == Types.RadStat.red ||", "agent", {"exit_on_danger", "abandon"}),
-    ("here + 1 < |places|", "here + 2 < |places|", "agent", {"next_waypoint", "end_of_mission"}),
-    ("Types.CommandSet.inspect(here)", "Types.CommandSet.inspect(here + 1)", "agent", {"inspect_here"}),
+    ("next := Types.Phase.exploring;", "next := Types.Phase.leaving;", "agent", {"end_of_mission"}),
     ("r >= 120.0", "r > 120.0", "radiationSensor", {"medium"}),
     ("i == here || in_before(i)", "i == here", "radiationSensor", {"marks_inspected"}),
 )

@@ -1,0 +1,226 @@
+"""False implementations and all the ways to make Dafny say "0 errors": none of them may ever be proved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from avow.backend import Job, Limits
+from avow.backends.dafny import BACKEND
+from avow.backends.dafny.scanner import Scan, scan, tokens
+from avow.verdict import Outcome, Verdict
+
+MakeJob = Callable[..., Job]
+
+CONTRACT = """
+context { Light : {red, green}; }
+node lamp {
+  inputs( r : REAL )
+  outputs( light : Light, n : NATURAL )
+  topics( )
+  assume sane ( 0 <= in.r )
+  guarantee low ( in.r < 10 -> out.light == green )
+  guarantee high ( 10 <= in.r -> out.light == red )
+  guarantee count ( out.n > 0 )
+}
+"""
+
+GOOD = """\
+include "lamp_spec.dfy"
+module LampImpl refines LampSpec {
+  predicate Env(in_r: real) { true }
+  lemma EnvNotEmpty() returns (in_r: real) { in_r := 0.0; }
+  method Step(in_r: real) returns (out_light: Types.Light, out_n: nat)
+  {
+    out_n := 1;
+    if in_r < 10.0 { out_light := Types.Light.green; } else { out_light := Types.Light.red; }
+  }
+}
+"""
+WRONG = GOOD.replace("Types.Light.red", "Types.Light.green")
+
+
+def settle(make_job: MakeJob, root: Path, text: str) -> dict[str, Outcome]:
+    (root / "lamp.dfy").write_text(text, encoding="utf-8")
+    job = make_job(CONTRACT, "lamp", implementation="lamp.dfy")
+    BACKEND.check(job)
+    report = BACKEND.discharge(job, root, Limits(seconds=120))
+    return {o.obligation.rsplit("/", 1)[1]: o for o in report.outcomes}
+
+
+def wrong(old: str, new: str) -> str:
+    assert old in WRONG, old
+    return WRONG.replace(old, new)
+
+
+STEP = "  method Step("
+BODY = "    out_n := 1;\n"
+HEAD = "module LampImpl refines LampSpec {\n"
+
+TRICKS = {
+    "assume false": wrong(BODY, BODY + "    assume false;\n"),
+    "verify false": wrong("method Step", "method {:verify false} Step"),
+    "verify false on the module": wrong("module LampImpl", "module {:verify false} LampImpl"),
+    "an axiom": wrong(STEP, "  lemma {:axiom} No() ensures false\n" + STEP).replace(BODY, BODY + "    No();\n"),
+    "a lemma without body": wrong(STEP, "  lemma No() ensures false\n" + STEP).replace(BODY, BODY + "    No();\n"),
+    "a lemma that calls itself": wrong(STEP, "  lemma No() ensures false decreases * { No(); }\n" + STEP),
+    "a function without body": wrong(
+        STEP, "  function No(): int\n    ensures false\n" + STEP
+    ).replace(BODY, BODY + "    ghost var x := No();\n"),
+    "a function with a match in its ensures and no body": wrong(
+        STEP, "  function No(l: Types.Light): int\n    ensures match l { case red => false case green => false }\n" + STEP
+    ).replace(BODY, BODY + "    ghost var x := No(out_light);\n"),
+    "no termination": wrong(
+        "returns (out_light: Types.Light, out_n: nat)\n",
+        "returns (out_light: Types.Light, out_n: nat)\n    decreases *\n",
+    ).replace(BODY, BODY + "    while true decreases * { }\n"),
+    "a step without body": GOOD[: GOOD.index("  {\n    out_n")] + "}\n",
+    "an empty module": 'include "lamp_spec.dfy"\n' + HEAD + "}\n",
+    "an empty file": "",
+    "another module's name": GOOD.replace("LampImpl", "OtherImpl"),
+    "no refinement": GOOD.replace(" refines LampSpec", ""),
+    "an abstract module": GOOD.replace("module LampImpl", "abstract module LampImpl"),
+    "within another module": f"module Outer {{\n{WRONG.replace(chr(10), ' ', 1)}}}\n",
+    "options on the module": wrong("module LampImpl", 'module {:options "/noVerify"} LampImpl'),
+    "extern": wrong("method Step", "method {:extern} Step"),
+    "an extern lemma": wrong(STEP, "  lemma {:extern} No() ensures false\n" + STEP).replace(BODY, BODY + "    No();\n"),
+    "an inclusion": 'include "other.dfy"\n' + WRONG,
+    "an inclusion that escapes": 'include "../../etc/lamp_spec.dfy.dfy"\n' + WRONG,
+    "a constant of no type": wrong(
+        STEP, "  type No = x: int | false witness *\n  const no: No\n" + STEP
+    ),
+    "a false predicate of the same name": wrong(STEP, "  predicate high(in_r: real, out_light: Types.Light) { true }\n" + STEP),
+    "a module Contract inside": wrong(
+        STEP, "  module Contract { predicate high(r: real, l: int) { true } }\n" + STEP
+    ),
+    "another import of that name": "module Evil { }\n" + wrong(HEAD, HEAD + "  import Contract = Evil\n"),
+    "another datatype of that name": wrong(STEP, "  datatype Light = red | green\n" + STEP),
+    "an Env that nothing meets": wrong("{ true }", "{ in_r < 0.0 }"),
+    "an Env that nothing meets, with a lemma that assumes": wrong("{ true }", "{ in_r < 0.0 }").replace(
+        "in_r := 0.0;", "assume in_r < 0.0 && 0.0 <= in_r;"
+    ),
+    "its own precondition": wrong(
+        "out_n: nat)\n", "out_n: nat)\n    requires in_r < 10.0\n"
+    ),
+    "not Dafny at all": "}}}} \x00 {:verify",
+    "only a comment": "/* " + GOOD + " */",
+    "an attribute of a later Dafny": wrong(STEP, "  @Verify(false)\n" + STEP),
+    "assume by another name": wrong(BODY, BODY + "    assume/**/ false;\n"),
+    "assume in a helper's calc": wrong(
+        STEP, "  lemma No() ensures false { calc { 1; { assume 1 == 2; } 2; } }\n" + STEP
+    ).replace(BODY, BODY + "    No();\n"),
+    "a false claim about division": wrong(BODY, BODY + "    assert 1 / 0 == 2;\n"),
+}  # fmt: skip
+
+
+@pytest.mark.needs_dafny
+@pytest.mark.parametrize("name", TRICKS)
+def test_no_trick_is_proved(make_job: MakeJob, tmp_path: Path, name: str) -> None:
+    outcomes = settle(make_job, tmp_path, TRICKS[name])
+    verdicts = {outcome.verdict for outcome in outcomes.values()}
+    # `low` and `count` may be proved of the wrong lamp where nothing else is amiss, but never `high`
+    assert outcomes["high"].verdict in (Verdict.UNKNOWN, Verdict.ERROR), outcomes["high"]
+    assert verdicts <= {Verdict.UNKNOWN, Verdict.ERROR, Verdict.PROVED}
+
+
+@pytest.mark.needs_dafny
+def test_the_good_lamp_is_proved(make_job: MakeJob, tmp_path: Path) -> None:
+    for outcome in settle(make_job, tmp_path, GOOD).values():
+        assert outcome.verdict is Verdict.PROVED, outcome
+
+
+@pytest.mark.needs_dafny
+def test_only_the_broken_guarantee_is_unproved(make_job: MakeJob, tmp_path: Path) -> None:
+    outcomes = settle(make_job, tmp_path, WRONG)
+    assert outcomes["high"].verdict is Verdict.UNKNOWN
+    assert "postcondition" in outcomes["high"].summary
+    assert outcomes["low"].verdict is Verdict.PROVED
+    assert outcomes["count"].verdict is Verdict.PROVED
+
+
+@pytest.mark.needs_dafny
+def test_what_env_adds_is_a_hypothesis(make_job: MakeJob, tmp_path: Path) -> None:
+    outcome = settle(make_job, tmp_path, WRONG.replace("{ true }", "{ in_r < 10.0 }"))["high"]
+    assert outcome.verdict is Verdict.PROVED
+    assert outcome.hypotheses == ("added assumption of the implementation, Env: in_r < 10.0",)
+
+
+@pytest.mark.needs_dafny
+@pytest.mark.parametrize("name", ["assume false", "an axiom", "a lemma without body", "extern", "no termination"])
+def test_what_is_taken_for_granted_is_shown(make_job: MakeJob, tmp_path: Path, name: str) -> None:
+    """Here on the good lamp: all verifies, and still it is no proof."""
+    good = TRICKS[name].replace("else { out_light := Types.Light.green; }", "else { out_light := Types.Light.red; }")
+    for outcome in settle(make_job, tmp_path, good).values():
+        assert outcome.verdict in (Verdict.UNKNOWN, Verdict.ERROR), outcome
+
+
+def scanned(text: str) -> Scan:
+    return scan(text, "LampSpec", "LampImpl", ("types.dfy", "lamp_contract.dfy", "lamp_spec.dfy"))
+
+
+class TestScan:
+    def test_the_good_lamp_takes_nothing_for_granted(self) -> None:
+        found = scanned(GOOD)
+        assert found.hypotheses == ()
+        assert found.problems == ()
+        assert found.environment == "true"
+        assert found.members == (("lemma", "EnvNotEmpty"), ("method", "Step"))
+        assert "include" not in found.text
+        assert found.text.count("\n") == GOOD.count("\n")
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "// assume false {:axiom}\n",
+            "/* assume /* nested */ {:verify false} */",
+            'const s := "assume {:axiom} /* ";',
+            'const s := @"a""assume";',
+            "method M() { var c := '\"'; var d := '\\''; }",
+            'module {:options "--function-syntax:4"} M { }',
+            "method M(x': int, x'': int) { }",
+            "lemma {:induction false} L() { }",
+        ],
+    )
+    def test_comments_and_strings_hide_and_show_nothing(self, text: str) -> None:
+        assert scanned(GOOD + text).hypotheses == ()
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "method M() { assume false; }",
+            "/* */ assume x;",
+            "/* /* */ */ assume x;",
+            "// \nassume x;",
+            '"\\"" assume x;',
+            "'\"' assume x;",
+            "method {:axiom} M()",
+            "method {: axiom} M()",
+            "method { :axiom} M()",
+            "method {/* */:/* */axiom} M()",
+            "// a comment\rassume false;",
+            "#if X\n/*\n#endif\nassume false;\n#if X\n*/\n#endif\n",
+            "method M() { var x := 0.assume; }",
+            "method {:verify\nfalse} M()",
+            'module {:options "--function-syntax:3", "/noVerify"} M { }',
+            'module {:options "/noVerify"} M { }',
+            "const c: int",
+            "const c: int\nmethod M() { var x := 1; }",
+            "type T",
+            "type T(==)",
+            "decreases *",
+            "witness *",
+            "expect x;",
+            "@Axiom method M()",
+            "trait T { }",
+            "method {:unheard_of} M() { }",
+        ],
+    )
+    def test_openings_are_seen(self, text: str) -> None:
+        assert scanned(GOOD + text).hypotheses
+
+    def test_an_unended_comment_or_string_ends_the_scan_quietly(self) -> None:
+        for text in ("/* /* */", '"abc', '@"abc', "'", "{:", "include", "module", "const", "type", "predicate Env("):
+            scanned(text)
+            tokens(text)
