@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,7 +86,7 @@ def _events(trace: str) -> Iterator[Recorded]:
 
     def lines() -> Iterator[str]:
         try:
-            yield from io.TextIOWrapper(click.get_binary_stream("stdin"), encoding="utf-8", newline="\n")
+            yield from io.TextIOWrapper(sys.stdin.buffer, encoding="utf-8", newline="\n")
         except UnicodeDecodeError:
             raise Rejected(Diagnostic("MON204", "standard input is not UTF-8 text")) from None
 

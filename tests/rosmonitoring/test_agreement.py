@@ -1,0 +1,397 @@
+"""The key test: on generated contracts and traces the RML text, our engine and a brute-force reading agree.
+
+Three programs that share no evaluation code: the RML file is read back by our grammar and executed by an interpreter of
+RML's semantics; the engine runs compiled clauses; the brute force below rebuilds each snapshot from the events so far
+and lets quantifiers range over every value that occurs and some that do not.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+import pytest
+
+from avow.backends.rosmonitoring.engine import Fault, Monitor
+from avow.backends.rosmonitoring.options import setup
+from avow.backends.rosmonitoring.rml_interpreter import Interpreter
+from avow.backends.rosmonitoring.rml_translate import translate
+from avow.language.sorts import NaturalSort
+from avow.language.terms import (
+    And,
+    Apply,
+    Arithmetic,
+    Compare,
+    Construct,
+    EnumValue,
+    Iff,
+    Implies,
+    In,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    SetTerm,
+    Term,
+    Variable,
+    Widen,
+)
+from avow.system.plan import System
+
+RCL = """
+context {{
+  Colour : {{red, green}};
+  Command : {{ move(REAL), tell(NATURAL, Colour), stop }};
+  Place : REAL x NATURAL --> BOOL;
+  Marks : NATURAL --> BOOL;
+}}
+node n {{
+  inputs( r : REAL, k : NATURAL, colour : Colour, command : Command, at : Place, last : Marks )
+  outputs( flag : BOOL, s : REAL, marks : Marks, light : Colour )
+  topics( a/R r matches(in.r), a/K k matches(in.k), a/C colour matches(in.colour), a/D command matches(in.command),
+          a/P at matches(in.at), a/F flag matches(out.flag), a/S s matches(out.s), a/M marks matches(out.marks),
+          a/L light matches(out.light) )
+  guarantee g ( {formula} )
+}}
+"""
+
+MAPPING: dict[str, Any] = {
+    "in.r": "data",
+    "in.k": "value.k",
+    "in.colour": {"field": "level", "values": {"0": "green", "rouge": "red"}},
+    "in.command": {"constructor": "what", "move": ["to"], "tell": ["to", "c"], "values": {"halt": "stop"}},
+    "in.at": ["x", "id"],
+    "in.last": {"previous": "out.marks", "initial": []},
+    "out.flag": {"field": "on", "initial": True},
+    "out.s": {"field": "data", "initial": -1.5},
+    "out.marks": ["id"],
+    "out.light": "light",
+}
+
+
+# -- formulas, as text -------------------------------------------------------------------------------------------------
+
+
+def formula(rng: random.Random, depth: int, reals: tuple[str, ...] = (), naturals: tuple[str, ...] = ()) -> str:
+    def real() -> str:
+        return rng.choice(("in.r", "out.s", "0", "1", "2.5", "(0 - 1.5)", *reals, *reals))
+
+    def natural() -> str:
+        return rng.choice(("in.k", "0", "1", "in.k + 1", *naturals, *naturals))
+
+    def colour() -> str:
+        return rng.choice(("red", "green", "in.colour", "out.light"))
+
+    if depth == 0:
+        order = rng.choice(("<", "<=", ">", ">=", "==", "!="))
+        return rng.choice(
+            (
+                f"{real()} {order} {real()}",
+                f"{natural()} {order} {natural()}",
+                f"{colour()} {rng.choice(('==', '!='))} {colour()}",
+                f"{colour()} in {{red}}",
+                f"in.command == move({real()})",
+                f"in.command != tell({natural()}, {colour()})",
+                "in.command == stop",
+                f"in.at({real()}, {natural()})",
+                f"out.marks({natural()})",
+                f"in.last({natural()})",
+                "out.flag",
+                "out.flag == FALSE",
+            )
+        )
+
+    def sub(more_reals: tuple[str, ...] = (), more_naturals: tuple[str, ...] = ()) -> str:
+        return f"({formula(rng, depth - 1, (*reals, *more_reals), (*naturals, *more_naturals))})"
+
+    x, n = f"x{len(reals)}", f"n{len(naturals)}"
+    return rng.choice(
+        (
+            lambda: f"{sub()} and {sub()}",
+            lambda: f"{sub()} or {sub()}",
+            lambda: f"{sub()} -> {sub()}",
+            lambda: f"{sub()} <=> {sub()}",
+            lambda: f"not {sub()}",
+            lambda: f"forall({x} in REAL | (in.command == move({x})) -> {sub((x,))})",
+            lambda: f"exists({x} in REAL, {n} in NATURAL | in.at({x}, {n}) and {sub((x,), (n,))})",
+            lambda: f"forall({n} in NATURAL | (out.marks({n}) <=> in.last({n})) or {sub((), (n,))})",
+            lambda: f"forall({n} in NATURAL | out.marks({n}) -> (in.last({n}) or {sub((), (n,))}))",
+            lambda: f"exists_unique({x} in REAL, {n} in NATURAL | in.at({x}, {n}) and {sub((x,), (n,))})",
+            lambda: f"exists({n} in NATURAL | {sub((), (n,))})",
+        )
+    )()
+
+
+# -- traces ------------------------------------------------------------------------------------------------------------
+
+
+def trace(rng: random.Random, length: int) -> list[dict[str, Any]]:
+    def number() -> Any:
+        return rng.choice((0, 1, 2.5, -1.5, 7))
+
+    def small() -> int:
+        return rng.choice((0, 1, 2))
+
+    def message() -> dict[str, Any]:
+        topic = rng.choice(("r", "k", "colour", "command", "at", "flag", "s", "marks", "light", "other"))
+        body: dict[str, Any]
+        match topic:
+            case "r" | "s":
+                return {"topic": topic, "data": number()}
+            case "k":
+                body = {"value": {"k": small()}}
+            case "colour":
+                body = {"level": rng.choice(("red", "green", 0, "rouge"))}
+            case "command":
+                body = rng.choice(
+                    (
+                        {"what": "move", "to": number()},
+                        {"what": "tell", "to": small(), "c": rng.choice(("red", "green"))},
+                        {"what": "halt"},
+                        {"what": "stop"},
+                    )
+                )
+            case "at":
+                body = {"x": number(), "id": small()}
+            case "flag":
+                body = {"on": rng.random() < 0.5}
+            case "marks":
+                body = {"id": small()}
+            case "light":
+                body = {"light": rng.choice(("red", "green"))}
+            case _:
+                body = {"anything": [1]}
+        if rng.random() < 0.02:
+            body = dict.fromkeys(body, "nonsense")
+        return {"topic": topic, "data": body} if rng.random() < 0.3 else {"topic": topic, **body}
+
+    return [{**message(), "time": k / 10} for k in range(length)]
+
+
+# -- brute force -------------------------------------------------------------------------------------------------------
+
+UNREADABLE = "unreadable"
+Snapshot = dict[str, Any]
+
+
+def read(event: Mapping[str, Any]) -> tuple[str, Any] | None:
+    """(variable, value): numbers as Fraction, elements as strings, commands as tuples, relations as sets of tuples."""
+    body = event["data"] if isinstance(event.get("data"), dict) else event
+    try:
+        match event["topic"]:
+            case "r":
+                return "in.r", real(event["data"])
+            case "s":
+                return "out.s", real(event["data"])
+            case "k":
+                return "in.k", whole(body["value"]["k"])
+            case "colour":
+                return "in.colour", {"red": "red", "rouge": "red", "green": "green", 0: "green"}[body["level"]]
+            case "light":
+                return "out.light", {"red": "red", "green": "green"}[body["light"]]
+            case "command":
+                match body["what"]:
+                    case "move":
+                        return "in.command", ("move", real(body["to"]))
+                    case "tell":
+                        colour = {"red": "red", "green": "green"}[body["c"]]
+                        return "in.command", ("tell", whole(body["to"]), colour)
+                    case "halt" | "stop":
+                        return "in.command", ("stop",)
+                return "in.command", UNREADABLE
+            case "at":
+                return "in.at", {(real(body["x"]), whole(body["id"]))}
+            case "marks":
+                return "out.marks", {(whole(body["id"]),)}
+            case "flag":
+                return "out.flag", body["on"] if isinstance(body["on"], bool) else UNREADABLE
+            case _:
+                return None
+    except (KeyError, TypeError, ValueError):
+        names = {"r": "in.r", "s": "out.s", "k": "in.k", "colour": "in.colour", "command": "in.command"}
+        names |= {"at": "in.at", "marks": "out.marks", "flag": "out.flag", "light": "out.light"}
+        return names[event["topic"]], UNREADABLE
+
+
+def real(raw: Any) -> Fraction:
+    if isinstance(raw, bool) or not isinstance(raw, int | float):
+        raise ValueError
+    return Fraction(str(raw))
+
+
+def whole(raw: Any) -> Fraction:
+    if real(raw).denominator != 1 or raw < 0:
+        raise ValueError
+    return real(raw)
+
+
+def truth(term: Term, snapshot: Snapshot, bound: dict[str, Any], reals: set[Any], naturals: set[Any]) -> Any:
+    def value(part: Term) -> Any:
+        return truth(part, snapshot, bound, reals, naturals)
+
+    match term:
+        case Literal(value=raw):
+            return raw if isinstance(raw, bool) else Fraction(raw) if not isinstance(raw, str) else raw
+        case EnumValue(name=name):
+            return name
+        case Variable():
+            return bound[term.name] if term.name in bound else snapshot[term.qualified]
+        case Construct(constructor=name, arguments=arguments):
+            return (name, *map(value, arguments))
+        case Apply(function=function, arguments=arguments):
+            return tuple(map(value, arguments)) in value(function)
+        case Widen(term=inner):
+            return value(inner)
+        case Negative(term=inner):
+            return -value(inner)
+        case Arithmetic(operator=operator, left=left, right=right):
+            return value(left) + value(right) if operator == "+" else value(left) - value(right)
+        case Compare(operator=operator, left=left, right=right):
+            a, b = value(left), value(right)
+            if operator in ("==", "!="):
+                return (a == b) is (operator == "==")
+            return {"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b}[operator]
+        case In(item=item, collection=SetTerm(items=items)):
+            return value(item) in [value(i) for i in items]
+        case Not(body=body):
+            return not value(body)
+        case And(items=items):
+            return all(value(i) for i in items)
+        case Or(items=items):
+            return any(value(i) for i in items)
+        case Implies(left=left, right=right):
+            return not value(left) or value(right)
+        case Iff(left=left, right=right):
+            return value(left) == value(right)
+        case Quantified(quantifier=quantifier, variables=variables, body=body):
+            pools = [naturals if isinstance(v.sort, NaturalSort) else reals for v in variables]
+            names = [v.name for v in variables]
+            found = (
+                truth(body, snapshot, {**bound, **dict(zip(names, chosen, strict=True))}, reals, naturals)
+                for chosen in product(*pools)
+            )
+            if quantifier is Quantifier.UNIQUE:
+                return sum(found) == 1
+            return any(found) if quantifier is Quantifier.EXISTS else all(found)
+    raise AssertionError(term)
+
+
+REALS = {Fraction(v, 2) for v in (-5, -3, -1, 0, 1, 2, 4, 5, 8, 14, 17)}
+NATURALS = {Fraction(v) for v in range(5)}
+"""Large enough for these formulas: every value that occurs in them and in the traces, one between each two neighbours,
+and one beyond each end."""
+
+
+def brute_force(system: System, events: list[dict[str, Any]]) -> int | None:
+    """The index (from 1) of the first event that breaks the guarantee or cannot be read, by the definition."""
+    clause = system.contract.node("n").guarantees[0]
+    mentioned = names_of(clause.formula)
+    needed = mentioned | ({"out.marks"} if "in.last" in mentioned else set())
+    outputs = {n for n in mentioned if n.startswith("out.")}
+    triggers = outputs or (mentioned - {"in.last"}) or {"out.marks"}
+    snapshot: Snapshot = {"out.flag": True, "out.s": Fraction(-3, 2), "in.last": set()}
+    for index, event in enumerate(events, start=1):
+        update = read(event)
+        if update is None:
+            continue
+        name, content = update
+        if content == UNREADABLE:
+            if name in needed:
+                return index
+            snapshot.pop(name, None)
+            continue
+        snapshot[name] = content
+        judged = name in triggers and mentioned <= snapshot.keys()
+        if judged and not truth(clause.formula, snapshot, {}, REALS, NATURALS):
+            return index
+        if name == "out.marks":
+            snapshot["in.last"] = content
+    return None
+
+
+def names_of(term: Term) -> set[str]:
+    from avow.language.terms import Role, children
+
+    found = {term.qualified} if isinstance(term, Variable) and term.role is not Role.BOUND else set()
+    for child in children(term):
+        found |= names_of(child)
+    return found
+
+
+# -- the comparison ----------------------------------------------------------------------------------------------------
+
+
+def first_rejected(text: str, events: list[dict[str, Any]]) -> int | None:
+    monitor = Interpreter(text)
+    for index, event in enumerate(events, start=1):
+        if monitor.step(event) == "false":
+            return index
+    return None
+
+
+def first_reported(system: System, events: list[dict[str, Any]], needed: set[str]) -> int | None:
+    found, faults = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    assert not faults
+    monitor = Monitor(found)
+    for event in events:
+        for violation in monitor.step(event):
+            if violation.fault is not Fault.MAPPING or violation.clause in needed:
+                return violation.index
+    assert monitor.tallies["g"].undecided == 0
+    return None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rml_engine_and_brute_force_agree(seed: int, make_system: Callable[..., System]) -> None:
+    rng = random.Random(seed)
+    translated = broken = clean = 0
+    for _ in range(10):
+        text = formula(rng, rng.choice((1, 2, 2, 3)))
+        system = make_system(RCL.format(formula=text), MAPPING)
+        node = system.contract.node("n")
+        found, _ = setup(system, node, system.plan.node("n").methods[0].options)
+        made = translate(found, node.guarantees)
+        mentioned = names_of(node.guarantees[0].formula)
+        needed = mentioned | ({"out.marks"} if "in.last" in mentioned else set())
+        for _ in range(4):
+            events = trace(rng, 30)
+            expected = brute_force(system, events) if mentioned - {"in.last"} or mentioned else None
+            if mentioned:
+                assert first_reported(system, events, needed) == expected, (text, events)
+            if not made.refused:
+                assert first_rejected(made.text, events) == expected, (text, made.text, events)
+                translated += 1
+                broken += expected is not None
+                clean += expected is None
+    assert translated >= 12
+    assert broken >= 3
+    assert clean >= 2
+
+
+def test_most_of_these_formulas_are_monitorable_in_rml(make_system: Callable[..., System]) -> None:
+    rng = random.Random(99)
+    refused = []
+    for _ in range(30):
+        system = make_system(RCL.format(formula=formula(rng, 2)), MAPPING)
+        node = system.contract.node("n")
+        found, _ = setup(system, node, system.plan.node("n").methods[0].options)
+        refused += translate(found, node.guarantees).refused.values()
+    assert len(refused) < 15
+    assert all(reason.startswith("not monitorable in RML: ") for reason in refused)
+
+
+def test_the_interpreter_notices_a_changed_threshold(make_system: Callable[..., System]) -> None:
+    """A control: a wrong translation does not pass the comparison."""
+    system = make_system(RCL.format(formula="in.r < 2.5 -> out.flag"), MAPPING)
+    node = system.contract.node("n")
+    found, _ = setup(system, node, system.plan.node("n").methods[0].options)
+    text = translate(found, node.guarantees).text
+    events = [{"topic": "r", "data": 2.4}, {"topic": "flag", "on": False}]
+    assert first_rejected(text, events) == 2
+    assert "2.5" in text
+    assert first_rejected(text.replace("2.5", "2.3"), events) is None
