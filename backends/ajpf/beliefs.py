@@ -93,6 +93,7 @@ class Reasoner:
         if condition.term is None:
             yield bindings
             return
+        ways: Iterator[Bindings]
         if condition.is_goal:
             ways = (u for g in goals if (u := unify(condition.term, g, bindings)) is not None)
         else:

@@ -61,6 +61,8 @@ class Checker:
         self.places = {atom: at for at, atom in enumerate(self.atoms)}
         self.labels = _labels(self.graph, self.atoms)
         self.reduced = reduce(self.whole(self.labels))
+        while len(smaller := reduce(self.reduced)) < 0.95 * len(self.reduced):
+            self.reduced = smaller
 
     def whole(self, labels: Sequence[int]) -> Kripke:
         offsets, targets = self.graph.offsets, self.graph.targets
@@ -193,7 +195,7 @@ def needs_fine_steps(properties: Iterable[Property]) -> bool:
 
 
 def explain(graph: Graph, lasso: Lasso, values: Mapping[str, str], explanation: str) -> Counterexample:
-    """The run in words: what the agent did last, what it believes beyond what it always does, what is new to perceive."""
+    """The run in words: what the agent did last, what it believes beyond its first beliefs, what is new to perceive."""
     always = frozenset(graph.agent.program.beliefs)
     trace: list[tuple[tuple[str, str], ...]] = []
     loop: int | None = None

@@ -34,9 +34,7 @@ class Graph:
         return len(self.targets)
 
 
-def explore(
-    agent: Agent, *, states: int = MAX_STATES, seconds: float = 60.0, megabytes: int = 4096
-) -> Graph:
+def explore(agent: Agent, *, states: int = MAX_STATES, seconds: float = 60.0, megabytes: int = 4096) -> Graph:
     """Every reachable state, breadth first, as far as the bounds let it (`Graph.unfinished`)."""
     deadline = time.monotonic() + seconds
     memory = _memory() + megabytes

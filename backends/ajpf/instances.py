@@ -1,7 +1,7 @@
 """A guarantee as properties: one instance for each value of its index variables, ``[] (H -> <> C)`` each.
 
-H and C are the guarantee's antecedent and consequent, mapped. Where the consequent speaks of inputs too, these belong to
-the moment of the trigger and move to H. Alternatives in H give a property each, so that each has a vacuity of its own.
+H and C are the guarantee's antecedent and consequent, mapped. Where the consequent speaks of inputs too, these belong
+to the moment of the trigger and move to H. Alternatives in H give a property each, each with a vacuity of its own.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The Gwendolen reasoning cycle as a transition system (design: page "AJPF and Gwendolen", "the subset, and its cycle").
+"""The Gwendolen reasoning cycle as a transition system (design: page "AJPF and Gwendolen", "the subset").
 
 One cycle: perceive; take the next intention; choose a plan for its top event; execute ONE deed. States are observed
 after perception and after each deed, which is where AJPF looks at its properties too. Everything that a state holds is

@@ -13,11 +13,11 @@ from avow.backends.ajpf import psl
 from avow.backends.ajpf.matching import Binding, choose, match
 from avow.backends.ajpf.psl import Formula
 from avow.backends.ajpf.psl_parser import Malformed, instantiate
-from avow.backends.ajpf.shape import conjunction, conjuncts, disjunction, disjuncts, free, shape
+from avow.backends.ajpf.shape import conjunction, conjuncts, disjunction, free, shape
 from avow.diagnostics import Span
 from avow.language.printer import show_term
 from avow.language.sorts import IntegerSort, NaturalSort
-from avow.language.terms import FALSE, TRUE, And, Literal, Not, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import And, Literal, Not, Or, Quantified, Quantifier, Role, Term, Variable
 from avow.logic.formula import substitute
 from avow.logic.traversal import subterms
 

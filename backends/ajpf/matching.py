@@ -1,5 +1,5 @@
-"""Matching of normal forms (`shape`) against patterns: up to renaming of bound variables and the order of ``and``, ``or``,
-``==`` and sets. Pattern variables stand for terms; ``i + 1`` in a pattern matches the number 5 with i = 4."""
+"""Matching of normal forms (`shape`) against patterns: up to renaming of bound variables and the order of ``and``,
+``or``, ``==`` and sets. Pattern variables stand for terms; ``i + 1`` in a pattern matches the number 5 with i = 4."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from avow.language.terms import (
     And,
     Arithmetic,
     Compare,
-    In,
     Literal,
     Or,
     Quantified,

@@ -36,7 +36,11 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*'*")
 _RANGES: dict[str, Any] = {
     "type": "object",
     "additionalProperties": {
-        "anyOf": [_TEXT, {"type": "integer"}, {"type": "array", "items": {"type": ["integer", "string"]}, "minItems": 1}]
+        "anyOf": [
+            _TEXT,
+            {"type": "integer"},
+            {"type": "array", "items": {"type": ["integer", "string"]}, "minItems": 1},
+        ]
     },
 }
 SCHEMA: dict[str, Any] = {

@@ -23,7 +23,6 @@ from avow.backends.ajpf.syntax import (
     Rule,
     Sign,
     Struct,
-    Term,
     Var,
     is_ground,
     show,
@@ -141,7 +140,7 @@ def _build(method: Any) -> Any:
     return v_args(meta=True)(method)
 
 
-class _Builder(Transformer[Token, Any]):
+class _Builder(Transformer):  # type: ignore[misc]
     """Parse tree to data. Its recursion is bounded: only terms nest, and `struct` measures how deep."""
 
     def __init__(self, file: str) -> None:

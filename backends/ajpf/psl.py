@@ -1,7 +1,7 @@
 """AJPF's property specification language: formulas, and how they are written so that AJPF reads what is meant.
 
-AJPF's grammar has traps (design: page "AJPF and Gwendolen", "The property file"): ``||`` binds tighter than ``&``, ``->``
-associates to the left, ``<>[]p`` loses its inner operator. The printer brackets every operand that is not a proposition.
+AJPF's grammar has traps (design: page "AJPF and Gwendolen", "The property file"): ``||`` binds tighter than ``&``,
+``->`` associates to the left, ``<>[]p`` loses its inner operator. The printer brackets whatever is no proposition.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ MAX_NESTING = 60
 
 _TOKEN = re.compile(r"\s*(\[\]|<>|->|\|\||[~&(),+\-]|[A-Za-z_][A-Za-z0-9_']*|[0-9]+(?:\.[0-9]+)?|\Z|.)", re.DOTALL)
 _NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?\Z")
-_BINARY = {"U": Until, "R": Release, "->": Implies}
+_BINARY: Mapping[str, Callable[[Formula, Formula], Formula]] = {"U": Until, "R": Release, "->": Implies}
 
 
 class Malformed(Exception):  # noqa: N818 - it names the text
@@ -95,7 +95,7 @@ class _Parser:
         return token
 
     def property(self, depth: int) -> Formula:
-        """One kind of operator at a level: a mixture is refused, since AJPF's precedences are not what people expect."""
+        """One kind of operator at a level: a mixture is refused, as AJPF's precedences are not what people expect."""
         if depth > MAX_NESTING:
             raise Malformed(f"brackets nested more than {MAX_NESTING} deep", self.now.offset)
         items = [self.unary(depth)]

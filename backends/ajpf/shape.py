@@ -1,8 +1,8 @@
 """A normal form of formulas for matching against a plan's table: what differs in writing only must look the same.
 
 Negation normal form over ``== < <= in`` and applications; ``f(x) == TRUE`` is ``f(x)``; ``t != s`` and ``!in`` are
-negations; quantifiers stand as far inside as they can: ``exists(x | P or Q)`` is two, and what does not mention x stands
-outside. (All sorts are non-empty, so that is sound.) Meaning is kept exactly.
+negations; quantifiers stand as far inside as they can: ``exists(x | P or Q)`` is two, and what does not mention x
+stands outside. (All sorts are non-empty, so that is sound.) Meaning is kept exactly.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def _value(term: Term) -> Term:
     if isinstance(term, Literal):
         if isinstance(term.sort, IntegerSort | NaturalSort) and isinstance(term.value, int):
             return _integer(term.value)
-        return Literal(Fraction(term.value), term.sort) if isinstance(term.sort, RealSort) else term  # type: ignore[arg-type]
+        return Literal(Fraction(term.value), term.sort) if isinstance(term.sort, RealSort) else term
     parts = tuple(_formula(p, True) if p.sort == BOOL and children(p) else _value(p) for p in children(term))
     made = rebuild(term, parts)
     match made:

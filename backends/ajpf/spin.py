@@ -66,7 +66,7 @@ def _verdict(folder: Path, claim: str, depth: int, seconds: float) -> bool:
     done = run(["./pan", "-a", "-n", f"-m{depth}", "-w18", "-N", claim], cwd=folder, seconds=seconds)
     text = done.stdout + done.stderr
     found = _ERRORS.search(text)
-    if done.timed_out or found is None or "too small" in text or "Search not completed" in text and found[1] == "0":
+    if done.timed_out or found is None or "too small" in text or ("Search not completed" in text and found[1] == "0"):
         raise NoOpinion(f"pan gave no answer: {text.strip()[:200]}")
     return found[1] == "0"
 
@@ -74,7 +74,7 @@ def _verdict(folder: Path, claim: str, depth: int, seconds: float) -> bool:
 def _model(checker: Checker, properties: Sequence[Property]) -> str:
     degrees = [checker.graph.offsets[s + 1] - checker.graph.offsets[s] for s in range(len(checker.graph))]
     most = max([*degrees, len(checker.graph.initial)])
-    lines = ['c_decl {\n\\#include \"graph.h\"\n}', "int s = 0;", ""]
+    lines = ['c_decl {\n\\#include "graph.h"\n}', "int s = 0;", ""]
     atoms = len(checker.atoms)
     fair = len(checker.graph.agent.environment.fair)
     for bit in range(atoms + 2 * fair):
@@ -84,9 +84,7 @@ def _model(checker: Checker, properties: Sequence[Property]) -> str:
         step = f"c_code {{ now.s = target[offset[now.s] + {way}]; }}"
         lines.append(f"  :: atomic {{ c_expr {{ offset[now.s + 1] - offset[now.s] > {way} }} -> {step} }}")
     lines += ["  od", "}", ""]
-    premise = [
-        f"((<> ([] (!a{atoms + 2 * at}))) || ([] (<> a{atoms + 2 * at + 1})))" for at in range(fair)
-    ]
+    premise = [f"((<> ([] (!a{atoms + 2 * at}))) || ([] (<> a{atoms + 2 * at + 1})))" for at in range(fair)]
     for number, p in enumerate(properties):
         formula = _ltl(p.formula, checker.places)
         whole = f"(!({' && '.join(premise)})) || ({formula})" if premise else formula

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from avow.backends.ajpf.automaton import Automaton
@@ -19,6 +19,9 @@ class Kripke:
     initial: tuple[int, ...]
     successors: Sequence[Sequence[int]]
     labels: Sequence[int]
+
+    def __len__(self) -> int:
+        return len(self.labels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +40,12 @@ class Lasso:
     loop: int
 
 
-def components(roots: Iterable[int], successors: Successors) -> list[list[int]]:
-    """Tarjan's strongly connected components, each after those that it can reach."""
+def components(roots: Iterable[int], successors: Successors) -> Iterator[list[int]]:
+    """Tarjan's strongly connected components, each after those that it can reach; found as they are asked for."""
     index: dict[int, int] = {}
     low: dict[int, int] = {}
     on_stack: set[int] = set()
     stack: list[int] = []
-    found: list[list[int]] = []
     for root in roots:
         if root in index:
             continue
@@ -74,8 +76,7 @@ def components(roots: Iterable[int], successors: Successors) -> list[list[int]]:
                         component.append(member)
                         if member == node:
                             break
-                    found.append(component)
-    return found
+                    yield component
 
 
 def reduce(graph: Kripke) -> Kripke:

@@ -21,7 +21,7 @@ class Var:
 
 @dataclass(frozen=True, slots=True)
 class Struct:
-    """``going(1)``, ``door``, ``-8.18``, ``"text"``: numbers and texts are constants that keep how they were written."""
+    """``going(1)``, ``door``, ``-8.18``, ``"text"``: numbers and texts are constants too."""
 
     functor: str
     args: tuple[Term, ...] = ()

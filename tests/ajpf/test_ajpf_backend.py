@@ -38,7 +38,7 @@ def test_another_agent_with_other_names(lift, tmp_path):
 def test_the_percept_semantics_change_the_verdict_and_are_named(lift, tmp_path):
     """A call that came while the door was open fires no event when the door shuts, if events are for changes only."""
     files = {
-        "cabin.yaml": "draws: {at_quiescence: repeatedly}\npercepts: {door: [open, nothing], calls: [call(1), nothing]}\n",
+        "cabin.yaml": "draws: {at_quiescence: repeatedly}\npercepts: {door: [open, nothing], c: [call(1), nothing]}\n",
         "cabin.gwen": (FIXTURES / "lift" / "cabin.gwen").read_text().replace("+open : { True } <- halt(0);", ""),
     }
     assert settle(lift({"semantics": "mcapl"}, files), tmp_path)["answers"].verdict is Verdict.CHECKED
@@ -224,7 +224,11 @@ def test_bad_environments_are_located(lift, text, message):
 
 
 def test_a_bad_program_is_located(lift):
-    job = lift(files={"cabin.gwen": "GWENDOLEN\n:name: cabin\n:Initial Beliefs:\n:Initial Goals:\n:Plans:\n+a : { B b } <- ;\n"})
+    job = lift(
+        files={
+            "cabin.gwen": "GWENDOLEN\n:name: cabin\n:Initial Beliefs:\n:Initial Goals:\n:Plans:\n+a : { B b } <- ;\n"
+        }
+    )
     (error,) = [d for d in BACKEND.check(job) if d.is_error]
     assert (error.span.line, error.span.column) == (6, 17)
 

@@ -62,16 +62,19 @@ FAULTS = {
         {"next_waypoint"},
     ),
     "danger ignored on arrival": (
-        lambda text: text.replace("+movebase_result(Id, 3) : { B going(L), ~B going(0), ", "+movebase_result(Id, 3) : { B going(L), ").replace(
-            "{ ~B danger, ~B going(0), B location_coordinate(L,", "{ B location_coordinate(L,"
-        ),
+        lambda text: text.replace(
+            "+movebase_result(Id, 3) : { B going(L), ~B going(0), ", "+movebase_result(Id, 3) : { B going(L), "
+        ).replace("{ ~B danger, ~B going(0), B location_coordinate(L,", "{ B location_coordinate(L,"),
         {"exit_on_danger"},
     ),
     "the inspection not noted": (
         lambda text: text.replace("inspect(L), +inspected(L), -going(L)", "inspect(L), -going(L)"),
         {"inspect_here"},
     ),
-    "the old result believed on": (lambda text: text.replace("-movebase_result(Old, 3), +going(L)", "+going(L)"), {"inspect_here"}),
+    "the old result believed on": (
+        lambda text: text.replace("-movebase_result(Old, 3), +going(L)", "+going(L)"),
+        {"inspect_here"},
+    ),
     "the mission resumed": (
         lambda text: text + "\n-danger_red : { B going(0) } <- -going(0), +!visit(1) [perform];\n",
         {"abandon", "exit_on_danger"},
