@@ -13,7 +13,7 @@ from avow.language.terms import Term
 from avow.logic.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.logic.values import Data, FunctionValue, Value
 
-STEPS = 20_000
+STEPS = 5_000
 """Statements after which a run is given up."""
 
 State = dict[str, Value]
@@ -36,6 +36,8 @@ class Machine:
     """Runs programs; compiled expressions are kept."""
 
     steps: int = 0
+    endless: int = 0
+    """How many runs have been given up."""
     compiled: dict[int, tuple[Term, Evaluator]] = field(default_factory=dict)
 
     def run(self, body: Block, start: Mapping[str, Value]) -> State:
@@ -51,11 +53,15 @@ class Machine:
             self.compiled[id(term)] = (term, compile_term(term))
         return self.compiled[id(term)][1](state)
 
+    def _ended(self) -> None:
+        if self.steps > STEPS:
+            self.endless += 1
+            raise NoEnd
+
     def _block(self, body: Block, state: State) -> None:
         for statement in body:
             self.steps += 1
-            if self.steps > STEPS:
-                raise NoEnd
+            self._ended()
             self._statement(statement, state)
 
     def _statement(self, statement: Statement, state: State) -> None:
@@ -92,8 +98,7 @@ class Machine:
             case While(condition=condition, body=body):
                 while self._compute(condition, state, at):
                     self.steps += 1
-                    if self.steps > STEPS:
-                        raise NoEnd
+                    self._ended()
                     self._block(body, state)
 
     def _compute(self, term: Term, state: State, at: Span) -> Value:

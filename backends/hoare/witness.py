@@ -42,6 +42,9 @@ _NUMERIC: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
 _TRIED = 300
 """Inputs tried where the solver does not lead to one (programs with loops)."""
 
+_ENDLESS = 3
+"""Runs without an end after which no more inputs are tried."""
+
 
 @dataclass(frozen=True, slots=True)
 class Breach:
@@ -68,6 +71,8 @@ def breach(triple: Triple, program: Program, failed: Sequence[Condition], millis
             found = _shown(triple, program, machine, values)
             if found is not None:
                 return found
+            if machine.endless >= _ENDLESS:
+                break
     return None
 
 
