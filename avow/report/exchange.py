@@ -8,8 +8,6 @@ from typing import Any
 from urllib.parse import quote
 from xml.sax.saxutils import escape, quoteattr
 
-import yaml
-
 from avow.assurance.argument import Argument, Shape
 from avow.assurance.codec import to_json
 from avow.assurance.model import Case, ObligationView
@@ -17,12 +15,13 @@ from avow.assurance.naming import is_advice, sanity_property, short
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.files import digest
+from avow.report.layout import json_text, yaml_text
 from avow.report.wording import MEANINGS, clean, tone
 
 
 def render_json(case: Case) -> str:
     """The whole case (schema: docs/schemas/case.schema.json)."""
-    return json.dumps(to_json(case), indent=1, ensure_ascii=True) + "\n"
+    return json_text(to_json(case))
 
 
 def headline(view: ObligationView) -> str:
@@ -128,7 +127,7 @@ def render_sarif(case: Case, *, findings_only: bool = False) -> str:
         "properties": {"system": case.system, "grade": case.grade.value, "ledgerHead": case.ledger_head},
     }
     schema = "https://json.schemastore.org/sarif-2.1.0.json"
-    return json.dumps({"$schema": schema, "version": "2.1.0", "runs": [run]}, indent=1, ensure_ascii=True) + "\n"
+    return json_text({"$schema": schema, "version": "2.1.0", "runs": [run]}, depth=4)
 
 
 def _rule(view: ObligationView) -> str:
@@ -236,12 +235,10 @@ def _statement(case: Case, node: str, views: list[ObligationView], result: str) 
 
 def render_gsn(argument: Argument, case: Case) -> str:
     """The goal structure as gsn2x reads it."""
-    levels: dict[str, Any] = {
-        "module": {"name": clean(case.system), "brief": clean(case.title)},
-    }
+    levels: dict[str, Any] = {"module": {"name": case.system, "brief": case.title}}
     for element in argument.elements:
         status = f" [{element.status}]" if element.status else ""
-        body: dict[str, Any] = {"text": clean(f"{element.title}{status}\n{element.text}".strip())}
+        body: dict[str, Any] = {"text": f"{element.title}{status}\n{element.text}".strip()}
         if element.supported_by:
             body["supportedBy"] = list(element.supported_by)
         if element.in_context_of:
@@ -249,4 +246,4 @@ def render_gsn(argument: Argument, case: Case) -> str:
         if element.shape in (Shape.GOAL, Shape.STRATEGY) and not element.supported_by:
             body["undeveloped"] = True
         levels[element.id] = body
-    return yaml.safe_dump(levels, sort_keys=False, allow_unicode=True, width=110)
+    return yaml_text(levels)

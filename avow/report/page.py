@@ -22,10 +22,16 @@ from avow.assurance.trend import trend
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.report import picture, wording
+from avow.report.wording import history
 
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.WELL_FORMED)
 _OPEN_AT_ONCE = 60
 """So many rows of a long list are shown at once; the rest is folded."""
+_IN_FULL = 1500
+"""So many obligations are shown with everything, those with something to tell first; the others in brief, so that a
+page over ten thousand is still a page that opens."""
+_DRAWN = 2500
+"""So many elements of the argument are drawn on one page; the other pictures are in gsn.svg and gsn.yaml."""
 
 
 @cache
@@ -86,6 +92,8 @@ def render_page(case: Case) -> str:
             used_methods=_used_methods(case),
             statuses=[s for s in Status if any(view.standing is s for view in views)],
             levels=techniques() if case.policy.name.startswith("sil") else (),
+            full=_in_full(views),
+            brief=_brief,
             kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in views)],
             open_at_once=_OPEN_AT_ONCE,
             has_claim=lambda claim: claim in {v.id for v in case.obligations},
@@ -133,6 +141,33 @@ def _reading_order(case: Case) -> Any:
     kinds = {kind: at for at, kind in enumerate(KINDS)}
     order = {view.id: at for at, view in enumerate(case.obligations)}
     return lambda view: (nodes.get(view.obligation.node, len(nodes)), kinds[view.obligation.kind], order[view.id])
+
+
+def _in_full(views: Sequence[ObligationView]) -> set[str]:
+    if len(views) <= _IN_FULL:
+        return {view.id for view in views}
+    telling = [view.id for view in views if not view.standing.supports or view.handled or history(view)]
+    return set(telling[:_IN_FULL])
+
+
+def _brief(view: ObligationView) -> Markup:
+    """An obligation in a few lines; built by hand, as there may be ten thousand of them."""
+    o = view.obligation
+    status = view.standing
+    chip = f'<span class="chip {wording.tone(status)}">{wording.MARKS[status]} {status}</span>'
+    methods = escape(" ".join(method for method, _ in view.planned))
+    marks = f'data-node="{escape(o.node)}" data-kind="{o.kind}" data-status="{status}" data-methods="{methods}"'
+    said = "".join(
+        f"<li><b>{escape(e.method)}</b> {e.verdict}: {escape(e.summary)}"
+        f"{f' <span class=quiet>({escape(wording.bound_text(e.bound))})</span>' if e.bound else ''}</li>"
+        for e in (item.entry.evidence for item in view.counting)
+    )
+    formula = f'<pre class="formula">{escape(o.formula)}</pre>' if o.formula else ""
+    return Markup(
+        f'<details class="ob" id="{wording.anchor(o.id)}" {marks}><summary>{chip} <b>{escape(short(o.id))}</b> '
+        f'<span class="claim">{escape(o.claim)}</span></summary><div class="body">{formula}<ul>{said}</ul>'
+        f'<p class="quiet">{escape(wording.where(view))} <code>avow explain {escape(o.id)}</code></p></div></details>\n'
+    )
 
 
 def _counts(views: Sequence[ObligationView]) -> list[tuple[Kind, list[tuple[Status, int]], int]]:
@@ -183,8 +218,12 @@ def _pictures(case: Case, argument: Argument) -> list[tuple[str, Markup]]:
     def link(element: Element) -> str | None:
         return f"#{wording.anchor(element.claim)}" if element.claim else None
 
-    drawn = []
+    drawn: list[tuple[str, Markup]] = []
+    room = _DRAWN
     for requirement, start in argument.goals:
+        room -= min(picture.LIMIT, len(argument.below(start)))
+        if room < 0:
+            break
         label = f"Argument for {requirement}, as a goal structure; the same as a list follows"
         drawn.append((requirement, Markup(picture.draw(argument, start, link, label))))  # escaped in picture.py
     return drawn
@@ -193,12 +232,15 @@ def _pictures(case: Case, argument: Argument) -> list[tuple[str, Markup]]:
 def _outlines(argument: Argument) -> dict[str, list[tuple[int, Element]]]:
     """Each requirement's argument as an indented list: (depth, element), for those who do not look at pictures."""
     known = {element.id: element for element in argument.elements}
-    found = {}
+    found: dict[str, list[tuple[int, Element]]] = {}
+    room = _DRAWN
     for requirement, start in argument.goals:
+        if room <= 0:
+            break
         rows: list[tuple[int, Element]] = []
         seen: set[str] = set()
         stack = [(0, start)]
-        while stack and len(rows) < 2000:
+        while stack and len(rows) < room:
             depth, name = stack.pop()
             if name in seen:
                 continue
@@ -207,6 +249,7 @@ def _outlines(argument: Argument) -> dict[str, list[tuple[int, Element]]]:
             rows.append((min(depth, 12), element))
             stack += [(depth + 1, child) for child in reversed((*element.in_context_of, *element.supported_by))]
         found[requirement] = rows
+        room -= len(rows)
     return found
 
 

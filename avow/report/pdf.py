@@ -14,7 +14,7 @@ from avow.evidence.status import Status
 from avow.report import picture
 from avow.report.wording import MARKS, bound_text, clean, tone, verdict_line
 
-_MOST = 1500
+_MOST = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
 
 _MOST_IN_A_PICTURE = 90
