@@ -61,10 +61,10 @@ def _node(inputs: str = "", outputs: str = "b : BOOL", topics: str = "", clauses
 _FILE = (
     Code("RCL001", "no contract", "The file holds neither a context nor a node.", "// nothing yet"),
     Code("RCL002", "unreadable file", "The file does not exist, is a folder, or may not be read."),
-    Code("RCL003", "file too large", "A file of more than 16 MB is no contract."),
+    Code("RCL003", "file too large", "A file of more than 4 MB, or a million words and signs, is no contract."),
     Code("RCL004", "not UTF-8", "Contracts are UTF-8; the place is the first byte that cannot be read."),
     Code("RCL005", "not a text", "The file holds a NUL character.", "node n\0"),
-    Code("RCL006", "too many errors", "Of one file, 200 errors are shown; the others are counted.", "`1`a" * 210),
+    Code("RCL006", "too many errors", "Of one file, 200 diagnostics are shown, and then reading ends.", "`1`a" * 210),
 )
 
 _SYNTAX = (

@@ -66,6 +66,8 @@ class Declarations:
 
     def add(self, trees: Sequence[Tree], reports: Reports) -> None:
         for tree in trees:
+            if reports.full:
+                return
             new = _Declared(tree, reports)
             old = self.declared.get(new.name.text)
             if old is None:

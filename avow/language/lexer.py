@@ -10,6 +10,9 @@ from typing import NamedTuple
 
 from avow.language.source import Reports
 
+MAX_TOKENS = 1_000_000
+"""A text with more is no contract; a megabyte of RCL has some 250,000."""
+
 MAX_DIGITS = 500
 """Longer numbers are rejected: nobody means them, and arithmetic on them costs more than it is worth."""
 
@@ -134,7 +137,7 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
     at, end = 0, len(text)
     match_at = _PATTERN.match
     junk_from = junk_to = -1
-    while at < end:
+    while at < end and not reports.full:
         match = match_at(text, at)
         if match is None:  # pragma: no cover - the last alternative takes any character
             break
@@ -180,6 +183,10 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
             _junk(reports, junk_from, junk_to)
             junk_from, junk_to = start, at
     _junk(reports, junk_from, junk_to)
+    if len(found) > MAX_TOKENS:
+        last = found[MAX_TOKENS]
+        reports.error("RCL003", f"the text has more than {MAX_TOKENS:,} words and signs", last.start, last.end)
+        return []
     return found
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.language.checker import Checker
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations
@@ -23,7 +23,7 @@ from avow.language.sorts import Sort
 from avow.language.source import Reports, Source
 from avow.language.terms import Role, Term, Variable
 
-MAX_BYTES = 16_000_000
+MAX_BYTES = 4_000_000
 """A larger file is no contract."""
 
 _NOTHING = Contract((), (), (), ())
@@ -162,9 +162,10 @@ def _contract(parsed: Sequence[tuple[FileSyntax, Reports]], declarations: Declar
 
 def _sorted(reports: Reports) -> list[Diagnostic]:
     found = sorted(reports.found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0))
-    if reports.dropped:
-        at = found[-1].span if found else None
-        found.append(Diagnostic("RCL006", f"{reports.dropped} more errors are not shown", at))
+    if reports.full:
+        severity = Severity.ERROR if reports.failed else Severity.WARNING
+        message = f"there is more to say, but {len(found)} diagnostics of one file are enough"
+        found.append(Diagnostic("RCL006", message, found[-1].span, severity))
     return found
 
 

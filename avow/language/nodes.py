@@ -64,6 +64,8 @@ def check_node(
     counts = dict.fromkeys(ClauseKind, 0)
     seen: dict[str, Span] = {}
     for syntax in node.clauses:
+        if reports.full:
+            break
         counts[syntax.kind] += 1
         clause = _clause(syntax, counts[syntax.kind], scope, seen, reports)
         if clause is not None:

@@ -99,7 +99,7 @@ class _Reader:
         contexts = 0
         if not self.tokens and not self.reports.failed:
             self.reports.error("RCL001", "there is no contract here: neither a context nor a node", 0, 0)
-        while self.at < len(self.tokens):
+        while self.at < len(self.tokens) and not self.reports.full:
             if self.kind() == "CONTEXT":
                 contexts += 1
                 if contexts > 1:
@@ -159,7 +159,7 @@ class _Reader:
     def context(self) -> None:
         brace = self.open_brace("`context`")
         count = 0
-        while self.at < len(self.tokens) and self.kind() not in _TOP:
+        while self.at < len(self.tokens) and self.kind() not in _TOP and not self.reports.full:
             if self.kind() == "RBRACE":
                 if count == 0 and brace is not None:
                     self.reports.error("RCL114", "this context declares nothing", brace.start, brace.end)
@@ -226,7 +226,7 @@ class _Reader:
         brace = self.open_brace("the node's name")
         self.out.nodes.append(node)
         before, seen = "", dict[str, Token]()
-        while self.at < len(self.tokens) and self.kind() not in _TOP:
+        while self.at < len(self.tokens) and self.kind() not in _TOP and not self.reports.full:
             if self.kind() == "RBRACE":
                 self.at += 1
                 break

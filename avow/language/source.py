@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from avow.diagnostics import Diagnostic, Severity, Span
 
 MAX_DIAGNOSTICS = 200
-"""More than this of one file are of no use to anyone; the rest is counted, not kept."""
+"""More than this of one file are of no use to anyone: reading ends there."""
 
 
 @dataclass(slots=True)
@@ -49,15 +49,13 @@ class Reports:
 
     source: Source
     found: list[Diagnostic] = field(default_factory=list)
-    dropped: int = 0
     _seen: set[tuple[str, str, Span | None]] = field(default_factory=set)
 
     def add(self, diagnostic: Diagnostic) -> None:
         key = (diagnostic.code, diagnostic.message, diagnostic.span)
         if key in self._seen:
             return
-        if len(self.found) >= MAX_DIAGNOSTICS:
-            self.dropped += 1
+        if self.full:
             return
         self._seen.add(key)
         self.found.append(diagnostic)
@@ -73,7 +71,13 @@ class Reports:
         notes: tuple[tuple[str, Span | None], ...] = (),
         severity: Severity = Severity.ERROR,
     ) -> None:
-        self.add(Diagnostic(code, message, self.source.span(start, end), severity, hint, notes))
+        if not self.full:
+            self.add(Diagnostic(code, message, self.source.span(start, end), severity, hint, notes))
+
+    @property
+    def full(self) -> bool:
+        """Whether nothing more is kept, so that looking for more is in vain."""
+        return len(self.found) >= MAX_DIAGNOSTICS
 
     @property
     def failed(self) -> bool:
