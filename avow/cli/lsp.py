@@ -1,0 +1,20 @@
+"""``avow lsp``: the language server."""
+
+from __future__ import annotations
+
+import click
+
+
+@click.command()
+def command() -> int:
+    """Serve an editor on standard input and output: diagnostics, hover, definition, outline, formatting."""
+    from avow.diagnostics import Diagnostic, Rejected
+
+    try:
+        from avow.lsp.server import serve
+    except ImportError:
+        raise Rejected(
+            Diagnostic("CLI010", "the language server needs pygls", hint="pip install 'avow[lsp]'")
+        ) from None
+    serve()
+    return 0

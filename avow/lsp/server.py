@@ -1,0 +1,195 @@
+"""The language server over pygls: diagnostics, hover, definition, outline, formatting."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from lsprotocol import types
+from pygls.lsp.server import LanguageServer
+from pygls.uris import to_fs_path
+
+from avow import __version__
+from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.language.format import format_text
+from avow.language.load import read_source
+from avow.language.source import Source
+from avow.lsp import answers
+from avow.lsp.answers import Document, StatusLookup, Symbol
+
+_SEVERITIES = {
+    Severity.ERROR: types.DiagnosticSeverity.Error,
+    Severity.WARNING: types.DiagnosticSeverity.Warning,
+    Severity.NOTE: types.DiagnosticSeverity.Information,
+}
+_KINDS = {
+    "node": types.SymbolKind.Class,
+    "type": types.SymbolKind.Struct,
+    "constant": types.SymbolKind.Constant,
+    "assumption": types.SymbolKind.Event,
+    "guarantee": types.SymbolKind.Function,
+}
+
+
+def make_server(status: StatusLookup = lambda node, clause: None) -> LanguageServer:
+    """A server with every answer registered; `status` says how a clause of a node stands in the ledger."""
+    server = LanguageServer("avow", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Full)
+    documents: dict[str, Document] = {}
+
+    def refresh(uri: str) -> None:
+        text = server.workspace.get_text_document(uri).source
+        file = to_fs_path(uri) or uri
+        document = answers.analyse(text, file, documents.get(uri), _companions(file))
+        documents[uri] = document
+        server.text_document_publish_diagnostics(
+            types.PublishDiagnosticsParams(
+                uri=uri, diagnostics=[_diagnostic(d, document) for d in document.diagnostics]
+            )
+        )
+
+    def current(uri: str) -> Document:
+        if uri not in documents:
+            refresh(uri)
+        return documents[uri]
+
+    def opened(params: types.DidOpenTextDocumentParams) -> None:
+        refresh(params.text_document.uri)
+
+    def changed(params: types.DidChangeTextDocumentParams) -> None:
+        refresh(params.text_document.uri)
+
+    def saved(params: types.DidSaveTextDocumentParams) -> None:
+        refresh(params.text_document.uri)
+
+    def closed(params: types.DidCloseTextDocumentParams) -> None:
+        documents.pop(params.text_document.uri, None)
+
+    def hover(params: types.HoverParams) -> types.Hover | None:
+        document = current(params.text_document.uri)
+        said = answers.hover(document, _offset(document.text, params.position), status)
+        return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, said)) if said else None
+
+    def definition(params: types.DefinitionParams) -> types.Location | None:
+        document = current(params.text_document.uri)
+        span = answers.definition(document, _offset(document.text, params.position))
+        if span is None:
+            return None
+        if span.file == document.file:
+            return types.Location(params.text_document.uri, _range(span, document.text))
+        source = read_source(Path(span.file))
+        text = source.text if isinstance(source, Source) else ""
+        return types.Location(Path(span.file).resolve().as_uri(), _range(span, text))
+
+    def outline(params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
+        document = current(params.text_document.uri)
+        return [_symbol(s, document) for s in answers.symbols(document)]
+
+    def formatting(params: types.DocumentFormattingParams) -> list[types.TextEdit]:
+        document = current(params.text_document.uri)
+        try:
+            formatted = format_text(document.text, document.file)
+        except Rejected:
+            return []
+        lines = document.text.count("\n") + 1
+        whole = types.Range(types.Position(0, 0), types.Position(lines, 0))
+        return [types.TextEdit(whole, formatted)] if formatted != document.text else []
+
+    for feature, answer in (
+        (types.TEXT_DOCUMENT_DID_OPEN, opened),
+        (types.TEXT_DOCUMENT_DID_CHANGE, changed),
+        (types.TEXT_DOCUMENT_DID_SAVE, saved),
+        (types.TEXT_DOCUMENT_DID_CLOSE, closed),
+        (types.TEXT_DOCUMENT_HOVER, hover),
+        (types.TEXT_DOCUMENT_DEFINITION, definition),
+        (types.TEXT_DOCUMENT_DOCUMENT_SYMBOL, outline),
+        (types.TEXT_DOCUMENT_FORMATTING, formatting),
+    ):
+        server.feature(feature)(answer)
+    return server
+
+
+def serve(status: StatusLookup = lambda node, clause: None) -> None:
+    """Run on standard input and output until the editor leaves."""
+    make_server(status).start_io()
+
+
+def _companions(file: str) -> tuple[Source, ...]:
+    """The other files of the system that a file belongs to, where its folder has a plan that names it."""
+    path = Path(file)
+    plan_file = path.parent / "plan.yaml"
+    if not plan_file.is_file():
+        return ()
+    from avow.system.plan_file import read_plan
+
+    try:
+        files = read_plan(plan_file)[0].contract_files
+    except Rejected:
+        return ()
+    names = [f.resolve() for f in files]
+    if path.resolve() not in names:
+        return ()
+    found = [read_source(f) for f in names if f != path.resolve()]
+    return tuple(f for f in found if isinstance(f, Source))
+
+
+# --- the protocol's words --------------------------------------------------------------------------------------------
+
+
+def _units(text: str) -> int:
+    """The length in UTF-16 code units, in which the protocol counts columns."""
+    return len(text.encode("utf-16-le")) // 2
+
+
+def _position(line: int, column: int, lines: list[str]) -> types.Position:
+    content = lines[line - 1] if 0 < line <= len(lines) else ""
+    return types.Position(max(line - 1, 0), _units(content[: max(column - 1, 0)]))
+
+
+def _range(span: Span, text: str) -> types.Range:
+    lines = text.split("\n")
+    return types.Range(_position(span.line, span.column, lines), _position(span.end_line, span.end_column, lines))
+
+
+def _offset(text: str, position: types.Position) -> int:
+    lines = text.split("\n")
+    if position.line >= len(lines):
+        return len(text)
+    line = lines[position.line]
+    column = units = 0
+    while column < len(line) and units < position.character:
+        units += _units(line[column])
+        column += 1
+    return sum(len(row) + 1 for row in lines[: position.line]) + column
+
+
+def _diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnostic:
+    nowhere = Span(document.file, 1, 1, 1, 1)
+    message = diagnostic.message + (f"\n{diagnostic.hint}" if diagnostic.hint else "")
+    related = [
+        types.DiagnosticRelatedInformation(
+            types.Location(Path(place.file).resolve().as_uri(), _range(place, document.text)), note
+        )
+        for note, place in diagnostic.notes
+        if place is not None and place.file == document.file
+    ]
+    arguments: dict[str, Any] = {"related_information": related} if related else {}
+    return types.Diagnostic(
+        range=_range(diagnostic.span or nowhere, document.text),
+        message=message,
+        severity=_SEVERITIES[diagnostic.severity],
+        code=diagnostic.code,
+        source="avow",
+        **arguments,
+    )
+
+
+def _symbol(symbol: Symbol, document: Document) -> types.DocumentSymbol:
+    place = _range(symbol.span, document.text)
+    return types.DocumentSymbol(
+        name=symbol.name or "(no name)",
+        kind=_KINDS[symbol.kind],
+        range=place,
+        selection_range=place,
+        detail=symbol.detail,
+        children=[_symbol(s, document) for s in symbol.inner],
+    )
