@@ -1,0 +1,202 @@
+"""Gwendolen: the parser, and the reasoning cycle step by step."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from avow.backends.ajpf.environment import Environment
+from avow.backends.ajpf.explore import explore
+from avow.backends.ajpf.interpreter import NONE, Agent, Semantics
+from avow.backends.ajpf.parser import parse_fact, parse_program
+from avow.backends.ajpf.syntax import show, show_deed, show_event
+from avow.diagnostics import Rejected
+
+
+def program(plans: str, beliefs: str = "", rules: str = "", goals: str = ""):
+    rules = f":Reasoning Rules:\n{rules}\n" if rules else ""
+    text = f"GWENDOLEN\n:name: ag\n:Initial Beliefs:\n{beliefs}\n{rules}:Initial Goals:\n{goals}\n:Plans:\n{plans}\n"
+    return parse_program(text, "ag.gwen")
+
+
+def environment(*groups, at_quiescence="never", at_start=True):
+    named = tuple(
+        (f"g{n}", tuple(None if w is None else parse_fact(w) for w in group)) for n, group in enumerate(groups)
+    )
+    return Environment(named, {}, {}, frozenset({"print"}), at_start, at_quiescence, ())
+
+
+def run(plans, *groups, semantics=Semantics.MCAPL, at_quiescence="never", **sections):
+    """The states of the only run, as (beliefs, last action), without repetitions."""
+    agent = Agent(program(plans, **sections), environment(*groups, at_quiescence=at_quiescence), semantics)
+    graph = explore(agent, states=1000)
+    assert graph.unfinished is None
+    state, seen, said = graph.initial[0], set(), []
+    while state not in seen:
+        seen.add(state)
+        targets = set(graph.targets[graph.offsets[state] : graph.offsets[state + 1]])
+        beliefs = agent.beliefs.items[graph.states[state].beliefs]
+        last = graph.states[state].last
+        shown = (
+            sorted(show(b) for b in beliefs.own | beliefs.perceived),
+            "" if last == NONE else show(agent.actions.items[last]),
+        )
+        if not said or said[-1] != shown:
+            said.append(shown)
+        assert len(targets) == 1, "the run branches"
+        state = targets.pop()
+    return said
+
+
+def actions(said):
+    return [last for at, (_, last) in enumerate(said) if last and (at == 0 or said[at - 1][1] != last)]
+
+
+def test_it_reads_the_subset():
+    made = program(
+        '+!go(X) [perform] : { B p, ~G q(_) [achieve], True } <- +b(X, -2.50), *w, -!g(X) [achieve], act("a, b"); // c\n'
+        "-p : { True };",
+        beliefs="p f(a, 1.0), /* c */ q(f(-3))",
+        rules="r(X) :- p, ~s(X);",
+        goals="go(1) [perform]\nh [achieve]",
+    )
+    assert [show(b) for b in made.beliefs] == ["p", "f(a, 1)", "q(f(-3))"]
+    assert [show_event(p.event) for p in made.plans] == ["+!go(X) [perform]", "-p"]
+    assert [show_deed(d) for d in made.plans[0].deeds] == ["+b(X, -2.5)", "*w", "-!g(X) [achieve]", 'act("a, b")']
+    assert made.plans[0].span.line == 11
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "column"),
+    [
+        ("", 1, 1),
+        ("GWENDOLEN\n:name: ag\n:Initial Beliefs:\np(\n", 5, 1),
+        ("GWENDOLEN\n:name: ag\n:Initial Beliefs:\np(X)\n:Initial Goals:\n:Plans:\n", 4, 1),
+        ("GWENDOLEN\n:name: ag\n:Initial Beliefs:\n:Initial Goals:\n:Plans:\n+a : { B b <- c;", 6, 12),
+        ("GWENDOLEN\n:name: ag\n:Initial Beliefs:\n:Initial Goals:\n:Plans:\n+a : {} <- c;", 6, 7),
+        ("GWENDOLEN\n:name: ag\n:Initial Beliefs:\n:Initial Goals:\n:Plans:\n+a : { True } <- c", 6, 19),
+        ("GWENDOLEN\n:name: ag\n:Initial Beliefs:\n\u2028\n:Initial Goals:\n:Plans:\n", 4, 1),
+    ],
+)
+def test_bad_programs_are_located(text, line, column):
+    with pytest.raises(Rejected) as caught:
+        parse_program(text, "bad.gwen")
+    span = caught.value.diagnostics[0].span
+    assert (span.file, span.line, span.column) == ("bad.gwen", line, column)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.text(alphabet=st.sampled_from("GWENDOLEN:name Iitalbefsgop{}()<->+!*~,;.\"'/\n_X1é\x00"), max_size=120))
+def test_any_text_is_a_program_or_rejected(text):
+    for whole in (text, f"GWENDOLEN\n:name: ag\n:Initial Beliefs:\n{text}\n:Initial Goals:\n:Plans:\n{text}"):
+        try:
+            parse_program(whole, "f")
+        except Rejected as error:
+            assert error.diagnostics[0].span is not None
+
+
+def test_deep_terms_are_refused():
+    for depth in (100, 20_000):
+        with pytest.raises(Rejected):
+            program("", beliefs="f(" * depth + "a" + ")" * depth)
+
+
+def test_the_first_plan_whose_guard_holds_is_taken():
+    plans = "+p : { B no } <- a; +p : { ~B no, B v(X) } <- b(X); +p : { True } <- c;"
+    assert actions(run(plans, ["p"], beliefs="v(7)")) == ["b(7)"]
+
+
+def test_negated_guards_come_after_positive_ones_wherever_they_stand():
+    plans = "+p : { ~B w(X), B v(X) } <- a(X);"
+    assert actions(run(plans, ["p"], beliefs="v(1) v(2) w(1)")) == ["a(2)"]
+
+
+def test_one_deed_a_cycle_first_in_first_out_unfinished_ones_to_the_back():
+    plans = "+p : { True } <- +p1, +p2; +q : { True } <- +q1, +q2;"
+    said = run(plans, ["p"], ["q"])
+    order = [next(iter(set(after) - set(before))) for (before, _), (after, _) in zip(said[1:], said[2:], strict=False)]
+    assert order == ["p1", "q1", "p2", "q2"]
+
+
+def test_adding_a_belief_posts_an_event_only_if_it_is_new():
+    plans = "+p : { True } <- +b, +b; +b : { B n(X) } <- -n(X), +m(X);"
+    said = run(plans, ["p"], beliefs="n(1) n(2)")
+    assert sum(b.startswith("m(") for b in said[-1][0]) == 1
+
+
+def test_dropping_a_belief_drops_all_that_unify():
+    said = run("+p : { True } <- -n(X, 1);", ["p"], beliefs="n(1, 1) n(2, 1) n(3, 2)")
+    assert said[-1][0] == ["n(3, 2)", "p"]
+
+
+def test_reasoning_rules():
+    plans = "+p : { B safe(X) } <- a(X);"
+    assert actions(run(plans, ["p"], beliefs="v(1) v(2) hot(1)", rules="safe(X) :- v(X), ~hot(X);")) == ["a(2)"]
+
+
+def test_subgoals_and_their_bindings():
+    plans = "+!top [perform] : { B v(X) } <- +!sub(X) [perform], done(X);+!sub(Y) [perform] : { B w(Y, X) } <- act(X);"
+    assert actions(run(plans, [None], beliefs="v(1) w(1, 9)", goals="top [perform]")) == ["act(9)", "done(1)"]
+
+
+def test_achieve_goals_are_tried_until_believed():
+    plans = "+!g [achieve] : { ~B half } <- +half; +!g [achieve] : { B half } <- +g; "
+    said = run(plans, [None], goals="g [achieve]")
+    assert said[-1][0] == ["g", "half"]
+
+
+def test_goals_in_guards_and_dropped_goals():
+    plans = (
+        "+!g [perform] : { True } <- *never, bad;"
+        "+p : { G g } <- -!g [perform], after;"
+        "-!g [perform] : { True } <- dropped;"
+    )
+    found = actions(run(plans, ["p"], goals="g [perform]"))
+    assert set(found) == {"after", "dropped"}
+
+
+@pytest.mark.parametrize(("semantics", "expected"), [(Semantics.MCAPL, ["go"]), (Semantics.EDGE, ["go", "on"])])
+def test_waiting_for_something_derived(semantics, expected):
+    """MCAPL wakes a waiting intention only for a belief that unifies with what it waits for; a rule's head is none."""
+    plans = "+!g [perform] : { True } <- *safe, on; +p : { True } <- go, -danger;"
+    found = actions(
+        run(plans, ["p"], beliefs="danger", rules="safe :- ~danger;", goals="g [perform]", semantics=semantics)
+    )
+    assert found == expected
+
+
+@pytest.mark.parametrize("semantics", list(Semantics))
+def test_waiting_for_a_belief(semantics):
+    plans = "+!g [perform] : { True } <- *ready(X), on(X); +p : { True } <- +ready(3);"
+    assert actions(run(plans, ["p"], goals="g [perform]", semantics=semantics)) == ["on(3)"]
+
+
+@pytest.mark.parametrize(("semantics", "expected"), [(Semantics.MCAPL, 2), (Semantics.EDGE, 1)])
+def test_percepts_that_persist(semantics, expected):
+    """At each draw MCAPL drops and adds them again, so that their events fire again."""
+    plans = "+p : { B n(X) } <- -n(X), look;"
+    said = run(plans, ["p"], beliefs="n(1) n(2)", semantics=semantics)
+    assert 2 - sum(b.startswith("n(") for b in said[-1][0]) == expected
+
+
+def test_print_is_no_action_and_draws_nothing():
+    said = run('+p : { True } <- print("x"), act;', ["p"])
+    assert actions(said) == ["act"]
+
+
+def test_draws_branch_and_quiescence():
+    agent = Agent(program("+p : { True } <- act;"), environment(["p", None], at_quiescence="once"), Semantics.MCAPL)
+    graph = explore(agent)
+    assert len(graph.initial) == 2
+    assert max(graph.offsets[s + 1] - graph.offsets[s] for s in range(len(graph))) == 2
+    assert all(graph.offsets[s + 1] > graph.offsets[s] for s in range(len(graph)))
+
+
+def test_percepts_are_believed_no_longer_than_they_are_drawn():
+    agent = Agent(program("+p : { True } <- act;"), environment(["p", None]), Semantics.EDGE)
+    graph = explore(agent)
+    for state in graph.states:
+        beliefs = agent.beliefs.items[state.beliefs]
+        if not state.drawn:
+            assert set(agent.environment.percepts(agent.choices.items[state.choice])) == set(beliefs.perceived)

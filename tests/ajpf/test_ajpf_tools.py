@@ -1,0 +1,159 @@
+"""Outside engines: how AJPF's answers are read, and Spin's second opinion."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from avow.backend import Limits
+from avow.backends.ajpf import BACKEND, ajpf_tool, spin
+from avow.backends.ajpf.ajpf_tool import Said, judge
+from avow.process import Completed
+from avow.verdict import Verdict
+
+RESULTS = "====================================================== results\n"
+HOLDS = RESULTS + "no errors detected\n"
+VIOLATED = RESULTS + 'error #1: ajpf.MCAPLListener "An Accepting Path has been found: …"\n'
+PATH = "[MS: 0, BS: 1, UN: 0], [MS: 4, BS: 2, UN: 0], [MS: 4, BS: 2, UN: 1]"
+
+
+def completed(stdout="", stderr="", code=0):
+    return Completed(("java",), code, stdout, stderr, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("done", "said"),
+    [
+        (completed(HOLDS), Said.HOLDS),
+        (completed(VIOLATED, PATH), Said.VIOLATED),
+        (completed(""), Said.ERROR),
+        (completed("no errors detected"), Said.ERROR),
+        (completed(HOLDS + VIOLATED), Said.ERROR),
+        (completed(RESULTS + "error #1: gov.nasa.jpf.vm.NoUncaughtExceptionsProperty"), Said.ERROR),
+        (completed(HOLDS + "error #1: gov.nasa.jpf.vm.NoUncaughtExceptionsProperty"), Said.ERROR),
+        (completed(HOLDS, "line 1:14 mismatched input '<>' expecting '('"), Said.ERROR),
+        (completed(HOLDS, "line 1:3 extraneous input ')'"), Said.ERROR),
+        (completed("search constraint: depth\n" + HOLDS), Said.INCONCLUSIVE),
+        (completed(HOLDS, code=None), Said.TIMEOUT),
+        (completed("Exception in thread main", code=0), Said.ERROR),
+    ],
+)
+def test_answers_are_read_from_the_text_never_from_the_exit_code(done, said):
+    assert judge(done).said is said
+
+
+def test_the_path_of_a_violation():
+    assert judge(completed(VIOLATED, PATH)).path == (0, 4, 4)
+
+
+def _installed(tmp_path: Path, monkeypatch, answer: str) -> None:
+    """A stand-in for a Java with AJPF; it answers the same to every property."""
+    home = tmp_path / "mcapl"
+    (home / "bin").mkdir(parents=True)
+    (home / "lib" / "3rdparty").mkdir(parents=True)
+    (tmp_path / "answer").write_text(answer)
+    java = tmp_path / "java"
+    java.write_text(
+        "#!/bin/sh\n"
+        'if [ "$1" = -version ]; then echo \'openjdk version "11.0.13"\' >&2; exit 0; fi\n'
+        f'for last; do :; done; test -f "$last" || exit 3; echo "$last" >> {tmp_path}/asked\n'
+        f"cat {tmp_path}/answer\n"
+    )
+    java.chmod(0o755)
+    monkeypatch.setenv("AJPF_HOME", str(home))
+    monkeypatch.setenv("AVOW_AJPF_JAVA", str(java))
+
+
+@pytest.mark.parametrize(
+    ("answer", "verdict"),
+    [
+        (HOLDS, Verdict.CHECKED),
+        (VIOLATED, Verdict.REFUTED),
+        ("crash", Verdict.ERROR),
+        ("search constraint", Verdict.UNKNOWN),
+    ],
+)
+def test_ajpf_as_the_engine(lift, tmp_path, monkeypatch, answer, verdict):
+    _installed(tmp_path, monkeypatch, answer)
+    job = lift({"engine": "ajpf", "environment_class": "lift.Env"})
+    folder = tmp_path / "out"
+    for name, text in BACKEND.export(job).items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    report = BACKEND.discharge(job, folder, Limits(seconds=60))
+    assert {o.verdict for o in report.outcomes} == {verdict}
+    assert report.tool == "AJPF"
+    assert len((tmp_path / "asked").read_text().splitlines()) == 3
+    assert "env = lift.Env" in (folder / "ajpf-run.ail").read_text()
+
+
+def test_a_contradiction_between_engines_is_an_error(lift, tmp_path, monkeypatch):
+    _installed(tmp_path, monkeypatch, VIOLATED)
+    job = lift({"engine": "auto", "environment_class": "lift.Env"})
+    monkeypatch.setattr(spin, "version", lambda: None)
+    report = BACKEND.discharge(job, tmp_path, Limits(seconds=60))
+    assert {o.verdict for o in report.outcomes} == {Verdict.ERROR}
+    assert report.tool != "AJPF"
+    assert "AJPF says violated" in report.outcomes[0].summary
+
+
+def test_ajpf_missing_is_not_run_and_says_how_to_get_it(lift, tmp_path, monkeypatch):
+    monkeypatch.delenv("AJPF_HOME", raising=False)
+    assert ajpf_tool.tool().present is False
+    job = lift({"engine": "ajpf", "environment_class": "lift.Env"})
+    report = BACKEND.discharge(job, tmp_path, Limits(seconds=60))
+    assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}
+    assert "AJPF_HOME" in report.outcomes[0].summary
+
+
+def test_a_substitute_is_never_called_ajpf(lift, tmp_path):
+    os.environ.pop("AJPF_HOME", None)
+    report = BACKEND.discharge(lift(), tmp_path, Limits(seconds=60))
+    said = " ".join([report.tool, *(o.summary for o in report.outcomes), str([o.details for o in report.outcomes])])
+    assert "AJPF" not in said
+
+
+@pytest.mark.needs_spin
+def test_spin_agrees(lift, tmp_path):
+    extra = {
+        "until": "(~D(cabin, go(1))) U B(cabin, floor(1))",
+        "release": "B(cabin, open) R (~D(cabin, halt(0)))",
+        "false": "<> D(cabin, go(1))",
+    }
+    report = BACKEND.discharge(lift({"engine": "spin", "properties": extra}), tmp_path, Limits(seconds=120))
+    outcome = report.outcomes[0]
+    assert outcome.verdict is Verdict.CHECKED
+    assert "Spin" in report.tool
+    entries = [
+        *outcome.details["properties"],
+        *(p for e in outcome.details["further_properties"] for p in e["properties"]),
+    ]
+    assert len(entries) == 5
+    for entry in entries:
+        (opinion,) = entry["second_opinions"].values()
+        assert opinion == {"checked": "holds", "refuted": "violated"}[entry["verdict"]]
+    assert {e["verdict"] for e in entries} == {"checked", "refuted"}
+
+
+@pytest.mark.needs_spin
+def test_spin_knows_the_fairness_assumptions(lift, tmp_path):
+    environment = (
+        "draws: {at_quiescence: repeatedly}\npercepts: {panel: [call(1), nothing]}\n"
+        "start: {panel: [nothing]}\nfair: [{percept: call(1), because: somebody always calls}]\n"
+    )
+    extra = {"moves": {"psl": "<> D(cabin, go(1))", "guarantee": "answers"}}
+    job = lift({"engine": "spin", "properties": extra, "instances": {"f": [1]}}, {"cabin.yaml": environment})
+    report = BACKEND.discharge(job, tmp_path, Limits(seconds=120))
+    (outcome,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
+    assert outcome.verdict is Verdict.CHECKED, outcome.summary
+
+
+def test_spin_missing_is_no_second_opinion(lift, tmp_path, monkeypatch):
+    monkeypatch.setattr(spin, "version", lambda: None)
+    report = BACKEND.discharge(lift({"engine": "auto"}), tmp_path, Limits(seconds=60))
+    assert {o.verdict for o in report.outcomes} == {Verdict.CHECKED}
+    assert "Spin" not in report.tool
+    report = BACKEND.discharge(lift({"engine": "spin"}), tmp_path, Limits(seconds=60))
+    assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}
