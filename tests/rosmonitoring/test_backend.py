@@ -1,0 +1,162 @@
+"""The backend as the core sees it: exports, outcomes, and what it says where it cannot say."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from avow.backend import Backend, Limits
+from avow.backends.rosmonitoring import BACKEND
+from avow.backends.rosmonitoring.configuration import problems
+from avow.backends.rosmonitoring.rml_reader import read
+from avow.system.load import load_system
+from avow.system.plan import System
+from avow.verdict import Outcome, Verdict
+
+from .conftest import job_for, write_case
+
+
+@pytest.fixture(scope="module")
+def with_traces(tmp_path_factory: pytest.TempPathFactory) -> System:
+    return load_system(write_case(tmp_path_factory.mktemp("backend"), {}))
+
+
+def discharge(system: System, name: str, folder: Path) -> dict[str, Outcome]:
+    job = job_for(system, name)
+    report = BACKEND.discharge(job, folder, Limits())
+    assert [o.obligation for o in report.outcomes] == [o.id for o in job.obligations]
+    return {o.obligation.rsplit("/", 1)[1]: o for o in report.outcomes}
+
+
+def test_it_is_a_backend() -> None:
+    assert isinstance(BACKEND, Backend)
+    jsonschema.Draft202012Validator.check_schema(dict(BACKEND.options_schema))
+    assert BACKEND.tools() == ()
+
+
+def test_importing_it_is_light() -> None:
+    code = (
+        "import sys, avow.backends.rosmonitoring; "
+        "print([m for m in ('z3', 'lark', 'yaml', 'rosbags', 'websockets', 'hypothesis') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", ["localisation", "navigation", "agent", "radiationSensor"])
+def test_exports_are_pure_and_well_formed(with_traces: System, name: str) -> None:
+    job = job_for(with_traces, name)
+    assert BACKEND.check(job) == ()
+    files = BACKEND.export(job)
+    assert files == BACKEND.export(job)
+    assert set(files) == {f"{name}.yaml", f"{name}.rml", f"{name}_monitor.json"}
+    assert problems(files[f"{name}.yaml"]) == []
+    read(files[f"{name}.rml"])
+    assert str(with_traces.plan.root) not in "".join(files.values())
+    assert next(iter(BACKEND.files(job))).name == "nominal.jsonl"
+
+
+@pytest.mark.parametrize("name", ["localisation", "navigation", "agent", "radiationSensor"])
+def test_nominal_trace_supports_every_guarantee(with_traces: System, name: str, tmp_path: Path) -> None:
+    for clause, outcome in discharge(with_traces, name, tmp_path).items():
+        assert outcome.verdict is Verdict.MONITORED, (clause, outcome.summary)
+        assert not outcome.vacuous
+        assert outcome.bound["events"] == 135
+        (digest,) = outcome.bound["traces"].values()  # type: ignore[attr-defined]
+        assert len(digest) == 64
+
+
+def changed(folder: Path, change: Callable[[str], str]) -> System:
+    place = write_case(folder, {})
+    trace = place / "traces" / "nominal.jsonl"
+    trace.write_text(change(trace.read_text(encoding="utf-8")), encoding="utf-8")
+    return load_system(place)
+
+
+def test_a_broken_guarantee_is_refuted_with_its_event(tmp_path: Path) -> None:
+    system = changed(tmp_path, lambda text: text.replace('"level": "red"', '"level": "green"', 1))
+    found = discharge(system, "radiationSensor", tmp_path)
+    assert found["high"].verdict is Verdict.REFUTED
+    assert found["high"].counterexample is not None
+    assert ("out.radiationStatus", "green") in found["high"].counterexample.values
+    assert {found[n].verdict for n in ("low", "medium", "marks_inspected")} == {Verdict.MONITORED}
+
+
+def test_bad_traces_are_errors_or_unknown_never_support(tmp_path: Path) -> None:
+    cases: dict[str, tuple[Callable[[str], str], Verdict]] = {
+        "json": (lambda text: text + "{", Verdict.ERROR),
+        "colour": (lambda text: text.replace('"level": "green"', '"level": "pink"', 1), Verdict.UNKNOWN),
+        "empty": (lambda text: "", Verdict.UNKNOWN),
+        "elsewhere": (lambda text: text.replace('"topic": "', '"topic": "other_'), Verdict.UNKNOWN),
+    }
+    for name, (change, verdict) in cases.items():
+        folder = tmp_path / name
+        folder.mkdir()
+        found = discharge(changed(folder, change), "radiationSensor", folder)
+        assert found["low"].verdict is verdict, (name, found["low"])
+
+
+def test_a_trigger_that_never_came_is_vacuous(tmp_path: Path) -> None:
+    def only_low(text: str) -> str:
+        rows = [json.loads(line) for line in text.splitlines()]
+        return "".join(json.dumps(r) + "\n" for r in rows[:20])
+
+    found = discharge(changed(tmp_path, only_low), "radiationSensor", tmp_path)
+    assert (found["low"].verdict, found["low"].vacuous) == (Verdict.MONITORED, False)
+    assert (found["high"].verdict, found["high"].vacuous) == (Verdict.MONITORED, True)
+
+
+SYSTEM = """
+node n {
+  inputs( r : REAL, hidden : REAL )
+  outputs( o : REAL )
+  topics( a/R r matches(in.r), a/O o matches(out.o) )
+  assume positive ( in.r >= 0 )
+  guarantee seen ( out.o >= in.r )
+  guarantee unseen ( out.o >= in.hidden )
+  guarantee hard ( forall(x in REAL | x * x + out.o > 0 or x * x * x < in.r) )
+}
+"""
+
+
+def test_without_a_trace_nothing_ran(make_system: Callable[..., System], tmp_path: Path) -> None:
+    found = discharge(make_system(SYSTEM), "n", tmp_path)
+    assert {o.verdict for o in found.values()} == {Verdict.NOT_RUN}
+
+
+def test_what_cannot_be_observed_is_unknown(make_system: Callable[..., System], tmp_path: Path) -> None:
+    system = make_system(SYSTEM, traces=["t.jsonl"])
+    trace = system.plan.root / "t.jsonl"
+    rows: list[dict[str, Any]] = [{"topic": "r", "data": 1}, {"topic": "o", "data": 2}]
+    trace.write_text("".join(json.dumps(r) + "\n" for r in rows), encoding="utf-8")
+    job = job_for(system, "n")
+    assert any("unseen cannot be monitored" in d.message and not d.is_error for d in BACKEND.check(job))
+    found = discharge(system, "n", tmp_path)
+    assert found["seen"].verdict is Verdict.MONITORED
+    assert found["unseen"].verdict is Verdict.UNKNOWN
+    assert "no topic" in found["unseen"].summary
+    assert found["hard"].verdict in (Verdict.UNKNOWN, Verdict.MONITORED)
+
+
+def test_a_guarantee_only_judged_while_its_assumption_is_broken_is_not_supported(
+    make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    system = make_system(SYSTEM, traces=["t.jsonl"])
+    trace = system.plan.root / "t.jsonl"
+    trace.write_text('{"topic": "r", "data": -1}\n{"topic": "o", "data": -2}\n', encoding="utf-8")
+    found = discharge(system, "n", tmp_path)
+    assert found["seen"].verdict is Verdict.UNKNOWN
+    assert "assumption" in found["seen"].summary
+
+
+def test_a_trace_outside_the_system_is_a_fault(make_system: Callable[..., System]) -> None:
+    for name in ("../secret.jsonl", "/etc/passwd", "absent.jsonl"):
+        faults = BACKEND.check(job_for(make_system(SYSTEM, traces=[name]), "n"))
+        assert any(d.code == "MON102" and d.span is not None for d in faults)

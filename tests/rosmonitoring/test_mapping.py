@@ -1,0 +1,193 @@
+"""Messages to values: the paper's Scalar, Collection and Function rules, and the plan's own; faults have places."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import pytest
+
+from avow.backends.rosmonitoring.engine import Monitor
+from avow.backends.rosmonitoring.options import setup
+from avow.diagnostics import Diagnostic
+from avow.logic.values import Data, Element, FunctionValue, Sequence, Value
+from avow.system.plan import System
+
+RCL = """
+context {
+  Colour : {red, green};
+  Command : { move(REAL, REAL), inspect(NATURAL), stop };
+  At : REAL x REAL --> BOOL;
+  Map : REAL x REAL --> NATURAL;
+  Sensors : {};
+}
+node n {
+  inputs( r : REAL, n : NATURAL, b : BOOL, s : STRING, c : Colour, at : At, map : Map, list : <INTEGER>, raw : Sensors )
+  outputs( cmd : Command )
+  topics( std_msgs/Float64 r matches(in.r), a/N n matches(in.n), a/B b matches(in.b), a/S s matches(in.s),
+          a/C c matches(in.c), a/At at matches(in.at), a/Map map matches(in.map), a/L list matches(in.list),
+          a/Raw raw matches(in.raw), a/Cmd cmd matches(out.cmd) )
+  guarantee g ( out.cmd == stop or in.r >= 0 )
+}
+"""
+
+
+def monitor_of(system: System) -> Monitor:
+    found, faults = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    assert faults == ()
+    return Monitor(found)
+
+
+def value_of(system: System, name: str, *events: dict[str, Any]) -> Value | str:
+    monitor = monitor_of(system)
+    trouble = ""
+    for event in events:
+        for violation in monitor.step(event):
+            trouble = violation.explanation
+    return trouble or monitor.values[name]
+
+
+def faults_of(system: System) -> tuple[Diagnostic, ...]:
+    return setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "event", "expected"),
+    [
+        ("in.r", {"topic": "r", "data": 1.25}, Fraction(5, 4)),
+        ("in.r", {"topic": "/r", "data": -3}, Fraction(-3)),
+        ("in.n", {"topic": "n", "count": 3}, 3),
+        ("in.n", {"topic": "n", "count": 3.0}, 3),
+        ("in.n", {"topic": "n", "note": "x", "count": 3}, 3),
+        ("in.b", {"topic": "b", "on": True}, True),
+        ("in.s", {"topic": "s", "data": "it's"}, "it's"),
+        ("in.c", {"topic": "c", "level": "red"}, Element("red")),
+        ("in.at", {"topic": "at", "posX": 1, "frame": "map", "posY": 2.5}, {(Fraction(1), Fraction(5, 2))}),
+        ("in.at", {"topic": "at", "data": {"posX": 1, "posY": 2}}, {(Fraction(1), Fraction(2))}),
+        ("in.at", {"topic": "at", "at": {"posX": 1, "posY": 2}, "other": 9}, {(Fraction(1), Fraction(2))}),
+        ("in.list", {"topic": "list", "data": [1, 2]}, Sequence((1, 2))),
+    ],
+)
+def test_without_field_names_the_messages_order_decides(
+    make_system: Callable[..., System], name: str, event: dict[str, Any], expected: Any
+) -> None:
+    found = value_of(make_system(RCL), name, event)
+    if isinstance(expected, set):
+        expected = FunctionValue(dict.fromkeys(expected, True), False)
+    assert found == expected
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        ({"topic": "n", "count": -1}, "negative"),
+        ({"topic": "n", "count": 1.5}, "not a whole number"),
+        ({"topic": "b", "on": 1}, "not a truth value"),
+        ({"topic": "c", "level": "blue"}, "outside {red, green}"),
+        ({"topic": "at", "posX": 1}, "fills 1 of 2 parameters"),
+        ({"topic": "r"}, "no fields"),
+    ],
+)
+def test_what_does_not_fit_is_reported(make_system: Callable[..., System], event: dict[str, Any], words: str) -> None:
+    found = value_of(make_system(RCL), "in.r", event)
+    assert isinstance(found, str)
+    assert words in found
+
+
+def test_function_with_a_result(make_system: Callable[..., System]) -> None:
+    """The last fitting field is the result; elsewhere the function has the value that the plan says."""
+    system = make_system(RCL, {"in.map": {"elsewhere": 99, "hold": "seen"}})
+    found = value_of(
+        system, "in.map", {"topic": "map", "x": 1, "y": 2, "z": 0, "id": 7}, {"topic": "map", "x": 3, "y": 4, "id": 8}
+    )
+    assert isinstance(found, FunctionValue)
+    assert (found(Fraction(1), Fraction(2)), found(Fraction(3), Fraction(4)), found(Fraction(0), Fraction(0))) == (
+        7,
+        8,
+        99,
+    )
+
+
+def test_a_total_function_is_not_guessed(make_system: Callable[..., System]) -> None:
+    system = make_system(RCL)
+    found, _ = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    assert "elsewhere" in found.hidden["in.map"]
+    assert "unspecified" in found.hidden["in.raw"]
+    assert "move, inspect, stop" in found.hidden["out.cmd"]
+
+
+COMMAND = {"constructor": "command", "move": ["pose.x", "pose.y"], "inspect": ["id"], "values": {"halt": "stop"}}
+
+
+@pytest.mark.parametrize(
+    ("message", "expected"),
+    [
+        ({"command": "move", "pose": {"x": 1, "y": 2}}, Data("move", (Fraction(1), Fraction(2)))),
+        ({"command": "inspect", "id": 4}, Data("inspect", (4,))),
+        ({"command": "halt"}, Data("stop")),
+        ({"command": "stop"}, Data("stop")),
+        ({"command": "fly"}, "none of the constructors"),
+        ({"command": "move", "pose": {"x": 1}}, "no field pose.y"),
+        ({"command": None}, "none of the constructors"),
+    ],
+)
+def test_constructors_by_a_field(make_system: Callable[..., System], message: dict[str, Any], expected: Any) -> None:
+    found = value_of(make_system(RCL, {"out.cmd": COMMAND}), "out.cmd", {"topic": "cmd", **message})
+    assert expected in found if isinstance(expected, str) and isinstance(found, str) else found == expected
+
+
+TABLE = {"scenario": {"waypoints": [{"id": 3, "x": 1.5, "y": "-2.0"}, {"id": 4, "x": 0, "y": 0}]}}
+
+
+def test_the_papers_command_mapping(make_system: Callable[..., System]) -> None:
+    """A string and an id become move to that waypoint's coordinates."""
+    cell = {"table": "waypoints", "key": "id", "by": "id"}
+    mapping = {
+        "out.cmd": {
+            "constructor": "command",
+            "move": [{**cell, "column": "x"}, {**cell, "column": "y"}],
+            "inspect": ["id"],
+        }
+    }
+    system = make_system(RCL, mapping, plan=TABLE)
+    event = {"topic": "cmd", "command": "move", "id": 3}
+    assert value_of(system, "out.cmd", event) == Data("move", (Fraction(3, 2), Fraction(-2)))
+    assert "no row" in str(value_of(system, "out.cmd", {**event, "id": 9}))
+
+
+@pytest.mark.parametrize(
+    ("mapping", "words"),
+    [
+        ({"in.rr": "data"}, "no variable 'in.rr'"),
+        ({"in.at": ["x"]}, "2 fields are wanted"),
+        ({"in.r": ["x", "y"]}, "1 field is wanted"),
+        ({"out.cmd": {"constructor": "c", "fly": []}}, "no constructor 'fly'"),
+        ({"out.cmd": {"constructor": "c", "move": ["x"]}}, "move takes 2 arguments"),
+        ({"out.cmd": {"constructor": "c", "values": {"a": "fly"}}}, "no constructor 'fly'"),
+        ({"in.at": {"scenario": True}}, "does not interpret"),
+        ({"in.r": {"previous": "out.nothing"}}, "no output 'out.nothing'"),
+        ({"in.r": {"previous": "out.cmd"}}, "another type"),
+        ({"in.r": {"field": "x", "initial": "green"}}, "not a number"),
+        ({"in.c": {"field": "x", "initial": "blue"}}, "outside {red, green}"),
+        (
+            {"out.cmd": {"constructor": "c", "inspect": [{"table": "t", "key": "a", "by": "b", "column": "c"}]}},
+            "no table 't'",
+        ),
+    ],
+)
+def test_faults_of_the_plan_have_their_place(
+    make_system: Callable[..., System], mapping: dict[str, Any], words: str
+) -> None:
+    faults = faults_of(make_system(RCL, mapping))
+    assert [d for d in faults if words in d.message], faults
+    assert all(d.span is not None and d.span.file.endswith("plan.yaml") for d in faults)
+
+
+def test_relations_latest_or_seen(make_system: Callable[..., System]) -> None:
+    events = [{"topic": "at", "x": 1, "y": 2}, {"topic": "at", "x": 3, "y": 4}]
+    latest = value_of(make_system(RCL, {"in.at": ["x", "y"]}), "in.at", *events)
+    seen = value_of(make_system(RCL, {"in.at": {"fields": ["x", "y"], "hold": "seen"}}), "in.at", *events)
+    assert isinstance(latest, FunctionValue)
+    assert isinstance(seen, FunctionValue)
+    assert (len(latest.table), len(seen.table)) == (1, 2)

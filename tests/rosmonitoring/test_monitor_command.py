@@ -1,0 +1,123 @@
+"""`avow monitor`: exit codes, output, and the oracle protocol over a real WebSocket."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from avow.backends.rosmonitoring.serve import answer, serve
+from avow.backends.rosmonitoring.session import session
+from avow.system.plan import System
+
+
+def avow(*arguments: str, stdin: str | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "avow", "monitor", *arguments]
+    return subprocess.run(command, input=stdin, capture_output=True, text=True, timeout=120)
+
+
+@pytest.fixture(scope="module")
+def traces(case_folder: Path) -> dict[str, Path]:
+    nominal = case_folder / "traces" / "nominal.jsonl"
+    faulty = case_folder / "traces" / "faulty.jsonl"
+    text = nominal.read_text(encoding="utf-8")
+    assert '"level": "red"' in text
+    faulty.write_text(text.replace('"level": "red"', '"level": "green"', 1), encoding="utf-8")
+    broken = case_folder / "traces" / "broken.jsonl"
+    broken.write_text('{"topic": "r", "radiation": 1}\n{"topic": "r", "radiation": }\n', encoding="utf-8")
+    return {"nominal": nominal, "faulty": faulty, "broken": broken}
+
+
+def test_nominal(case_folder: Path, traces: dict[str, Path]) -> None:
+    done = avow(str(case_folder), str(traces["nominal"]))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "nothing broken" in done.stdout
+    assert "agent.next_waypoint (guarantee): judged 16 times" in done.stdout
+
+
+def test_faulty_as_json_and_from_standard_input(case_folder: Path, traces: dict[str, Path]) -> None:
+    text = traces["faulty"].read_text(encoding="utf-8")
+    line = 1 + next(
+        k
+        for k, row in enumerate(text.splitlines())
+        if "radiationStatus" in row
+        and json.loads(row)["time"] > 0
+        and json.loads(text.splitlines()[k - 1]).get("radiation", 0) >= 250
+    )
+    done = avow(str(case_folder), "-", "--json", "--node", "radiationSensor", stdin=text)
+    assert done.returncode == 1
+    whole = json.loads(done.stdout)
+    (violation,) = whole["violations"]
+    assert (violation["clause"], violation["fault"], violation["event"], violation["line"]) == (
+        "high",
+        "guarantee",
+        line,
+        line,
+    )
+    assert whole["clean"] is False
+    assert [n["node"] for n in whole["nodes"]] == ["radiationSensor"]
+
+
+@pytest.mark.parametrize(
+    ("trace", "words"),
+    [("broken", "broken.jsonl:2:"), ("absent", "cannot read"), ("nodes", "did you mean")],
+)
+def test_bad_input_is_code_2_with_its_place(case_folder: Path, traces: dict[str, Path], trace: str, words: str) -> None:
+    if trace == "nodes":
+        done = avow(str(case_folder), str(traces["nominal"]), "--node", "agnt")
+    else:
+        done = avow(str(case_folder), str(traces.get(trace, case_folder / "absent.jsonl")))
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_usage(case_folder: Path) -> None:
+    assert avow(str(case_folder)).returncode == 2
+    assert avow(str(case_folder), "x", "--serve", "0").returncode == 2
+
+
+def test_replies_always_carry_a_verdict_and_never_a_final_one(case: System, nominal: list[dict[str, Any]]) -> None:
+    running = session(case)
+    frames = [json.dumps(e) for e in nominal]
+    frames += ["", "nonsense", "[]", "[" * 100_000, '{"topic": "radiationStatus", "level": "green"', "{}"]
+    for frame in frames:
+        reply = json.loads(answer(running, frame))
+        assert reply["verdict"] in ("currently_true", "currently_false")
+    first = json.loads(answer(session(case), frames[0]))
+    assert first.pop("verdict") == "currently_true"
+    assert first == nominal[0]
+
+
+def test_the_oracle_over_a_websocket(case: System, nominal: list[dict[str, Any]]) -> None:
+    client = pytest.importorskip("websockets.sync.client")
+    started: list[Any] = []
+    up = threading.Event()
+
+    def ready(server: Any) -> None:
+        started.append(server)
+        up.set()
+
+    thread = threading.Thread(target=serve, args=(lambda: session(case), 0, ready), daemon=True)
+    thread.start()
+    assert up.wait(20)
+    port = started[0].socket.getsockname()[1]
+    try:
+        with client.connect(f"ws://127.0.0.1:{port}") as socket:
+            verdicts = []
+            for event in nominal:
+                changed = {**event, "level": "green"} if event.get("level") == "red" else event
+                socket.send(json.dumps(changed))
+                verdicts.append(json.loads(socket.recv(timeout=20))["verdict"])
+            assert len(verdicts) == len(nominal)
+            at = next(k for k, e in enumerate(nominal) if e.get("level") == "red")
+            assert verdicts.index("currently_false") == at
+            assert verdicts[:at] == ["currently_true"] * at
+    finally:
+        started[0].shutdown()
+        thread.join(20)

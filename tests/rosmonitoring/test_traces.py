@@ -1,0 +1,119 @@
+"""Traces: JSON lines with located faults, bags of both ROS generations, digests."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
+from avow.backends.rosmonitoring.traces import digest_trace, parse_event, read_lines, read_trace
+from avow.diagnostics import Rejected
+
+
+def test_lines_are_counted_with_blank_ones() -> None:
+    found = list(read_lines(['{"topic": "a"}\n', "\n", '{"topic": "b", "x": 0.1}\n'], "t"))
+    assert [(r.index, r.line, r.event["topic"]) for r in found] == [(1, 1, "a"), (2, 3, "b")]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "column", "words"),
+    [
+        ('{"topic": "a"}\n{"topic": }\n', 2, 11, "not JSON"),
+        ("[1, 2]\n", 1, 1, "a JSON object"),
+        ("3\n", 1, 1, "a JSON object"),
+        ('{"a": 1} {"b": 2}\n', 1, 10, "not JSON"),
+        ('{"topic": "a"', 1, 14, "not JSON"),
+        ("[" * 100_000 + "\n", 1, 1, "too deeply"),
+        ('{"a": ' + "9" * 5000 + "}\n", 1, 1, "digits"),
+    ],
+)
+def test_malformed_lines_are_located(tmp_path: Path, text: str, line: int, column: int, words: str) -> None:
+    path = tmp_path / "t.jsonl"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(Rejected) as error:
+        list(read_trace(path))
+    (fault,) = error.value.diagnostics
+    assert fault.span is not None
+    assert (fault.span.line, fault.span.column) == (line, column)
+    assert words in fault.message
+
+
+def test_files_that_are_no_text(tmp_path: Path) -> None:
+    path = tmp_path / "t.jsonl"
+    path.write_bytes(b'{"topic": "\xff\xfe"}\n')
+    with pytest.raises(Rejected, match="UTF-8"):
+        list(read_trace(path))
+    with pytest.raises(Rejected, match="cannot read"):
+        list(read_trace(tmp_path / "absent.jsonl"))
+
+
+def test_numbers_are_exact() -> None:
+    event = parse_event('{"a": 0.1, "b": 1e2, "c": 7, "d": 1e999999999}')
+    assert (exact(event["a"]), exact(event["b"]), exact(event["c"])) == (Fraction(1, 10), 100, 7)
+    for bad in (event["d"], float("nan"), float("inf"), True, "1", None, Decimal("x")):
+        with pytest.raises((NotANumber, ValueError)):
+            exact(bad)
+
+
+def _write_bag(path: Path, version: int) -> None:
+    pytest.importorskip("rosbags")
+    from rosbags.typesys import Stores, get_typestore
+
+    if version == 1:
+        from rosbags.rosbag1 import Writer as Writer1
+
+        store = get_typestore(Stores.ROS1_NOETIC)
+        message_type: Any = store.types["std_msgs/msg/Float64"]
+        with Writer1(path) as writer:
+            connection = writer.add_connection("/r", "std_msgs/msg/Float64", typestore=store)
+            for k, value in enumerate((0.1, 130.0)):
+                data = store.serialize_ros1(message_type(data=value), "std_msgs/msg/Float64")
+                writer.write(connection, (k + 1) * 10**9, data)
+        return
+    from rosbags.rosbag2 import Writer as Writer2
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    message_type = store.types["std_msgs/msg/Float64"]
+    with Writer2(path, version=8) as writer2:
+        connection2 = writer2.add_connection("/r", "std_msgs/msg/Float64", typestore=store)
+        for k, value in enumerate((0.1, 130.0)):
+            data = store.serialize_cdr(message_type(data=value), "std_msgs/msg/Float64")
+            writer2.write(connection2, (k + 1) * 10**9, data)
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_bags(tmp_path: Path, version: int) -> None:
+    path = tmp_path / ("run.bag" if version == 1 else "run")
+    _write_bag(path, version)
+    found = list(read_trace(path))
+    assert [(r.event["topic"], r.event["time"], exact(r.event["data"])) for r in found] == [
+        ("/r", 1.0, Fraction(1, 10)),
+        ("/r", 2.0, 130),
+    ]
+
+
+def test_what_is_no_bag(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    (tmp_path / "bad.bag").write_bytes(b"not a bag")
+    (tmp_path / "folder").mkdir()
+    for name in ("bad.bag", "folder"):
+        with pytest.raises(Rejected):
+            list(read_trace(tmp_path / name))
+
+
+def test_digests_change_with_content_and_names(tmp_path: Path) -> None:
+    file = tmp_path / "a.jsonl"
+    file.write_text(json.dumps({"topic": "a"}), encoding="utf-8")
+    first = digest_trace(file)
+    file.write_text(json.dumps({"topic": "b"}), encoding="utf-8")
+    assert digest_trace(file) != first
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    (folder / "x").write_text("1", encoding="utf-8")
+    before = digest_trace(folder)
+    (folder / "x").rename(folder / "y")
+    assert digest_trace(folder) != before
