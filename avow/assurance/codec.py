@@ -7,17 +7,21 @@ an unknown or missing field, or a value of another type, is `Unreadable`, never 
 from __future__ import annotations
 
 import dataclasses
+import json
+import sys
 import types
 import typing
 from collections.abc import Mapping
 from enum import StrEnum
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from avow.assurance.model import Case
 from avow.evidence.encoding import Unreadable, encode, plain
 from avow.evidence.encoding import decode as decode_evidence
 from avow.evidence.record import Evidence
+from avow.files import write
 
 SCHEMA = "https://avow.invalid/schemas/case-1"
 """Names the format in ``report.json``; raised when it changes incompatibly."""
@@ -178,3 +182,13 @@ _PLAIN: dict[Any, dict[str, Any]] = {
     bool: {"type": "boolean"},
     type(None): {"type": "null"},
 }
+
+
+def write_schemas(folder: Path) -> None:
+    """Write the published schemas (``python -m avow.assurance.codec docs/schemas``)."""
+    for name, schema in (("case", case_schema()), ("evidence", evidence_schema())):
+        write(folder / f"{name}.schema.json", json.dumps(schema, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    write_schemas(Path(sys.argv[1]))

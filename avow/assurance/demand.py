@@ -10,7 +10,7 @@ from avow.assurance.model import MethodInfo, ObligationView, Suggestion
 from avow.assurance.policy import Demand, Policy, costs
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
-from avow.evidence.status import Status, effective, join, weigh
+from avow.evidence.status import Status, effective, join, link_rank, weigh
 from avow.verdict import Verdict
 
 
@@ -162,7 +162,7 @@ def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], f
 
     fitting = sorted(
         (info for info in facts.methods if fits(info)),
-        key=lambda info: (order.get(info.strength, 9) + (0 if info.available else 5), info.name),
+        key=lambda info: (order.get(info.strength, 9) + (0 if info.available else 5), -link_rank(info.link), info.name),
     )
     node = view.obligation.node
     if not fitting:

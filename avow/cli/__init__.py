@@ -27,6 +27,7 @@ COMMANDS = {
     "monitor": "judge a recorded trace against assumptions and guarantees",
     "refines": "weaker assumptions, stronger guarantees?",
     "report": "render the reports, or check one against the ledger",
+    "requirements": "requirements from CSV or ReqIF, as a plan's section",
     "review": "fill in the digests of a review record",
     "sanity": "is the contract worth verifying?",
     "simulate": "run the composed contracts over the plan's scenario",

@@ -66,6 +66,11 @@ def weakest(statuses: Iterable[Status]) -> Status | None:
     return min(statuses, key=lambda status: status.rank, default=None)
 
 
+def link_rank(link: Link) -> int:
+    """Greater is more mechanical."""
+    return _LINK_RANK[link]
+
+
 def weakest_link(links: Iterable[Link]) -> Link | None:
     """The least mechanical link between contract and artifact; None of none."""
     return min(links, key=_LINK_RANK.__getitem__, default=None)

@@ -219,6 +219,11 @@ def case(
 # -- a case in which about everything happens -----------------------------------------------------------------------
 
 G = guarantee
+_NEXT_WAYPOINT = (
+    "∀ x′, y′ ∈ ℝ, i ∈ ℕ · (in.at(x′, y′) ∧ in.wayP(x′, y′, i) ∧ in.inspected(i) ∧ in.radiationStatus ∉ {red, orange}) "
+    "⇒ ∃ x, y ∈ ℝ · (in.wayP(x, y, i + 1) ∨ (in.wayP(x, y, 0) ∧ ¬(∃ x″, y″ ∈ ℝ · in.wayP(x″, y″, i + 1)))) "
+    "∧ out.command = move(x, y)"
+)
 _NODES: dict[str, list[tuple[str, str, str]]] = {
     "localisation": [
         ("one_position", "The node outputs a unique (x, y) coordinate", "∃! x, y ∈ ℝ · out.position(x, y)")
@@ -239,8 +244,7 @@ _NODES: dict[str, list[tuple[str, str, str]]] = {
         (
             "next_waypoint",
             "At an inspected waypoint without danger it moves to the next one, or to the exit",
-            "∀ x′, y′ ∈ ℝ, i ∈ ℕ · (in.at(x′, y′) ∧ in.wayP(x′, y′, i) ∧ in.inspected(i) ∧ in.radiationStatus ∉ {red, orange}) ⇒ "
-            "∃ x, y ∈ ℝ · (in.wayP(x, y, i + 1) ∨ (in.wayP(x, y, 0) ∧ ¬(∃ x″, y″ ∈ ℝ · in.wayP(x″, y″, i + 1)))) ∧ out.command = move(x, y)",
+            _NEXT_WAYPOINT,
         ),
         (
             "inspect_here",
@@ -495,7 +499,8 @@ def rover_parts() -> tuple[System, list[Obligation], list[Evidence], dict[tuple[
                 "(A_L ∧ A_A) ⇒ ◇G_N: given both, the robot eventually is where it was told to go",
                 ("localisation", "agent"),
                 (SideCondition("G_L ⇒ A_N.position", side.id), SideCondition("out.command persists", persists.id)),
-                r"\infer[\mathrm{R3}]{A_L \land A_A \Rightarrow \Diamond G_N}{A_L \Rightarrow \Diamond G_L & A_A \Rightarrow \Diamond G_A}",
+                r"\infer[\mathrm{R3}]{A_L \land A_A \Rightarrow \Diamond G_N}"
+                r"{A_L \Rightarrow \Diamond G_L & A_A \Rightarrow \Diamond G_A}",
                 ("in.wayP is provided by the environment",),
             ),
         ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import json
 import os
 import signal
@@ -37,7 +38,7 @@ def test_records_survive_and_are_chained(tmp_path: Path) -> None:
     assert again.damage == ()
     assert again.head == entries[-1].hash
     assert entries[0].previous == GENESIS
-    assert all(b.previous == a.hash for a, b in zip(entries, entries[1:], strict=False))
+    assert all(b.previous == a.hash for a, b in itertools.pairwise(entries))
 
 
 def test_every_line_meets_the_published_schema(tmp_path: Path) -> None:

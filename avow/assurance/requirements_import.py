@@ -1,0 +1,178 @@
+"""Requirements from other tools: CSV and ReqIF 1.x, as `Requirement`s and as the ``requirements:`` section of a plan.
+
+CSV has a header row; its columns are found by their names (``id``, ``statement``, ``text``…), whatever their case.
+ReqIF: every SPEC-OBJECT, with its attributes by their LONG-NAMEs. XML that declares a document type is refused: nothing
+is fetched, nothing is expanded. Errors are diagnostics with codes REQS001 to REQS004, located where there is a line.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.system.plan import Requirement
+
+_COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "id": ("id", "requirement", "requirement id", "identifier", "key", "req", "reqif.foreignid"),
+    "text": ("text", "statement", "description", "sentence", "reqif.text", "title", "name", "reqif.name"),
+    "formula": ("formula", "formalised as", "formalization", "formalisation", "rcl"),
+    "temporal": ("temporal", "temporal property", "ltl"),
+    "supported_by": ("supported_by", "supported by", "guarantees", "allocated to"),
+}
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,99}\Z")
+
+
+def read_requirements(path: Path) -> tuple[Requirement, ...]:
+    """The requirements in a .csv or .reqif file, in its order. Raises Rejected with all faults found."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise Rejected(Diagnostic("REQS001", f"{path} cannot be read: {error.strerror}")) from None
+    if path.suffix.lower() in (".reqif", ".xml"):
+        return read_reqif(data, str(path))
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise Rejected(Diagnostic("REQS001", f"{path} is not UTF-8: {error.reason} at byte {error.start}")) from None
+    return read_csv(text, str(path))
+
+
+def read_csv(text: str, file: str) -> tuple[Requirement, ...]:
+    """Raises Rejected."""
+    try:
+        dialect: type[csv.Dialect] | str = csv.Sniffer().sniff(text[:4096], delimiters=",;\t")
+    except csv.Error:
+        dialect = "excel"
+    reader = csv.reader(io.StringIO(text, newline=""), dialect)
+    rows: list[tuple[int, list[str]]] = []
+    try:
+        rows.extend((reader.line_num, row) for row in reader if any(cell.strip() for cell in row))
+    except csv.Error as error:
+        raise Rejected(Diagnostic("REQS001", f"{file} is no CSV: {error}", _at(file, reader.line_num))) from None
+    if not rows:
+        raise Rejected(Diagnostic("REQS002", f"{file} is empty: a header row is wanted", _at(file, 1)))
+    header = [_bare(cell) for cell in rows[0][1]]
+    columns = {field: header.index(name) for field, names in _COLUMNS.items() for name in names[::-1] if name in header}
+    if "text" not in columns:
+        known = ", ".join(_COLUMNS["text"])
+        fault = f"{file} has no column with the requirements' text; its columns: {', '.join(rows[0][1])}"
+        raise Rejected(Diagnostic("REQS002", fault, _at(file, 1), hint=f"name it one of: {known}"))
+    found = []
+    for line, row in rows[1:]:
+        cells = {field: row[at].strip() if at < len(row) else "" for field, at in columns.items()}
+        found.append((line, cells))
+    return _requirements(found, file)
+
+
+def read_reqif(data: bytes, file: str) -> tuple[Requirement, ...]:
+    """Raises Rejected."""
+    if b"<!DOCTYPE" in data[:100_000] or b"<!ENTITY" in data:
+        raise Rejected(Diagnostic("REQS003", f"{file} declares a document type or entities: that is not accepted"))
+    try:
+        root = ElementTree.fromstring(data)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        line = error.position[0] if isinstance(error, ElementTree.ParseError) else 1
+        raise Rejected(Diagnostic("REQS003", f"{file} is no XML: {error}", _at(file, line))) from None
+    names = {
+        e.get("IDENTIFIER", ""): _bare(e.get("LONG-NAME", ""))
+        for e in root.iter()
+        if _tag(e).startswith("ATTRIBUTE-DEFINITION-")
+    }
+    enumerated = {e.get("IDENTIFIER", ""): e.get("LONG-NAME", "") for e in root.iter() if _tag(e) == "ENUM-VALUE"}
+    found = []
+    for thing in root.iter():
+        if _tag(thing) == "SPEC-OBJECT":
+            values = dict(_values(thing, names, enumerated))
+            cells = {field: next((values[n] for n in known if values.get(n)), "") for field, known in _COLUMNS.items()}
+            cells["id"] = cells["id"] or thing.get("LONG-NAME", "") or thing.get("IDENTIFIER", "")
+            found.append((1, cells))
+    if not found:
+        raise Rejected(Diagnostic("REQS002", f"{file} holds no SPEC-OBJECT", _at(file, 1)))
+    return _requirements(found, file)
+
+
+def plan_section(requirements: Iterable[Requirement]) -> str:
+    """The ``requirements:`` section of a plan.yaml; every text is quoted."""
+    lines = ["requirements:"]
+    for r in requirements:
+        parts = [f"text: {_quoted(r.text)}"]
+        parts += [f"formula: {_quoted(r.formula)}"] if r.formula else []
+        parts += [f"temporal: {_quoted(r.temporal)}"] if r.temporal else []
+        parts += [f"supported_by: [{', '.join(map(_quoted, r.supported_by))}]"]
+        lines += [f"  {_quoted(r.id)}:", *(f"    {part}" for part in parts)]
+    return "\n".join(lines) + "\n"
+
+
+def _requirements(rows: Iterable[tuple[int, Mapping[str, str]]], file: str) -> tuple[Requirement, ...]:
+    faults: list[Diagnostic] = []
+    found: dict[str, Requirement] = {}
+    for number, (line, cells) in enumerate(rows, 1):
+        name = re.sub(r"[^A-Za-z0-9_.-]+", "_", cells.get("id", "")).strip("_") or f"REQ{number}"
+        name = name if name[0].isalpha() else f"R{name}"
+        if not _NAME.match(name):
+            faults.append(Diagnostic("REQS004", f"'{cells.get('id', '')}' cannot name a requirement", _at(file, line)))
+        elif name in found:
+            faults.append(Diagnostic("REQS004", f"two requirements are called '{name}'", _at(file, line)))
+        elif not cells["text"]:
+            faults.append(Diagnostic("REQS004", f"requirement '{name}' has no text", _at(file, line)))
+        else:
+            supports = tuple(part for part in re.split(r"[\s,;]+", cells.get("supported_by", "")) if part)
+            found[name] = Requirement(
+                name,
+                " ".join(cells["text"].split()),
+                cells.get("formula") or None,
+                cells.get("temporal") or None,
+                supports,
+                _at(file, line),
+            )
+    if faults:
+        raise Rejected(*faults)
+    return tuple(found.values())
+
+
+def _values(
+    thing: ElementTree.Element, names: Mapping[str, str], enumerated: Mapping[str, str]
+) -> Iterator[tuple[str, str]]:
+    for value in thing.iter():
+        tag = _tag(value)
+        if not tag.startswith("ATTRIBUTE-VALUE-"):
+            continue
+        reference = next((e.text or "" for e in value.iter() if _tag(e).startswith("ATTRIBUTE-DEFINITION-")), "")
+        name = names.get(reference.strip())
+        if not name:
+            continue
+        if tag == "ATTRIBUTE-VALUE-XHTML":
+            holder = next((e for e in value.iter() if _tag(e) == "THE-VALUE"), None)
+            text = " ".join("".join(holder.itertext()).split()) if holder is not None else ""
+        elif tag == "ATTRIBUTE-VALUE-ENUMERATION":
+            marks = [(e.text or "").strip() for e in value.iter() if _tag(e) == "ENUM-VALUE-REF"]
+            text = ", ".join(enumerated.get(mark, mark) for mark in marks)
+        else:
+            text = value.get("THE-VALUE", "").strip()
+        yield name, text
+
+
+def _tag(element: ElementTree.Element) -> str:
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+
+
+def _bare(name: str) -> str:
+    return " ".join(name.lower().split())
+
+
+def _quoted(text: str) -> str:
+    return (
+        json.dumps(text, ensure_ascii=True)
+        if not any(ord(c) > 0xFFFF for c in text)
+        else json.dumps(text, ensure_ascii=False)
+    )
+
+
+def _at(file: str, line: int) -> Span:
+    return Span(file, line, 1, line, 1)

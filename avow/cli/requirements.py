@@ -1,0 +1,34 @@
+"""``avow requirements``: requirements of another tool as the section of a plan."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+
+@click.command()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False))
+@click.option("--json", "as_json", is_flag=True, help="For machines.")
+def command(file: str, as_json: bool) -> int:
+    """The requirements in FILE (CSV or ReqIF) as the `requirements:` section of a plan.yaml, on standard output."""
+    from pathlib import Path
+
+    from avow.assurance.requirements_import import plan_section, read_requirements
+
+    found = read_requirements(Path(file))
+    if as_json:
+        listed = [
+            {
+                "id": r.id,
+                "text": r.text,
+                "formula": r.formula,
+                "temporal": r.temporal,
+                "supported_by": list(r.supported_by),
+            }
+            for r in found
+        ]
+        click.echo(json.dumps({"requirements": listed}, indent=1))
+    else:
+        click.echo(plan_section(found), nl=False)
+    return 0

@@ -1,0 +1,320 @@
+"""The case: staleness by meaning, history, roll-up to requirements, findings, grades, exit codes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from assurance.sample import (
+    RUN,
+    case,
+    evidence,
+    guarantee,
+    key_of,
+    keys_of,
+    node_plan,
+    obligation,
+    rover_case,
+    rover_parts,
+    system,
+)
+from avow.assurance.case import conclude_again
+from avow.assurance.codec import case_schema, evidence_schema, from_json, to_json
+from avow.assurance.model import Case, Currency, Derivation, Grade, SideCondition
+from avow.evidence.audit import Discrepancy, Fault
+from avow.evidence.encoding import Unreadable
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind
+from avow.evidence.status import Status
+from avow.files import digest
+from avow.system.plan import Finding, Requirement
+from avow.verdict import Verdict
+
+G = guarantee("n", "g")
+PLANS = [node_plan("n", "low", "hoare", "hypothesis")]
+SYSTEM = system({"n": ["g"]}, plans=PLANS)
+SCHEMAS = Path(__file__).parents[2] / "docs" / "schemas"
+
+
+def status_of(found: Case, name: str = "rover/n/guarantee/g") -> Status:
+    return found.obligation(name).status
+
+
+# -- staleness by meaning -------------------------------------------------------------------------------------------
+
+
+def test_evidence_of_another_meaning_is_stale_and_kept_as_history() -> None:
+    changed = replace(G, digest=digest("another threshold"))
+    record = evidence(G)
+    found = case(SYSTEM, [changed], [record], keys={(G.id, "hoare"): key_of(changed, "hoare")})
+    assert status_of(found) is Status.STALE
+    view = found.obligations[0]
+    assert [item.currency for item in view.evidence] == [Currency.STALE]
+    assert view.counting == ()
+    assert not found.good
+
+
+def test_the_same_key_but_another_digest_does_not_count() -> None:
+    found = case(SYSTEM, [replace(G, digest=digest("other"))], [evidence(G)], keys=keys_of([evidence(G)]))
+    assert status_of(found) is Status.STALE
+
+
+def test_a_withdrawn_method_does_not_count() -> None:
+    found = case(SYSTEM, [G], [evidence(G)], keys={})
+    assert status_of(found) is Status.STALE
+    assert found.obligations[0].evidence[0].currency is Currency.WITHDRAWN
+
+
+def test_a_newer_pass_does_not_hide_an_older_refutation_of_the_same_question() -> None:
+    found = case(SYSTEM, [G], [evidence(G, Verdict.REFUTED, run="1"), evidence(G, run="2")])
+    assert status_of(found) is Status.CONTRADICTORY
+    tested = [evidence(G, Verdict.REFUTED, "hypothesis", run="1"), evidence(G, Verdict.TESTED, "hypothesis", run="2")]
+    assert status_of(case(SYSTEM, [G], tested)) is Status.REFUTED
+    assert found.obligations[0].evidence[0].currency is Currency.REPEATED
+
+
+def test_deleting_a_record_is_never_having_had_it() -> None:
+    subject, obligations, records, keys, extras = rover_parts()
+    for at in range(0, len(records), 3):
+        rest = records[:at] + records[at + 1 :]
+        found = case(subject, obligations, rest, keys=keys, **extras)
+        again = conclude_again(from_json(json.loads(json.dumps(to_json(found)))))
+        assert again == found
+
+
+def test_order_of_records_does_not_matter_for_any_status() -> None:
+    subject, obligations, records, keys, extras = rover_parts()
+    one = case(subject, obligations, records, keys=keys, **extras)
+    other = case(subject, obligations, records[::-1], keys=keys, **extras)
+    assert [v.standing for v in one.obligations] == [v.standing for v in other.obligations]
+    assert [(r.status, r.answer) for r in one.requirements] == [(r.status, r.answer) for r in other.requirements]
+
+
+# -- requirements ---------------------------------------------------------------------------------------------------
+
+
+def requirement_case(*supports: str, formula: str | None = None, own: Verdict | None = None, **others: Any) -> Case:
+    sanity = obligation("n", Kind.SANITY, "realizable")
+    ours = obligation(SYSTEM_LEVEL, Kind.REQUIREMENT, "R")
+    records = [evidence(G), evidence(sanity, others.pop("sanity", Verdict.PROVED), "sanity")]
+    obligations = [G, sanity]
+    if own is not None:
+        obligations.append(ours)
+        records.append(evidence(ours, own, "compose"))
+    subject = system({"n": ["g"]}, plans=PLANS, requirements=[Requirement("R", "text", formula, None, supports)])
+    return case(subject, obligations, records, **others)
+
+
+def test_prose_is_linked() -> None:
+    for supports in (("n.g",), ("n",), ("n/guarantee/g",)):
+        r = requirement_case(*supports).requirements[0]
+        assert r.status is Status.LINKED
+        assert r.weakest_status is Status.PROVED
+        assert "Linked in prose" in r.answer
+
+
+def test_a_formula_is_as_good_as_its_own_evidence_and_what_it_rests_on() -> None:
+    assert requirement_case("n.g", formula="f", own=Verdict.PROVED).requirements[0].status is Status.PROVED
+    refuted = requirement_case("n.g", formula="f", own=Verdict.REFUTED).requirements[0]
+    assert refuted.status is Status.REFUTED
+    unknown = requirement_case("n.g", formula="f", own=Verdict.UNKNOWN).requirements[0]
+    assert unknown.status is Status.UNKNOWN
+    assert requirement_case("n.g", formula="f").requirements[0].status is Status.MISSING
+    # settled on the contracts, nobody said on which: then it rests on every guarantee
+    assert requirement_case(formula="f", own=Verdict.PROVED).requirements[0].rests_on[-1] == G.id
+
+
+def test_an_unrealizable_contract_supports_nothing() -> None:
+    found = requirement_case("n.g", sanity=Verdict.REFUTED)
+    view = found.obligation(G.id)
+    assert view.status is Status.PROVED  # its own evidence
+    assert view.standing is Status.UNSUPPORTED  # all things considered
+    assert found.requirements[0].status is Status.UNSUPPORTED
+    assert found.requirements[0].below == ("rover/n/sanity/realizable",)
+
+
+def test_names_that_stand_for_nothing_are_told() -> None:
+    r = requirement_case("n.g", "n.nothing").requirements[0]
+    assert r.status is Status.MISSING
+    assert r.unknown_names == ("n.nothing",)
+    assert requirement_case().requirements[0].status is Status.MISSING
+
+
+def test_requirements_that_support_each_other_are_refused() -> None:
+    subject = system(
+        {"n": ["g"]},
+        plans=PLANS,
+        requirements=[Requirement("A", "a", None, None, ("B",)), Requirement("B", "b", None, None, ("A", "n"))],
+    )
+    found = case(subject, [G], [evidence(G)])
+    assert [r.status for r in found.requirements] == [Status.CIRCULAR, Status.CIRCULAR]
+    assert "support itself" in found.requirements[0].answer
+    assert not found.good
+
+
+def test_a_hypothesis_that_names_an_obligation_rests_on_it() -> None:
+    other = guarantee("n", "h")
+    subject = system({"n": ["g", "h"]}, plans=PLANS)
+    good = case(subject, [G, other], [evidence(G, hypotheses=("n/guarantee/h",)), evidence(other)])
+    assert good.obligation(G.id).standing is Status.PROVED
+    bad = case(subject, [G, other], [evidence(G, hypotheses=(other.id,)), evidence(other, Verdict.REFUTED)])
+    assert bad.obligation(G.id).standing is Status.UNSUPPORTED
+    circle = case(subject, [G, other], [evidence(G, hypotheses=(other.id,)), evidence(other, hypotheses=(G.id,))])
+    assert circle.obligation(G.id).standing is Status.CIRCULAR
+
+
+def test_a_derivation_rests_on_side_conditions_and_premises() -> None:
+    side = obligation(SYSTEM_LEVEL, Kind.COMPOSITION, "side")
+    subject = system({"n": ["g"]}, plans=PLANS, requirements=[Requirement("R", "t", None, None, ("D1",))])
+    d1 = Derivation("D1", "R1", "…", "…", ("n",), (SideCondition("A", side.id),))
+    good = case(subject, [G, side], [evidence(G), evidence(side, method="compose")], derivations=[d1])
+    assert good.derivations[0].status is Status.PROVED
+    assert good.requirements[0].status is Status.LINKED
+    bad = case(subject, [G, side], [evidence(G), evidence(side, Verdict.REFUTED, "compose")], derivations=[d1])
+    assert bad.derivations[0].status is Status.UNSUPPORTED
+    lost = case(
+        subject, [G, side], [evidence(G), evidence(side, method="compose")], derivations=[replace(d1, premises=("x",))]
+    )
+    assert lost.derivations[0].status is Status.MISSING
+
+
+# -- findings -------------------------------------------------------------------------------------------------------
+
+
+def finding_case(expected: list[Finding] | None = None, accepted: list[Finding] = [], *records: Any) -> Case:  # noqa: B006
+    subject = system({"n": ["g"]}, plans=PLANS, expected=expected, accepted=accepted, policy="reproduction")
+    return case(subject, [G], list(records))
+
+
+REFUTED = evidence(G, Verdict.REFUTED)
+
+
+@pytest.mark.parametrize("pattern", ["n/guarantee/g", "n/*/g", "*/guarantee/?"])
+def test_expected_findings_are_strict_both_ways(pattern: str) -> None:
+    expected = [Finding(pattern, "refuted")]
+    assert finding_case(expected, [], REFUTED).exit_code == 0
+    absent = finding_case(expected, [], evidence(G))
+    assert absent.exit_code == 1
+    assert "expected but not there" in next(g.reason for g in absent.gates if g.id == "expected")
+    extra = finding_case([], [], REFUTED)
+    assert extra.exit_code == 1
+    assert "there but not expected: n.g" in next(g.reason for g in extra.gates if g.id == "expected")
+    assert finding_case([], [], evidence(G)).exit_code == 0
+    assert finding_case([Finding(pattern, "vacuous")], [], REFUTED).exit_code == 1
+
+
+def test_an_expected_finding_may_name_the_method() -> None:
+    records = (evidence(G), evidence(G, Verdict.REFUTED, "hypothesis"))
+    assert finding_case([Finding("n/guarantee/g", "refuted", method="hypothesis")], [], *records).exit_code == 0
+    assert finding_case([Finding("n/guarantee/g", "refuted", method="hoare")], [], *records).exit_code == 1
+
+
+def test_accepted_findings_expire() -> None:
+    def accepted(**changes: str) -> Finding:
+        return replace(Finding("n/guarantee/g", "refuted", "known", "A. Person", "2026-01-01", "2026-12-31"), **changes)
+
+    taken = finding_case(None, [accepted()], REFUTED)
+    assert taken.exit_code == 0
+    assert taken.obligations[0].handled == "accepted"
+    assert status_of(taken) is Status.REFUTED  # accepting a risk does not make the claim true
+    assert finding_case(None, [accepted(expires="2026-11-20")], REFUTED).exit_code == 1
+    assert finding_case(None, [accepted(expires="2026-11-21")], REFUTED).exit_code == 0
+    no_end = replace(accepted(), expires=None)
+    assert finding_case(None, [no_end], REFUTED).exit_code == 0  # a year from its date
+    assert finding_case(None, [replace(no_end, date="2025-11-20")], REFUTED).exit_code == 1
+    assert finding_case(None, [accepted(verdict="vacuous")], REFUTED).exit_code == 1
+    unused = finding_case(None, [accepted()], evidence(G))
+    assert any(i.kind == "unused" for i in unused.open_items)
+
+
+def test_advice_fails_nothing_but_is_told() -> None:
+    advice = obligation("n", Kind.SANITY, "redundant-g")
+    found = case(SYSTEM, [G, advice], [evidence(G), evidence(advice, Verdict.REFUTED, "sanity")])
+    assert found.exit_code == 0
+    assert [i.kind for i in found.open_items if i.advice] == ["advice"]
+    real = obligation("n", Kind.SANITY, "realizable")
+    assert case(SYSTEM, [G, real], [evidence(G), evidence(real, Verdict.REFUTED, "sanity")]).exit_code == 1
+
+
+# -- gates, grades, exit codes --------------------------------------------------------------------------------------
+
+
+def test_exit_code_3_only_for_want_of_a_tool() -> None:
+    assert case(SYSTEM, [G], [evidence(G)]).exit_code == 0
+    assert case(SYSTEM, [G], [evidence(G, Verdict.NOT_RUN)]).exit_code == 3
+    assert case(SYSTEM, [G], [evidence(G, Verdict.ERROR)]).exit_code == 3
+    assert case(SYSTEM, [G], [evidence(G, Verdict.UNKNOWN)]).exit_code == 1
+    both = system({"n": ["g", "h"]}, plans=PLANS)
+    other = guarantee("n", "h")
+    mixed = case(both, [G, other], [evidence(G, Verdict.NOT_RUN), evidence(other, Verdict.REFUTED)])
+    assert mixed.exit_code == 1
+
+
+def test_tampering_fails_whatever_the_evidence_says() -> None:
+    serious = Discrepancy(Fault.CHANGED, "a.log", "a.log was changed")
+    assert case(SYSTEM, [G], [evidence(G)], discrepancies=[serious]).exit_code == 1
+    assert case(SYSTEM, [G], [evidence(G)], discrepancies=[replace(serious, serious=False)]).exit_code == 0
+
+
+def test_certified_means_all_fresh_and_all_verified() -> None:
+    fresh = replace(RUN, fresh=True)
+    assert case(SYSTEM, [G], [evidence(G)], run=fresh).grade is Grade.CERTIFIED
+    assert case(SYSTEM, [G], [evidence(G)]).grade is Grade.CHECKED
+    assert case(SYSTEM, [G], [evidence(G)], run=fresh, discrepancies=None).grade is Grade.CHECKED
+    old = evidence(G, run="an earlier run")
+    found = case(SYSTEM, [G], [old], run=fresh)
+    assert found.grade is Grade.CHECKED
+    assert status_of(found) is Status.STALE  # a fresh run believes no support that it did not see
+    refuted = case(SYSTEM, [G], [evidence(G, Verdict.REFUTED, run="an earlier run"), evidence(G)], run=fresh)
+    assert status_of(refuted) is Status.CONTRADICTORY  # but it forgets no refutation
+
+
+def test_sil4_asks_for_a_certified_case() -> None:
+    subject = system({"n": ["g"]}, plans=PLANS, policy={"profile": "default", "certified": True})
+    assert case(subject, [G], [evidence(G)]).exit_code == 1
+    assert case(subject, [G], [evidence(G)], run=replace(RUN, fresh=True)).exit_code == 0
+
+
+def test_vanished_obligations_leave_orphans_not_support() -> None:
+    found = case(SYSTEM, [], [evidence(G)])
+    assert len(found.orphans) == 1
+    assert found.obligations == ()
+
+
+def test_single_methods_and_hypotheses_are_listed() -> None:
+    found = rover_case()
+    assert "rover/agent/guarantee/next_waypoint" in found.single_method
+    assert "rover/radiationSensor/guarantee/low" not in found.single_method
+    assert "percepts are edge-triggered" in [h.text for h in found.hypotheses]
+
+
+# -- as data --------------------------------------------------------------------------------------------------------
+
+
+def test_a_case_survives_json_and_meets_its_schema() -> None:
+    found = rover_case()
+    data = json.loads(json.dumps(to_json(found)))
+    assert from_json(data) == found
+    assert conclude_again(from_json(data)) == found
+    jsonschema.Draft202012Validator(case_schema()).validate(data)
+    data["requirements"][0]["status"] = "splendid"
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft202012Validator(case_schema()).validate(data)
+    with pytest.raises(Unreadable):
+        from_json(data)
+
+
+@pytest.mark.parametrize("bad", [None, [], {}, {"schema": "other"}, {"schema": "https://avow.invalid/schemas/case-1"}])
+def test_other_json_is_no_case(bad: object) -> None:
+    with pytest.raises(Unreadable):
+        from_json(bad)
+
+
+@pytest.mark.parametrize(("name", "schema"), [("case", case_schema()), ("evidence", evidence_schema())])
+def test_published_schemas_are_up_to_date(name: str, schema: dict[str, Any]) -> None:
+    published = json.loads((SCHEMAS / f"{name}.schema.json").read_text())
+    assert published == schema, "write it again: python -m avow.assurance.codec docs/schemas"

@@ -1,0 +1,192 @@
+"""Policies: profiles, rules of a plan, located errors, and what a demand accepts."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from assurance.sample import TODAY, case, evidence, guarantee, node_plan, system
+from avow.assurance.demand import independent
+from avow.assurance.model import Case
+from avow.assurance.policy import costs, profile, profile_names, read_policy, techniques
+from avow.diagnostics import Rejected, Span
+from avow.evidence.record import Evidence
+from avow.evidence.status import Status
+from avow.system.plan import Located
+from avow.verdict import Link, Verdict
+
+
+def located(data: Any) -> Located:
+    spans: dict[tuple[str | int, ...], Span] = {}
+
+    def mark(value: Any, path: tuple[str | int, ...]) -> None:
+        spans[path] = Span("plan.yaml", len(spans) + 1, 1, len(spans) + 1, 9)
+        items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+        for key, item in items:
+            mark(item, (*path, key))
+
+    mark(data, ())
+    return Located(data, spans[()], spans)
+
+
+def test_profiles_are_ready_and_ordered_by_strictness() -> None:
+    assert set(profile_names()) == {"default", "reproduction", "sil1", "sil2", "sil3", "sil4"}
+    demands = [profile(f"sil{n}").demand("high") for n in (1, 2, 3, 4)]
+    for weaker, stricter in itertools.pairwise(demands):
+        assert set(stricter.one_of) <= set(weaker.one_of)
+        assert stricter.methods >= weaker.methods
+        assert stricter.reviewers >= weaker.reviewers
+    assert profile("sil4").certified
+    assert all(dict(t.levels).keys() == {"sil1", "sil2", "sil3", "sil4"} for t in techniques())
+    assert set(costs()) == {v.value for v in Verdict if v.supports}
+
+
+def test_no_section_means_default_and_names_mean_profiles() -> None:
+    assert read_policy(located(None)) == read_policy(located({})) == profile("default")
+    assert read_policy(located("sil3")) == profile("sil3")
+
+
+def test_rules_replace_what_they_name() -> None:
+    policy = read_policy(
+        located(
+            {
+                "profile": "sil2",
+                "guarantees": {"low": {"one_of": ["justified"], "max_age_days": 30, "links": ["generated"]}},
+                "reviewers": ["A. Person"],
+                "certified": True,
+                "sanity": [],
+            }
+        )
+    )
+    assert policy.demand("high") == profile("sil2").demand("high")
+    assert policy.demand("low").one_of == (Status.JUSTIFIED,)
+    assert policy.demand("low").max_age(Status.TESTED) == 30
+    assert policy.demand("low").links == (Link.GENERATED,)
+    assert (policy.reviewers, policy.certified, policy.sanity) == (("A. Person",), True, ())
+    assert policy.demand("unheard of") == policy.demand("high")
+
+
+@pytest.mark.parametrize(
+    ("data", "path", "word"),
+    [
+        ("sil5", (), "sil5"),
+        (3, (), "profile's name"),
+        ({"profile": "defautl"}, ("profile",), "defautl"),
+        ({"guarantee": {}}, ("guarantee",), "unknown key 'guarantee'"),
+        ({"guarantees": []}, ("guarantees",), "maps a criticality"),
+        ({"guarantees": {"hihg": {}}}, ("guarantees", "hihg"), "hihg"),
+        ({"guarantees": {"high": {"one_of": ["refuted"]}}}, ("guarantees", "high", "one_of", 0), "refuted"),
+        ({"guarantees": {"high": {"methods": -1}}}, ("guarantees", "high", "methods"), "whole number"),
+        ({"guarantees": {"high": {"methods": True}}}, ("guarantees", "high", "methods"), "whole number"),
+        ({"guarantees": {"high": {"independent": "yes"}}}, ("guarantees", "high", "independent"), "true or false"),
+        (
+            {"guarantees": {"high": {"max_age_days": {"proven": 3}}}},
+            ("guarantees", "high", "max_age_days", "proven"),
+            "proven",
+        ),
+        ({"guarantees": {"high": 2}}, ("guarantees", "high"), "mapping"),
+        ({"sanity": {"a": 1}}, ("sanity",), "list of words"),
+        ({"certified": "on"}, ("certified",), "true or false"),
+    ],
+)
+def test_errors_are_located(data: Any, path: tuple[str | int, ...], word: str) -> None:
+    where = located(data)
+    with pytest.raises(Rejected) as caught:
+        read_policy(where)
+    fault = caught.value.diagnostics[0]
+    assert word in fault.message
+    assert fault.span == where.at(*path)
+
+
+def test_all_faults_are_told_at_once() -> None:
+    with pytest.raises(Rejected) as caught:
+        read_policy(located({"profile": "x", "sanity": ["y"], "z": 1}))
+    assert len(caught.value.diagnostics) == 3
+
+
+def the_case(policy: Any, *records: Evidence, criticality: str = "high") -> Case:
+    subject = system({"n": ["g"]}, plans=[node_plan("n", criticality, "hoare", "hypothesis", "review")], policy=policy)
+    return case(subject, [guarantee("n", "g")], list(records))
+
+
+def gate(found: Case, name: str = "guarantees-high") -> tuple[bool, str]:
+    it = next(g for g in found.gates if g.id == name)
+    return it.passed, it.reason
+
+
+PROOF = evidence("n.g")
+TEST = evidence("n.g", Verdict.TESTED, "hypothesis")
+REVIEW = evidence("n.g", Verdict.REVIEWED, "review", details={"reviewers": ["A", "B"], "date": "2026-11-01"})
+
+
+def test_no_single_point_of_evidence() -> None:
+    assert gate(the_case("default", PROOF, TEST))[0]
+    passed, reason = gate(the_case("default", PROOF))
+    assert not passed
+    assert "1 independent method, but 2" in reason
+    same_solver = replace(TEST, tool="z3")
+    assert not gate(the_case("default", PROOF, same_solver))[0]  # two wrappings of one solver are one
+
+
+def test_independence_is_a_matching() -> None:
+    def item(backend: str, tool: str) -> Evidence:
+        return replace(PROOF, backend=backend, tool=tool)
+
+    assert independent([]) == 0
+    assert independent([item("a", "z3"), item("b", "z3"), item("a", "cvc5")]) == 2
+    assert independent([item("a", "z3"), item("a", "cvc5")]) == 1
+    assert independent([item("a", "x"), item("b", "x"), item("b", "y"), item("c", "y"), item("c", "z")]) == 3
+
+
+def test_a_refutation_is_never_disregarded() -> None:
+    old = replace(evidence("n.g", Verdict.REFUTED, "review"), started="2001-01-01T00:00:00Z")
+    assert not gate(the_case("default", PROOF, TEST, old))[0]
+
+
+def test_age_reviewers_links_hypotheses() -> None:
+    low = {
+        "guarantees": {
+            "high": {"one_of": ["proved", "tested", "reviewed"], "reviewers": 2, "max_age_days": {"reviewed": 30}}
+        }
+    }
+    assert gate(the_case(low, REVIEW))[0]
+    stale = replace(REVIEW, details={"reviewers": ["A", "B"], "date": "2026-09-01"})
+    assert "81 days old" in gate(the_case(low, stale))[1]
+    assert (
+        "dated in the future"
+        in gate(the_case(low, replace(REVIEW, details={**REVIEW.details, "date": "2027-01-01"})))[1]
+    )
+    assert "reviewed by 1" in gate(the_case(low, replace(REVIEW, details={"reviewer": "A", "date": "2026-11-01"})))[1]
+    named = {**low, "reviewers": ["A"]}
+    assert "B may not review" in gate(the_case(named, REVIEW))[1]
+    strict = {"guarantees": {"high": {"one_of": ["proved"], "links": ["generated"], "unconditional": True}}}
+    assert gate(the_case(strict, PROOF))[0]
+    assert "link is mapped" in gate(the_case(strict, replace(PROOF, link=Link.MAPPED)))[1]
+    assert "rests on hypotheses" in gate(the_case(strict, replace(PROOF, hypotheses=("h",))))[1]
+    assert TODAY.isoformat() == "2026-11-21"
+
+
+def test_the_cheapest_step_is_named() -> None:
+    def step(found: Case) -> str:
+        suggestion = found.obligations[0].suggestion
+        return suggestion.text if suggestion else ""
+
+    assert step(the_case("default", PROOF, TEST)) == ""
+    assert step(the_case("default", PROOF)).startswith("add `hypothesis`")  # any second method: the cheapest is a test
+    assert step(the_case("default")).startswith("add `ajpf`")  # a check is asked, and cheaper than a proof
+    only = case(
+        system({"n": ["g"]}, plans=[node_plan("n", "high", "dafny")]),
+        [guarantee("n", "g")],
+        [],
+        keys={("rover/n/guarantee/g", "dafny"): "k"},
+    )
+    assert step(only) == "install what `dafny` needs: apt install dafny"
+    assert step(the_case("default", evidence("n.g", Verdict.REFUTED))).startswith("repair")
+
+
+def test_reproduction_asks_nothing_of_guarantees() -> None:
+    assert the_case("reproduction").exit_code == 0
+    assert the_case("default").exit_code == 1
