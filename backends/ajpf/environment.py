@@ -1,6 +1,6 @@
 """The agent's environment as data: when percepts are drawn, from what, and what is assumed of the draws.
 
-    draws: {at_start: true, at_quiescence: once, quiet: [print]}     # every action but the quiet ones draws
+    draws: {at_start: true, at_quiescence: once, quiet: [beep]}      # every action but print and the quiet ones draws
     percepts:                                                        # one alternative of each group is drawn
       result: ["arrived(0, 3)", nothing]
       light: [red, amber, nothing]
@@ -214,7 +214,7 @@ def _read(located: Located) -> Environment:
         tuple(groups.items()),
         start,
         after,
-        frozenset(draws.get("quiet", ("print",))),
+        frozenset(draws.get("quiet", ())),
         draws.get("at_start", True),
         draws.get("at_quiescence", "once"),
         tuple(fair),

@@ -87,6 +87,10 @@ class State(NamedTuple):
     """It was drawn because the agent had nothing to do, and no action has been done since."""
 
 
+PRINT = "print"
+"""Not an action in the world: it neither draws percepts nor counts as the last action done."""
+
+
 class _Effect(NamedTuple):
     """What one deed does, as far as it depends on beliefs and the intention alone."""
 
@@ -289,9 +293,11 @@ class Agent:
         if effect.action == NONE:
             return (new,)
         name = self.actions.items[effect.action].functor
-        if name in self.environment.quiet:
+        if name == PRINT:
             return (new._replace(waited=False),)
         new = new._replace(last=effect.action, waited=False)
+        if name in self.environment.quiet:
+            return (new,)
         return tuple(new._replace(choice=draw, drawn=True) for draw in self._draws(state.choice, name))
 
     def _effect(self, base: int, number: int, deed: Deed) -> _Effect:
