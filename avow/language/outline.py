@@ -175,19 +175,25 @@ class _Reader:
             self.reports.error("RCL115", "this `{` is never closed", brace.start, brace.end, hint="close it with `}`")
 
     def declaration(self) -> None:
-        first, depth, relation = self.at, 0, False
+        first, relation = self.at, False
+        stack: list[str] = []
         while self.at < len(self.tokens):
             kind = self.kind()
             if kind in _TOP or kind in _SECTIONS:
                 break
-            if depth <= 0 and (kind == "SEMICOLON" or kind == "RBRACE"):
+            if kind == "SEMICOLON" and "RPAR" not in stack:  # also within `{`: that brace lacks its partner
                 break
-            if kind in ("COLON", "EQUALS", "EQ") and depth == 0:
+            if kind == "RBRACE" and not stack:
+                break
+            if kind in ("COLON", "EQUALS", "EQ") and not stack:
                 if relation and self.kind(-1) == "NAME":
                     self.at -= 1  # the name before belongs to the next declaration
                     break
                 relation = True
-            depth += (kind in _OPEN) - (kind in _CLOSE)
+            if kind in _OPEN:
+                stack.append(_OPEN[kind])
+            elif kind in _CLOSE and stack:
+                stack.pop()
             self.at += 1
         if self.at == first:  # a keyword where a declaration should begin
             self.complain(

@@ -45,6 +45,7 @@ from avow.language.terms import (
     Or,
     Quantified,
     Quantifier,
+    Role,
     SequenceRange,
     SequenceTerm,
     SetTerm,
@@ -156,7 +157,7 @@ class _Printer:
             case EnumValue(name=name):
                 return self.style.name(name), ATOM
             case Variable():
-                return self.style.name(term.qualified), ATOM
+                return self.style.name(self.variable(term)), ATOM
             case Construct(constructor=name, arguments=arguments, sort=sort):
                 parameters = sort.constructor(name).parameters
                 return self.applied(self.style.name(name), arguments, parameters), ATOM
@@ -211,6 +212,13 @@ class _Printer:
                 return self.quantified(term)
             case Widen(term=inner):
                 return self.form(inner, real)
+
+    def variable(self, term: Variable) -> str:
+        """``in.r``; of another node, ``sensor.r`` (in RCL ``sensor.in.r``, which has one meaning always)."""
+        node, dot, name = term.name.partition(".")
+        if not dot or term.role is Role.BOUND:
+            return term.qualified
+        return f"{node}.{term.role}.{name}" if self.style.careful else term.name
 
     def side(self, term: Term, place: int) -> str:
         """A side of `->` or `<=>`. RCL has parentheses round `and` and `or` there, as the lint RCL401 asks for."""
