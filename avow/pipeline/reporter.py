@@ -76,7 +76,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         self.runtime_errors.append(msg)
 
     def complete_run(self) -> None:
-        from avow.pipeline.assess import finished, index_is_due, known
+        from avow.pipeline.assess import exit_code, finished, index_is_due, known
         from avow.pipeline.overview import write_overview
         from avow.pipeline.summary import print_obligations, print_summary
 
@@ -96,6 +96,9 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             self.outstream.write(message + "\n")
         if self._run_lock is not None:
             self._run_lock.close()
+        # A failing gate is no failing task: doit would call its group an error (2), and it knows no code 3.
+        if not self.failures and not self.runtime_errors and exit_code():
+            raise SystemExit(exit_code())
 
     def _line(self, text: str) -> None:
         self._clear()
