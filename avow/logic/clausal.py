@@ -1,4 +1,4 @@
-"""A formula as a disjunction of conjunctions, one level at a time: a quantifier searches one conjunction after another."""
+"""A formula as a disjunction of conjunctions, one level at a time: a quantifier searches one conjunction at a time."""
 
 from __future__ import annotations
 

@@ -65,6 +65,8 @@ class Constraint:
 
 def satisfy(constraints: Sequence[Constraint], names: Sequence[str]) -> dict[str, Fraction] | None:
     """Values of `names` that meet every constraint, or None if there are none. Raises TooMany."""
+    if all(len(c.left.coefficients) <= 1 for c in constraints):
+        return _satisfy_box(constraints, names)
     current = list(dict.fromkeys(constraints))
     removed: list[tuple[str, list[Constraint]]] = []
     for name in names:
@@ -79,6 +81,22 @@ def satisfy(constraints: Sequence[Constraint], names: Sequence[str]) -> dict[str
     values: dict[str, Fraction] = {}
     for name, about in reversed(removed):
         values[name] = _choose(name, about, values)
+    return values
+
+
+def _satisfy_box(constraints: Sequence[Constraint], names: Sequence[str]) -> dict[str, Fraction] | None:
+    """As `satisfy`, where no constraint connects two variables: each has a lower and an upper bound of its own."""
+    about: dict[str, list[Constraint]] = {name: [] for name in names}
+    for constraint in constraints:
+        if constraint.left.coefficients:
+            about[constraint.left.coefficients[0][0]].append(constraint)
+        elif not constraint.holds({}):
+            return None
+    values: dict[str, Fraction] = {}
+    for name, own in about.items():
+        values[name] = _choose(name, own, {})
+        if not all(c.holds(values) for c in own):
+            return None
     return values
 
 
@@ -103,17 +121,23 @@ def _eliminate(name: str, about: Sequence[Constraint]) -> list[Constraint]:
 
 
 def _choose(name: str, about: Sequence[Constraint], values: Mapping[str, Fraction]) -> Fraction:
+    """A value that meets the constraints if any does: what an equation says, else within the bounds."""
     low: Fraction | None = None
     high: Fraction | None = None
     for constraint in about:
-        coefficient = constraint.left.coefficient(name)
-        bound = -constraint.left.at({**values, name: Fraction(0)}) / coefficient
+        rest, own = constraint.left.constant, Fraction(1)
+        for other, coefficient in constraint.left.coefficients:
+            if other == name:
+                own = coefficient
+            else:
+                rest += coefficient * values[other]
+        bound = -rest / own
         if constraint.operator == "==":
             return bound
-        if coefficient > 0:
-            high = bound if high is None else min(high, bound)
+        if own > 0:
+            high = bound if high is None or bound < high else high
         else:
-            low = bound if low is None else max(low, bound)
+            low = bound if low is None or bound > low else low
     if low is None:
         return Fraction(0) if high is None else high - 1
     return low + 1 if high is None else (low + high) / 2

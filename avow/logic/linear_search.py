@@ -7,6 +7,7 @@ the points of a table, so that the formula is a system of inequalities in a, whi
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 
@@ -27,7 +28,7 @@ from avow.language.terms import (
 from avow.logic.clausal import Part, conjunction
 from avow.logic.evaluate import Code, Compiler, Env, NotEvaluable
 from avow.logic.linear import Constraint, Linear, TooMany, satisfy
-from avow.logic.renaming import bound_names
+from avow.logic.renaming import bound_names, has_variables
 
 Alternatives = Callable[[Env], list[tuple[Constraint, ...]]]
 """The formula as a disjunction of systems, given the other variables' values."""
@@ -117,19 +118,20 @@ def _comparison(compiler: Compiler, term: Compare, positive: bool, unknown: froz
     left, right = _linear(compiler, term.left, unknown), _linear(compiler, term.right, unknown)
     if left is None or right is None:
         return None
-    one, other = left, right
     operator = term.operator if positive else _NEGATED[term.operator]
+    if operator in (">", ">="):
+        left, right, operator = right, left, operator.replace(">", "<")
+    one, other = left.constant, right.constant
+    coefficients = _sum(left.coefficients, right.coefficients, Fraction(-1))
+    straight = Linear.of(coefficients, Fraction(0)).coefficients
+    turned = Linear.of({n: -c for n, c in coefficients.items()}, Fraction(0)).coefficients
 
     def run(env: Env) -> list[tuple[Constraint, ...]]:
-        difference = one(env).plus(other(env), Fraction(-1))
-        turned = difference.times(Fraction(-1))
-        match operator:
-            case "==" | "<" | "<=":
-                return [(Constraint(difference, operator),)]
-            case ">" | ">=":
-                return [(Constraint(turned, operator.replace(">", "<")),)]
-            case _:
-                return [(Constraint(difference, "<"),), (Constraint(turned, "<"),)]
+        constant = Fraction(one(env) - other(env))
+        if operator != "!=":
+            return [(Constraint(Linear(straight, constant), operator),)]
+        below = Constraint(Linear(straight, constant), "<")
+        return [(below,), (Constraint(Linear(turned, -constant), "<"),)]
 
     return run
 
@@ -137,44 +139,64 @@ def _comparison(compiler: Compiler, term: Compare, positive: bool, unknown: froz
 _NEGATED = {"==": "!=", "!=": "==", "<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 
 
-def _linear(compiler: Compiler, term: Term, unknown: frozenset[str]) -> Callable[[Env], Linear] | None:
+@dataclass(frozen=True, slots=True)
+class _Sum:
+    """``sum of coefficient * unknown + constant``; the coefficients are known when the formula is compiled."""
+
+    coefficients: dict[str, Fraction]
+    constant: Code
+
+
+def _linear(compiler: Compiler, term: Term, unknown: frozenset[str]) -> _Sum | None:
     if not bound_names(term) & unknown:
-        code = compiler.code(term)
-        return lambda env: Linear((), Fraction(code(env)))
+        return _Sum({}, compiler.code(term))
     match term:
         case Variable(name=name):
-            itself = Linear(((name, Fraction(1)),), Fraction(0))
-            return lambda env: itself
+            return _Sum({name: Fraction(1)}, lambda env: Fraction(0))
         case Negative(term=inside):
-            inner = _linear(compiler, inside, unknown)
-            return None if inner is None else _scaled(inner, lambda env: Fraction(-1))
+            return _scaled(_linear(compiler, inside, unknown), Fraction(-1))
         case Arithmetic(operator="+" | "-" as operator, left=left, right=right):
             one, other = _linear(compiler, left, unknown), _linear(compiler, right, unknown)
             if one is None or other is None:
                 return None
-            first, second, sign = one, other, Fraction(1 if operator == "+" else -1)
-            return lambda env: first(env).plus(second(env), sign)
+            first, second = one.constant, other.constant
+            if operator == "+":
+                return _Sum(
+                    _sum(one.coefficients, other.coefficients, Fraction(1)), lambda env: first(env) + second(env)
+                )
+            return _Sum(_sum(one.coefficients, other.coefficients, Fraction(-1)), lambda env: first(env) - second(env))
         case Arithmetic(operator="*", left=left, right=right):
-            if bound_names(left) & unknown and bound_names(right) & unknown:
-                return None
-            variable, factor = (left, right) if bound_names(left) & unknown else (right, left)
-            inner = _linear(compiler, variable, unknown)
-            return None if inner is None else _scaled(inner, compiler.code(factor))
-        case Arithmetic(operator="/", left=left, right=right) if not bound_names(right) & unknown:
-            inner, divisor = _linear(compiler, left, unknown), compiler.code(right)
-            return None if inner is None else _scaled(inner, lambda env: _inverse(divisor(env)))
+            for side, factor in ((left, right), (right, left)):
+                known = _known(compiler, factor)
+                if known is not None:
+                    return _scaled(_linear(compiler, side, unknown), known)
+            return None
+        case Arithmetic(operator="/", left=left, right=right):
+            divisor = _known(compiler, right)
+            return _scaled(_linear(compiler, left, unknown), 1 / divisor) if divisor else None
         case _:
             return None
 
 
-def _inverse(value: Fraction) -> Fraction:
-    if value == 0:
-        raise NotEvaluable("division by zero")
-    return 1 / Fraction(value)
+def _known(compiler: Compiler, term: Term) -> Fraction | None:
+    """The value of a term without variables."""
+    if has_variables(term):
+        return None
+    try:
+        return Fraction(compiler.code(term)([]))
+    except NotEvaluable:
+        return None
 
 
-def _scaled(inner: Callable[[Env], Linear], factor: Code) -> Callable[[Env], Linear]:
-    return lambda env: inner(env).times(Fraction(factor(env)))
+def _scaled(inner: _Sum | None, factor: Fraction) -> _Sum | None:
+    if inner is None:
+        return None
+    constant = inner.constant
+    return _Sum({n: c * factor for n, c in inner.coefficients.items()}, lambda env: constant(env) * factor)
+
+
+def _sum(left: dict[str, Fraction], right: dict[str, Fraction], factor: Fraction) -> dict[str, Fraction]:
+    return {n: left.get(n, Fraction(0)) + factor * right.get(n, Fraction(0)) for n in {**left, **right}}
 
 
 def _all(sides: Sequence[Alternatives | None]) -> Alternatives | None:

@@ -35,6 +35,17 @@ def bound_names(term: Term) -> frozenset[str]:
     return found
 
 
+def has_variables(term: Term) -> bool:
+    """Whether any variable, of any role, occurs in the term."""
+    stack = [term]
+    while stack:
+        term = stack.pop()
+        if isinstance(term, Variable):
+            return True
+        stack.extend(children(term))
+    return False
+
+
 def rename_apart(term: Term) -> Term:
     """The same meaning, with no bound name used by two quantifiers or both bound and free."""
     used = set(bound_names(term))

@@ -10,7 +10,7 @@ it either, `NotEvaluable` says which variable it is.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -305,12 +305,14 @@ class Plan:
         if matching is None or len(left) == len(unbound):
             return None
         match, function = matching, self._compiler.code(term.function)
+        known = tuple(k for k, a in enumerate(term.arguments) if not bound_names(a) & unbound)
+        lookup = _Lookup(known, tuple(self._compiler.code(term.arguments[k]) for k in known))
 
         def run(env: Env) -> Iterator[None]:
             value = function(env)
             if value.default is positive:
                 raise Unrestricted("a relation holds at infinitely many points")
-            for key, result in list(value.table.items()):
+            for key, result in lookup.rows(value.table, env):
                 if result is positive and match(env, key):
                     yield None
 
@@ -419,6 +421,32 @@ class Plan:
                 yield None
 
         return Step(3, frozenset((variable.name,)), run)
+
+
+class _Lookup:
+    """The points of a table that agree with the arguments already known: by an index, where that pays.
+
+    The index of the last table is kept: a map stays the same from one evaluation to the next. Tables do not change.
+    """
+
+    def __init__(self, known: tuple[int, ...], codes: tuple[Code, ...]) -> None:
+        self._known = known
+        self._codes = codes
+        self._table: Any = None
+        self._index: dict[tuple[Any, ...], list[tuple[Any, Any]]] = {}
+
+    def rows(self, table: Mapping[Any, Any], env: Env) -> Iterable[tuple[Any, Any]]:
+        if not self._known or len(table) <= _FEW:
+            return list(table.items())
+        if table is not self._table:
+            index: dict[tuple[Any, ...], list[tuple[Any, Any]]] = {}
+            for key, value in table.items():
+                index.setdefault(tuple([key[k] for k in self._known]), []).append((key, value))
+            self._table, self._index = table, index
+        return self._index.get(tuple([code(env) for code in self._codes]), ())
+
+
+_FEW = 3
 
 
 def _integers(low: int, high: int) -> range:

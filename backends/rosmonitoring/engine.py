@@ -100,8 +100,24 @@ class Monitor:
     """Clauses that no message changes: judged once, at the first event."""
 
     def __post_init__(self) -> None:
+        self._observe()
+        wanted = None if self.guarantees is None else set(self.guarantees)
+        node = self.setup.node
+        for clause in node.clauses:
+            if clause.kind is ClauseKind.ASSUMPTION or wanted is None or clause.name in wanted:
+                self._watch(clause)
+
+    def restart(self) -> None:
+        """A new run begins: every variable is as at the start. The tallies go on."""
+        self.values.clear()
+        self._seen.clear()
+        self._readers.clear()
+        self._previous.clear()
+        self._observe()
+
+    def _observe(self) -> None:
         for name, rule in self.setup.rules.items():
-            self._versions[name] = 0
+            self._versions[name] = self._versions.get(name, 0) + 1
             match rule:
                 case Constant(value=value):
                     self.values[name] = value
@@ -114,11 +130,6 @@ class Monitor:
         for name, source in self._previous:
             if name not in self.values and source in self.values:
                 self.values[name] = self.values[source]
-        wanted = None if self.guarantees is None else set(self.guarantees)
-        node = self.setup.node
-        for clause in node.clauses:
-            if clause.kind is ClauseKind.ASSUMPTION or wanted is None or clause.name in wanted:
-                self._watch(clause)
 
     def step(self, event: Mapping[str, Any]) -> list[Violation]:
         """Judge one event. Never raises for what the event holds."""

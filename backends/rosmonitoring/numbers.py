@@ -25,6 +25,20 @@ class Decimal:
         return hash(self.text)
 
 
+class Exact(Fraction):
+    """A fraction that computes its hash once: the same readings are looked up in tables again and again."""
+
+    __slots__ = ("_kept",)
+    _kept: int
+
+    def __hash__(self) -> int:
+        try:
+            return self._kept
+        except AttributeError:
+            self._kept = super().__hash__()
+            return self._kept
+
+
 class NotANumber(Exception):  # noqa: N818 - it names what was found
     """NaN, an infinity, or a number too long to be meant."""
 
@@ -45,12 +59,18 @@ def exact(raw: object) -> Fraction | int:
     raise NotANumber
 
 
+@functools.lru_cache(maxsize=4096)
+def whole(value: int) -> Fraction:
+    """A whole number as a real one."""
+    return Exact(value)
+
+
 @functools.lru_cache(maxsize=65536)
 def _fraction(text: str) -> Fraction:
     if len(text) > _LONGEST or abs(_exponent(text)) > _LONGEST:
         raise NotANumber
     try:
-        return Fraction(text)
+        return Exact(text)
     except (ValueError, ZeroDivisionError):
         raise NotANumber from None
 

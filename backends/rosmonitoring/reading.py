@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
-from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
+from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact, whole
 from avow.backends.rosmonitoring.rules import Argument, Choice, Fields, Hold, InOrder, Lookup, Path
 from avow.language.sorts import (
     BOOL,
@@ -70,7 +70,8 @@ def convert(raw: Any, sort: Sort, names: Mapping[str, str]) -> Value:
     """A field's content as a value of a sort. Raises MappingError."""
     match sort:
         case RealSort():
-            return Fraction(_number(raw))
+            real = _number(raw)
+            return whole(real) if isinstance(real, int) else real
         case IntegerSort() | NaturalSort():
             number = _number(raw)
             if number.denominator != 1:
