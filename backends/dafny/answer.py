@@ -10,7 +10,9 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 
 _NOISE = re.compile(r"Prover error: line \d+ column \d+: unknown parameter|Legal parameters are:|  \w+ \([\w ]+\)")
-_SAID = re.compile(r"(?P<file>[^\s(][^(\n]*)\((?P<line>\d+),(?P<column>\d+)\): (?P<what>Error[^\n]*)")
+_SAID = re.compile(
+    r"(?P<file>[^\s(][^(\n]*)\((?P<line>\d+),(?P<column>\d+)\): (?P<what>Error[^\n]*|Warning[^\n]*no body[^\n]*)"
+)
 _COUNT = re.compile(r"(\d+) (?:resolution/type|parse) errors? detected in ")
 
 
@@ -30,6 +32,8 @@ class Member:
 
     kind: str
     module: str
+    scope: str
+    """The class within the module; ``_default`` for what stands in the module itself."""
     name: str
     outcome: str
     failures: tuple[Failure, ...]
@@ -59,8 +63,8 @@ def read_members(xml: str) -> tuple[Member, ...] | None:
 
 
 def complaints(output: str) -> tuple[Complaint, ...]:
-    """Every error that Dafny prints with a place."""
-    return tuple(Complaint(m["file"].strip(), int(m["line"]), m["what"].strip()) for m in _SAID.finditer(output))
+    """Every error that Dafny prints with a place, and every warning of a body that is missing."""
+    return tuple(Complaint(_file(m["file"]), int(m["line"]), m["what"].strip()) for m in _SAID.finditer(output))
 
 
 def counted(output: str) -> int | None:
@@ -81,12 +85,18 @@ def _member(element: ElementTree.Element) -> Member:
     conclusion = element.find("conclusion")
     outcome = conclusion.get("outcome", "") if conclusion is not None else ""
     failures = tuple(_failure(error) for error in element.iter("error"))
-    return Member(kind, path[0].replace("__", "_"), path[-1].replace("__", "_"), outcome, failures)
+    module, *between, name = [part.replace("__", "_") for part in path] if len(path) > 1 else ["", *path]
+    return Member(kind, module, between[-1] if between else "", name, outcome, failures)
 
 
 def _failure(error: ElementTree.Element) -> Failure:
-    related = tuple((r.get("file", ""), _number(r.get("line"))) for r in error.iter("related"))
-    return Failure(error.get("message", ""), error.get("file", ""), _number(error.get("line")), related)
+    related = tuple((_file(r.get("file", "")), _number(r.get("line"))) for r in error.iter("related"))
+    return Failure(error.get("message", ""), _file(error.get("file", "")), _number(error.get("line")), related)
+
+
+def _file(name: str) -> str:
+    """Without the module by which a refinement inherits the place: ``lamp_spec.dfy[LampImpl]``."""
+    return re.sub(r"\[\w+\]$", "", name.strip())
 
 
 def _number(text: str | None) -> int:

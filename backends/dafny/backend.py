@@ -122,7 +122,7 @@ class DafnyBackend:
             return all_alike(Verdict.NOT_RUN, f"dafny is not on this machine; install it with: {INSTALL}")
         scanned = _scan(text, generated)
         try:
-            settled = settle(generated, scanned, path.name, limits)
+            settled = settle(job.node, generated, scanned, path.name, limits)
         except (process.ToolMissing, OSError) as error:
             return all_alike(Verdict.ERROR, f"dafny could not be run: {error}")
         uncovered = dict(generated.uncovered)

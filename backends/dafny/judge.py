@@ -13,9 +13,11 @@ from dataclasses import dataclass, field
 
 from avow.backend import Limits
 from avow.backends.dafny.answer import Member
+from avow.backends.dafny.candidate import candidates
 from avow.backends.dafny.modules import Generated
 from avow.backends.dafny.runner import Run, audit, verify
 from avow.backends.dafny.scanner import Scan
+from avow.language.contract import Node
 from avow.verdict import Verdict
 
 _FINISHED = re.compile(r"Dafny program verifier finished with (\d+) verified, (\d+) errors?(.*)")
@@ -38,8 +40,8 @@ class Judgement:
     logs: Mapping[str, str]
 
 
-def settle(generated: Generated, scanned: Scan, shown_name: str, limits: Limits) -> Judgement:
-    """Run Dafny and judge each guarantee. `shown_name` is what the implementation is called in messages.
+def settle(node: Node, generated: Generated, scanned: Scan, shown_name: str, limits: Limits) -> Judgement:
+    """Run Dafny and judge each guarantee of the node. `shown_name` is what the implementation is called in messages.
 
     Raises ToolMissing, OSError.
     """
@@ -72,14 +74,23 @@ def settle(generated: Generated, scanned: Scan, shown_name: str, limits: Limits)
         if _broken(again, scanned, generated, shown_name) is None:
             left = _unproved(again) or tuple(_lacking(again.members or (), scanned, generated))
             unproved |= dict.fromkeys(spared, left)
-    verdicts = {name: _verdict(unproved[name], taken, scanned, generated) for name in guarantees}
+    tried = [dict(c) for c in candidates(run.model, node)] if any(unproved.values()) else []
+    verdicts = {name: _verdict(unproved[name], taken, scanned, generated, tried) for name in guarantees}
     return Judgement(verdicts, run.command, logs)
 
 
-def _verdict(unproved: tuple[str, ...], taken: tuple[str, ...], scanned: Scan, generated: Generated) -> Settled:
+def _verdict(
+    unproved: tuple[str, ...],
+    taken: tuple[str, ...],
+    scanned: Scan,
+    generated: Generated,
+    tried: list[dict[str, str]],
+) -> Settled:
     details: dict[str, object] = {"module": generated.impl_module, "members": [name for _, name in scanned.members]}
     if unproved:
         details["not proved"] = list(unproved)
+        if tried:
+            details["candidates"] = tried  # what the prover could not rule out; nobody ran the implementation there
         return Settled(Verdict.UNKNOWN, f"not proved: {_few(unproved)}", taken, details)
     if taken:
         return Settled(
@@ -100,7 +111,8 @@ def _broken(run: Run, scanned: Scan, generated: Generated, shown_name: str) -> S
     printed = _FINISHED.search(run.output)
     if run.members is not None and printed is not None and run.code in (0, 4):
         return None
-    errors = [f"{_name(c.file, generated, shown_name)}:{c.line}: {c.message}" for c in run.complaints]
+    said = [c for c in run.complaints if c.message.startswith("Error")]
+    errors = [f"{_name(c.file, generated, shown_name)}:{c.line}: {c.message}" for c in said]
     count = run.counted or len(errors)
     problems = [what for _, what in scanned.problems]
     details: dict[str, object] = {"errors": errors, "problems": problems}
@@ -116,24 +128,24 @@ def _taken_for_granted(run: Run, scanned: Scan, generated: Generated, shown_name
     """What the implementation assumes, by our scan and by Dafny's own account; None where Dafny gave none."""
     if run.timed_out or run.code not in (0, 3) or _FINISHED.search(run.output) is None:
         return None
-    if run.code == 3 and not run.complaints:
+    if run.code == 3 and not any(c.message.startswith("Error") for c in run.complaints):
         return None
     found = [f"{shown_name}:{line}: {what}" for line, what in scanned.hypotheses]
-    # The generated modules leave the partial operations open on purpose (see `modules`).
+    # The generated types leave the partial operations open on purpose (see `modules`); nothing else may be open.
     found += [
         f"{_name(c.file, generated, shown_name)}:{c.line}: {c.message}"
         for c in run.complaints
-        if c.file not in (generated.types_file, generated.contract_file, generated.spec_file)
+        if c.file != generated.types_file
     ]
     return tuple(dict.fromkeys(found))
 
 
 def _lacking(members: tuple[Member, ...], scanned: Scan, generated: Generated) -> list[str]:
     """Members that should be in the answer and are not: Dafny is silent of a method without a body."""
-    there = {(m.module, m.name) for m in members if m.kind == "Impl"}
+    there = {m.name for m in members if (m.kind, m.module, m.scope) == ("Impl", generated.impl_module, "_default")}
     names = {m.name for m in members if m.kind == "Impl"}
     found = [what for _, what in scanned.problems]
-    found += [f"no answer about {n}" for n in ("EnvNotEmpty", "Step") if (generated.impl_module, n) not in there]
+    found += [f"no answer about {n}" for n in ("EnvNotEmpty", "Step") if n not in there]
     found += [f"no answer about {kind} {name}" for kind, name in scanned.members if name not in names]
     if scanned.environment is None:
         found.append("predicate Env has no body")

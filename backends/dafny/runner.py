@@ -15,6 +15,8 @@ from avow.tools import find_tool
 INSTALL = "apt-get install dafny"
 
 _ANSWER = "answer.xml"
+_MODEL = "model.txt"
+_MAX_MODEL = 4_000_000
 
 
 def dafny() -> Tool:
@@ -33,6 +35,8 @@ class Run:
     complaints: tuple[Complaint, ...]
     counted: int | None
     output: str
+    model: str
+    """The prover's models of what it could not prove, as Boogie prints them."""
 
     @property
     def timed_out(self) -> bool:
@@ -42,7 +46,7 @@ class Run:
 def verify(files: Mapping[str, str], limits: Limits) -> Run:
     """Verify all files together. Raises ToolMissing."""
     each = max(1, min(30, int(limits.seconds / 2)))
-    flags = ("/nologo", "/compile:0", f"/timeLimit:{each}", "/errorLimit:20", f"/xml:{_ANSWER}")
+    flags = ("/nologo", "/compile:0", f"/timeLimit:{each}", "/errorLimit:20", f"/xml:{_ANSWER}", f"/mv:{_MODEL}")
     return _run(flags, files, limits, answer=True)
 
 
@@ -60,11 +64,16 @@ def _run(flags: Sequence[str], files: Mapping[str, str], limits: Limits, *, answ
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
         done = process.run(command, cwd=folder, seconds=limits.seconds, megabytes=limits.megabytes)
-        path = folder / _ANSWER
-        try:
-            xml = path.read_text(encoding="utf-8", errors="replace") if answer and path.is_file() else ""
-        except OSError:
-            xml = ""
+        xml = _read(folder / _ANSWER) if answer else ""
+        model = _read(folder / _MODEL)[:_MAX_MODEL] if answer else ""
     output = quiet(done.stdout + done.stderr)
     members = read_members(xml) if xml else None
-    return Run(command, done.code, members, complaints(output), counted(output), output)
+    return Run(command, done.code, members, complaints(output), counted(output), output, model)
+
+
+def _read(path: Path) -> str:
+    """Empty where there is no such file: what is missing is noticed by what it should have said."""
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""

@@ -133,8 +133,9 @@ class _Scanner:
                     self.open(token, f"'{token.text} *': {what}")
                 case "include" if token.kind == "word":
                     blanked = self.include(at, blanked)
-                case "trait" | "iterator" if token.kind == "word":
-                    self.open(token, f"a {token.text} may have members without bodies")
+                case "trait" | "iterator" | "abstract" if token.kind == "word":
+                    what = f"{token.text} module" if token.text == "abstract" else token.text
+                    self.open(token, f"'{what}' may have members without bodies")
                 case _ if token.kind == "word":
                     self.declaration(at)
         self.module()

@@ -71,6 +71,7 @@ _MUTANTS: tuple[tuple[str, str, str, set[str]], ...] = (
 
 
 @pytest.mark.needs_dafny
+@pytest.mark.slow
 @pytest.mark.parametrize(("old", "new", "node", "broken"), _MUTANTS)
 def test_a_wrong_implementation_is_not_proved(
     make_job: MakeJob, tmp_path: Path, old: str, new: str, node: str, broken: set[str]
