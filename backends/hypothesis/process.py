@@ -40,21 +40,24 @@ class Subject:
         return reply
 
     def ask_all(self, cases: Sequence[Inputs]) -> list[Any]:
-        """For each case what the subject returned, or the SubjectFailed that it ended in. Many at a time cost less:
-        each question wakes another process."""
+        """For each case what the subject returned, or the SubjectFailed that it ended in; where the process itself
+        fails, nothing for the cases after. Many at a time cost less: each question wakes another process."""
         try:
             replies = self._exchange(cases)
         except SubjectFailed as failure:
             if len(cases) == 1:
                 return [failure]
-            return [self._alone(inputs) for inputs in cases]
+            return self._one_by_one(cases)
         return [self._reply(reply) for reply in replies]
 
-    def _alone(self, inputs: Inputs) -> Any:
-        try:
-            return self.ask(inputs)
-        except SubjectFailed as failure:
-            return failure
+    def _one_by_one(self, cases: Sequence[Inputs]) -> list[Any]:
+        """The answers up to the first case that has none: which of many it was that ended the process."""
+        replies: list[Any] = []
+        for inputs in cases:
+            replies.append(self.ask_all([inputs])[0])
+            if isinstance(replies[-1], SubjectFailed):
+                break
+        return replies
 
     def _reply(self, reply: Any) -> Any:
         if not isinstance(reply, dict) or not ({"error", "value"} & reply.keys()):
