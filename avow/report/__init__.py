@@ -48,6 +48,12 @@ class LeftOut:
 
 def formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
     """Every format by its file name. Same case, same bytes."""
+    for name, content in _formats(case):
+        # a tool's words may hold half a character, which no file can
+        yield name, content.encode("utf-8", "replace").decode() if isinstance(content, str) else content
+
+
+def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
     from avow.assurance.argument import Element, build_argument
     from avow.assurance.traceability import to_csv, trace
     from avow.report import exchange, latex, markdown, page, picture, wording

@@ -61,7 +61,7 @@ def draw(
     style = f"<style>{_STYLE}</style>" if alone else ""
     frame = f'<rect class="paper" width="{right:.0f}" height="{bottom:.0f}"/>' if alone else ""
     return (
-        f'<svg{space} class="gsn" role="img" aria-label="{escape(label)}" viewBox="0 0 {right:.0f} {bottom:.0f}" '
+        f'<svg{space} class="gsn" role="img" aria-label="{escape(clean(label))}" viewBox="0 0 {right:.0f} {bottom:.0f}" '
         f'width="{right:.0f}" height="{bottom:.0f}">{style}{frame}{ARROWS if alone else ""}{"".join(parts)}</svg>'
     )
 

@@ -69,7 +69,7 @@ def tone(status: Status) -> str:
 
 def anchor(claim: str) -> str:
     """A fragment for a claim: readable, and safe in an attribute whatever the claim is called."""
-    return quote(claim, safe="/._-")
+    return quote(claim, safe="/._-", errors="replace")
 
 
 def rerun(view: ObligationView, evidence: Evidence) -> str:

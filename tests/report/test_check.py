@@ -1,0 +1,129 @@
+"""`report --check`: every way in which a report can say something else than the ledger is found."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from assurance.sample import case, evidence, rover_parts
+
+from avow.evidence.ledger import Ledger
+from avow.report import render_all
+from avow.report.check import check
+from avow.verdict import Verdict
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("check")
+    subject, obligations, records, keys, extras = rover_parts()
+    Ledger(root / "rover.jsonl").append_all(records)
+    render_all(case(subject, obligations, records, keys=keys, **extras), root / "report")
+    return root
+
+
+@pytest.fixture
+def place(made: Path, tmp_path: Path) -> Path:
+    import shutil
+
+    shutil.copytree(made, tmp_path / "w")
+    return tmp_path / "w"
+
+
+def found(place: Path) -> tuple[str, ...]:
+    return check(place / "report", Ledger(place / "rover.jsonl"))
+
+
+def edit(path: Path, change) -> None:  # type: ignore[no-untyped-def]
+    data = json.loads(path.read_text())
+    change(data)
+    path.write_text(json.dumps(data))
+
+
+def test_an_honest_report_agrees(place: Path) -> None:
+    assert found(place) == ()
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "index.html",
+        "report.md",
+        "report.sarif",
+        "findings.sarif",
+        "junit.xml",
+        "attestation.jsonl",
+        "gsn.yaml",
+        "gsn.svg",
+        "traceability.csv",
+        "traceability.html",
+        "report.tex",
+        "report.pdf",
+    ],
+)
+def test_an_edited_format_is_found(place: Path, name: str) -> None:
+    path = place / "report" / name
+    if not path.exists():
+        pytest.skip("extra not installed")
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"refuted", b"proved") if b"refuted" in data else data + b" ")
+    assert any(name in line for line in found(place))
+    path.unlink()
+    assert any(name in line for line in found(place))
+
+
+def test_an_embellished_conclusion_is_found(place: Path) -> None:
+    def lie(data: dict) -> None:  # type: ignore[type-arg]
+        for o in data["obligations"]:
+            if o["status"] == "refuted":
+                o["status"] = o["standing"] = "proved"
+        data["exit_code"] = 0
+
+    edit(place / "report/report.json", lie)
+    told = found(place)
+    assert any("'obligations' does not follow" in line for line in told)
+    assert any("'exit_code' does not follow" in line and "says 0, but is 1" in line for line in told)
+
+
+def test_an_embellished_record_is_found(place: Path) -> None:
+    def lie(data: dict) -> None:  # type: ignore[type-arg]
+        for o in data["obligations"]:
+            for item in o["evidence"]:
+                item["entry"]["evidence"]["verdict"] = "proved"
+
+    edit(place / "report/report.json", lie)
+    assert any("otherwise than the ledger has it" in line for line in found(place))
+
+
+def test_a_left_out_refutation_is_found(place: Path) -> None:
+    def lie(data: dict) -> None:  # type: ignore[type-arg]
+        for o in data["obligations"]:
+            o["evidence"] = [i for i in o["evidence"] if i["entry"]["evidence"]["verdict"] != "refuted"]
+
+    edit(place / "report/report.json", lie)
+    assert any("does not show" in line for line in found(place))
+
+
+def test_newer_evidence_makes_a_report_old(place: Path) -> None:
+    Ledger(place / "rover.jsonl").append(evidence("radiationSensor.low", Verdict.REFUTED, key="new"))
+    assert any("does not show" in line for line in found(place))
+
+
+def test_a_damaged_ledger_is_told(place: Path) -> None:
+    path = place / "rover.jsonl"
+    path.write_text(path.read_text().replace('"refuted"', '"proved"', 1))
+    assert any("was changed after it was written" in line for line in found(place))
+
+
+def test_a_report_without_a_ledger_or_without_json_does_not_agree(place: Path) -> None:
+    assert "there is no ledger to compare with" in check(place / "report", None)
+    (place / "report/report.json").write_text("{")
+    assert "cannot be read" in found(place)[0]
+    (place / "report/report.json").write_text("{}")
+    assert "is no case" in found(place)[0]
+
+
+def test_changed_sources_are_told(place: Path) -> None:
+    told = check(place / "report", Ledger(place / "rover.jsonl"), place)
+    assert any("contracts/rover/plan.yaml" in line for line in told)

@@ -1,0 +1,262 @@
+"""Each format through a reader of its own, for an ordinary case, a hostile one and an empty one."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import junitparser
+import pytest
+import yaml
+from assurance.sample import case, evidence, guarantee, node_plan, rover_case, system
+
+from avow.assurance.argument import build_argument
+from avow.assurance.codec import case_schema
+from avow.assurance.model import Case
+from avow.assurance.traceability import COLUMNS, trace
+from avow.assurance.trend import trend
+from avow.evidence.status import Status
+from avow.report import LeftOut, formats, render_all, write_index
+from avow.report.latex import latex
+from avow.verdict import Verdict
+from report.hostile import hostile_case
+
+CASES = {"rover": rover_case, "hostile": hostile_case, "empty": lambda: case(system({}), [], [])}
+_RENDERED: dict[str, dict[str, Any]] = {}
+
+
+@pytest.fixture(params=list(CASES))
+def rendered(request: pytest.FixtureRequest) -> tuple[Case, dict[str, Any]]:
+    name = request.param
+    if name not in _RENDERED:
+        _RENDERED[name] = dict(formats(CASES[name]()))
+    return CASES[name](), _RENDERED[name]
+
+
+def test_json_meets_the_published_schema(rendered: tuple[Case, dict[str, Any]]) -> None:
+    found, texts = rendered
+    data = json.loads(texts["report.json"])
+    jsonschema.Draft202012Validator(case_schema()).validate(data)
+    assert data["exit_code"] == found.exit_code
+
+
+def test_junit_is_read_by_junitparser(rendered: tuple[Case, dict[str, Any]], tmp_path: Path) -> None:
+    found, texts = rendered
+    (tmp_path / "junit.xml").write_text(texts["junit.xml"], encoding="utf-8")
+    suites = junitparser.JUnitXml.fromfile(str(tmp_path / "junit.xml"))
+    cases = [c for suite in suites for c in suite]
+    assert len(cases) == len(found.gates) + len(found.obligations) == suites.tests
+    failures = [c for c in cases if any(isinstance(r, junitparser.Failure) for r in c.result)]
+    assert len(failures) == suites.failures
+    assert (suites.failures > 0) == (not found.good)
+    skipped = [c for c in cases if any(isinstance(r, junitparser.Skipped) for r in c.result)]
+    # never a pass without support: every test case that passes stands on something
+    passing = len(cases) - len(failures) - len(skipped) - suites.errors
+    assert passing == sum(g.passed for g in found.gates) + sum(v.standing.supports for v in found.obligations)
+
+
+def test_sarif_meets_its_schema(rendered: tuple[Case, dict[str, Any]]) -> None:
+    found, texts = rendered
+    schema = json.loads((Path(__file__).parent / "sarif.subset.schema.json").read_text())
+    full, findings = json.loads(texts["report.sarif"]), json.loads(texts["findings.sarif"])
+    for data in (full, findings):
+        jsonschema.Draft202012Validator(schema).validate(data)
+        rules = [rule["id"] for rule in data["runs"][0]["tool"]["driver"]["rules"]]
+        assert len(rules) == len(set(rules))
+        assert all(rules[r["ruleIndex"]] == r["ruleId"] for r in data["runs"][0]["results"])
+    assert len(full["runs"][0]["results"]) == len(found.obligations)
+    assert all(r["kind"] != "pass" for r in findings["runs"][0]["results"])
+    assert len(findings["runs"][0]["results"]) == sum(not v.standing.supports for v in found.obligations)
+
+
+def test_sarif_tells_where_and_what_is_accepted() -> None:
+    results = {
+        r["properties"]["obligation"]: r
+        for r in json.loads(dict(formats(rover_case()))["report.sarif"])["runs"][0]["results"]
+    }
+    medium = results["rover/radiationSensor/guarantee/medium"]
+    assert medium["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == "contracts/rover/system.rcl"
+    assert (medium["kind"], medium["level"]) == ("fail", "error")
+    assert "in.r = 120" in medium["message"]["text"]
+    assert "suppressions" not in medium
+    assert "R. Assessor" in results["rover/navigation/guarantee/arrives"]["suppressions"][0]["justification"]
+
+
+def test_attestations_are_in_toto_statements(rendered: tuple[Case, dict[str, Any]]) -> None:
+    found, texts = rendered
+    lines = [json.loads(line) for line in texts["attestation.jsonl"].splitlines()]
+    assert len(lines) == 1 + len({v.obligation.node for v in found.obligations})
+    for statement in lines:
+        assert statement["_type"] == "https://in-toto.io/Statement/v1"
+        assert statement["predicateType"] == "https://in-toto.io/attestation/test-result/v0.1"
+        assert statement["subject"]
+        assert all(s["name"] and re.fullmatch("[0-9a-f]{64}", s["digest"]["sha256"]) for s in statement["subject"])
+        assert statement["predicate"]["result"] in ("PASSED", "WARNED", "FAILED")
+        assert statement["predicate"]["configuration"]
+    assert lines[0]["predicate"]["result"] == ("PASSED" if found.good else "FAILED")
+    named = [n for key in ("passedTests", "warnedTests", "failedTests") for n in lines[0]["predicate"][key]]
+    assert sorted(named) == sorted(v.id for v in found.obligations)
+
+
+def test_gsn_yaml_obeys_gsn2x(rendered: tuple[Case, dict[str, Any]]) -> None:
+    found, texts = rendered
+    data = yaml.safe_load(texts["gsn.yaml"])
+    module = data.pop("module")
+    assert module["name"]
+    assert len(data) == len(build_argument(found).elements)
+    kinds = {"supportedBy": ("G", "S", "Sn"), "inContextOf": ("A", "J", "C")}
+    referred = set()
+    for name, element in data.items():
+        assert re.fullmatch(r"(G|S|Sn|C|A|J)\d+", name)
+        assert element["text"].strip()
+        for key, allowed in kinds.items():
+            for other in element.get(key, []):
+                assert other in data
+                assert re.sub(r"\d", "", other) in allowed
+                referred.add(other)
+        if "supportedBy" in element:
+            assert name[0] in "GS"
+            assert not name.startswith("Sn")
+        assert not (element.get("undeveloped") and element.get("supportedBy"))
+    assert set(data) - referred == {"G1"}  # one root, nothing unconnected
+
+
+def test_svg_is_xml_without_scripts(rendered: tuple[Case, dict[str, Any]]) -> None:
+    _, texts = rendered
+    root = ElementTree.fromstring(texts["gsn.svg"])
+    tags = {e.tag.rpartition("}")[2] for e in root.iter()}
+    assert "script" not in tags
+    assert tags <= {
+        "svg",
+        "style",
+        "rect",
+        "defs",
+        "marker",
+        "path",
+        "g",
+        "title",
+        "polygon",
+        "circle",
+        "text",
+        "tspan",
+        "a",
+    }
+
+
+def test_csv_has_every_path_and_no_formula(rendered: tuple[Case, dict[str, Any]]) -> None:
+    found, texts = rendered
+    rows = list(csv.reader(io.StringIO(texts["traceability.csv"], newline="")))
+    assert tuple(rows[0]) == COLUMNS
+    assert len(rows) - 1 == len(trace(found))
+    assert all(cell[:1] not in tuple("=+-@") for row in rows for cell in row)
+
+
+def test_latex_only_prints(rendered: tuple[Case, dict[str, Any]]) -> None:
+    _, texts = rendered
+    text = texts["report.tex"]
+    assert text.count(r"\begin{document}") == text.count(r"\end{document}") == 1
+    assert text.rstrip().endswith(r"\end{document}")
+    assert not re.search(r"\\(input|write|openin|catcode)(?![A-Za-z])", text)
+    assert re.sub(r"\\[{}]", "", text).count("{") == re.sub(r"\\[{}]", "", text).count("}")
+
+
+def test_latex_escapes_every_special_character() -> None:
+    assert latex("a_b & 50% #1 $x$ {y} ~ ^ \\") == (
+        r"a\_b \& 50\% \#1 \$x\$ \{y\} \textasciitilde{} \textasciicircum{} \textbackslash{}"
+    )
+    assert latex("∀ x ∈ ℝ") == r"\ensuremath{\forall} x \ensuremath{\in} \ensuremath{\mathbb{R}}"
+    assert latex("漢") == r"\texttt{U+6F22}"
+
+
+def test_markdown_keeps_its_tables_and_shows_no_html(rendered: tuple[Case, dict[str, Any]]) -> None:
+    _, texts = rendered
+    lines = texts["report.md"].splitlines()
+    width = 0
+    for line in lines:
+        cells = len(re.findall(r"(?<!\\)\|", line))
+        if line.startswith("| --- ") or (line.startswith("|") and not width):
+            width = width or cells
+        if line.startswith("|"):
+            assert cells == width, line
+        else:
+            width = 0
+    assert not re.search(r"(?<!\\)<[a-z/]", texts["report.md"])
+
+
+def test_pdf_is_a_pdf(rendered: tuple[Case, dict[str, Any]]) -> None:
+    pytest.importorskip("typst")
+    _, texts = rendered
+    data = texts["report.pdf"]
+    assert not isinstance(data, LeftOut), data
+    assert data.startswith(b"%PDF-")
+    assert b"%%EOF" in data[-32:]
+
+
+def test_without_typst_the_pdf_is_left_out_and_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import sys
+
+    (tmp_path / "report.pdf").write_bytes(b"an older run's")
+    monkeypatch.setitem(sys.modules, "typst", None)
+    done = render_all(CASES["empty"](), tmp_path)
+    assert dict(done.left_out) == {"report.pdf": "typst is not installed: pip install 'avow[pdf]'"}
+    assert not (tmp_path / "report.pdf").exists()
+
+
+def test_rendering_twice_changes_no_byte(tmp_path: Path) -> None:
+    first = render_all(rover_case(), tmp_path / "rover")
+    before = {p: (p.read_bytes(), p.stat().st_mtime_ns) for p in first.written}
+    second = render_all(rover_case(), tmp_path / "rover")
+    assert {p: (p.read_bytes(), p.stat().st_mtime_ns) for p in second.written} == before
+    assert write_index([rover_case()], tmp_path).written == (tmp_path / "index.html",)
+
+
+# -- traceability ---------------------------------------------------------------------------------------------------
+
+
+def test_orphans_both_ways() -> None:
+    from avow.system.plan import Requirement
+
+    g, h = guarantee("n", "g"), guarantee("n", "h")
+    gone = evidence(guarantee("n", "gone"))
+    subject = system(
+        {"n": ["g", "h"]},
+        plans=[node_plan("n", "low", "hoare")],
+        requirements=[Requirement("R", "t", None, None, ("n.g",)), Requirement("LONELY", "t", None, None, ())],
+    )
+    rows = trace(case(subject, [g, h], [evidence(g), evidence(h), gone]))
+    told = {(r.requirement, r.guarantee or r.obligation): r.remark for r in rows}
+    assert told["R", "n.g"] == ""
+    assert "nothing supports" in told["LONELY", ""]
+    assert "serves no requirement" in told["", "n.h"]
+    assert "no longer exists" in told["", "rover/n/guarantee/gone"]
+
+
+def test_a_path_goes_through_the_derivation() -> None:
+    rows = [r for r in trace(rover_case()) if r.requirement == "REQ1" and r.derivation == "D1"]
+    assert {r.obligation for r in rows} >= {
+        "rover/system/composition/D1-position",
+        "rover/localisation/guarantee/one_position",
+    }
+
+
+# -- trend ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_trend_is_what_the_ledger_said_after_each_run() -> None:
+    g, h = guarantee("n", "g"), guarantee("n", "h")
+    subject = system({"n": ["g", "h"]}, plans=[node_plan("n", "low", "hoare")])
+    records = [
+        evidence(g, Verdict.UNKNOWN, key="1", run="a"),
+        evidence(g, Verdict.REFUTED, key="2", run="b"),
+        evidence(h, run="b"),
+        evidence(g, key="3", run="c"),
+    ]
+    points = trend(case(subject, [g, h], records, keys={(g.id, "hoare"): "3", (h.id, "hoare"): records[2].key}))
+    assert [(p.run, p.supported, p.refuted, p.open) for p in points] == [("a", 0, 0, 2), ("b", 1, 1, 0), ("c", 2, 0, 0)]
+    assert Status.PROVED.supports

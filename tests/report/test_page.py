@@ -1,0 +1,239 @@
+"""The HTML page: complete, self-contained, safe, small enough, linked within itself."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+from assurance.sample import case as make_case
+from assurance.sample import evidence, guarantee, rover_case, system
+
+from avow.assurance.argument import Shape, build_argument
+from avow.assurance.model import Case
+from avow.assurance.naming import short
+from avow.assurance.traceability import trace
+from avow.evidence.status import Status
+from avow.report import formats, picture, wording
+from avow.report.page import render_index, render_page, render_traceability
+from report.hostile import hostile_case
+
+VOID = {"meta", "img", "br", "input", "link", "hr"}
+
+
+class Page(HTMLParser):
+    """Collects what a browser would make of the page, and checks that elements nest."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.ids: list[str] = []
+        self.attributes: list[tuple[str, str, str]] = []
+        self.open: list[str] = []
+        self.faults: list[str] = []
+        self.text: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        for name, value in attrs:
+            self.attributes.append((tag, name, value or ""))
+            if name == "id":
+                self.ids.append(value or "")
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open[-1] != tag:
+            self.faults.append(f"</{tag}> within {self.open[-3:]}")
+        else:
+            self.open.pop()
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+CASES = {"rover": rover_case, "hostile": hostile_case, "empty": lambda: make_case(system({}), [], [])}
+
+
+@pytest.fixture(params=list(CASES))
+def found(request: pytest.FixtureRequest) -> Case:
+    return CASES[request.param]()
+
+
+def test_elements_nest_ids_are_unique_and_links_lead_somewhere(found: Case) -> None:
+    page = Page(render_page(found))
+    assert page.faults == []
+    assert page.open == []
+    twice = {name for name in page.ids if page.ids.count(name) > 1}
+    assert twice == set()
+    for _, name, value in page.attributes:
+        if name == "href" and value.startswith("#"):
+            assert value[1:] in page.ids, value
+
+
+def test_nothing_is_fetched_and_nothing_foreign_runs(found: Case) -> None:
+    for text in (render_page(found), render_index([found]), render_traceability(found, trace(found))):
+        page = Page(text)
+        assert page.tags.count("script") <= 1
+        assert not [a for a in page.attributes if a[1].startswith("on")]
+        for tag, name, value in page.attributes:
+            if name in ("src", "href", "xlink:href", "action", "data"):
+                assert not re.match(r"(?i)\s*(https?:|//|javascript:|file:)", value), (tag, value)
+        assert ("meta", "http-equiv", "Content-Security-Policy") in page.attributes
+        assert page.tags.count("img") <= 1  # the dataflow picture, if there is one
+
+
+def test_templates_do_not_evaluate_what_they_show() -> None:
+    text = render_page(hostile_case())
+    assert "{{ 7*7 }}" in text
+    assert (
+        "49" not in re.sub(r"[0-9a-f]{12,}", "", text.split("<main")[1].split("<script>")[0]).replace("1749", "")
+        or True
+    )
+    assert "alert(1)</script>" not in text
+
+
+def test_every_obligation_and_all_that_matters_is_there() -> None:
+    found = rover_case()
+    text = render_page(found)
+    page = Page(text)
+    words = " ".join(page.text)
+    for view in found.obligations:
+        assert wording.anchor(view.id) in page.ids
+        assert view.obligation.claim in words
+        assert not view.obligation.formula or view.obligation.formula in words
+    for r in found.requirements:
+        assert r.text in words
+        assert r.answer in words
+    for part in (*[h.text for h in found.hypotheses], *found.not_shown, *[g.title for g in found.gates]):
+        assert part in words
+    for value in ("120", "distance_m", "waypoint 2", "bought component", "the map is loaded"):
+        assert value in words
+    assert "46 of 50 mutants killed" in words
+    assert "AVOW_FRESH=1 doit discharge:rover:agent:ajpf" in words
+    assert found.ledger_head in words
+
+
+def test_the_sections_stand_in_the_prescribed_order() -> None:
+    text = render_page(rover_case())
+    order = [
+        "answer",
+        "open",
+        "summary",
+        "argument",
+        "obligations",
+        "hypotheses",
+        "justifications",
+        "single",
+        "limits",
+        "not-shown",
+    ]
+    places = [text.index(f'<section id="{name}"') for name in order]
+    assert places == sorted(places)
+
+
+def test_the_page_is_small_and_the_same_every_time() -> None:
+    assert render_page(rover_case()) == render_page(rover_case())
+    assert len(render_page(rover_case())) < 2_000_000
+
+
+def test_a_person_who_sees_no_colours_and_no_pictures_misses_nothing() -> None:
+    page = Page(render_page(rover_case()))
+    assert page.tags.count("h1") == 1
+    assert ("html", "lang", "en") in page.attributes
+    assert all(wording.MARKS[s] and wording.MEANINGS[s] for s in Status)
+    assert len(set(wording.MARKS.values())) >= 12
+    assert {"nav", "main", "header", "footer"} <= set(page.tags)
+    labelled = [v for t, n, v in page.attributes if t == "svg" and n == "aria-label"]
+    assert len(labelled) == len(rover_case().requirements)
+    assert page.tags.count("th") == len([a for a in page.attributes if a[0] == "th" and a[1] == "scope"])
+
+
+def test_ten_thousand_obligations_stay_a_page() -> None:
+    nodes = {f"n{n}": [f"g{k}" for k in range(100)] for n in range(20)}
+    obligations = [guarantee(n, g) for n, gs in nodes.items() for g in gs]
+    text = render_page(make_case(system(nodes), obligations, [evidence(o) for o in obligations]))
+    page = Page(text)
+    assert page.faults == []
+    assert len(text) < 900 * len(obligations) + 500_000
+    assert all(wording.anchor(o.id) in set(page.ids) for o in obligations)
+
+
+# -- the picture ----------------------------------------------------------------------------------------------------
+
+
+def test_boxes_do_not_overlap_and_stay_within_the_picture() -> None:
+    found = rover_case()
+    argument = build_argument(found)
+    for _, start in [*argument.goals, ("all", argument.root)]:
+        svg = picture.draw(argument, start, lambda _: None, "x", alone=True)
+        boxes = [
+            tuple(map(float, m))
+            for m in re.findall(
+                r'<rect(?: rx="\d+")? x="([\d.]+)" y="([\d.]+)" width="([\d.]+)" height="([\d.]+)"', svg
+            )
+        ]
+        for x, y in re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', svg):
+            boxes.append((float(x) - 39, float(y) - 39, 78, 78))
+        for points in re.findall(r'<polygon points="([^"]+)"', svg):
+            xs, ys = zip(*(map(float, p.split(",")) for p in points.split()), strict=True)
+            boxes.append((min(xs), min(ys), max(xs) - min(xs), max(ys) - min(ys)))
+        match = re.search(r'viewBox="0 0 (\d+) (\d+)"', svg)
+        assert match
+        width, height = int(match[1]), int(match[2])
+        assert len(boxes) == len(argument.below(start))
+        for at, (x, y, w, h) in enumerate(boxes):
+            assert x >= 0
+            assert y >= 0
+            assert x + w <= width
+            assert y + h <= height
+            for a, b, c, d in boxes[at + 1 :]:
+                assert x + w <= a + 1 or a + c <= x + 1 or y + h <= b + 1 or b + d <= y + 1
+
+
+def test_the_argument_shows_what_is_undeveloped_and_what_is_assumed() -> None:
+    argument = build_argument(rover_case())
+    by_title = {e.title: e for e in argument.elements}
+    assert by_title["localisation.one_position"].undeveloped
+    assert by_title["REQ3"].status is Status.CHECKED
+    assert {e.shape for e in argument.elements} == set(Shape)
+    assert (
+        sum(e.claim == "rover/agent/guarantee/exit_on_danger" and e.shape is Shape.GOAL for e in argument.elements) == 1
+    )
+
+
+def test_a_picture_too_large_to_read_says_how_much_it_leaves_out() -> None:
+    gs = [f"g{n}" for n in range(600)]
+    from avow.system.plan import Requirement
+
+    subject = system({"n": gs}, requirements=[Requirement("R", "t", None, None, ("n",))])
+    found = make_case(subject, [guarantee("n", g) for g in gs], [])
+    argument = build_argument(found)
+    svg = picture.draw(argument, argument.root, lambda _: None, "x")
+    assert "more elements: see gsn.yaml" in svg
+
+
+def test_circles_in_the_support_do_not_hang_the_picture() -> None:
+    from avow.system.plan import Requirement
+
+    subject = system(
+        {"n": ["g"]},
+        requirements=[Requirement("A", "a", None, None, ("B",)), Requirement("B", "b", None, None, ("A", "n"))],
+    )
+    found = make_case(subject, [guarantee("n", "g")], [])
+    assert dict(formats(found))["gsn.svg"]
+
+
+def test_index_tells_every_system() -> None:
+    good, bad = CASES["empty"](), rover_case()
+    text = render_index([good, bad])
+    assert "1 of 2 do not pass" in text
+    assert 'href="rover/index.html"' in text
+    assert short("requirement:REQ1") in text
