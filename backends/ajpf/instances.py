@@ -101,6 +101,7 @@ def _instantiate(clause: Clause, mapper: Mapper, keys: set[str]) -> Claim:
     about: dict[Formula, list[str]] = {}
     ranges: dict[str, str] = {}
     settled: list[str] = []
+    mapper.expanded.clear()
     for variables, antecedent, consequent in _implications(clause.formula):
         used = [v for v in variables if is_index(v.sort) and v.name in free(antecedent) | free(consequent)]
         others = tuple(v for v in variables if not is_index(v.sort))
@@ -136,6 +137,8 @@ def _instantiate(clause: Clause, mapper: Mapper, keys: set[str]) -> Claim:
     properties = tuple(
         replace(p, key=_key(clause.name, about[f], keys), about=_merged(about[f])) for f, p in found.items()
     )
+    for name, numbers in mapper.expanded.items():
+        ranges.setdefault(name, _span(numbers))
     indices = tuple(f"{name} in {values}" for name, values in ranges.items())
     return Claim(clause.name, properties, None, clause.span, indices, tuple(settled))
 

@@ -77,6 +77,8 @@ class Mapper:
     range_of: Range
     used: set[str] = field(default_factory=set)
     """The texts of the rows that covered something."""
+    expanded: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    """Index variables quantified within formulas, and the finite ranges that they were given."""
 
     def map(self, term: Term) -> Mapped:
         """A formula in normal form. Raises NotCovered."""
@@ -121,10 +123,10 @@ class Mapper:
         if isinstance(term, Not):
             made = self._whole(term.body)
             if made is not None:
-                return Unit(psl.negation(made.formula), made.output)
+                return _negated(made)
         raise NotCovered(f"no mapping for {show_term(term)}", term.span or _first_span(term))
 
-    def _whole(self, term: Term) -> Unit | None:
+    def _whole(self, term: Term) -> Mapped | None:
         """By a row that covers just this."""
         for row in self.rows:
             binding = next(match(row.pattern, term, row.variables, {}), None)
@@ -161,6 +163,7 @@ class Mapper:
         values = self.range_of(variable)
         if values is None:
             raise NotCovered(f"{variable.name} has no finite range here (options: instances)", term.span)
+        self.expanded[variable.name] = tuple(values)
         rest = tuple(v for v in term.variables if v != variable)
         cases = []
         for value in values:
@@ -173,11 +176,10 @@ class Mapper:
         names = {v.name for v in term.variables}
         items = conjuncts(term.body)
         static = [i for i in items if not free(i) - names and not _has_output(i)]
-        for group in (static,):
-            if group:
-                truth = self._decided(Quantified(Quantifier.EXISTS, _used(term, group), conjunction(group), term.span))
-                if truth is False:
-                    return NO
+        if static:
+            possible = Quantified(Quantifier.EXISTS, _used(term, static), conjunction(static), term.span)
+            if self._decided(possible) is False:
+                return NO
         made = self._cover(items, True)
         for name in names:
             joined = [m for m, covered in made if m != YES and any(name in free(c) for c in covered)]
@@ -188,7 +190,7 @@ class Mapper:
                 )
         return _join(True, [m for m, _ in made])
 
-    def _unit(self, row: Row, binding: Binding, covered: tuple[Term, ...]) -> Unit:
+    def _unit(self, row: Row, binding: Binding, covered: tuple[Term, ...]) -> Mapped:
         self.used.add(row.text)
         values = {
             name: value.value
@@ -199,6 +201,8 @@ class Mapper:
             formula = instantiate(row.formula, values)
         except Malformed as error:
             raise NotCovered(f"the row “{row.text}” cannot be used here: {error.reason}", row.span) from None
+        if isinstance(formula, psl.Truth):
+            return YES if formula.value else NO
         return Unit(formula, any(_has_output(c) for c in covered))
 
 

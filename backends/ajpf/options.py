@@ -9,6 +9,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import jsonschema
+
 from avow.backend import Job
 from avow.backends.ajpf.environment import Environment, read_environment
 from avow.backends.ajpf.interpreter import Semantics
@@ -25,6 +27,8 @@ from avow.language.terms import Quantified
 from avow.logic.traversal import subterms
 from avow.system.paths import inside
 
+COMMON = ("id", "guarantees", "seconds", "megabytes", "seed")
+"""Options that belong to every method; the core reads them."""
 MAX_INSTANCES = 1_000
 DEFAULT_STATES = 1_000_000
 
@@ -131,6 +135,16 @@ class Setup:
 
 def read(job: Job) -> Setup:
     """Raises Rejected with every problem."""
+    options = job.method.options
+    given = {key: value for key, value in job.options.items() if key not in COMMON}
+    odd = [
+        Diagnostic(
+            "AJPF119", f"{'.'.join(map(str, e.absolute_path)) or 'options'}: {e.message}"[:300], options.at(*e.path)
+        )
+        for e in jsonschema.Draft202012Validator(SCHEMA).iter_errors(given)
+    ]
+    if odd:
+        raise Rejected(*odd)
     reader = _Reader(job)
     setup = reader.setup()
     if reader.faults or setup is None:

@@ -246,3 +246,41 @@ def test_a_fair_run_is_demanded():
     graph = Kripke((0,), [(0, 1), (1,)], [1 | ASK, 2 | ASK | GRANT])
     assert satisfiable(graph, Always(P), False, small=True) is not None
     assert satisfiable(graph, Always(P), True, small=True) is None
+
+
+@st.composite
+def repetitive_graphs(draw):
+    """Few labels and few ways: stretches of one label, loops in them and ways out, as agents' graphs have them."""
+    size = draw(st.integers(2, 6))
+    labels = [draw(st.sampled_from([1, 1, 1, 2, 0])) for _ in range(size)]
+    successors = [tuple(sorted(draw(st.sets(st.integers(0, size - 1), min_size=1, max_size=2)))) for _ in range(size)]
+    return Kripke((0,), successors, labels)
+
+
+SHAPES = [
+    Always(P),
+    Eventually(Q),
+    Always(Not(Q)),
+    Until(P, Q),
+    And((P, Eventually(And((Not(P), Not(Q)))))),
+    Always(Or((P, Q))),
+    Eventually(Always(P)),
+    And((Always(Eventually(P)), Always(Eventually(Not(P))))),
+]
+
+
+@settings(max_examples=250, deadline=None, suppress_health_check=list(HealthCheck))
+@given(repetitive_graphs())
+def test_reduction_changes_nothing(graph):
+    small = reduce(graph)
+    assert len(small) <= len(graph)
+    for formula in SHAPES:
+        expected = oracle(graph, formula, False)
+        assert oracle(small, formula, False) == expected
+        assert (satisfiable(graph, formula, False, small=True) is not None) == expected
+
+
+def test_reduction_keeps_endless_stuttering():
+    graph = Kripke((0,), [(0, 1), (2,), (2,)], [1, 1, 2])
+    assert satisfiable(graph, Always(P), False, small=True) is not None
+    assert satisfiable(Kripke((0,), [(1,), (2,), (2,)], [1, 1, 2]), Always(P), False, small=True) is None
