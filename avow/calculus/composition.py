@@ -8,6 +8,8 @@ from avow.calculus.derivation import Goal
 from avow.calculus.discharge import Answers, Bounds, settle
 from avow.calculus.meaning import Meanings
 from avow.calculus.rules import WHOLE, derive
+from avow.calculus.scenario import world
+from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
 from avow.system.plan import System
 
@@ -20,6 +22,7 @@ class Composition:
     goals: tuple[Goal, ...]
     meanings: Meanings
     _answers: dict[str, Answers] = field(default_factory=dict)
+    _machine: Machine | None = None
 
     def goal(self, name: str) -> Goal:
         return next(goal for goal in self.goals if goal.name == name)
@@ -29,6 +32,12 @@ class Composition:
         if goal.name not in self._answers:
             self._answers[goal.name] = settle(self.frame, goal, bounds)
         return self._answers[goal.name]
+
+    def machine(self, seed: int = 0) -> Machine:
+        """The composed contracts as a transition system, made once. Raises CannotRun."""
+        if self._machine is None:
+            self._machine = Machine(world(self.frame), seed)
+        return self._machine
 
     @property
     def whole(self) -> Goal:

@@ -114,8 +114,13 @@ class TemporalQuestion:
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         from avow.calculus.model_checking import judge
+        from avow.calculus.scenario import CannotRun
 
-        return judge(composition.frame, self.name, self.formula, bounds)
+        try:
+            machine = composition.machine(bounds.seed)
+        except CannotRun:
+            machine = None  # the judge meets the same obstacle, and says what it means for the property
+        return judge(composition.frame, self.name, self.formula, bounds, machine)
 
 
 def requirement_question(frame: Frame, requirement: Requirement) -> FormulaQuestion | TemporalQuestion | None:

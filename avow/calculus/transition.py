@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from random import Random
 from typing import Any
 
 import z3
@@ -28,6 +29,11 @@ from avow.system.plan import Endpoint
 
 MAX_ANSWERS = 4_000
 """Answers of one node to one input; with more, a search is not exhaustive."""
+
+MAX_FOUND = 300
+"""Answers that the solver is asked for, where they cannot be enumerated."""
+
+MAX_SHAPES = MAX_FOUND
 
 Values = dict[str, Value]
 Holds = Callable[[Mapping[str, Value]], bool]
@@ -63,6 +69,15 @@ class Stuck:
         return f"no output of {self.node} meets {', '.join(self.clauses)} at {given}"
 
 
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """A run: up to a node without an answer, or up to a step that leaves the memory that step `back` - 1 left."""
+
+    steps: tuple[Step, ...]
+    stuck: Stuck | None = None
+    back: int | None = None
+
+
 @dataclass(slots=True)
 class _Solver:
     """One node: its clauses compiled, its answers remembered."""
@@ -75,8 +90,12 @@ class _Solver:
     guarantees: tuple[tuple[str, Holds], ...]
     read: tuple[str, ...]
     """Inputs that the guarantees mention."""
+    assumed: tuple[str, ...]
+    """Inputs that the assumptions mention."""
+    shapes: tuple[Values, ...] | None
+    """The relations that its guarantees allow whatever the inputs; None where that is no help."""
     answers: dict[object, tuple[Values, ...]] = field(default_factory=dict)
-    complete: bool = True
+    broken: dict[object, tuple[str, ...]] = field(default_factory=dict)
 
 
 class Machine:
@@ -114,6 +133,9 @@ class Machine:
         relations = tuple((p, self.world.points(node.name, p)) for p in functions)
         plain = tuple((p, self.world.candidates(node.name, p)) for p in node.outputs if p not in functions)
         mentioned = {v.name for clause in node.guarantees for v in ports_of(clause.formula) if v.role is Role.INPUT}
+        assumed = {v.name for clause in node.assumptions for v in ports_of(clause.formula)}
+        searched = [(p, points) for p, points in relations if _definition(node.guarantees, p) is None]
+
         return _Solver(
             node,
             self.world,
@@ -122,7 +144,18 @@ class Machine:
             tuple((clause.name, self.judge(clause.formula)) for clause in node.assumptions),
             tuple((clause.name, self.judge(clause.formula)) for clause in node.guarantees),
             tuple(p.name for p in node.inputs if p.name in mentioned),
+            tuple(p.name for p in node.inputs if p.name in assumed),
+            self._shapes(node, searched),
         )
+
+    def _shapes(self, node: Node, relations: Sequence[tuple[Port, tuple[Point, ...]]]) -> tuple[Values, ...] | None:
+        """Found once, these need only be held against the other guarantees for each input."""
+        own = {port.variable for port, _ in relations}
+        about = [clause.formula for clause in node.guarantees if set(ports_of(clause.formula)) <= own]
+        if not relations or not about:
+            return None
+        found, complete = _search(relations, (), about, {}, self.seed)
+        return tuple(found) if complete and len(found) <= MAX_SHAPES else None
 
     def judge(self, formula: Term, *, finite: bool = False) -> Holds:
         """Whether a formula holds: exactly if that can be had, else with quantifiers over the scenario's values.
@@ -192,10 +225,34 @@ class Machine:
         self.memories.setdefault(found, {str(endpoint): values[str(endpoint)] for endpoint in self.memory})
         return found
 
+    # -- one run -------------------------------------------------------------------------------------------------------
+
+    def walk(self, random: Random, length: int, *, until_repeat: bool = False) -> Walk:
+        """One run, chosen at random: each node answers what it is given with one of its allowed outputs."""
+        memory = random.choice(self.initial())
+        steps: list[Step] = []
+        seen: dict[tuple[object, ...], int] = {}
+        for number in range(length):
+            values: Values = {f"{name}@before": value for name, value in self.memories[memory].items()}
+            values |= random.choice(self.environment)
+            broken: tuple[str, ...] = ()
+            for name in self.order:
+                answers, faults = self._answers(name, values)
+                if not answers:
+                    return Walk(tuple(steps), self._why_stuck(self.solvers[name], self._inputs(name, values)))
+                broken += faults
+                values |= {f"{name}.{port}": value for port, value in random.choice(answers).items()}
+            memory = self._remember(values)
+            steps.append(Step(values, memory, broken))
+            if until_repeat and memory in seen:
+                return Walk(tuple(steps), None, seen[memory] + 1)
+            seen.setdefault(memory, number)
+        return Walk(tuple(steps))
+
     # -- steps ---------------------------------------------------------------------------------------------------------
 
     def steps(self, memory: tuple[object, ...]) -> tuple[Step, ...]:
-        """Every step from a memory; none if some node cannot answer (see `stuck`)."""
+        """Every step from a memory. Where some node has no answer to what it may be given, see `stuck`."""
         if memory not in self._steps:
             self._steps[memory] = tuple(self._all_steps(memory))
         return self._steps[memory]
@@ -207,7 +264,10 @@ class Machine:
             for name in self.order:
                 extended: list[tuple[Values, tuple[str, ...]]] = []
                 for values, broken in partial:
-                    answers, faults = self._answers(name, values, memory)
+                    answers, faults = self._answers(name, values)
+                    if not answers and memory not in self.stuck:
+                        self.stuck[memory] = self._why_stuck(self.solvers[name], self._inputs(name, values))
+
                     extended += [
                         ({**values, **{f"{name}.{port}": v for port, v in answer.items()}}, broken + faults)
                         for answer in answers
@@ -216,25 +276,30 @@ class Machine:
             for values, broken in partial:
                 yield Step(values, self._remember(values), broken)
 
-    def _answers(
-        self, name: str, values: Values, memory: tuple[object, ...]
-    ) -> tuple[tuple[Values, ...], tuple[str, ...]]:
+    def _inputs(self, name: str, values: Values) -> Values:
+        node = self.frame.node(name)
+        return {f"in.{port.name}": values[self.frame.input(name, port.name).qualified] for port in node.inputs}
+
+    def _answers(self, name: str, values: Values) -> tuple[tuple[Values, ...], tuple[str, ...]]:
+        """What a node may put out, given what it reads; and its assumptions that do not hold."""
         solver = self.solvers[name]
-        inputs = {f"in.{port.name}": values[self.frame.input(name, port.name).qualified] for port in solver.node.inputs}
-        broken = tuple(f"{name}.{clause}" for clause, holds in solver.assumptions if not holds(inputs))
+        inputs = self._inputs(name, values)
+
+        place = tuple(key(inputs[f"in.{port}"]) for port in solver.assumed)
+        if place not in solver.broken:
+            failed = [clause for clause, holds in solver.assumptions if not holds(inputs)]
+            solver.broken[place] = tuple(f"{name}.{clause}" for clause in failed)
+        broken = solver.broken[place]
         index = (bool(broken), *(key(inputs[f"in.{port}"]) for port in solver.read))
         if index not in solver.answers:
             solver.answers[index] = self._solve(solver, inputs, free=bool(broken))
-        answers = solver.answers[index]
-        if not answers and memory not in self.stuck:
-            self.stuck[memory] = self._why_stuck(solver, inputs)
-        return answers, broken
+        return solver.answers[index], broken
 
     def _solve(self, solver: _Solver, inputs: Values, *, free: bool) -> tuple[Values, ...]:
         """Every output that meets the guarantees (all of them, where an assumption is broken)."""
         guarantees = () if free else solver.guarantees
         defined, searched = self._defined(solver, inputs) if not free else ({}, list(solver.relations))
-        if searched:
+        if searched and (free or solver.shapes is None):
             constraints = [] if free else [clause.formula for clause in solver.node.guarantees]
             known = inputs | {f"out.{name}": value for name, value in defined.items()}
             given = _by_variable(solver.node, known)
@@ -244,8 +309,11 @@ class Machine:
             return tuple({**defined, **answer} for answer in answers)
         found: list[Values] = []
         names = [port.name for port, _ in solver.plain]
-        for combination in product(*(values for _, values in solver.plain)):
-            outputs = {**defined, **dict(zip(names, combination, strict=True))}
+        shapes = solver.shapes if searched and solver.shapes is not None else ({},)
+        choices = [dict(zip(names, values, strict=True)) for values in product(*(values for _, values in solver.plain))]
+        for shape, choice in product(shapes, choices):
+            outputs: Values = {**defined, **shape, **choice}
+
             valuation = inputs | {f"out.{name}": value for name, value in outputs.items()}
             if all(holds(valuation) for _, holds in guarantees):
                 found.append(outputs)
@@ -358,7 +426,7 @@ def _search(
                 return found, True
             if status != z3.sat:
                 raise CannotRun(f"the solver cannot decide which outputs are allowed: {solver.reason_unknown()}")
-            if len(found) >= MAX_ANSWERS:
+            if len(found) >= MAX_FOUND:
                 return found, False
             model = solver.model()
             reader = Model(translator, model)

@@ -7,8 +7,9 @@ several providers, delays, or lets a node feed itself; an input named by a conne
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from avow.diagnostics import Diagnostic, Severity, Span
 from avow.language.contract import Node, Port
@@ -191,25 +192,27 @@ def _deadlock(cycle: tuple[str, ...], edges: Sequence[Edge], spans: Mapping[str,
     return Diagnostic("PLAN123", message, spans.get(cycle[0]), Severity.WARNING, hint)
 
 
+N = TypeVar("N", bound=Hashable)
+
 # -- loops -------------------------------------------------------------------------------------------------------------
 
 
-def components(nodes: Iterable[str], arcs: Iterable[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
+def components(nodes: Iterable[N], arcs: Iterable[tuple[N, N]]) -> tuple[tuple[N, ...], ...]:
     """Strongly connected components, providers before consumers; nodes within one in the order given (Tarjan)."""
     names = tuple(nodes)
-    successors: dict[str, list[str]] = {name: [] for name in names}
+    successors: dict[N, list[N]] = {name: [] for name in names}
     for source, target in arcs:
         if source in successors and target in successors:
             successors[source].append(target)
     position = {name: k for k, name in enumerate(names)}
-    index: dict[str, int] = {}
-    low: dict[str, int] = {}
-    on_stack: set[str] = set()
-    stack: list[str] = []
-    found: list[tuple[str, ...]] = []
+    index: dict[N, int] = {}
+    low: dict[N, int] = {}
+    on_stack: set[N] = set()
+    stack: list[N] = []
+    found: list[tuple[N, ...]] = []
     for root in names:
         work = [] if root in index else [root]
-        pending: dict[str, Iterator[str]] = {}
+        pending: dict[N, Iterator[N]] = {}
         while work:
             name = work[-1]
             if name not in index:

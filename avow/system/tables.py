@@ -112,7 +112,6 @@ def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
             found.update(dict.fromkeys(values))
         return tuple(found)
     text = cell_text(piece)
-
     span = _RANGE.match(text)
     if span:
         low, high = int(span[1]), int(span[2])
@@ -121,7 +120,7 @@ def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
         if high - low >= MAX_VALUES:
             return f"the range {text} has more than {MAX_VALUES} values"
         return tuple(str(number) for number in range(low, high + 1))
-        return _each_row(text, tables)
+    return _each_row(text, tables)
 
 
 def _each_row(text: str, tables: dict[str, Table]) -> tuple[str, ...] | str:

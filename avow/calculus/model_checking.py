@@ -1,0 +1,291 @@
+"""Temporal requirements, settled on the composed contracts over the plan's scenario, before anything is implemented.
+
+`checked` only if every step that the scenario allows was looked at; a search cut short is `tested` at best. A run that
+breaks the property is shown as it goes, with the step to which it returns. A system that cannot take another step
+stays as it is for ever, and the report says which node has no answer.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from random import Random
+
+from avow.calculus.answers import Answer
+from avow.calculus.discharge import Bounds
+from avow.calculus.ltl import Lasso, demands_progress, violation
+from avow.calculus.scenario import CannotRun, world
+from avow.calculus.transition import Holds, Machine, Step, Stuck, Walk
+from avow.calculus.variables import Frame
+from avow.logic.formula import free_variables
+from avow.logic.values import Value
+from avow.system.temporal import Property, State, states_of
+from avow.verdict import Counterexample, Verdict
+
+MAX_STATES = 50_000
+RUNS = 20
+RUN_LENGTH = 60
+"""Runs tried before a search, and their length."""
+
+MAX_SHOWN = 12
+"""Variables shown of each step of a run."""
+
+_Memory = tuple[object, ...]
+
+
+@dataclass(slots=True)
+class Explored:
+    """The steps reached so far. Steps that agree in what the property sees and in the memory they leave are one."""
+
+    machine: Machine
+    judges: dict[State, Holds]
+    steps: list[Step] = field(default_factory=list)
+    index: dict[object, int] = field(default_factory=dict)
+    following: dict[_Memory, tuple[int, ...]] = field(default_factory=dict)
+    truth: list[dict[State, bool]] = field(default_factory=list)
+    initial: list[int] = field(default_factory=list)
+    cannot_start: Stuck | None = None
+    waiting: deque[tuple[_Memory, int]] = field(default_factory=deque)
+    depth: int = 0
+
+    def open(self, memory: _Memory) -> tuple[int, ...]:
+        """The steps from a memory, each once."""
+        if memory not in self.following:
+            found: dict[int, None] = {}
+            for step in self.machine.steps(memory):
+                truth = {state: judge(step.values) for state, judge in self.judges.items()}
+                index = (tuple(truth.values()), step.memory)
+                if index not in self.index:
+                    self.index[index] = len(self.steps)
+                    self.steps.append(step)
+                    self.truth.append(truth)
+                found[self.index[index]] = None
+            self.following[memory] = tuple(found)
+        return self.following[memory]
+
+    def kind(self, step: Step) -> int:
+        """The number of the steps that count as one with this one."""
+        truth = tuple(judge(step.values) for judge in self.judges.values())
+        return self.index[(truth, step.memory)]
+
+    def concrete(self, run: list[int]) -> list[Step]:
+        """A run of these kinds of steps, each step really taken from the memory that the one before it leaves."""
+        found: list[Step] = []
+        memories = self.machine.initial()
+        for kind in run:
+            step = next((s for m in memories for s in self.machine.steps(m) if self.kind(s) == kind), None)
+            if step is None:  # it stays as it is: there is no further step
+                break
+            found.append(step)
+            memories = (step.memory,)
+        return found
+
+    def successors(self, step: int) -> tuple[int, ...]:
+        """The explored steps after a step; a step after which there is none stays for ever."""
+        memory = self.steps[step].memory
+        if memory not in self.following:
+            return ()
+        stays = (step,) if memory in self.machine.stuck or not self.following[memory] else ()
+        return self.following[memory] + stays
+
+
+def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: Machine | None = None) -> Answer:
+    """Whether every run of the composed contracts has the property, within the scenario.
+
+    A `machine` that answered other questions is quicker: it remembers the steps.
+    """
+    try:
+        machine = machine or Machine(world(frame), bounds.seed)
+
+        found = _tried(machine, frame, name, formula, bounds)
+        if found is not None:
+            return found
+        explored = _begin(machine, frame, formula)
+        stopped = explored.cannot_start is not None and demands_progress(formula)
+        done = stopped or _explore(explored, formula, bounds)
+
+    except CannotRun as reason:
+        return _cannot_run(frame, name, formula, str(reason))
+    if isinstance(done, Lasso):
+        return _broken(explored, name, formula, done)
+    if explored.cannot_start is not None and stopped:
+        told = f"the system cannot take a first step: {explored.cannot_start.text()}"
+        verdict = Verdict.REFUTED if explored.cannot_start.genuine else Verdict.UNKNOWN
+        return Answer(verdict, told, Counterexample(explanation=told), bound=_bound(explored))
+    if done and not machine.incomplete:
+        return Answer(
+            Verdict.CHECKED,
+            f"every run within the scenario has it: {len(explored.steps)} kinds of steps, all looked at",
+            bound=_bound(explored),
+            details={"exhaustive": True},
+        )
+    why = "; ".join(sorted(machine.incomplete)) or "time or steps ran out"
+    return Answer(
+        Verdict.TESTED,
+        f"no run of the first {explored.depth} steps was found to break it; not exhaustive: {why}",
+        bound=_bound(explored) | {"n": len(explored.steps)},
+        details={"exhaustive": False},
+    )
+
+
+def _tried(machine: Machine, frame: Frame, name: str, formula: Property, bounds: Bounds) -> Answer | None:
+    """Some runs at random: most systems that break a property do so soon, and a search need not even begin."""
+    random = Random(bounds.seed)
+    deadline = time.monotonic() + bounds.milliseconds / 4000
+    judges = _judges(machine, frame, formula)
+    best: tuple[Walk, int] | None = None  # a run that gets stuck tells more than one that goes round
+    for _ in range(RUNS):
+        walk = machine.walk(random, RUN_LENGTH, until_repeat=True)
+        if walk.steps and (walk.back is not None or (walk.stuck is not None and walk.stuck.genuine)):
+            back = len(walk.steps) - 1 if walk.back is None else walk.back
+            if (best is None or walk.stuck is not None) and _breaks(walk.steps, back, formula, judges):
+                best = (walk, back)
+        if time.monotonic() > deadline or (best is not None and best[0].stuck is not None):
+            break
+    if best is None:
+        return None
+    walk, back = best
+    return _shown_run(machine, frame, name, formula, list(walk.steps), back, walk.stuck, {"runs": RUNS})
+
+
+def _breaks(steps: Sequence[Step], back: int, formula: Property, judges: dict[State, Holds]) -> bool:
+    """Whether a run, which goes on with step `back` after its last, breaks the property."""
+    truth = [{state: judge(step.values) for state, judge in judges.items()} for step in steps]
+    following = [(k + 1,) for k in range(len(steps) - 1)] + [(back,)]
+    return violation(formula, [0], following.__getitem__, lambda k, state: truth[k][state]) is not None
+
+
+def _judges(machine: Machine, frame: Frame, formula: Property) -> dict[State, Holds]:
+    from avow.calculus.requirements import system_term
+
+    return {state: machine.judge(system_term(frame, state.term), finite=True) for state in states_of(formula)}
+
+
+def _begin(machine: Machine, frame: Frame, formula: Property) -> Explored:
+    explored = Explored(machine, _judges(machine, frame, formula))
+
+    found: dict[int, None] = {}
+    for memory in machine.initial():
+        first = explored.open(memory)
+        explored.cannot_start = explored.cannot_start or machine.stuck.get(memory)
+        if explored.cannot_start is not None and demands_progress(formula):
+            break
+
+        found.update(dict.fromkeys(first))
+    explored.initial = list(found)
+    explored.waiting.extend((explored.steps[k].memory, 1) for k in explored.initial)
+    return explored
+
+
+def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | bool:
+    """Breadth first; looks for a violation now and then. True: nothing is left to look at."""
+    deadline = time.monotonic() + bounds.milliseconds / 1000
+    scenario = explored.machine.world.scenario
+    deepest = scenario.steps
+    next_look, stuck_seen, cut = 64, 0, False
+    while explored.waiting:
+        memory, depth = explored.waiting.popleft()
+        explored.depth = max(explored.depth, depth)
+        if memory in explored.following:
+            continue
+        if (deepest is not None and depth >= deepest) or len(explored.steps) > MAX_STATES:
+            cut = True
+            continue
+        if time.monotonic() > deadline:
+            cut = True
+            break
+        following = explored.open(memory)
+        explored.waiting.extend((explored.steps[k].memory, depth + 1) for k in following)
+        stuck = len(explored.machine.stuck)
+        if len(explored.steps) >= next_look or stuck > stuck_seen:
+            next_look, stuck_seen = 2 * len(explored.steps), stuck if stuck > stuck_seen else stuck_seen
+            found = _violation(explored, formula)
+            if found is not None:
+                return found
+    return _violation(explored, formula) or not cut
+
+
+def _violation(explored: Explored, formula: Property) -> Lasso | None:
+    return violation(formula, explored.initial, explored.successors, lambda k, state: explored.truth[k][state])
+
+
+def _broken(explored: Explored, name: str, formula: Property, lasso: Lasso) -> Answer:
+    run = [*lasso.prefix, *lasso.cycle]
+    machine = explored.machine
+    last = explored.steps[run[-1]]
+    stays = len(lasso.cycle) == 1 and run[-1] not in explored.following.get(last.memory, ())
+    stuck = machine.stuck.get(last.memory) if stays else None
+    steps = explored.concrete(run)
+    return _shown_run(machine, machine.frame, name, formula, steps, len(lasso.prefix), stuck, _bound(explored))
+
+
+def _shown_run(
+    machine: Machine,
+    frame: Frame,
+    name: str,
+    formula: Property,
+    steps: list[Step],
+    back: int,
+    stuck: Stuck | None,
+    bound: dict[str, object],
+) -> Answer:
+    """A run that breaks the property, as a counterexample."""
+    trace = tuple(step.shown(_interesting(machine, frame, formula)) for step in steps)
+    if stuck is not None:
+        told = f"stuck after step {len(steps)}: {stuck.text()}"
+    else:
+        told = f"from step {back + 1} on, the run repeats"
+    broken = sorted({clause for step in steps for clause in step.broken})
+    if broken:
+        told += f"; on the way an assumption does not hold: {', '.join(broken)}"
+    shown = Counterexample(trace[-1] if trace else (), told, trace, back)
+    if stuck is not None and not stuck.genuine:
+        summary = f"{told}: perhaps only because the scenario lacks the value"
+        return Answer(Verdict.UNKNOWN, summary, shown, bound=bound, details={"exhaustive": False})
+    return Answer(Verdict.REFUTED, f"a run of the composed contracts breaks {name}: {told}", shown, bound=bound)
+
+
+def _interesting(machine: Machine, frame: Frame, formula: Property) -> list[str]:
+    """The variables worth showing: what the environment chose, the outputs, and what the property speaks of."""
+    from avow.calculus.requirements import system_term
+
+    about = [
+        variable.qualified
+        for state in states_of(formula)
+        for variable in sorted(free_variables(system_term(frame, state.term)), key=lambda v: v.qualified)
+    ]
+    chosen = [
+        name for name in machine.environment[0] if len({_key(values[name]) for values in machine.environment}) > 1
+    ]
+    outputs = [f"{node}.{port.name}" for node in machine.order for port in frame.node(node).outputs]
+    return list(dict.fromkeys([*about, *chosen, *outputs]))[:MAX_SHOWN]
+
+
+def _key(value: Value) -> object:
+    from avow.calculus.scenario import key
+
+    return key(value)
+
+
+def _cannot_run(frame: Frame, name: str, formula: Property, reason: str) -> Answer:
+    if frame.graph.deadlocks and demands_progress(formula) and reason.startswith("start-up deadlock"):
+        return Answer(
+            Verdict.REFUTED,
+            f"no run ever takes a step, so {name} is not met: {reason}",
+            Counterexample(explanation=reason),
+        )
+    return Answer(Verdict.UNKNOWN, f"the contracts cannot be run over the scenario: {reason}")
+
+
+def _bound(explored: Explored) -> dict[str, object]:
+    scenario = explored.machine.world.scenario
+    return {
+        "steps": len(explored.steps),
+        "memories": len(explored.following),
+        "depth": explored.depth,
+        "scenario": scenario.digest,
+        "tables": {table.name: len(table.rows) for table in scenario.tables},
+        "domains": {domain: len(values) for domain, values in scenario.domains.items()},
+    }
