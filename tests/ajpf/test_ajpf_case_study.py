@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -145,3 +147,32 @@ def test_bounds_give_unknown(rover, tmp_path):
 
 def test_export_is_pure(rover):
     assert BACKEND.export(rover(*REPAIRED)) == BACKEND.export(rover(*REPAIRED))
+
+
+@pytest.mark.parametrize("case", [REPAIRED, PUBLISHED])
+def test_the_exported_properties(rover, case):
+    """Refresh with AVOW_REFRESH=1 where a change is meant."""
+    golden = Path(__file__).parent / "golden" / f"{case[0]}.psl"
+    text = BACKEND.export(rover(*case))["jackal.psl"]
+    if os.environ.get("AVOW_REFRESH"):
+        golden.write_text(text)
+    assert text == golden.read_text()
+
+
+@pytest.mark.parametrize("method", ["repaired_method.yaml", "published_method.yaml"])
+def test_the_page_shows_what_is_tested(root, method):
+    page = (root / "docs" / "backends" / "ajpf.md").read_text()
+    assert textwrap.dedent((root / "tests" / "ajpf" / "fixtures" / method).read_text()).strip() in page
+
+
+def test_every_code_is_on_the_page(root):
+    page = (root / "docs" / "backends" / "ajpf.md").read_text().partition("## Diagnostics")[2]
+    listed = set()
+    for row in page.splitlines()[3:]:
+        listed |= {f"AJPF{number}" for number in re.findall(r"\d{3}", row.split("|")[1])}
+    used = {
+        code
+        for path in (root / "backends" / "ajpf").glob("*.py")
+        for code in re.findall(r"AJPF\d{3}", path.read_text())
+    }
+    assert used == listed
