@@ -60,10 +60,9 @@ def draw(
     space = ' xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"' if alone else ""
     style = f"<style>{_STYLE}</style>" if alone else ""
     frame = f'<rect class="paper" width="{right:.0f}" height="{bottom:.0f}"/>' if alone else ""
-    return (
-        f'<svg{space} class="gsn" role="img" aria-label="{escape(clean(label))}" viewBox="0 0 {right:.0f} {bottom:.0f}" '
-        f'width="{right:.0f}" height="{bottom:.0f}">{style}{frame}{ARROWS if alone else ""}{"".join(parts)}</svg>'
-    )
+    size = f'viewBox="0 0 {right:.0f} {bottom:.0f}" width="{right:.0f}" height="{bottom:.0f}"'
+    head = f'<svg{space} class="gsn" role="img" aria-label="{escape(clean(label))}" {size}>'
+    return f"{head}{style}{frame}{ARROWS if alone else ''}{''.join(parts)}</svg>"
 
 
 def _tree(argument: Argument, start: str) -> tuple[list[_Box], int, list[tuple[_Box, _Box]]]:

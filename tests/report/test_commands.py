@@ -1,0 +1,157 @@
+"""The commands audit, explain, report --check and diff in a workspace of their own."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from assurance.sample import case, evidence, rover_parts
+from click.testing import CliRunner, Result
+
+from avow.assurance.compare import compare, of_case, of_ledger
+from avow.cli.audit import command as audit
+from avow.cli.diff import command as diff
+from avow.cli.explain import command as explain
+from avow.cli.report import command as report
+from avow.diagnostics import Rejected
+from avow.evidence.ledger import Ledger
+from avow.files import digest
+from avow.report import render_all
+from avow.verdict import Verdict
+
+
+@pytest.fixture(scope="module")
+def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("workspace")
+    (root / "contracts/rover").mkdir(parents=True)
+    (root / "dodo.py").touch()
+    (root / "contracts/rover/plan.yaml").write_text("plan")
+    (root / "contracts/rover/system.rcl").write_text("contract")
+    (root / "a.log").write_text("log")
+    subject, obligations, records, keys, extras = rover_parts()
+    logged = evidence("radiationSensor.low", outputs={"a.log": digest("log")}, run="later")
+    records.append(logged)
+    ledger = Ledger(root / "artifacts/ledger/rover.jsonl")
+    ledger.append_all(records)
+    render_all(case(subject, obligations, records, keys=keys, **extras), root / "reports/rover")
+    return root
+
+
+@pytest.fixture
+def root(template: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    shutil.copytree(template, tmp_path / "w")
+    monkeypatch.chdir(tmp_path / "w")
+    return tmp_path / "w"
+
+
+def run(command: Any, *arguments: str) -> tuple[int, str]:
+    """Exit code (the command's return value) and output; what the command line would tell a user of a `Rejected`."""
+    result: Result = CliRunner().invoke(command, list(arguments), standalone_mode=False)
+    if result.exception is not None:
+        raise result.exception
+    return int(result.return_value), result.output
+
+
+def test_audit_agrees_then_names_what_was_done(root: Path) -> None:
+    assert run(audit) == (0, "rover: 36 records, 0 discrepancies\n")
+    (root / "a.log").write_text("edited")
+    code, text = run(audit, "rover")
+    assert code == 1
+    assert "a.log" in text
+    assert "was changed" in text
+    data = json.loads(run(audit, "--json")[1])
+    assert data["systems"]["rover"]["discrepancies"][0]["fault"] == "changed"
+    with pytest.raises(Rejected):
+        run(audit, "rovr")
+
+
+def test_audit_signs_and_verifies(root: Path) -> None:
+    pytest.importorskip("cryptography")
+    assert run(audit, "--new-key", "key")[0] == 0
+    assert run(audit, "--key", "key.pub")[0] == 1  # not signed yet
+    assert run(audit, "--sign", "key")[0] == 0
+    assert run(audit, "--key", "key.pub")[0] == 0
+    (root / "a.log").write_text("edited")
+    assert run(audit, "--sign", "key")[0] == 1  # what disagrees is not signed
+
+
+@pytest.mark.parametrize(
+    "name", ["radiationSensor.medium", "rover/radiationSensor/guarantee/medium", "radiationSensor/guarantee/medium"]
+)
+def test_explain_tells_all_of_one_obligation(root: Path, name: str) -> None:
+    code, text = run(explain, name)
+    assert code == 0
+    for part in (
+        "refuted",
+        "in.r = 120",
+        "guarantee medium demands orange",
+        "AVOW_FRESH=1 doit",
+        "system.rcl:",
+        "REQ2",
+        "120 ≤ in.r",
+    ):
+        assert part in text
+    data = json.loads(run(explain, name, "--json")[1])
+    assert data["obligations"][0]["status"] == "refuted"
+
+
+def test_explain_shows_runs_and_history_and_says_what_is_near(root: Path) -> None:
+    assert "returns to step 2" in run(explain, "REQ4")[1]
+    assert "no longer count" in run(explain, "localisation.one_position")[1]
+    with pytest.raises(Rejected) as caught:
+        run(explain, "radiationSensor.mediun")
+    assert "radiationSensor.medium" in (caught.value.diagnostics[0].hint or "")
+    (root / "reports/rover/report.json").write_text("{")
+    with pytest.raises(Rejected):
+        run(explain, "REQ4")
+
+
+def test_report_check(root: Path) -> None:
+    code, text = run(report, "--check", "reports/rover")
+    assert (code, text.count("agrees with the ledger")) == (0, 1), text
+    (root / "contracts/rover/system.rcl").write_text("another contract")
+    code, text = run(report, "--check", "reports/rover")
+    assert code == 1
+    assert "system.rcl has changed" in text
+    assert json.loads(run(report, "--check", "reports/rover", "--json")[1])["agrees"] is False
+
+
+def test_diff_of_reports_and_ledgers(root: Path) -> None:
+    assert run(diff, "reports/rover", "reports/rover") == (0, "nothing changed\n")
+    subject, obligations, records, keys, extras = rover_parts()
+    better = [r for r in records if r.verdict is not Verdict.REFUTED]
+    render_all(case(subject, obligations, better, keys=keys, **extras), root / "new")
+    text = run(diff, "reports/rover", "new")[1]
+    assert "better: rover/radiationSensor/guarantee/medium: refuted → tested" in text
+    other = root / "other.jsonl"
+    Ledger(other).append_all([*records, evidence("radiationSensor.low", Verdict.REFUTED)])
+    changes = json.loads(run(diff, "artifacts/ledger/rover.jsonl", str(other), "--json")[1])["changes"]
+    assert changes[0] == {
+        "system": "rover",
+        "kind": "worse",
+        "subject": "rover/radiationSensor/guarantee/low",
+        "before": "proved",
+        "after": "contradictory",
+    }
+    with pytest.raises(Rejected):
+        run(diff, "no-such-revision", "reports/rover")
+    with pytest.raises(Rejected):
+        run(diff, "--", "--output=x", "reports/rover")
+
+
+def test_comparison_tells_new_gone_and_changed_claims() -> None:
+    subject, obligations, records, keys, extras = rover_parts()
+    old = of_case(case(subject, obligations, records, keys=keys, **extras))
+    assert compare(old, old) == ()
+    from dataclasses import replace
+
+    changed = [replace(obligations[1], digest=digest("other")), *obligations[2:]]
+    new = of_case(case(subject, changed, records, keys=keys, **extras))
+    kinds = {(c.kind, c.subject) for c in compare(old, new)}
+    assert ("removed", obligations[0].id) in kinds
+    assert ("meaning", obligations[1].id) in kinds
+    assert ("added", obligations[0].id) in {(c.kind, c.subject) for c in compare(new, old)}
+    assert of_ledger("x", ()).claims == {}
