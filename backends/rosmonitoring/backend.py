@@ -16,6 +16,8 @@ from avow.verdict import Counterexample, Link, Outcome, Verdict
 
 if TYPE_CHECKING:
     from avow.backends.rosmonitoring.engine import Monitor, Violation
+    from avow.backends.rosmonitoring.options import Setup
+    from avow.evidence.obligation import Obligation
 
 KEPT = 200
 """Violations of one trace that are written to the log; all are counted."""
@@ -101,11 +103,9 @@ class RosMonitoringBackend:
                 Outcome(o.id, Verdict.ERROR, "; ".join(f.message for f in faults)) for o in job.obligations
             )
             return Report(outcomes, "avow monitor", __version__)
+        refused = _refused(job, found)
         if not _traces(job):
-            outcomes = tuple(
-                Outcome(o.id, Verdict.NOT_RUN, "monitor generated; the plan names no trace to judge")
-                for o in job.obligations
-            )
+            outcomes = tuple(_without_trace(job, found, refused, o) for o in job.obligations)
             return Report(outcomes, "avow monitor", __version__)
         from avow.backends.rosmonitoring.engine import Monitor
 
@@ -116,7 +116,28 @@ class RosMonitoringBackend:
             runs.append(_judge(job, name, monitor, deadline))
         logs = {f"trace-{k}.log": run.log() for k, run in enumerate(runs, start=1)}
         outcomes = tuple(_outcome(o.id, o.name, runs) for o in job.obligations)
+        for obligation, outcome in zip(job.obligations, outcomes, strict=True):
+            outcome.details["rml"] = refused.get(obligation.name, "translated")
         return Report(outcomes, "avow monitor", __version__, (), logs)
+
+
+def _refused(job: Job, found: Setup) -> dict[str, str]:
+    from avow.backends.rosmonitoring.rml_translate import translate
+
+    return translate(found, [job.clause(o) for o in job.obligations]).refused
+
+
+def _without_trace(job: Job, found: Setup, refused: dict[str, str], obligation: Obligation) -> Outcome:
+    """A monitor is no evidence before it has watched something."""
+    formula = job.clause(obligation).formula
+    hidden = next((reason for name, reason in found.hidden.items() if _mentions(formula, name)), None)
+    if hidden is not None:
+        return Outcome(obligation.id, Verdict.UNKNOWN, f"not monitorable: {hidden}")
+    reason = refused.get(obligation.name)
+    summary = "monitor generated; the plan names no trace to judge"
+    if reason is not None:
+        summary = f"the plan names no trace to judge; {reason} (our own engine can judge it)"
+    return Outcome(obligation.id, Verdict.NOT_RUN, summary, details={"rml": reason or "translated"})
 
 
 class _Run:

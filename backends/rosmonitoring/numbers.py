@@ -31,7 +31,7 @@ class Exact(Fraction):
     __slots__ = ("_kept",)
     _kept: int
 
-    def __hash__(self) -> int:
+    def __hash__(self) -> int:  # type: ignore[override]
         try:
             return self._kept
         except AttributeError:

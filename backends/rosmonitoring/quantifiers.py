@@ -24,7 +24,7 @@ from avow.backends.rosmonitoring.rml import (
     size,
     some,
 )
-from avow.backends.rosmonitoring.symbols import Points, Scalar, Symbol, Variant, code, constant, equal
+from avow.backends.rosmonitoring.symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
 from avow.language.sorts import (
     BOOL,
     BoolSort,
@@ -129,14 +129,21 @@ class Eliminator:
         return compare(term.operator, self._number(term.left, bound), self._number(term.right, bound))
 
     def _apply(self, term: Apply, bound: Bound) -> Condition:
-        points = self._points(term)
         arguments = [self._value(a, bound) for a in term.arguments]
+        tracked = self._tracked(term)
+        if tracked is not None:
+            return tracked.flag(tuple(arguments))
+        points = self._points(term)
         return some(
             [
                 every([holds, *(equal(a, p) for a, p in zip(arguments, parts, strict=True))])
                 for holds, parts in points.tuples
             ]
         )
+
+    def _tracked(self, term: Apply) -> Tracked | None:
+        found = self.symbols.get(term.function.qualified) if isinstance(term.function, Variable) else None
+        return found if isinstance(found, Tracked) else None
 
     def _points(self, term: Apply) -> Points:
         if isinstance(term.function, Variable):
@@ -263,6 +270,8 @@ class Eliminator:
         """The ways in which a part can hold, each with what it fixes; None if the part fixes nothing."""
         match part.term:
             case Apply(function=Variable(role=Role.INPUT | Role.OUTPUT)) if part.positive:
+                if self._tracked(part.term) is not None:
+                    return None
                 points = self._points(part.term)
                 cases: list[tuple[Condition, list[Part], Bound]] = []
                 for holds, values in points.tuples:

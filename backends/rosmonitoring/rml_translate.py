@@ -8,7 +8,7 @@ matches, and the monitor's answer is false. A message that its rule cannot read 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
@@ -17,6 +17,7 @@ from pathlib import PurePath
 from avow.backends.rosmonitoring.options import Setup, same_topic
 from avow.backends.rosmonitoring.quantifiers import Eliminator
 from avow.backends.rosmonitoring.rml import (
+    FALSE,
     TRUE,
     Calculation,
     Comparison,
@@ -35,12 +36,23 @@ from avow.backends.rosmonitoring.rml import (
     every,
     key,
     names_in,
+    opposite,
     some,
     string,
     write,
 )
 from avow.backends.rosmonitoring.rules import Choice, Constant, Fields, Lookup, Path, Previous, Rule
-from avow.backends.rosmonitoring.symbols import Points, Scalar, Symbol, Variant, carried, code, components, constant
+from avow.backends.rosmonitoring.symbols import (
+    Points,
+    Scalar,
+    Symbol,
+    Tracked,
+    Variant,
+    carried,
+    code,
+    components,
+    constant,
+)
 from avow.language.contract import Clause
 from avow.language.sorts import BoolSort, DataSort, EnumSort, FunctionSort, NaturalSort, Sort, StringSort
 from avow.language.terms import Role
@@ -219,8 +231,11 @@ class _Machine:
                 first = None if isinstance(source, Constant) else source.initial
             if first is not None:
                 values[self.flags[name]] = Number(Fraction(1))
-                parts = components(self.symbols[name])
-                values.update(zip(parts, _parts(first, rule.variable.sort), strict=True))
+                symbol = self.symbols[name]
+                if isinstance(symbol, Tracked):
+                    values.update(_seen_at_start(symbol, first, rule.variable.sort))
+                else:
+                    values.update(zip(components(symbol), _parts(first, rule.variable.sort), strict=True))
         return [values[name] for name in state]
 
     def _steps(
@@ -271,6 +286,9 @@ class _Machine:
                     _field_cases(path, s, f"x{at}_{k}", names)
                     for k, (path, s) in enumerate(zip(paths, sorts, strict=True), start=1)
                 ]
+                symbol = self.symbols[name]
+                if isinstance(symbol, Tracked):
+                    return [case for parts in product(*per_field) for case in _tracked_cases(symbol, parts)]
                 first: tuple[Numeric, ...] = (Number(Fraction(1)),) if relation else ()
                 return [_together(first, parts) for parts in product(*per_field)]
             case Choice(variable=variable):
@@ -316,6 +334,30 @@ def _together(first: tuple[Numeric, ...], parts: Sequence[_Case]) -> _Case:
         tuple(b for p in parts for b in p.binds),
         every([p.guard for p in parts]),
     )
+
+
+def _tracked_cases(symbol: Tracked, parts: Sequence[_Case]) -> Iterator[_Case]:
+    """A message whose tuple is one of those asked for sets its number; any other changes nothing."""
+    whole = _together((), parts)
+    others: list[Condition] = []
+    for at, flag in symbol.flags.items():
+        here = every([compare("==", v, Number(k)) for v, k in zip(whole.values, at, strict=True)])
+        values = tuple(Number(Fraction(1)) if name == flag else Name(name) for name in symbol.flags.values())
+        others.append(opposite(here))
+        if here != FALSE:
+            yield replace(whole, values=values, guard=every([whole.guard, here]))
+    rest = every([whole.guard, *others])
+    if rest != FALSE:
+        yield replace(whole, values=tuple(Name(name) for name in symbol.flags.values()), guard=rest)
+
+
+def _seen_at_start(symbol: Tracked, first: Value, sort: Sort) -> dict[str, Numeric]:
+    known = constant(first, sort)
+    assert isinstance(known, Points)
+    seen = set()
+    for _, parts in known.tuples:
+        seen.add(tuple(p.number.value for p in parts if isinstance(p, Scalar) and isinstance(p.number, Number)))
+    return {flag: Number(Fraction(at in seen)) for at, flag in symbol.flags.items()}
 
 
 def _field_cases(path: Path, sort: Sort, name: str, names: dict[str, str] | object) -> list[_Case]:

@@ -7,7 +7,7 @@ scenario's tables are known beforehand. Anything else (a relation that holds of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 from avow.backends.rosmonitoring.rml import (
@@ -59,7 +59,32 @@ class Points:
     tuples: tuple[tuple[Condition, tuple[Symbol, ...]], ...]
 
 
-Symbol = Scalar | Variant | Points
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """A relation that holds of every tuple seen, where only known tuples are asked for: a number for each of these, 1
+    once it has been seen. The tuples are collected while the condition is made."""
+
+    prefix: str
+    flags: dict[tuple[Fraction, ...], str] = field(default_factory=dict, hash=False)
+
+    def flag(self, arguments: tuple[Symbol, ...]) -> Condition:
+        """When the relation holds there. Raises NotRml."""
+        at: list[Fraction] = []
+        for argument in arguments:
+            if not isinstance(argument, Scalar) or not isinstance(argument.number, Number):
+                raise NotRml(
+                    "it asks a relation that holds of all tuples seen for a tuple that is not known beforehand"
+                )
+            at.append(argument.number.value)
+        name = self.flags.setdefault(tuple(at), f"{self.prefix}_{len(self.flags) + 1}")
+        if len(self.flags) > TRACKED:
+            raise NotRml(f"it asks a relation for more than {TRACKED} tuples")
+        return compare("==", Name(name), Number(Fraction(1)))
+
+
+TRACKED = 48
+
+Symbol = Scalar | Variant | Points | Tracked
 
 
 def code(sort: EnumSort | DataSort, name: str) -> int:
@@ -111,10 +136,10 @@ def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
     name = rule.variable.qualified
     sort = rule.variable.sort
     if isinstance(sort, FunctionSort):
+        if isinstance(rule, Fields) and rule.hold is Hold.SEEN and rule.each is None and sort.result == BOOL:
+            return Tracked(prefix)
         if isinstance(source, Fields | InOrder) and (source.hold is Hold.SEEN or getattr(source, "each", None)):
-            raise NotRml(
-                f"{name} may hold of any number of tuples, and an RML equation carries a fixed number of values"
-            )
+            raise NotRml(f"{name} holds of any number of tuples, and an RML equation carries a fixed number of values")
         if sort.result != BOOL:
             raise NotRml(f"{name} is a function with a result")
         parts = tuple(_named(s, f"{prefix}_{k}", name) for k, s in enumerate(sort.parameters, start=1))
@@ -163,6 +188,8 @@ def components(symbol: Symbol) -> tuple[str, ...]:
             return (name,)
         case Variant(tag=Name(name=name), arguments=arguments):
             return (name, *(part for row in arguments for a in row for part in components(a)))
+        case Tracked(flags=flags):
+            return tuple(flags.values())
         case Points(tuples=((Comparison(left=Name(name=flag)), parts),)):
             return (flag, *(part for p in parts for part in components(p)))
         case _:

@@ -51,11 +51,11 @@ context {{
   Marks : NATURAL --> BOOL;
 }}
 node n {{
-  inputs( r : REAL, k : NATURAL, colour : Colour, command : Command, at : Place, last : Marks )
+  inputs( r : REAL, k : NATURAL, colour : Colour, command : Command, at : Place, last : Marks, done : Marks )
   outputs( flag : BOOL, s : REAL, marks : Marks, light : Colour )
   topics( a/R r matches(in.r), a/K k matches(in.k), a/C colour matches(in.colour), a/D command matches(in.command),
           a/P at matches(in.at), a/F flag matches(out.flag), a/S s matches(out.s), a/M marks matches(out.marks),
-          a/L light matches(out.light) )
+          a/L light matches(out.light), a/X done matches(in.done) )
   guarantee g ( {formula} )
 }}
 """
@@ -71,6 +71,7 @@ MAPPING: dict[str, Any] = {
     "out.s": {"field": "data", "initial": -1.5},
     "out.marks": ["id"],
     "out.light": "light",
+    "in.done": {"fields": ["id"], "hold": "seen", "initial": [[2]]},
 }
 
 
@@ -101,6 +102,7 @@ def formula(rng: random.Random, depth: int, reals: tuple[str, ...] = (), natural
                 f"in.at({real()}, {natural()})",
                 f"out.marks({natural()})",
                 f"in.last({natural()})",
+                f"in.done({rng.choice(('0', '1', '2', natural()))})",
                 "out.flag",
                 "out.flag == FALSE",
             )
@@ -138,7 +140,7 @@ def trace(rng: random.Random, length: int) -> list[dict[str, Any]]:
         return rng.choice((0, 1, 2))
 
     def message() -> dict[str, Any]:
-        topic = rng.choice(("r", "k", "colour", "command", "at", "flag", "s", "marks", "light", "other"))
+        topic = rng.choice(("r", "k", "colour", "command", "at", "flag", "s", "marks", "light", "done", "other"))
         body: dict[str, Any]
         match topic:
             case "r" | "s":
@@ -160,7 +162,7 @@ def trace(rng: random.Random, length: int) -> list[dict[str, Any]]:
                 body = {"x": number(), "id": small()}
             case "flag":
                 body = {"on": rng.random() < 0.5}
-            case "marks":
+            case "marks" | "done":
                 body = {"id": small()}
             case "light":
                 body = {"light": rng.choice(("red", "green"))}
@@ -208,6 +210,8 @@ def read(event: Mapping[str, Any]) -> tuple[str, Any] | None:
                 return "in.at", {(real(body["x"]), whole(body["id"]))}
             case "marks":
                 return "out.marks", {(whole(body["id"]),)}
+            case "done":
+                return "in.done", {(whole(body["id"]),)}
             case "flag":
                 return "out.flag", body["on"] if isinstance(body["on"], bool) else UNREADABLE
             case _:
@@ -215,6 +219,7 @@ def read(event: Mapping[str, Any]) -> tuple[str, Any] | None:
     except (KeyError, TypeError, ValueError):
         names = {"r": "in.r", "s": "out.s", "k": "in.k", "colour": "in.colour", "command": "in.command"}
         names |= {"at": "in.at", "marks": "out.marks", "flag": "out.flag", "light": "out.light"}
+        names["done"] = "in.done"
         return names[event["topic"]], UNREADABLE
 
 
@@ -295,6 +300,7 @@ def brute_force(system: System, events: list[dict[str, Any]]) -> int | None:
     outputs = {n for n in mentioned if n.startswith("out.")}
     triggers = outputs or (mentioned - {"in.last"}) or {"out.marks"}
     snapshot: Snapshot = {"out.flag": True, "out.s": Fraction(-3, 2), "in.last": set()}
+    snapshot["in.done"] = {(Fraction(2),)}
     for index, event in enumerate(events, start=1):
         update = read(event)
         if update is None:
@@ -303,9 +309,10 @@ def brute_force(system: System, events: list[dict[str, Any]]) -> int | None:
         if content == UNREADABLE:
             if name in needed:
                 return index
-            snapshot.pop(name, None)
+            if name != "in.done":
+                snapshot.pop(name, None)
             continue
-        snapshot[name] = content
+        snapshot[name] = snapshot[name] | content if name == "in.done" else content
         judged = name in triggers and mentioned <= snapshot.keys()
         if judged and not truth(clause.formula, snapshot, {}, REALS, NATURALS):
             return index

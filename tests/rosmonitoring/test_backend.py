@@ -128,7 +128,13 @@ node n {
 
 def test_without_a_trace_nothing_ran(make_system: Callable[..., System], tmp_path: Path) -> None:
     found = discharge(make_system(SYSTEM), "n", tmp_path)
-    assert {o.verdict for o in found.values()} == {Verdict.NOT_RUN}
+    assert {n: o.verdict for n, o in found.items()} == {
+        "seen": Verdict.NOT_RUN,
+        "unseen": Verdict.UNKNOWN,
+        "hard": Verdict.NOT_RUN,
+    }
+    assert "not monitorable in RML" in found["hard"].summary
+    assert not any(o.verdict.supports for o in found.values())
 
 
 def test_what_cannot_be_observed_is_unknown(make_system: Callable[..., System], tmp_path: Path) -> None:

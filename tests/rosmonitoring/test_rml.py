@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
+from avow.backends.rosmonitoring.rml_interpreter import Interpreter
 from avow.backends.rosmonitoring.rml_reader import Malformed, read
 from avow.backends.rosmonitoring.rml_translate import Translation, translate
 from avow.system.plan import System
@@ -37,13 +40,33 @@ def test_the_case_studys_files(name: str, case: System) -> None:
 
 
 def test_what_is_refused_says_why(case: System) -> None:
-    agent = rml_of(case, "agent")
-    assert set(agent.refused) == {"next_waypoint", "inspect_here", "end_of_mission"}
-    assert all("in.inspected" in reason for reason in agent.refused.values())
-    for name, reason in agent.refused.items():
-        assert f"guarantee {name}: {reason}" in agent.text
-    assert set(rml_of(case, "navigation").refused) == {"somewhere"}
-    assert set(rml_of(case, "radiationSensor").refused) == {"marks_inspected"}
+    assert rml_of(case, "agent").refused == {}
+    navigation, sensor = rml_of(case, "navigation"), rml_of(case, "radiationSensor")
+    assert set(navigation.refused) == {"somewhere"}
+    assert set(sensor.refused) == {"marks_inspected"}
+    for made in (navigation, sensor):
+        for name, reason in made.refused.items():
+            assert f"guarantee {name}: {reason}" in made.text
+
+
+def test_the_papers_agent_is_monitored_in_rml_as_by_the_engine(case: System, nominal: list[dict[str, Any]]) -> None:
+    """On the nominal run, and on it with each command's place, constructor or waypoint changed."""
+    found, _ = setup(case, case.contract.node("agent"), case.plan.node("agent").methods[0].options)
+    text = translate(found, case.contract.node("agent").guarantees).text
+    commands = [k for k, e in enumerate(nominal) if e["topic"] == "command"]
+    changes = [{}, {"posX": 1.5}, {"id": 11}, {"command": "inspect"}, {"command": "move"}]
+    differing = 0
+    for at in commands[::3]:
+        for change in changes:
+            events = [{**e, **change} if k == at else e for k, e in enumerate(nominal)]
+            interpreter, monitor = Interpreter(text), Monitor(found, solver=False)
+            rejected = next((k for k, e in enumerate(events) if interpreter.step(e) == "false"), None)
+            faults = [monitor.step(e) for e in events]
+            guarantees = {g.name for g in case.contract.node("agent").guarantees}
+            reported = next((k for k, f in enumerate(faults) if any(v.clause in guarantees for v in f)), None)
+            assert rejected == reported, (at, change)
+            differing += rejected is not None
+    assert differing >= 5
 
 
 GOOD = """
