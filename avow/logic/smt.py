@@ -10,8 +10,10 @@ functions with finitely many exceptions (a table and a default) are tried: what 
 
 from __future__ import annotations
 
+import contextlib
+import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Literal as OneOf
@@ -134,7 +136,8 @@ def _ask(
     engine: Engine,
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
     if engine == "qsat":
-        return _ask_qsat(translator, assertions, tracked, timeout_ms)
+        with _watchdog(translator, timeout_ms):
+            return _ask_qsat(translator, assertions, tracked, timeout_ms)
     solver = z3.Solver(ctx=translator.context)
     solver.set("timeout", max(1, int(timeout_ms)))
     solver.set("random_seed", seed)
@@ -144,12 +147,33 @@ def _ask(
         switch = z3.Bool(f"track!{number}", translator.context)
         solver.add(z3.Implies(switch, expr))
         switches[switch.get_id()] = (switch, label)
-    result = solver.check(*(switch for switch, _ in switches.values()))
+    with _watchdog(translator, timeout_ms):
+        result = solver.check(*(switch for switch, _ in switches.values()))
     if result == z3.sat:
         return "sat", solver.model(), (), ""
     if result == z3.unsat:
         return "unsat", None, tuple(switches[s.get_id()][1] for s in solver.unsat_core()), ""
     return "unknown", None, (), str(solver.reason_unknown())
+
+
+@contextlib.contextmanager
+def _watchdog(translator: Translator, timeout_ms: int) -> Iterator[None]:
+    """Interrupt Z3 where it misses its own time limit, which it does: seen 84 s for 16 ms."""
+    done = threading.Event()
+
+    def bark() -> None:
+        wait = timeout_ms / 1000 + 0.05
+        while not done.wait(wait):
+            translator.context.interrupt()
+            wait = 0.05
+
+    dog = threading.Thread(target=bark, daemon=True)
+    dog.start()
+    try:
+        yield
+    finally:
+        done.set()
+        dog.join()
 
 
 def _ask_qsat(
