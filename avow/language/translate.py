@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -32,13 +32,7 @@ from avow.language.terms import Term
 def to_rcl(contract: Contract) -> str:
     """The contract as an RCL file, which reads back as the equal contract. Constants are expanded in formulas."""
     out: list[str] = []
-    names = dict(contract.types)
-    constants = dict(contract.constants)
-    declarations = [
-        f"  {name} = {show_type(sort)};" if name in constants else f"  {name} : {_written(sort, names, name)};"
-        for name, sort in contract.types
-    ]
-    declarations += [f"  {name} = {show_term(term, 'rcl')};" for name, term in contract.constants if name not in names]
+    declarations = list(_declarations(contract))
     if declarations:
         out += ["context {", *declarations, "}", ""]
     for node in contract.nodes:
@@ -53,6 +47,23 @@ def to_rcl(contract: Contract) -> str:
             out.append(f"  {word}{_head(clause)}( {show_term(clause.formula, 'rcl')} )")
         out += ["}", ""]
     return format_text("\n".join(out), "contract.rcl")
+
+
+def _declarations(contract: Contract) -> Iterator[str]:
+    """The context's lines, in an order that keeps that of the types and that of the constants."""
+    names, constants = dict(contract.types), dict(contract.constants)
+    waiting = iter(contract.constants)
+    for name, sort in contract.types:
+        if name not in constants:
+            yield f"  {name} : {_written(sort, names, name)};"
+            continue
+        for constant, term in waiting:  # an enumeration that is a constant: first the constants before it
+            if constant == name:
+                break
+            yield f"  {constant} = {show_term(term, 'rcl')};"
+        yield f"  {name} = {show_type(sort)};"
+    for constant, term in waiting:
+        yield f"  {constant} = {show_term(term, 'rcl')};"
 
 
 def _head(clause: Clause) -> str:

@@ -82,7 +82,8 @@ class Formulas:
             case 4:
                 return choice(("b", "in.b", "b2", "TRUE", "FALSE"))
             case 5:
-                return f"{choice(('st', 'st2', 'red'))} {choice(('in', '!in'))} {choice(('{red, green}', 'Q', 'RadStat', '{}'))}"
+                of = choice(("{red, green}", "Q", "RadStat", "{}"))
+                return f"{choice(('st', 'st2', 'red'))} {choice(('in', '!in'))} {of}"
             case 6:
                 command = choice(("halt", f"move({number(1, names)}, {number(1, names)})", "inspect(k + 1)"))
                 return f"c == {command}"

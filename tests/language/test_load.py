@@ -43,6 +43,7 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+
 from .generate import CONTRACT
 
 

@@ -1,0 +1,97 @@
+"""Printing and reading again gives the equal term."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+
+from avow.diagnostics import Rejected
+from avow.language.load import check_text, parse_formula
+from avow.language.printer import show_number, show_sort, show_term, show_type
+from avow.language.sorts import REAL, OpaqueSort
+from avow.language.terms import And, Literal, Or, Role, Variable
+
+from .generate import CONTRACT, Formulas
+
+LOADED = check_text(CONTRACT, "t")[0]
+assert LOADED is not None
+NODE = LOADED.nodes[0]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_round_trip_of_random_formulas(seed: int) -> None:
+    formulas = Formulas(seed)
+    kept, faults = 0, []
+    for _ in range(250):
+        text = formulas.formula(1 + formulas.random.randrange(4))
+        try:
+            term = parse_formula(text, NODE, LOADED)
+        except Rejected as rejected:
+            faults += [d for d in rejected.diagnostics if d.code not in ("RCL302", "RCL309")]
+            continue
+        kept += 1
+        shown = show_term(term, "rcl")
+        assert parse_formula(shown, NODE, LOADED) == term, (text, shown)
+        for style in ("unicode", "text", "latex"):
+            assert show_term(term, style)  # type: ignore[arg-type]
+    assert kept > 150
+    assert faults == []
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("(b and b2) and b", "(in.b and out.b2) and in.b"),
+        ("b and (b2 or b)", "in.b and (out.b2 or in.b)"),
+        ("(b and b2) or b", "in.b and out.b2 or in.b"),
+        ("not (b == b2)", "not in.b == out.b2"),
+        ("(b -> b2) -> b", "(in.b -> out.b2) -> in.b"),
+        ("b -> (b2 -> b)", "in.b -> out.b2 -> in.b"),
+        ("b and b2 -> b", "(in.b and out.b2) -> in.b"),
+        ("r - (r - 1) > 0", "in.r - (in.r - 1) > 0"),
+        ("(r * 2) + 1 > 0", "in.r * 2 + 1 > 0"),
+        ("0 <= r and r < 120", "0 <= in.r < 120"),
+        ("i + 1.0 > r", "in.i + 1.0 > in.r"),
+        ("-(-(r)) > 0", "-(-in.r) > 0"),
+        ("forall(x in REAL, y in REAL | x < y)", "forall(x, y in REAL | x < y)"),
+        ("not st in {red}", "in.st !in {red}"),
+        ("(forall(x in REAL | x < r)) and b", "forall(x in REAL | x < in.r) and in.b"),
+    ],
+)
+def test_parentheses(text: str, shown: str) -> None:
+    assert show_term(parse_formula(text, NODE, LOADED), "rcl") == shown
+
+
+def test_styles() -> None:
+    term = parse_formula("forall(x' in REAL | in.m(x', 1) and st2 !in Q -> c == move(x', 0.5))", NODE, LOADED)
+    assert show_term(term) == "∀ x' ∈ ℝ · in.m(x', 1) ∧ out.st2 ∉ {red, green} → out.c = move(x', 0.5)"
+    assert show_term(term, "text") == (
+        "for all x' in reals: in.m(x', 1) and out.st2 not in {red, green} implies out.c is move(x', 0.5)"
+    )
+    latex = show_term(term, "latex")
+    assert latex.startswith(r"\forall x' \in \mathbb{R} \bullet \mathit{in.m}(x', 1) \land \mathit{out.st2} \notin \{")
+    inner = parse_formula("(forall(x in REAL | x < r)) <=> b", NODE, LOADED)
+    assert show_term(inner) == "(∀ x ∈ ℝ · x < in.r) ↔ in.b"
+
+
+def test_terms_made_by_hand() -> None:
+    a = Variable(Role.INPUT, "b", NODE.input("b").sort)
+    assert show_term(And(()), "rcl") == "TRUE"
+    assert show_term(Or(()), "rcl") == "FALSE"
+    assert show_term(And((a,)), "rcl") == "in.b"
+    assert show_term(Literal(Fraction(1, 3), REAL), "rcl") == "1 / 3"
+    assert show_term(Literal(-5, REAL), "unicode") == "-5.0"
+    assert show_term(Variable(Role.INPUT, "n.b", a.sort), "rcl") == "n.in.b"
+    assert show_term(Variable(Role.INPUT, "n.b", a.sort)) == "n.b"
+
+
+def test_numbers_and_sorts() -> None:
+    assert [show_number(Fraction(x))[0] for x in ("1/8", "-5/2", "7", "1/1000", "1/7")] == [
+        *("0.125", "-2.5", "7", "0.001", "1 / 7")
+    ]
+    sorts = dict(LOADED.types)
+    assert show_sort(sorts["M"]) == "REAL x INTEGER --> BOOL"
+    assert show_type(sorts["Cmd"]) == "{move(REAL, REAL), inspect(NATURAL), halt}"
+    assert show_sort(OpaqueSort("O")) == "O"
+    assert show_type(OpaqueSort("O")) == "{}"

@@ -1,0 +1,114 @@
+"""avow translate: RCL reads back as the equal contract, LaTeX compiles, SMT-LIB is accepted by Z3 and cvc5."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from avow.language.contract import Contract
+from avow.language.load import check_text, load_contract
+from avow.language.translate import FORMATS
+
+from .generate import CONTRACT
+
+HOSTILE = r"""
+context { T_x' : {a_b, c'd, e''}; F : {u, v} x (REAL, <T_x'>) --> REAL x REAL;
+  W = {wa, wb}; K = -2.5; S = "} \\end{x} %$#&_^~<>|é—∀🤖"; }
+node n_1 {
+  inputs( t : T_x', f : F, s : STRING, _ : REAL, in_line : {go(REAL), halt}, u : {} )
+  outputs( b : BOOL )
+  topics( my_pkg/msg/Some_Type s matches(in.s) )
+  guarantee n_a
+    "100 % of \\section{x} & $y$ #1 _ ^ ~ {braces} \"quoted\" — é ∀ 🤖 <b>"
+    ( b -> s == S and t == a_b and K < _ )
+  guarantee( in.in_line != halt and exists(q in in_line | q == go(1)) and forall(w in W | w == wa) )
+}
+"""
+
+
+def contracts(root: Path) -> list[Contract]:
+    texts = [CONTRACT, HOSTILE]
+    found = []
+    for text in texts:
+        contract, diagnostics = check_text(text, "t.rcl")
+        assert contract is not None, [str(d) for d in diagnostics if d.is_error]
+        found.append(contract)
+    return found + [load_contract([p]) for p in sorted(root.glob("contracts/*/*.rcl"))]
+
+
+def test_rcl_reads_back(root: Path) -> None:
+    for contract in contracts(root):
+        text = FORMATS["rcl"](contract)
+        again, found = check_text(text, "again.rcl")
+        assert again is not None, (text, [f"{d.span} {d.message}" for d in found if d.is_error])
+        assert replace(again, files=contract.files) == contract
+        assert "RCL401" not in {d.code for d in found}
+
+
+def test_json_is_complete(root: Path) -> None:
+    for contract in contracts(root):
+        data = json.loads(FORMATS["json"](contract))
+        assert [n["name"] for n in data["nodes"]] == [n.name for n in contract.nodes]
+        for node, shown in zip(contract.nodes, data["nodes"], strict=True):
+            assert [c["name"] for c in shown["guarantees"]] == [c.name for c in node.guarantees]
+            assert all(c["term"]["kind"] for c in shown["guarantees"])
+
+
+def test_words_and_signs(root: Path) -> None:
+    contract = load_contract([root / "contracts" / "remote_inspection_published" / "system.rcl"])
+    unicode = FORMATS["unicode"](contract)
+    assert "WayP : ℝ × ℝ → ℕ" in unicode
+    assert "∃! x, y ∈ ℝ · out.position(x, y)" in unicode
+    assert "for exactly one x, y in reals: out.position(x, y)" in FORMATS["text"](contract)
+
+
+@pytest.mark.needs_latex
+def test_latex_compiles(root: Path, tmp_path: Path) -> None:
+    pdflatex = shutil.which("pdflatex")
+    assert pdflatex is not None
+    for i, contract in enumerate(contracts(root)):
+        (tmp_path / f"c{i}.tex").write_text(FORMATS["latex"](contract), "utf-8")
+        command = [pdflatex, "-halt-on-error", "-interaction=nonstopmode", "-no-shell-escape", f"c{i}.tex"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=120, check=False)
+        assert done.returncode == 0, done.stdout.decode("latin-1")[-3000:]
+        assert (tmp_path / f"c{i}.pdf").stat().st_size > 1000
+
+
+def test_latex_is_escaped(root: Path) -> None:
+    text = FORMATS["latex"](contracts(root)[1])
+    assert r"100 \% of \textbackslash{}section\{x\} \& \$y\$ \#1 \_ \textasciicircum{} \textasciitilde{}" in text
+    assert r"\end{x}" not in text
+    assert "🤖" not in text
+
+
+def test_smtlib_is_accepted_by_z3(root: Path) -> None:
+    import z3
+
+    from avow.logic.contract_smtlib import to_smtlib
+
+    for contract in contracts(root)[2:]:
+        for script in to_smtlib(contract).split("(reset)"):
+            assert len(z3.parse_smt2_string(script)) > 0
+
+
+@pytest.mark.needs_cvc5
+def test_smtlib_is_accepted_by_cvc5(root: Path) -> None:
+    import cvc5
+
+    from avow.logic.contract_smtlib import to_smtlib
+
+    for contract in contracts(root)[2:]:
+        solver = cvc5.Solver(cvc5.TermManager())
+        parser = cvc5.InputParser(solver)
+        parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, to_smtlib(contract), "contract")
+        count = 0
+        while not (command := parser.nextCommand()).isNull():
+            count += 1
+            if not str(command).startswith("(check-sat"):
+                assert "error" not in command.invoke(solver, parser.getSymbolManager())
+        assert count > 10
