@@ -56,7 +56,7 @@ class Layout:
                 line, indent = token.line, token.column
             base = base or token.column
             if opens is not None:
-                opens.column, opens.explicit, chained = self._column(token, opens, blocks, base, starts_line)
+                opens.column, opens.explicit, chained = self._column(token, opens, blocks, base, starts_line, indent)
                 if chained:
                     opens.indent = indent
                 blocks.append(opens)
@@ -110,11 +110,11 @@ class Layout:
         raise self._rejected(token, f"{token} here belongs to no open {end}")
 
     def _column(
-        self, token: Token, opens: _Block, blocks: list[_Block], base: int, starts_line: bool
+        self, token: Token, opens: _Block, blocks: list[_Block], base: int, starts_line: bool, indent: int
     ) -> tuple[int, bool, bool]:
         around = blocks[-1].column if blocks else base
         if token.type in {"IF", "MATCH"} and not starts_line and not opens.first:
-            return around + 1, False, True  # ELSE IF: a chain, its branches need not be indented below the IF
+            return indent + 1, False, True  # ELSE IF: a chain, its branches need not be indented below the IF
         return token.column, token.column <= around, False
 
     def _rejected(self, token: Token, message: str) -> Rejected:

@@ -82,6 +82,16 @@ def test_a_chain_of_else_if() -> None:
     assert second.otherwise
 
 
+def test_a_long_chain_of_else_if() -> None:
+    text = "IF a < 0 THEN\n  x := 0\n" + "".join(f"ELSE IF a < {k} THEN\n  x := {k}\n" for k in range(1, 20))
+    body = parse(text + "ELSE\n  x := 99\nz := 1").body
+    assert len(body) == 2
+    depth, at = 0, body[0]
+    while isinstance(at, IfStatement):
+        depth, at = depth + 1, at.otherwise[0]
+    assert depth == 20
+
+
 def test_match_while_maps_and_declarations() -> None:
     source = parse(
         "VAR n : NATURAL; GIVEN f : NATURAL x REAL --> REAL;\nm[n] := TRUE\n"
