@@ -277,7 +277,8 @@ class _Reader:
             backend, options = next(iter(item.entries.items()))
             if options.value is None and options.entries is None and options.items is None and not options.text:
                 options = Piece(options.span, entries={})
-        if options.entries is None:
+        if options.entries is None and (options.items is not None or not isinstance(options.value, str)):
+            # A bare text (`review: reviews/x.yaml`) is for the backend's own schema to take or refuse.
             self.fault("PLAN105", f"nodes.{node}: the options of {backend!r} must be a mapping", options.span)
             return None
         if not _METHOD_ID.match(backend):

@@ -18,6 +18,9 @@ from avow.system.paths import inside
 from avow.system.schema import suggest
 from avow.verdict import Link, Outcome, Verdict
 
+COMMON = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
+"""Options that every method has; they are the pipeline's."""
+
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     "type": "object",
@@ -25,12 +28,6 @@ SCHEMA: dict[str, Any] = {
         "implementation": {
             "type": "string",
             "description": "the Dafny file that refines the generated specification, relative to the system's folder",
-        },
-        "id": {"type": "string", "description": "tells several methods of one node apart"},
-        "guarantees": {
-            "type": ["array", "string"],
-            "items": {"type": "string"},
-            "description": "the guarantees to verify (default: all of the node's)",
         },
     },
     "required": ["implementation"],
@@ -68,7 +65,7 @@ class DafnyBackend:
                 hint=suggest(str(key), SCHEMA["properties"]),
             )
             for key in job.options
-            if key not in SCHEMA["properties"]
+            if key not in SCHEMA["properties"] and key not in COMMON
         ]
         try:
             path, text = _implementation(job)

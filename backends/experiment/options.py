@@ -16,6 +16,9 @@ from avow.language.terms import Literal, Negative, Term, Widen
 from avow.system.paths import inside
 from avow.system.schema import suggest
 
+COMMON = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
+"""Options that every method has; they are the pipeline's."""
+
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     "type": "object",
@@ -35,12 +38,6 @@ SCHEMA: dict[str, Any] = {
             "description": "the claimed probability of success; without it no run at all may fail",
         },
         "protocol": {"type": "string", "description": "how the runs were made, for the report"},
-        "id": {"type": "string", "description": "tells several methods of one node apart"},
-        "guarantees": {
-            "type": ["array", "string"],
-            "items": {"type": "string"},
-            "description": "the guarantees that the runs speak of (default: all of the node's)",
-        },
     },
     "required": ["within"],
     "oneOf": [{"required": ["data", "measure"]}, {"required": ["summary"]}],
@@ -85,7 +82,7 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
     options = job.options
     known: dict[str, Any] = SCHEMA["properties"]
     for key in options:
-        if key not in known:
+        if key not in known and key not in COMMON:
             problems.add(str(key), f"'{key}' is no option of an experiment", suggest(str(key), known))
     data, summary = _path(problems, "data"), _path(problems, "summary")
     if ("data" in options) == ("summary" in options):

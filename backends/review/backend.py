@@ -16,18 +16,15 @@ from avow.system.paths import inside
 from avow.system.schema import suggest
 from avow.verdict import Counterexample, Link, Outcome, Verdict
 
+COMMON = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
+"""Options that every method has; they are the pipeline's."""
+
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     "description": "the record's path, or the record's path under the key 'record'",
     "type": ["object", "string"],
     "properties": {
         "record": {"type": "string", "description": "YAML record of the review, relative to the system's folder"},
-        "id": {"type": "string", "description": "tells several methods of one node apart"},
-        "guarantees": {
-            "type": ["array", "string"],
-            "items": {"type": "string"},
-            "description": "the guarantees that were reviewed (default: all of the node's)",
-        },
     },
     "required": ["record"],
     "additionalProperties": False,
@@ -104,7 +101,7 @@ def _read(job: Job) -> Record:
     options = job.method.options
     problems = []
     for key in job.options:
-        if key not in SCHEMA["properties"]:
+        if key not in SCHEMA["properties"] and key not in COMMON:
             message = f"'{key}' is no option of a review"
             problems.append(
                 Diagnostic("REV101", message, options.at(key), hint=suggest(str(key), SCHEMA["properties"]))

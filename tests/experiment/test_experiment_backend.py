@@ -53,6 +53,11 @@ def test_the_tolerance_may_be_a_constant_or_have_a_unit(make_job: Callable[..., 
     assert settle(make_job(**{**GOOD, "within": "24 cm"})).verdict is Verdict.REFUTED
 
 
+def test_the_pipelines_own_options_are_not_ours(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text(rows(*["0.1"] * 47))
+    assert BACKEND.check(make_job(**GOOD, id="x", guarantees=["arrives"], seconds=5, megabytes=9, seed=1)) == ()
+
+
 def test_one_failing_run_refutes_and_is_named(make_job: Callable[..., Any], tmp_path: Path) -> None:
     (tmp_path / "runs.csv").write_text(rows(*["0.2"] * 46, "0.2500000000000000000001"))
     outcome = settle(make_job(**GOOD))

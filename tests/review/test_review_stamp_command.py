@@ -76,3 +76,10 @@ def test_what_is_not_there_is_told(folder: Path, arguments: list[str], capsys: p
 def test_a_folder_without_a_plan(tmp_path: Path) -> None:
     shutil.rmtree(tmp_path)
     assert main([str(tmp_path), "n"]) == 2
+
+
+def test_the_short_form_names_the_record(folder: Path) -> None:
+    """``review: review.yaml``, as the plan's documentation has it."""
+    (folder / "plan.yaml").write_text(PLAN.split("      - review")[0] + "      - review: review.yaml\n")
+    assert len(stamp(folder, "n")) == 2
+    assert read_record(folder / "review.yaml").clauses[0].clause == "high"
