@@ -1,0 +1,67 @@
+"""What would make it hold: the assumption found does, and no weaker one would."""
+
+from __future__ import annotations
+
+import pytest
+
+from avow.language.terms import And, Iff, Term
+from avow.logic.eliminate import remedy
+from avow.logic.formula import conjunction
+from avow.logic.smt import entails
+from avow.verdict import Verdict
+
+from .contracts import contract, formula
+
+CONTRACT = contract(
+    """context { Colour : {red, orange, green}; }
+    node n {
+      inputs( r : REAL, k : INTEGER, b : BOOL, c : Colour, at : REAL --> BOOL )
+      outputs( o : REAL, d : Colour ) topics() guarantee( out.o == in.r ) }"""
+)
+NODE = CONTRACT.nodes[0]
+INPUTS = [port.variable for port in NODE.inputs]
+
+
+def say(text: str) -> Term:
+    return formula(text, NODE, CONTRACT)
+
+
+@pytest.mark.parametrize(
+    ("hypotheses", "goal", "expected"),
+    [
+        (["out.o == in.r + 1"], "out.o >= 5", "in.r >= 4"),
+        (["out.o >= in.r"], "out.o > 5", "in.r > 5"),
+        (["out.o >= in.r", "out.o <= 2 * in.r"], "out.o <= 10", "in.r <= 5"),
+        (["in.c == red -> out.d == red"], "out.d == red", "in.c == red"),
+        (["in.b -> out.o == 3", "not in.b -> out.o == in.r"], "out.o == 3", "in.b or in.r == 3"),
+        (["in.r > 2"], "in.r > 5", "in.r > 5"),
+        (["out.d != red -> in.c == green", "in.c != orange"], "out.d == red", "in.c == red"),
+        (["in.k > 3"], "in.k > 10", "in.k >= 11"),
+    ],
+)
+def test_the_weakest_assumption(hypotheses: list[str], goal: str, expected: str) -> None:
+    known = {f"H{k}": say(h) for k, h in enumerate(hypotheses)}
+    found = remedy(known, say(goal), INPUTS)
+    assert found is not None
+    assert found.weakest
+    assert entails({**known, "found": found.assumption}, say(goal)).verdict is Verdict.PROVED
+    same = entails(known, Iff(found.assumption, say(expected)))
+    assert same.verdict is Verdict.PROVED, found.assumption
+
+
+def test_nothing_about_the_inputs_would_help() -> None:
+    assert remedy({"H": say("out.o >= in.r")}, say("out.o <= 3"), INPUTS) is None
+    assert remedy({"H": say("in.r > 2")}, say("in.r < 1"), INPUTS) is None
+
+
+def test_functions_are_beyond_it() -> None:
+    assert remedy({"H": say("in.at(in.r)")}, say("in.at(1)"), INPUTS) is None
+
+
+def test_it_reads_back_what_it_shows() -> None:
+    from avow.language.printer import show_term
+
+    found = remedy({"H": say("out.o == in.r + 1")}, conjunction([say("out.o >= 5"), say("out.o <= 7")]), INPUTS)
+    assert found is not None
+    assert isinstance(found.assumption, And)
+    assert entails([say(show_term(found.assumption, "rcl"))], found.assumption).verdict is Verdict.PROVED

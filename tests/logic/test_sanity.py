@@ -1,0 +1,281 @@
+"""Contracts whose faults are known: each must be found, and nothing else be called wrong."""
+
+from __future__ import annotations
+
+import pytest
+
+from avow.language.contract import Node
+from avow.logic.sanity import Bounds, Property, SanityResult, analyse, claims, node_key, outcomes
+from avow.logic.smt import replay, solve
+from avow.logic.values import FunctionValue
+from avow.verdict import Verdict
+
+from .contracts import case_study, contract, node
+
+PATIENT = Bounds(milliseconds=10_000)
+"""The tests share the machine: what takes a tenth of a second alone may take seconds."""
+
+
+def results(of: Node) -> dict[str, SanityResult]:
+    return {result.name: result for result in analyse(of, bounds=PATIENT)}
+
+
+def refuted(of: Node) -> set[str]:
+    """The names of the refuted claims that are no mere consequence of another; no claim may stay open, but whether an
+    assumption is needed where the contract is not realizable."""
+    found = results(of)
+    unknown = {r.name for r in found.values() if r.verdict is Verdict.UNKNOWN and r.about is not Property.UNNEEDED}
+    assert not unknown
+    return {r.name for r in found.values() if r.verdict is Verdict.REFUTED and not r.because}
+
+
+# -- seeded faults -----------------------------------------------------------------------------------------------------
+
+LEVELS = "Level : {low, mid, high}; Command : {move(REAL, REAL), inspect(NATURAL), halt(BOOL)};"
+
+
+def bands(a: str, b: str, *more: str) -> Node:
+    """Classify a reading into three bands. The bands meet at a and b."""
+    return node(
+        f"""inputs( r : REAL ) outputs( v : Level )| assume( 0 <= in.r )
+        guarantee( in.r < {a} -> out.v == low ) guarantee( {a} <= in.r < {b} -> out.v == mid )
+        guarantee( {b} <= in.r -> out.v == high ) {" ".join(more)}""",
+        LEVELS,
+    )
+
+
+GOOD = {"unneeded-A1"}
+"""A reading below 0 would do no harm to `bands`."""
+
+
+@pytest.mark.parametrize(("a", "b"), [("120", "250"), ("0.5", "0.75"), ("1", "1000000")])
+def test_a_good_contract_is_good(a: str, b: str) -> None:
+    assert refuted(bands(a, b)) == GOOD
+    found = results(bands(a, b))
+    assert found["realizable"].verdict is Verdict.PROVED
+    assert found["undetermined-v"].verdict is Verdict.PROVED
+
+
+@pytest.mark.parametrize(
+    ("clause", "faults"),
+    [
+        # contradictory: no input at all is served
+        ("guarantee( out.v == low ) guarantee( out.v == mid )", {"consistent"}),
+        ("guarantee( in.r < 0 )", {"consistent"}),
+        # unrealizable: served for some inputs only
+        ("guarantee( in.r > 200 -> out.v == low )", {"realizable"}),
+        ("guarantee( in.r == 120.5 -> out.v != mid )", {"realizable"}),
+        ("guarantee( in.r != 7 )", {"realizable"}),
+        # vacuous
+        ("guarantee( in.r < -1 -> out.v == high )", {"tautology-G4"}),
+        ("guarantee( (in.r < 100 and in.r > 130) -> out.v == high )", {"tautology-G4"}),
+        # redundant
+        ("guarantee( in.r == 3 -> out.v == low )", {"redundant-G4"}),
+        ("guarantee( out.v == low or in.r >= 120 )", {"redundant-G4", "redundant-G1"}),
+        ("guarantee( in.r < 120 -> out.v == low )", {"redundant-G4", "redundant-G1"}),
+        # a tautology
+        ("guarantee( out.v == low -> out.v in {low, mid} )", {"tautology-G4"}),
+        # assumptions
+        ("assume( in.r < 0 )", {"assumptions-satisfiable"}),
+        ("assume( in.r >= -5 )", {"redundant-A2", "unneeded-A2"}),
+        ("assume( in.r == in.r )", {"tautology-A2"}),
+    ],
+)
+def test_a_seeded_fault_is_found(clause: str, faults: set[str]) -> None:
+    found = refuted(bands("120", "250", clause))
+    assert {name for name in found if not name.startswith(("unneeded-A1",))} == faults
+
+
+def test_unconstrained_and_undetermined_outputs() -> None:
+    two = node(
+        "inputs( r : REAL ) outputs( v : Level, w : Level, u : REAL )"
+        "| guarantee( out.v == low or out.v == mid ) guarantee( out.u == in.r or out.w == out.w )",
+        LEVELS,
+    )
+    found = refuted(two)
+    assert {"unconstrained-w", "unconstrained-u", "undetermined-v", "tautology-G2"} >= found
+    assert {"undetermined-v", "tautology-G2"} <= found
+    answers = results(two)
+    assert answers["unconstrained-v"].verdict is Verdict.PROVED
+    assert answers["unconstrained-w"].verdict is Verdict.REFUTED
+    assert answers["undetermined-w"].because == "unconstrained-w"
+
+
+COMMANDS = {
+    "two demands at once": (
+        """guarantee( in.n < 5 -> out.c == inspect(in.n) )
+        guarantee( in.r > 1 -> exists(x in REAL | out.c == move(x, x)) )""",
+        {"realizable"},
+    ),
+    "kept apart": (
+        """guarantee( (in.n < 5 and in.r <= 1) -> out.c == inspect(in.n) )
+        guarantee( in.r > 1 -> exists(x in REAL | out.c == move(x, x)) )""",
+        set(),
+    ),
+    "an existential that cannot be met": (
+        "guarantee( exists(i in NATURAL | i < in.n and out.c == inspect(i)) )",
+        {"realizable"},
+    ),
+    "an existential that can": ("guarantee( exists(i in NATURAL | i > in.n and out.c == inspect(i)) )", set()),
+    "a negative number for a natural": (
+        "guarantee( exists(i in NATURAL | i + 1 == in.n and out.c == inspect(i)) )",
+        {"realizable"},
+    ),
+    "a demand for two waypoints": (
+        "guarantee( forall(i in NATURAL | in.done(i) -> out.c == inspect(i)) )",
+        {"realizable"},
+    ),
+    "a demand for one of them": (
+        """guarantee( exists(i in NATURAL | in.done(i)) ->
+        exists(i in NATURAL | in.done(i) and out.c == inspect(i)) )""",
+        set(),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_commands(name: str) -> None:
+    clauses, faults = COMMANDS[name]
+    text = f"inputs( r : REAL, n : NATURAL, done : NATURAL --> BOOL ) outputs( c : Command )| {clauses}"
+    assert {f for f in refuted(node(text, LEVELS)) if "undetermined" not in f} == faults
+
+
+FUNCTIONS = {
+    "a frame condition": ("guarantee( forall(i in NATURAL | out.f(i) <=> (in.f(i) or i == in.n)) )", set()),
+    "and a demand that breaks it": (
+        """guarantee( forall(i in NATURAL | out.f(i) <=> (in.f(i) or i == in.n)) )
+        guarantee( forall(i in NATURAL | not (out.f(i) and i > 3)) )""",
+        {"realizable"},
+    ),
+    "a single point": ("guarantee( exists_unique(i in NATURAL | out.f(i)) )", set()),
+    "within bounds": (
+        "guarantee( forall(i in NATURAL | out.f(i) -> i < 9) ) guarantee( exists(i in NATURAL | out.f(i)) )",
+        set(),
+    ),
+    "within bounds that exclude everything": (
+        "guarantee( forall(i in NATURAL | out.f(i) -> i < in.n) ) guarantee( exists(i in NATURAL | out.f(i)) )",
+        {"realizable"},
+    ),
+    "a numeric function": ("guarantee( forall(x in REAL | out.g(x) == in.g(x) + 1) )", set()),
+    "a numeric function below zero": ("guarantee( forall(x in REAL | out.g(x) + 1 == in.g(x)) )", {"realizable"}),
+}
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_functions(name: str) -> None:
+    clauses, faults = FUNCTIONS[name]
+    functions = "f : NATURAL --> BOOL, g : REAL --> NATURAL"
+    text = f"inputs( n : NATURAL, {functions} ) outputs( {functions} )| {clauses}"
+    found = {f for f in refuted(node(text)) if "undetermined" not in f and "unconstrained" not in f}
+    assert found == faults
+
+
+def test_division_by_zero_makes_nothing_realizable() -> None:
+    # Whatever 1 / 0 is, it is one value: but nobody knows that it is 7.
+    impossible = node("inputs( r : REAL ) outputs( v : REAL )| guarantee( out.v == 7 ) guarantee( out.v == 1 / in.r )")
+    assert results(impossible)["realizable"].verdict is not Verdict.PROVED
+    possible = node("inputs( r : REAL ) outputs( v : REAL )| guarantee( out.v == 1 / in.r )")
+    assert results(possible)["realizable"].verdict is not Verdict.REFUTED
+
+
+# -- the case study ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def published() -> dict[str, dict[str, SanityResult]]:
+    return {n.name: results(n) for n in case_study("remote_inspection_published").nodes}
+
+
+@pytest.fixture(scope="module")
+def repaired() -> dict[str, dict[str, SanityResult]]:
+    return {n.name: results(n) for n in case_study("remote_inspection").nodes}
+
+
+def test_the_repaired_nodes_are_realizable(repaired: dict[str, dict[str, SanityResult]]) -> None:
+    for name, found in repaired.items():
+        for claim in ("assumptions-satisfiable", "consistent", "realizable"):
+            assert found[claim].verdict is Verdict.PROVED, (name, claim)
+        assert not [r.name for r in found.values() if r.fails]
+        assert not [r.name for r in found.values() if r.verdict is Verdict.REFUTED and r.severity == "warning"]
+    assert set(repaired["agent"]["realizable"].clauses) == {"exit_known", "one_waypoint"}
+
+
+def test_the_published_agent_is_not_realizable(published: dict[str, dict[str, SanityResult]]) -> None:
+    result = published["agent"]["realizable"]
+    assert result.verdict is Verdict.REFUTED
+    conflicting = {clauses for clauses, _ in result.conflicts}
+    assert {("G2", "G3"), ("G1", "G3")} <= conflicting
+    for clauses, shown in result.conflicts:
+        if clauses == ("G2", "G3"):
+            assert "guarantee G2 demands out.command = inspect(" in shown.explanation
+            assert "guarantee G3 demands out.command = move(" in shown.explanation
+            assert dict(shown.values).keys() == {"in.wayP", "in.at", "in.radiationStatus", "in.inspected"}
+    assert len(result.clauses) == 2
+
+
+def test_the_published_radiation_sensor_says_nothing(published: dict[str, dict[str, SanityResult]]) -> None:
+    found = published["radiationSensor"]
+    assert found["tautology-G1"].verdict is Verdict.REFUTED
+    for name in ("vacuous-G1", "unconstrained-radiationStatus", "unconstrained-inspected"):
+        assert found[name].verdict is Verdict.REFUTED
+        assert found[name].because == "tautology-G1"
+    assert published["agent"]["tautology-A1"].verdict is Verdict.REFUTED, "an assumption that is true by typing"
+
+
+def test_the_other_published_nodes_are_sound(published: dict[str, dict[str, SanityResult]]) -> None:
+    for name in ("localisation", "navigation"):
+        assert not [r.name for r in published[name].values() if r.fails]
+        assert published[name]["realizable"].verdict is Verdict.PROVED
+
+
+# -- what the pipeline relies on ---------------------------------------------------------------------------------------
+
+
+def test_an_unrealizable_input_is_really_without_output() -> None:
+    bad = bands("120", "250", "guarantee( in.r > 200 -> out.v == low )")
+    from avow.logic.realizability import realizable
+
+    ports = [p.variable for p in bad.inputs], [p.variable for p in bad.outputs]
+    guarantees = {c.name: c.formula for c in bad.guarantees}
+    assumptions = {c.name: c.formula for c in bad.assumptions}
+    answer = realizable(*ports, assumptions, guarantees)
+    assert answer.verdict is Verdict.REFUTED
+    assert replay(assumptions.values(), answer.inputs) is True
+    assert solve(guarantees, given=answer.inputs).status == "unsat"
+
+
+def test_outcomes_answer_each_obligation() -> None:
+    of = bands("120", "250")
+    wanted = {f"s/n/sanity/{claim.name}": claim.name for claim in claims(of)} | {"s/n/sanity/gone": "gone"}
+    found = outcomes(of, wanted)
+    assert [o.obligation for o in found] == list(wanted)
+    assert found[-1].verdict is Verdict.ERROR
+    assert all(o.verdict in {Verdict.PROVED, Verdict.REFUTED} for o in found[:-1])
+
+
+def test_the_key_follows_the_meaning_only() -> None:
+    text = """context { L = 120; }
+        node n { inputs(r : REAL) outputs(v : REAL) topics() assume(in.r > L) guarantee(out.v < L) }"""
+    key = node_key(contract(text).nodes[0])
+    assert node_key(contract(text.replace("assume(", "// because\n assume (")).nodes[0]) == key
+    assert node_key(contract(text.replace("120", "121")).nodes[0]) != key
+    assert node_key(contract(text.replace("guarantee(", "guarantee low (")).nodes[0]) != key
+
+
+def test_names_of_claims_are_unique() -> None:
+    for system in ("remote_inspection", "remote_inspection_published"):
+        for of in case_study(system).nodes:
+            names = [claim.name for claim in claims(of)]
+            assert len(names) == len(set(names))
+
+
+def test_a_scenario_gives_bounded_answers_only_where_needed() -> None:
+    of = node(
+        "inputs( f : NATURAL --> NATURAL ) outputs( v : NATURAL )"
+        "| guarantee( forall(i in NATURAL | in.f(i * i * i + i) + in.f(i) <= out.v) )"
+    )
+    given = {of.input("f").variable: FunctionValue({(1,): 4}, 0)}
+    found = {r.name: r for r in analyse(of, scenario=given, bounds=Bounds(milliseconds=3_000))}
+    answer = found["realizable"]
+    assert answer.verdict in {Verdict.CHECKED, Verdict.REFUTED, Verdict.UNKNOWN}
+    assert answer.bounded == (answer.verdict is Verdict.CHECKED)

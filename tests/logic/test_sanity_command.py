@@ -1,0 +1,104 @@
+"""``avow sanity``: what people see, what machines read, and the exit codes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from click.testing import CliRunner, Result
+
+from avow.cli.sanity import command
+from avow.diagnostics import Rejected
+
+GOOD = """node n { inputs(r : REAL) outputs(v : REAL) topics() assume(in.r >= 0)
+  guarantee low (in.r < 5 -> out.v == 1) guarantee high (in.r >= 5 -> out.v == in.r) }"""
+
+BAD = GOOD.replace("in.r >= 5 ->", "in.r >= 4 ->")
+
+
+def run(tmp_path: Path, text: str, *options: str) -> tuple[Result, int]:
+    path = tmp_path / "system.rcl"
+    path.write_text(text)
+    result = CliRunner().invoke(command, [str(path), *options], standalone_mode=False)
+    if result.exception:
+        raise result.exception
+    code = result.return_value
+    assert isinstance(code, int)
+    return result, code
+
+
+def as_json(tmp_path: Path, text: str, root: Path) -> dict[str, Any]:
+    result, _ = run(tmp_path, text, "--json")
+    found = json.loads(result.stdout)
+    jsonschema.validate(found, json.loads((root / "docs/schemas/sanity.schema.json").read_text()))
+    return {r["name"]: r for r in found["results"]}
+
+
+def test_a_good_contract(tmp_path: Path, root: Path) -> None:
+    result, code = run(tmp_path, GOOD)
+    assert code == 0
+    assert "0 of them errors" in result.stdout
+    found = as_json(tmp_path, GOOD, root)
+    assert found["realizable"]["verdict"] == "proved"
+    assert found["vacuous-low"]["verdict"] == "proved"
+    assert found["vacuous-low"]["place"]["line"] == 2
+
+
+def test_a_bad_contract(tmp_path: Path, root: Path) -> None:
+    result, code = run(tmp_path, BAD)
+    assert code == 1
+    assert "realizable" in result.stdout
+    found = as_json(tmp_path, BAD, root)
+    answer = found["realizable"]
+    assert answer["verdict"] == "refuted"
+    assert answer["clauses"] == ["low", "high"]
+    assert 4 <= float(answer["counterexample"]["values"]["in.r"]) < 5
+    assert "guarantee low demands out.v = 1" in answer["counterexample"]["text"]
+    assert answer["conflicts"][0]["clauses"] == ["low", "high"]
+
+
+def test_every_property_has_its_words_in_the_schema(root: Path) -> None:
+    from avow.logic.claims import Property
+
+    schema = json.loads((root / "docs/schemas/sanity.schema.json").read_text())
+    described = schema["$defs"]["result"]["properties"]["property"]
+    assert set(described["enum"]) == {str(p) for p in Property}
+    assert all(f"{p}:" in described["description"] for p in Property)
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("node n {", ()),
+        (GOOD, ("--node", "m")),
+        (GOOD, ("--seconds", "0")),
+        ("\x00", ()),
+    ],
+)
+def test_bad_input_is_a_diagnostic(tmp_path: Path, text: str, options: tuple[str, ...]) -> None:
+    with pytest.raises(Rejected):
+        run(tmp_path, text, *options)
+
+
+def test_a_missing_file_is_a_diagnostic(tmp_path: Path) -> None:
+    result = CliRunner().invoke(command, [str(tmp_path / "none.rcl")], standalone_mode=False)
+    assert isinstance(result.exception, Rejected)
+
+
+def test_markup_in_a_contract_is_text(tmp_path: Path) -> None:
+    text = BAD.replace("r : REAL", "r : REAL, s : STRING").replace(
+        "in.r < 5 ->", 'in.r < 5 and in.s == "[red]x[/red]" ->'
+    )
+    result, code = run(tmp_path, text)
+    assert code == 1
+    assert "[red]x[/red]" in "".join(result.stdout.split())
+
+
+def test_deep_nesting_is_no_crash(tmp_path: Path) -> None:
+    deep = "not (" * 60 + "in.r < 5" + ")" * 60
+    result, code = run(tmp_path, GOOD.replace("in.r < 5 ->", f"{deep} ->"))
+    assert code == 0
+    assert "refuted" not in result.stdout.splitlines()[0]
