@@ -49,10 +49,10 @@ class HypothesisBackend:
         return problems(job)
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        from avow.backends.hypothesis.subject import locate
+        from avow.backends.hypothesis.subject import locate, modules
 
         try:
-            return (locate(job).path,)
+            return modules(locate(job).path)
         except Rejected:
             return ()
 

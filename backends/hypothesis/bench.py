@@ -135,8 +135,7 @@ class Bench:
         @self._configuration((Phase.generate,))
         @given(self.inputs)
         def every(inputs: Inputs) -> None:
-            if self.end is not None and time.monotonic() > self.end:
-                raise OutOfTime
+            self._in_time()
             if not self._assumed(inputs):
                 self.rejected += 1
                 assume(False)
@@ -163,6 +162,7 @@ class Bench:
     def _try(self, cases: list[Inputs]) -> None:
         """Ask the subject, and judge each guarantee of each answer."""
         for inputs, reply in zip(cases, self.subject.ask_all(cases), strict=False):
+            self._in_time()
             try:
                 found = self._outputs(reply)
             except SubjectFailed as error:
@@ -172,6 +172,10 @@ class Bench:
             self._judge(inputs, found)
             if all(g.failure is not None for g in self.guarantees.values()):
                 raise _Enough
+
+    def _in_time(self) -> None:
+        if self.end is not None and time.monotonic() > self.end:
+            raise OutOfTime
 
     def _judge(self, inputs: Inputs, found: dict[str, Value]) -> None:
         values = valuation(inputs, found)

@@ -69,6 +69,29 @@ def locate(job: Job) -> SubjectFile:
     return SubjectFile(name, path, function)
 
 
+def modules(path: Path) -> tuple[Path, ...]:
+    """The subject's file and the files beside it that it imports, directly or not: what its answers depend on."""
+    found: dict[Path, None] = {}
+    stack = [path]
+    while stack:
+        file = stack.pop()
+        if file in found:
+            continue
+        found[file] = None
+        try:
+            tree = ast.parse(file.read_bytes())
+        except (OSError, ValueError, SyntaxError, RecursionError):
+            continue
+        for node in ast.walk(tree):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            heads = {name.partition(".")[0] for name in names} - {""}
+            for head in sorted(heads):
+                beside = (path.parent / f"{head}.py", path.parent / head / "__init__.py")
+                stack.extend(candidate for candidate in beside if candidate.is_file())
+    return tuple(sorted(found))
+
+
 def _top_level(tree: ast.Module) -> dict[str, ast.stmt]:
     found: dict[str, ast.stmt] = {}
     for statement in tree.body:

@@ -285,6 +285,15 @@ def test_pattern_names_do_not_capture_the_contracts(tmp_path: Path) -> None:
     )
 
 
+def test_a_map_that_is_an_input_may_be_assigned(tmp_path: Path) -> None:
+    program = PROGRAM.replace("done := before\n", "").replace("done[i]", "before[i]")
+    found = verdicts(job(tmp_path / "a", sensor(), program, {**TABLE, "out.done": "before"}))
+    assert found["marks"] is Verdict.PROVED
+    wrong = program.replace("before[i] := TRUE", "before[i] := FALSE")
+    found = verdicts(job(tmp_path / "b", sensor(), wrong, {**TABLE, "out.done": "before"}))
+    assert found["marks"] is Verdict.REFUTED
+
+
 # -- bad plans and programs --------------------------------------------------------------------------------------------
 
 

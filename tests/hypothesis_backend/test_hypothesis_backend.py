@@ -298,6 +298,15 @@ def test_bad_subjects_are_located(tmp_path: Path, subject: str, text: str, code:
     assert BACKEND.export(wanted) == {}
 
 
+def test_files_beside_the_subject_count(tmp_path: Path) -> None:
+    wanted = job(tmp_path, "import os\nfrom limits import LOW\nimport helper.more\n" + STEP)
+    for name, text in {"limits.py": "import s", "helper/__init__.py": "", "other.py": ""}.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    names = [path.relative_to(tmp_path).as_posix() for path in BACKEND.files(wanted)]
+    assert names == ["helper/__init__.py", "limits.py", "s.py"]
+
+
 def test_optional_arguments_and_keywords(tmp_path: Path) -> None:
     assert BACKEND.check(job(tmp_path / "a", "def step(r, *, mode=1, **more): pass")) == ()
     assert BACKEND.check(job(tmp_path / "b", "from x import step")) == ()
