@@ -1,0 +1,276 @@
+"""The grammar as a whole, the command line, the Pygments lexer, the language server."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from avow.language.lexer import Token, tokens
+from avow.language.load import check_text
+from avow.language.source import Reports, Source
+
+from .generate import CONTRACT
+
+# --- the grammar -----------------------------------------------------------------------------------------------------
+
+
+def test_the_grammar_is_unambiguous_and_covers_whole_files(root: Path) -> None:
+    """LALR(1) tables exist without conflict for `start`, the file as a whole, and accept what the parts accept."""
+    from lark import Lark
+
+    grammar = (root / "avow" / "language" / "grammar.lark").read_text("utf-8")
+    lark = Lark(grammar, parser="lalr", lexer="basic", start="start")
+    for path in sorted(root.glob("contracts/*/*.rcl")):
+        machine = lark.parse_interactive("")
+        for token in tokens(Reports(Source("f", path.read_text("utf-8")))):
+            machine.feed_token(token)
+        machine.feed_token(Token("$END", "", 0, 0))
+
+
+def test_the_grammars_terminals_are_the_lexers() -> None:
+    """Lark's own lexer, on the terminals as the grammar writes them, finds the same tokens as ours."""
+    from lark import Lark
+
+    grammar = (Path(__file__).parents[2] / "avow" / "language" / "grammar.lark").read_text("utf-8")
+    lark = Lark(grammar, parser="lalr", lexer="basic", start="start")
+    text = CONTRACT.replace(
+        "TRUE", 'forall(x\', y in REAL | <1 upto k> == ns -> x\' !in {0.5} <=> "a\\"b" != s or <> == sq)'
+    )
+    theirs = [(t.type, str(t)) for t in lark.lex(text)]
+    ours = [(t.type, t.text) for t in tokens(Reports(Source("f", text)))]
+    assert ours == theirs
+
+
+# --- the command line ------------------------------------------------------------------------------------------------
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "avow", *arguments], capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> dict[str, str]:
+    (tmp_path / "good.rcl").write_text(CONTRACT)
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "bad.rcl").write_text("node n { inputs() outputs(b : BOOL) topics() guarantee(c) }")
+    return {"good": str(tmp_path / "good.rcl"), "bad": str(tmp_path / "sub" / "bad.rcl")}
+
+
+def test_check(files: dict[str, str]) -> None:
+    done = run("check", files["good"])
+    assert done.returncode == 0, done.stderr
+    assert "1 file: " in done.stdout
+    done = run("check", files["good"], files["bad"])
+    assert done.returncode == 2
+    assert "error[RCL201]" in done.stdout
+    done = run("check", "--json", files["bad"])
+    assert done.returncode == 2
+    codes = [d["code"] for d in json.loads(done.stdout)["diagnostics"]]
+    assert codes == ["RCL201"]
+    assert json.loads(run("check", "--sarif", files["bad"]).stdout)["version"] == "2.1.0"
+    assert run("check", "/no/such/file.rcl").returncode == 2
+
+
+def invoke(name: str, *arguments: str, stdin: str | None = None) -> tuple[int, str]:
+    import importlib
+
+    command = importlib.import_module(f"avow.cli.{name}").command
+    result = CliRunner().invoke(command, list(arguments), input=stdin, standalone_mode=False)
+    assert result.exception is None, result.exception
+    return result.return_value or 0, result.output
+
+
+def test_check_off_and_folders(files: dict[str, str], tmp_path: Path) -> None:
+    assert "RCL405" in invoke("check", files["good"])[1]
+    assert "RCL405" not in invoke("check", "--off", "RCL405", files["good"])[1]
+    code, output = invoke("check", str(tmp_path / "sub"))
+    assert code == 2
+    assert "RCL201" in output
+    assert invoke("check", str(tmp_path / "empty"))[0] == 2
+    assert "Nothing of that name" in invoke("check", "--explain", files["bad"])[1]
+
+
+def test_fmt(tmp_path: Path) -> None:
+    path = tmp_path / "f.rcl"
+    path.write_text("node n{inputs()outputs(b:BOOL)topics()G(b)}")
+    assert invoke("fmt", "--check", str(path))[0] == 1
+    code, diff = invoke("fmt", "--diff", str(path))
+    assert code == 1
+    assert "+  guarantee( b )" in diff
+    assert path.read_text() == "node n{inputs()outputs(b:BOOL)topics()G(b)}"
+    assert invoke("fmt", str(path))[0] == 0
+    assert invoke("fmt", "--check", str(tmp_path))[0] == 0
+    code, output = invoke("fmt", "-", stdin="node n{inputs()outputs(b:BOOL)topics()G(b)}")
+    assert (code, output) == (0, path.read_text())
+    path.write_text("node n{")
+    assert invoke("fmt", str(path))[0] == 2
+    assert path.read_text() == "node n{"
+
+
+@pytest.mark.parametrize("notation", ["rcl", "text", "unicode", "latex", "json"])
+def test_translate(files: dict[str, str], tmp_path: Path, notation: str) -> None:
+    code, output = invoke("translate", files["good"], "--to", notation)
+    assert code == 0
+    assert "halt" in output
+    assert invoke("translate", files["good"], "--to", notation, "-o", str(tmp_path / "o"))[0] == 0
+    assert (tmp_path / "o").read_text("utf-8") == output
+
+
+# --- Pygments --------------------------------------------------------------------------------------------------------
+
+
+def test_pygments(root: Path) -> None:
+    from pygments.token import Comment, Error, Keyword, Name, Operator
+
+    from avow.language.pygments_lexer import RclLexer
+
+    for path in sorted(root.glob("contracts/*/*.rcl")):
+        text = path.read_text("utf-8")
+        found = list(RclLexer(stripnl=False, ensurenl=False).get_tokens(text))
+        assert "".join(value for _, value in found) == text
+        assert not any(kind is Error for kind, _ in found)
+        kinds = dict((value, kind) for kind, value in found)
+        assert kinds["guarantee"] is Keyword.Declaration
+        assert kinds["REAL"] is Keyword.Type
+        assert kinds["agent" if "agent" in kinds else "GRA"] is Name.Class
+        assert kinds["->"] is Operator
+        assert any(kind in Comment for kind, _ in found)
+
+
+# --- the language server ---------------------------------------------------------------------------------------------
+
+TEXT = """\
+context { Stat : {red, green}; Limit = 3; }
+node n {
+  inputs( r : REAL )
+  outputs( stat : Stat )
+  topics( string s matches(out.stat) )
+  guarantee fine "It is *fine*" ( forall(x in REAL | x < in.r -> stat == red and r < Limit) )
+}
+"""
+
+
+def at(text: str, needle: str, plus: int = 0) -> int:
+    return text.index(needle) + plus
+
+
+def test_answers() -> None:
+    from avow.lsp.answers import analyse, definition, hover, symbols
+
+    document = analyse(TEXT, "f")
+    said = hover(document, at(TEXT, "stat == red"))
+    assert said is not None
+    assert "`out.stat` : `Stat` = `{red, green}`" in said
+    assert "topic `s`" in said
+    assert hover(document, at(TEXT, "x < in.r")) == "`x` : `REAL` (quantified)"
+    assert "constant `Limit` = `3`" in (hover(document, at(TEXT, "Limit)")) or "")
+    assert "an element of `Stat`" in (hover(document, at(TEXT, "red and")) or "")
+    clause = hover(document, at(TEXT, "fine"), lambda node, clause: f"{node}/{clause}: proved by *x*")
+    assert clause is not None
+    assert "∀ x ∈ ℝ" in clause
+    assert r"proved by \*x\*" in clause
+    places = {
+        name: definition(document, at(TEXT, needle, plus))
+        for name, needle, plus in (
+            ("in.r", "in.r ->", 3),
+            ("Stat", "Stat )", 0),
+            ("red", "red and", 0),
+            ("x", "x < in.r", 0),
+            ("Limit", "Limit)", 0),
+        )
+    }
+    assert {n: (p.line, p.column) for n, p in places.items() if p} == {
+        "in.r": (3, 11),
+        "Stat": (1, 11),
+        "red": (1, 19),
+        "x": (6, 42),
+        "Limit": (1, 32),
+    }
+    outline = symbols(document)
+    assert [(s.name, s.kind) for s in outline] == [("Stat", "type"), ("Limit", "constant"), ("n", "node")]
+    assert [(s.name, s.detail) for s in outline[2].inner] == [("fine", "It is *fine*")]
+
+
+def test_answers_while_typing() -> None:
+    """What was known before the last change still helps; and no text, and no place in it, brings an exception."""
+    from avow.lsp.answers import analyse, definition, hover, symbols
+
+    before = analyse(TEXT, "f")
+    broken = TEXT.replace("stat == red and", "stat == ")
+    document = analyse(broken, "f", before)
+    assert document.diagnostics
+    assert "`out.stat`" in (hover(document, at(broken, "stat == ")) or "")
+    for cut in range(0, len(TEXT), 7):
+        document = analyse(TEXT[:cut], "f", before)
+        symbols(document)
+        for offset in range(0, cut, 5):
+            hover(document, offset)
+            definition(document, offset)
+
+
+def test_server_speaks_the_protocol(tmp_path: Path) -> None:
+    pytest.importorskip("pygls")
+    path = tmp_path / "f.rcl"
+    text = "// 🤖 é\n" + TEXT.replace("red and", "rde and")
+    path.write_text(text, "utf-8")
+    uri = path.as_uri()
+    place = {"line": 4, "character": 12}
+    requests = [
+        {"id": 1, "method": "initialize", "params": {"processId": None, "rootUri": None, "capabilities": {}}},
+        {"method": "initialized", "params": {}},
+        {
+            "method": "textDocument/didOpen",
+            "params": {"textDocument": {"uri": uri, "languageId": "rcl", "version": 1, "text": text}},
+        },
+        {"id": 2, "method": "textDocument/documentSymbol", "params": {"textDocument": {"uri": uri}}},
+        {"id": 3, "method": "textDocument/definition", "params": {"textDocument": {"uri": uri}, "position": place}},
+        {
+            "id": 4,
+            "method": "textDocument/formatting",
+            "params": {"textDocument": {"uri": uri}, "options": {"tabSize": 2, "insertSpaces": True}},
+        },
+        {"id": 5, "method": "shutdown"},
+        {"method": "exit"},
+    ]
+    data = b""
+    for request in requests:
+        body = json.dumps({"jsonrpc": "2.0", **request}).encode()
+        data += b"Content-Length: %d\r\n\r\n%s" % (len(body), body)
+    done = subprocess.run(
+        [sys.executable, "-m", "avow", "lsp"], input=data, capture_output=True, timeout=60, check=False
+    )
+    answers = []
+    rest = done.stdout
+    while rest:
+        head, _, rest = rest.partition(b"\r\n\r\n")
+        length = int(next(h for h in head.split(b"\r\n") if h.startswith(b"Content-Length")).split(b":")[1])
+        answers.append(json.loads(rest[:length]))
+        rest = rest[length:]
+    by_id = {a["id"]: a.get("result") for a in answers if "id" in a and "method" not in a}
+    assert [s["name"] for s in by_id[2]] == ["Stat", "Limit", "n"]
+    published = [a["params"] for a in answers if a.get("method") == "textDocument/publishDiagnostics"]
+    assert [d["code"] for d in published[0]["diagnostics"]] == ["RCL201"]
+    assert published[0]["diagnostics"][0]["range"]["start"] == {"line": 6, "character": 73}
+    assert by_id[4] == [] or "guarantee fine" in by_id[4][0]["newText"]
+
+
+def test_checking_does_not_import_the_solver(root: Path) -> None:
+    """Editors and pre-commit check in milliseconds: no Z3, no reports, and Lark only when there is something to read."""
+    code = (
+        "import sys; from avow.language.load import check_text; assert 'lark' not in sys.modules; "
+        "check_text('context { A : {a}; }', 'f'); "
+        "assert not {'z3', 'doit', 'jinja2', 'hypothesis'} & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_texts_with_surrogates_do_not_break_the_tables() -> None:
+    assert check_text("node \udc80", "f")[0] is None
