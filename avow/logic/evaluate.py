@@ -84,7 +84,10 @@ def evaluate(term: Term, valuation: Mapping[str, Value], *, domains: Domains | N
 
 
 def compile_term(term: Term, *, domains: Domains | None = None) -> Evaluator:
-    """Compile once, evaluate often. The result raises NotEvaluable; so does compiling a term nested too deeply."""
+    """Compile once, evaluate often. The result raises NotEvaluable; so does compiling a term nested too deeply.
+
+    A function's table must not be changed after it was given: an index of it may be kept.
+    """
     compiler = Compiler(domains or {})
     code = _guarded(lambda: compiler.code(rename_apart(term)))
     fill = _filler(compiler)

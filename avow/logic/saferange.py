@@ -53,6 +53,10 @@ class Unrestricted(NotEvaluable):
     """Met at run time: a table's default makes infinitely many points satisfy a part."""
 
 
+class Incomplete(NotEvaluable):
+    """Candidates could not all be enumerated; those that were are not all there are."""
+
+
 @dataclass(frozen=True, slots=True)
 class Step:
     """Binds `binds` to each value that can satisfy one part; lower ranks yield fewer candidates."""
@@ -204,7 +208,7 @@ class Plan:
             for _ in self._steps[k](env):
                 yield from self._descend(k + 1, env, doubt)
         except NotEvaluable as reason:
-            yield doubt or reason
+            yield reason if isinstance(reason, Unrestricted) else Incomplete(reason.reason)
 
     def _ready(self, pending: list[Part], unbound: set[str]) -> tuple[Code, ...]:
         """Take out the parts that are fully bound by now; their checks."""
@@ -287,7 +291,7 @@ class Plan:
             found: dict[tuple[Any, ...], None] = {}
             for plan in plans:
                 for reason in plan.solutions(env):
-                    if isinstance(reason, Unrestricted):
+                    if isinstance(reason, Unrestricted | Incomplete):
                         raise reason
                     found[tuple([env[s] for s in slots])] = None
             for candidate in found:

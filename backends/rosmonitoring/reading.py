@@ -155,7 +155,10 @@ def _relation_literal(raw: Any, sort: FunctionSort, names: Mapping[str, str]) ->
 
 
 def _show(raw: Any) -> str:
-    text = repr(raw)
+    try:
+        text = repr(raw)
+    except RecursionError:
+        return "something nested deeply"
     return text if len(text) <= 60 else text[:57] + "..."
 
 

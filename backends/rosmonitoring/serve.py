@@ -30,7 +30,10 @@ def answer(session: Session, frame: str | bytes) -> str:
     reply["verdict"] = "currently_false" if found else "currently_true"
     if found:
         reply["violations"] = [violation_json(v) for v in found]
-    return json.dumps(reply)
+    try:
+        return json.dumps(reply)
+    except RecursionError:
+        return json.dumps({"verdict": reply["verdict"]})
 
 
 def serve(make: Callable[[], Session], port: int, ready: Callable[[Any], None] | None = None) -> None:

@@ -85,6 +85,7 @@ def test_usage(case_folder: Path) -> None:
 def test_replies_always_carry_a_verdict_and_never_a_final_one(case: System, nominal: list[dict[str, Any]]) -> None:
     running = session(case)
     frames = [json.dumps(e) for e in nominal]
+    frames += [f'{{"topic": "r", "radiation": {"[" * n}{"]" * n}}}' for n in range(900, 1000, 7)]
     frames += ["", "nonsense", "[]", "[" * 100_000, '{"topic": "radiationStatus", "level": "green"', "{}"]
     for frame in frames:
         reply = json.loads(answer(running, frame))
