@@ -70,7 +70,8 @@ class Meanings:
     def environment(self, ports: Iterable[str] | None = None) -> str:
         """The plan's environment assumptions (on some ports)."""
         wanted = None if ports is None else set(ports)
-        return digest(*(a.formula for a in self.frame.assumed if wanted is None or a.port in wanted))
+        formulas = digest(*(a.formula for a in self.frame.assumed if wanted is None or a.port in wanted))
+        return sha256("\n".join([formulas, *sorted(self.frame.own_inputs), "constant", *sorted(self.frame.constants)]))
 
     def all(self, selected: frozenset[str]) -> str:
         """Everything that is selected."""

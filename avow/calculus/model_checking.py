@@ -256,9 +256,8 @@ def _interesting(machine: Machine, frame: Frame, formula: Property) -> list[str]
         for state in states_of(formula)
         for variable in sorted(free_variables(system_term(frame, state.term)), key=lambda v: v.qualified)
     ]
-    chosen = [
-        name for name in machine.environment[0] if len({_key(values[name]) for values in machine.environment}) > 1
-    ]
+    given = [values for choices in machine.environment.values() for values in choices]
+    chosen = [name for name in given[0] if len({_key(values[name]) for values in given}) > 1]
     outputs = [f"{node}.{port.name}" for node in machine.order for port in frame.node(node).outputs]
     return list(dict.fromkeys([*about, *chosen, *outputs]))[:MAX_SHOWN]
 

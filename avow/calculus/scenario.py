@@ -6,7 +6,7 @@ The scenario restricts which values are *tried*; whether a guarantee holds of th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
@@ -20,6 +20,7 @@ from avow.language.sorts import (
     NATURAL,
     REAL,
     STRING,
+    DataSort,
     FunctionSort,
     IntegerSort,
     NaturalSort,
@@ -30,7 +31,8 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.logic.evaluate import NotEvaluable, evaluate, finite_values
-from avow.logic.values import FunctionValue, Opaque, Value
+from avow.logic.values import Data, FunctionValue, Opaque, Value
+from avow.system.names import ports_named
 from avow.system.plan import Scenario
 
 MAX_CANDIDATES = 20_000
@@ -75,14 +77,58 @@ class World:
                 wanted = sort.parameters[0] if len(sort.parameters) == 1 else TupleSort(sort.parameters)
                 found = [self.parse(text, wanted) for text in texts]
                 return tuple(v if isinstance(v, tuple) else (v,) for v in found)
-        ranges = [finite_values(parameter, self.domains) for parameter in sort.parameters]
-        known = [r for r in ranges if r is not None]
-        if len(known) < len(ranges) or math.prod(map(len, known)) > MAX_CANDIDATES:
+        found_points = self.tuples(sort.parameters)
+        if found_points is None:
             raise CannotRun(
                 f"where {node}.{port.name} may hold is not said, or too many places; give scenario.domains: "
                 f"{{out.{port.name}: …}} or the ranges of its parameters' types"
             )
-        return tuple(product(*known))
+        return found_points
+
+    def tuples(self, sorts: Sequence[Sort]) -> tuple[Point, ...] | None:
+        """The combinations of values that are tried: of the given ranges if every sort has one, else the places that
+        the interpreted tables speak of (a relation on REAL x REAL x NATURAL speaks of pairs of reals)."""
+        ranges = [finite_values(sort, self.domains) for sort in sorts]
+        known = [r for r in ranges if r is not None]
+        if len(known) == len(ranges):
+            return tuple(product(*known)) if math.prod(map(len, known)) <= MAX_CANDIDATES else None
+        found: dict[Point, None] = {}
+        for signature, rows in self.rows():
+            for start in range(len(signature) - len(sorts) + 1):
+                if list(signature[start : start + len(sorts)]) == list(sorts):
+                    found.update(dict.fromkeys(row[start : start + len(sorts)] for row in rows))
+        return tuple(found) or None
+
+    def rows(self) -> Iterator[tuple[tuple[Sort, ...], list[Point]]]:
+        """Every interpreted table: the sorts of its columns, and its rows."""
+        for name, (table, columns) in self.scenario.interpret.items():
+            ports = ports_named(name, self.frame.system.contract.nodes)
+            if not ports or not isinstance(ports[0][1].sort, FunctionSort):
+                continue
+            sort = ports[0][1].sort
+            signature = sort.parameters if sort.result == BOOL else (*sort.parameters, sort.result)
+            cells = [self.scenario.table(table).column(column) for column in columns]
+            yield (
+                signature,
+                [
+                    tuple(self.parse(c, s) for c, s in zip(row, signature, strict=False))
+                    for row in zip(*cells, strict=True)
+                ],
+            )
+
+    def plain_values(self, sort: Sort) -> tuple[Value, ...] | None:
+        """The values of a sort that are tried; None where they are not finitely many."""
+        if isinstance(sort, DataSort) and sort not in self.domains:
+            found: list[Value] = []
+            for constructor in sort.constructors:
+                arguments = self.tuples(constructor.parameters) if constructor.parameters else ((),)
+                if arguments is None:
+                    return None
+                found += [Data(constructor.name, values) for values in arguments]
+            return tuple(found)
+        if isinstance(sort, TupleSort) and sort not in self.domains:
+            return self.tuples(sort.items)
+        return finite_values(sort, self.domains) or (tuple(p[0] for p in self.tuples((sort,)) or ()) or None)
 
     def values(self, name: str, owners: Sequence[str], port: Port) -> tuple[Value, ...]:
         for owner in owners:
@@ -93,7 +139,7 @@ class World:
             return (Opaque(port.sort.name, 0),)
         if isinstance(port.sort, FunctionSort):
             raise CannotRun(f"{name}: say where it holds: scenario.interpret: {{in.{port.name}: table(column, …)}}")
-        found = finite_values(port.sort, self.domains)
+        found = self.plain_values(port.sort)
         if found is None or len(found) > MAX_CANDIDATES:
             why = "has infinitely many values" if found is None else "has too many values"
             raise CannotRun(f"{name} ({port.type_name}) {why}; give scenario.domains: {{{owners[0]}.{port.name}: …}}")

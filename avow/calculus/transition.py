@@ -19,7 +19,7 @@ from avow.language.contract import Clause, Node, Port
 from avow.language.sorts import FunctionSort
 from avow.language.terms import Apply, Iff, Quantified, Quantifier, Role, Term, Variable
 from avow.logic.evaluate import NotEvaluable, compile_term
-from avow.logic.formula import free_variables
+from avow.logic.formula import free_variables, substitute
 from avow.logic.models import Model
 from avow.logic.translation import Translator, Unsupported
 from avow.logic.values import FunctionValue, Value, show
@@ -110,10 +110,12 @@ class Machine:
         """Why a search through this machine is not exhaustive, if it is not."""
         self.order = self._order()
         self.solvers = {name: self._solver(self.frame.node(name)) for name in self.order}
+        self.constants: list[str] = []
         self.environment = self._environment()
         self.memory = tuple(dict.fromkeys(edge.source for edge in self.graph.edges if edge.delayed))
         self.memories: dict[tuple[object, ...], Values] = {}
         self.stuck: dict[tuple[object, ...], Stuck] = {}
+        self._first: tuple[tuple[object, ...], ...] | None = None
         self._steps: dict[tuple[object, ...], tuple[Step, ...]] = {}
 
     # -- set-up --------------------------------------------------------------------------------------------------------
@@ -160,11 +162,15 @@ class Machine:
     def judge(self, formula: Term, *, finite: bool = False) -> Holds:
         """Whether a formula holds: exactly if that can be had, else with quantifiers over the scenario's values.
         `finite`: over the scenario's values in any case."""
-        domains = self.world.domains
-        exact = None if finite else compile_term(formula)
-        bounded = compile_term(formula, domains=domains)
+        # Evaluation takes a free variable of a system for one that has yet to be found, unless it is an input.
+        given = {v: Variable(Role.INPUT, f"={v.name}", v.sort) for v in free_variables(formula) if v.role is Role.BOUND}
+        names = [(v.name, known.qualified) for v, known in given.items()]
+        closed = substitute(formula, given)
+        exact = None if finite else compile_term(closed)
+        bounded = compile_term(closed, domains=self.world.domains)
 
-        def holds(values: Mapping[str, Value]) -> bool:
+        def holds(found: Mapping[str, Value]) -> bool:
+            values = {**found, **{known: found[name] for name, known in names}} if names else found
             if exact is not None:
                 try:
                     return bool(exact(values))
@@ -177,53 +183,91 @@ class Machine:
 
         return holds
 
-    def _environment(self) -> tuple[Values, ...]:
-        """Every combination of what the environment may give at a step."""
+    def _environment(self) -> dict[tuple[object, ...], tuple[Values, ...]]:
+        """Every combination of what the environment may give at a step, by the values of its constants."""
         names: dict[str, tuple[Value, ...]] = {}
         for endpoint in self.graph.environment:
             variable = self.frame.input(endpoint.node, endpoint.port)
             port = self.frame.node(endpoint.node).input(endpoint.port)
             names.setdefault(variable.qualified, self.world.choices(endpoint.node, port))
+            if {
+                f"in.{endpoint.port}",
+                str(endpoint),
+            } & self.frame.constants and variable.qualified not in self.constants:
+                self.constants.append(variable.qualified)
         facts = [self.judge(term) for term in self.frame.environment().values()]
-        found = [dict(zip(names, combination, strict=True)) for combination in product(*names.values())]
-        allowed = tuple(values for values in found if all(fact(values) for fact in facts))
-        if not allowed:
+        found: dict[tuple[object, ...], list[Values]] = {}
+        for combination in product(*names.values()):
+            values: Values = dict(zip(names, combination, strict=True))
+            if all(fact(values) for fact in facts):
+                found.setdefault(tuple(key(values[name]) for name in self.constants), []).append(values)
+        if not found:
             raise CannotRun("no value of the scenario is as the plan assumes of the environment")
-        return allowed
+        return {constants: tuple(choices) for constants, choices in found.items()}
 
     # -- memory --------------------------------------------------------------------------------------------------------
 
     def initial(self) -> tuple[tuple[object, ...], ...]:
         """The memories before the first step."""
-        ranges: list[tuple[Value, ...]] = []
-        for endpoint in self.memory:
-            edge = next(e for e in self.graph.edges if e.delayed and e.source == endpoint)
-            condition = initial_condition(self.frame.system, edge)
-            port = self.frame.node(endpoint.node).output(endpoint.port)
-            ranges.append(self._initial_values(endpoint, port, condition))
-        names = [str(endpoint) for endpoint in self.memory]
-        return tuple(self._remember(dict(zip(names, values, strict=True))) for values in product(*ranges))
+        if self._first is None:
+            self._first = tuple(dict.fromkeys(self._initial()))
+        return self._first
 
-    def _initial_values(self, endpoint: Endpoint, port: Port, condition: Term | None) -> tuple[Value, ...]:
+    def _initial(self) -> Iterator[tuple[object, ...]]:
+        names = [str(endpoint) for endpoint in self.memory]
+        for choices in self.environment.values():
+            constants = {name: choices[0][name] for name in self.constants}
+            ranges = [tuple({key(v): v for v in self._initially(e, choices)}.values()) for e in self.memory]
+            for values in product(*ranges):
+                yield self._remember({**constants, **dict(zip(names, values, strict=True))})
+
+    def _initially(self, endpoint: Endpoint, choices: Sequence[Values]) -> Iterator[Value]:
+        """The initial values of an output, for whatever its node's environment inputs may be at first."""
+        edge = next(e for e in self.graph.edges if e.delayed and e.source == endpoint)
+        condition = initial_condition(self.frame.system, edge)
+        port = self.frame.node(endpoint.node).output(endpoint.port)
+        inputs = sorted({v.name for v in ports_of(condition) if v.role is Role.INPUT}) if condition is not None else []
+        names = {f"in.{name}": self.frame.input(endpoint.node, name).qualified for name in inputs}
+        given = {tuple(key(values[name]) for name in names.values()): values for values in choices}
+        if len(given) > 1:
+            self.incomplete.add(f"the initial value of {endpoint} depends on inputs that change")
+        for values in given.values():
+            known = {own: values[name] for own, name in names.items()}
+            yield from self._initial_values(endpoint, port, condition, known)
+
+    def _initial_values(
+        self, endpoint: Endpoint, port: Port, condition: Term | None, given: Values
+    ) -> tuple[Value, ...]:
         if isinstance(port.sort, FunctionSort):
             points = self.world.points(endpoint.node, port)
             constraints = [] if condition is None else [condition]
-            answers, complete = _search(((port, points),), (), constraints, {}, self.seed)
+            known = _by_variable(self.frame.node(endpoint.node), given)
+            answers, complete = _search(((port, points),), (), constraints, known, self.seed)
             if not complete:
                 self.incomplete.add(f"too many initial values of {endpoint}")
             found = tuple(answer[port.name] for answer in answers)
         else:
             candidates = self.world.candidates(endpoint.node, port)
             holds = self.judge(condition) if condition is not None else None
-            found = tuple(v for v in candidates if holds is None or holds({f"out.{port.name}": v}))
+            found = tuple(v for v in candidates if holds is None or holds({**given, f"out.{port.name}": v}))
         if not found:
             raise CannotRun(f"no value of the scenario is an initial value of {endpoint}")
         return found
 
     def _remember(self, values: Values) -> tuple[object, ...]:
-        found = tuple(key(values[str(endpoint)]) for endpoint in self.memory)
-        self.memories.setdefault(found, {str(endpoint): values[str(endpoint)] for endpoint in self.memory})
+        names = [*self.constants, *map(str, self.memory)]
+        found = tuple(key(values[name]) for name in names)
+        self.memories.setdefault(found, {name: values[name] for name in names})
         return found
+
+    def _before(self, memory: tuple[object, ...]) -> Values:
+        """What a memory gives to the next step."""
+        values = self.memories[memory]
+        return {f"{endpoint}@before": values[str(endpoint)] for endpoint in self.memory}
+
+    def _given(self, memory: tuple[object, ...]) -> tuple[Values, ...]:
+        """What the environment may give after a memory."""
+        return self.environment[memory[: len(self.constants)]]
 
     # -- one run -------------------------------------------------------------------------------------------------------
 
@@ -233,8 +277,7 @@ class Machine:
         steps: list[Step] = []
         seen: dict[tuple[object, ...], int] = {}
         for number in range(length):
-            values: Values = {f"{name}@before": value for name, value in self.memories[memory].items()}
-            values |= random.choice(self.environment)
+            values = self._before(memory) | random.choice(self._given(memory))
             broken: tuple[str, ...] = ()
             for name in self.order:
                 answers, faults = self._answers(name, values)
@@ -258,8 +301,8 @@ class Machine:
         return self._steps[memory]
 
     def _all_steps(self, memory: tuple[object, ...]) -> Iterator[Step]:
-        before = {f"{name}@before": value for name, value in self.memories[memory].items()}
-        for given in self.environment:
+        before = self._before(memory)
+        for given in self._given(memory):
             partial: list[tuple[Values, tuple[str, ...]]] = [({**before, **given}, ())]
             for name in self.order:
                 extended: list[tuple[Values, tuple[str, ...]]] = []

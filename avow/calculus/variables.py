@@ -29,6 +29,10 @@ class Frame:
     graph: Graph
     assumed: tuple[Assumed, ...]
     own_inputs: frozenset[str]
+    """Inputs of one node (``agent.wayP``) that the plan sets apart from the inputs of that name that others read."""
+    constants: frozenset[str]
+    """Environment inputs (``in.wayP``, ``agent.wayP``) that keep their value."""
+
     _nodes: dict[str, Node] = field(default_factory=dict)
     _mappings: dict[tuple[str, int], Mapping[Variable, Term]] = field(default_factory=dict)
     _terms: dict[tuple[str, str, int], Term] = field(default_factory=dict)
@@ -62,10 +66,15 @@ class Frame:
         """The variable that an input reads: its provider's, now or one step earlier, or the environment's."""
         edge = self.graph.by_target.get(Endpoint(node, port))
         if edge is None:
-            # An entry of the plan for one node's input sets it apart from the inputs of that name that others read.
-            own = f"{node}.{port}"
-            name = own if own in self.own_inputs else port
-            return Variable(Role.INPUT, name + SUFFIXES[earlier], self.node(node).input(port).sort)
+            sort = self.node(node).input(port).sort
+            own = f"{node}.{port}" in self.own_inputs
+            if (f"{node}.{port}" if own else f"in.{port}") in self.constants:
+                earlier = 0
+            if own:
+                return system_variable(f"{node}.in.{port}", sort, earlier)
+
+            return Variable(Role.INPUT, port + SUFFIXES[earlier], sort)
+
         return self.output(edge.source.node, edge.source.port, earlier + (1 if edge.delayed else 0))
 
     def environment(self, earlier: int = 0) -> dict[str, Term]:
@@ -86,7 +95,10 @@ class Frame:
                 if condition is not None:
                     source = self.node(edge.source.node).output(edge.source.port).variable
                     before = self.output(edge.source.node, edge.source.port, 1)
-                    found[f"initial {edge.source}"] = substitute(condition, {source: before})
+                    found[f"initial {edge.source}"] = substitute(
+                        condition, {**self.mapping(edge.source.node), source: before}
+                    )
+
         return found
 
 
@@ -95,7 +107,8 @@ def frame(system: System) -> Frame:
     graph = dataflow(system)
     own = frozenset(entry.port for entry in system.plan.environment if not entry.port.startswith("in."))
     nodes = {node.name: node for node in system.contract.nodes}
-    return Frame(system, graph, environment_assumptions(system, graph), own, nodes)
+    constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
+    return Frame(system, graph, environment_assumptions(system, graph), own, constants, nodes)
 
 
 def system_variable(name: str, sort: Sort, earlier: int = 0) -> Variable:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.language.contract import Node
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Term, Variable, children
 from avow.system.graph import Edge, Graph
@@ -26,7 +27,8 @@ class Assumed:
 def initial_condition(system: System, edge: Edge) -> Term | None:
     """What holds of the source's ``out.<port>`` before the first step; None where nothing is said.
 
-    The text is a value of the port's type, or a formula about ``out.<port>``. Raises Rejected, located.
+    The text is a value of the port's type, or a formula about ``out.<port>`` (and the node's environment inputs, as
+    they are at the first step). Raises Rejected, located.
     """
     if edge.initial is None:
         return None
@@ -45,10 +47,20 @@ def initial_condition(system: System, edge: Edge) -> Term | None:
         except Rejected as rejected:
             failures.append(rejected)
             continue
-        foreign = [v for v in ports_of(term) if (v.role, v.name) != (Role.OUTPUT, port.name)]
+        fed = {c.target.port for c in system.plan.connections if c.target.node == node.name} | _fed_by_names(
+            system, node
+        )
+        foreign = [
+            v
+            for v in ports_of(term)
+            if (v.role, v.name) != (Role.OUTPUT, port.name) and (v.role is Role.OUTPUT or v.name in fed)
+        ]
         if not foreign:
             return term
-        message = f"an initial value may speak of out.{port.name} only, not of {foreign[0].qualified}"
+        message = (
+            f"an initial value may speak of out.{port.name} and of inputs from the environment, "
+            f"not of {foreign[0].qualified}"
+        )
         failures.append(Rejected(Diagnostic("PLAN112", message, edge.span)))
     what = "; ".join(d.message for d in failures[0].diagnostics)
     message = (
@@ -107,6 +119,12 @@ def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
     except Rejected as rejected:
         faults += rejected.diagnostics
     return tuple(dict.fromkeys(faults))
+
+
+def _fed_by_names(system: System, node: Node) -> set[str]:
+    """The inputs of a node that another node's output of that name and type feeds."""
+    others = [(p.name, p.sort) for other in system.contract.nodes if other.name != node.name for p in other.outputs]
+    return {p.name for p in node.inputs if (p.name, p.sort) in others}
 
 
 def ports_of(term: Term) -> tuple[Variable, ...]:

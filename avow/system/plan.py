@@ -67,6 +67,8 @@ class EnvironmentInput:
     assume: str | None
     because: str | None
     span: Span | None = field(default=None, compare=False, repr=False)
+    constant: bool = False
+    """Whether its value is the same at every step (a map, a setting)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -187,7 +187,14 @@ class _Reader:
         for port, piece in self.entries("environment"):
             assume = piece.at("assume")
             because = piece.at("because")
-            yield EnvironmentInput(port, assume.text if assume else None, because.text if because else None, piece.span)
+            constant = piece.at("constant")
+            yield EnvironmentInput(
+                port,
+                assume.text if assume else None,
+                because.text if because else None,
+                piece.span,
+                bool(constant and constant.value),
+            )
 
     def scenario(self) -> Scenario | None:
         if self.root.at("scenario") is None:
