@@ -1,43 +1,19 @@
-"""The AJPF backend: a node's guarantees as temporal properties of the Gwendolen program that implements it."""
+"""The AJPF backend: a node's guarantees as temporal properties of the Gwendolen program that implements it.
+
+Imports stay light: whoever lists the backends does not load a parser and a model checker.
+"""
 
 from __future__ import annotations
 
-import tempfile
-import time
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from avow.backend import Job, Limits, Report, Tool
-from avow.backends.ajpf import ajpf_tool, psl, spin
-from avow.backends.ajpf.ajpf_tool import Answer, Said
-from avow.backends.ajpf.automaton import TooLarge
-from avow.backends.ajpf.beliefs import TooDeep
-from avow.backends.ajpf.checker import Checker, OutOfTime, Property, explain, needs_fine_steps
-from avow.backends.ajpf.explore import explore
-from avow.backends.ajpf.files import ail_file, export_files, jpf_file
-from avow.backends.ajpf.instances import Instantiation, diagnose, instances
-from avow.backends.ajpf.interpreter import Agent
-from avow.backends.ajpf.options import SCHEMA, Setup, named_files, read
-from avow.backends.ajpf.settle import Frame, Settled, outcome
+from avow.backends.ajpf.schema import SCHEMA
 from avow.diagnostics import Diagnostic, Rejected
-from avow.files import write
-from avow.verdict import Counterexample, Link, Outcome, Verdict
-
-ENGINE = "Avow's own Gwendolen checker"
-GRACE = 0.5
-"""Of the time limit, what may be used beyond it to look for violations in what could be explored."""
-SPIN_SHARE = 0.5
-"""Of the time that is left, what Spin may use for its second opinion."""
-
-_SAID = {
-    Said.HOLDS: Verdict.CHECKED,
-    Said.VIOLATED: Verdict.REFUTED,
-    Said.INCONCLUSIVE: Verdict.UNKNOWN,
-    Said.TIMEOUT: Verdict.UNKNOWN,
-    Said.ERROR: Verdict.ERROR,
-}
+from avow.system.paths import inside
+from avow.verdict import Link, Verdict
 
 
 class AjpfBackend:
@@ -56,9 +32,14 @@ class AjpfBackend:
     )
 
     def tools(self) -> tuple[Tool, ...]:
+        from avow.backends.ajpf import ajpf_tool, spin
+
         return (ajpf_tool.tool(), spin.tool())
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        from avow.backends.ajpf.instances import diagnose, instances
+        from avow.backends.ajpf.options import read
+
         try:
             setup = read(job)
         except Rejected as error:
@@ -66,191 +47,18 @@ class AjpfBackend:
         return tuple(diagnose(setup, instances(job, setup)))
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        return named_files(job)
+        names = [v for key in ("program", "environment") if isinstance(v := job.options.get(key), str)]
+        return tuple(path for name in names if (path := inside(job.root, name)) is not None)
 
     def export(self, job: Job) -> Mapping[str, str]:
+        from avow.backends.ajpf.files import export_files
+        from avow.backends.ajpf.instances import instances
+        from avow.backends.ajpf.options import read
+
         setup = read(job)
         return export_files(job, setup, instances(job, setup))
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
-        try:
-            setup = read(job)
-        except Rejected as error:
-            said = "; ".join(d.message for d in error.diagnostics[:3])
-            outcomes = tuple(
-                Outcome(o.id, Verdict.ERROR, f"the agent cannot be checked: {said}", link=Link.MAPPED)
-                for o in job.obligations
-            )
-            return Report(outcomes, ENGINE, self.version)
-        run = _Run(setup, instances(job, setup), folder, limits)
-        frame = run.frame()
-        claims = {claim.guarantee: claim for claim in frame.made.claims}
-        outcomes = tuple(outcome(o, claims[o.name], frame) for o in job.obligations)
-        return Report(outcomes, frame.engine, run.version(self.version), run.command, run.logs)
+        from avow.backends.ajpf.run import settle
 
-
-class _Run:
-    """One discharge: exploration, our own answers, then those of the engines that the plan wants or that are here."""
-
-    def __init__(self, setup: Setup, made: Instantiation, folder: Path, limits: Limits) -> None:
-        self.setup = setup
-        self.made = made
-        self.folder = folder
-        self.limits = limits
-        self.deadline = time.monotonic() + limits.seconds
-        self.results: dict[str, Settled] = {}
-        self.counterexamples: dict[str, Counterexample] = {}
-        self.bound: dict[str, object] = {}
-        self.engine = ENGINE
-        self.logs: dict[str, str] = {}
-        self.command: tuple[str, ...] = ()
-        self.ajpf = ajpf_tool.find() if setup.environment_class and setup.semantics == "mcapl" else None
-
-    def version(self, own: str) -> str:
-        if self.setup.engine == "ajpf":
-            return self.ajpf.version if self.ajpf else ""
-        return own
-
-    def left(self) -> float:
-        return max(0.0, self.deadline - time.monotonic())
-
-    def frame(self) -> Frame:
-        checker = self.own()
-        if checker is not None and self.setup.engine in ("auto", "spin"):
-            self.ask_spin(checker)
-        if self.setup.engine == "ajpf" or (self.setup.engine == "auto" and self.ajpf is not None):
-            self.ask_ajpf(instead=self.setup.engine == "ajpf")
-        return Frame(self.setup, self.made, self.results, self.counterexamples, self.engine, self.bound)
-
-    # Our own engine
-
-    def own(self) -> Checker | None:
-        """Results for every property; where a bound was met, a violation within it still counts. The checker of the
-        whole state space, where that was explored."""
-        setup, properties = self.setup, self.made.properties
-        agent = Agent(setup.program, setup.environment, setup.semantics, fine=needs_fine_steps(properties))
-        graph = explore(agent, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
-        self.bound |= {"states": len(graph), "transitions": graph.transitions, "exhaustive": graph.unfinished is None}
-        if graph.unfinished is not None:
-            self.bound["unfinished"] = graph.unfinished
-            self.deadline += self.limits.seconds * GRACE
-        try:
-            checker = Checker(graph, properties)
-        except (TooDeep, RecursionError):
-            reason = "the agent's terms or reasoning rules nest too deeply"
-            self.results = {p.key: Settled(Verdict.UNKNOWN, reason) for p in properties}
-            return None
-        for p in properties:
-            self.results[p.key] = self.one(checker, p)
-        self.explain(checker)
-        return checker if graph.unfinished is None else None
-
-    def one(self, checker: Checker, p: Property) -> Settled:
-        try:
-            result = checker.check(p, self.deadline)
-        except OutOfTime:
-            return Settled(Verdict.UNKNOWN, f"no time left of {self.limits.seconds:g} s")
-        except (TooLarge, RecursionError):
-            return Settled(Verdict.UNKNOWN, "the property's automaton is too large")
-        unfinished = checker.graph.unfinished
-        if result.holds and unfinished is not None:
-            return Settled(Verdict.UNKNOWN, f"not refuted, but the state space is unfinished: {unfinished}")
-        verdict = Verdict.CHECKED if result.holds else Verdict.REFUTED
-        return Settled(verdict, "", result.vacuous, result.immediate)
-
-    def explain(self, checker: Checker) -> None:
-        """A run for the first refuted property of each guarantee, and of each further property."""
-        groups = [claim.properties for claim in self.made.claims] + [ps for _, ps in self.made.extras]
-        for group in groups:
-            refuted = next((p for p in group if self.results[p.key].verdict is Verdict.REFUTED), None)
-            if refuted is None:
-                continue
-            lasso = checker.lasso(refuted)
-            if lasso is None:  # the reduced and the whole graph disagree: never to happen, never to be passed over
-                self.results[refuted.key] = Settled(Verdict.ERROR, "the checker contradicts itself")
-                continue
-            name, equals, value = refuted.about.partition(" = ")
-            values = {name: value} if equals else {}
-            values["property"] = psl.show(refuted.formula)
-            found = explain(checker.graph, lasso, values, _because(refuted))
-            self.counterexamples[refuted.key] = found
-            self.logs[f"{refuted.key}.trace.txt"] = _trace(found)
-
-    # Others
-
-    def ask_spin(self, checker: Checker) -> None:
-        name = f"Spin {spin.version()}"
-        with tempfile.TemporaryDirectory() as temporary:
-            try:
-                seconds = self.left() * SPIN_SHARE if self.setup.engine == "auto" else self.left()
-                answers = spin.opinions(checker, self.made.properties, Path(temporary), seconds)
-            except spin.NoOpinion as error:
-                self.bound["spin"] = f"no second opinion: {error.reason}"
-                if self.setup.engine == "spin":
-                    verdict = Verdict.NOT_RUN if spin.version() is None else Verdict.UNKNOWN
-                    reason = f"the plan wants Spin's opinion: {error.reason} ({spin.tool().install})"
-                    self.results = {key: replace(r, verdict=verdict, reason=reason) for key, r in self.results.items()}
-                return
-            self.logs["spin.pml"] = (Path(temporary) / "agent.pml").read_text()
-        for key, holds in answers.items():
-            self.second(key, name, Said.HOLDS if holds else Said.VIOLATED)
-        self.engine += f" and {name}"
-
-    def second(self, key: str, name: str, said: Said) -> None:
-        """Note another engine's answer; a contradiction is an error, never a vote."""
-        result = self.results[key]
-        opinions = {**result.opinions, name: str(said)}
-        other = _SAID[said]
-        decided = (Verdict.CHECKED, Verdict.REFUTED)
-        if result.verdict in decided and other in decided and result.verdict is not other:
-            reason = f"{ENGINE} says {result.verdict}, {name} says {said}"
-            self.results[key] = replace(result, verdict=Verdict.ERROR, reason=reason, opinions=opinions)
-        else:
-            self.results[key] = replace(result, opinions=opinions)
-
-    def ask_ajpf(self, *, instead: bool) -> None:
-        """AJPF's answers, beside ours or instead of them. Vacuity and runs in words stay our own engine's."""
-        if instead:
-            self.engine = "AJPF"
-        if self.ajpf is None:
-            reason = f"AJPF is not here: {ajpf_tool.INSTALL}"
-            self.results = {p.key: Settled(Verdict.NOT_RUN, reason) for p in self.made.properties}
-            self.counterexamples = {}
-            return
-        name = self.setup.program.name
-        paths = {ending: self.folder.resolve() / f"ajpf-run.{ending}" for ending in ("ail", "jpf")}
-        write(paths["ail"], ail_file(self.setup, str(self.folder.resolve() / f"{name}.gwen")))
-        for p in self.made.properties:
-            if self.left() <= 1:
-                answer = Answer(Said.TIMEOUT, "no time left")
-            else:
-                properties = str(self.folder.resolve() / f"{name}.psl")
-                write(paths["jpf"], jpf_file(str(paths["ail"]), properties, p.key))
-                answer = ajpf_tool.check(self.ajpf, paths["jpf"], self.left(), self.limits.megabytes)
-            if answer.log:
-                self.logs[f"{p.key}.ajpf.txt"] = answer.log
-            if instead:
-                own = self.results[p.key]
-                self.results[p.key] = Settled(_SAID[answer.said], answer.reason, own.vacuous, own.immediate)
-                if own.verdict in (Verdict.CHECKED, Verdict.REFUTED):
-                    self.results[p.key] = replace(self.results[p.key], opinions={ENGINE: str(own.verdict)})
-            else:
-                self.second(p.key, "AJPF", answer.said)
-
-
-def _because(p: Property) -> str:
-    if p.goal is not None and p.trigger is not None:
-        return f"{psl.show(p.trigger)} comes about on this run, and afterwards {psl.show(p.goal)} never does"
-    if p.trigger is not None:
-        return f"{psl.show(p.trigger)} comes about on this run, and what must follow does not"
-    return "the property fails on this run"
-
-
-def _trace(found: Counterexample) -> str:
-    lines = [found.text(), ""]
-    for at, step in enumerate(found.trace):
-        mark = "loop starts here: " if at == found.loop else ""
-        lines.append(f"{at:4} {mark}{'; '.join(f'{name}: {value}' for name, value in step)}")
-    if found.loop is not None:
-        lines.append(f"     … and from step {found.loop} again, for ever")
-    return "\n".join(lines) + "\n"
+        return settle(job, folder, limits, self.version)

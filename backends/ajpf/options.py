@@ -18,6 +18,7 @@ from avow.backends.ajpf.mapping import Row
 from avow.backends.ajpf.parser import read_program
 from avow.backends.ajpf.psl import AGENT_NAME, KEYWORDS, Formula, Modality, atoms
 from avow.backends.ajpf.psl_parser import Malformed, index_names, instantiate, parse_psl
+from avow.backends.ajpf.schema import SCHEMA
 from avow.backends.ajpf.shape import TooComplex, free, shape
 from avow.backends.ajpf.syntax import Program
 from avow.diagnostics import Diagnostic, Rejected, Span
@@ -32,72 +33,9 @@ COMMON = ("id", "guarantees", "seconds", "megabytes", "seed")
 MAX_INSTANCES = 1_000
 DEFAULT_STATES = 1_000_000
 
-_TEXT = {"type": "string"}
 _BINDER = re.compile(r"\b(?:forall|exists|exists_unique)\s*\(([^|;]*)[|;]")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*'*")
 """A pattern's own quantifiers bind names that the clauses use too: these are no free variables of it."""
-
-_RANGES: dict[str, Any] = {
-    "type": "object",
-    "additionalProperties": {
-        "anyOf": [
-            _TEXT,
-            {"type": "integer"},
-            {"type": "array", "items": {"type": ["integer", "string"]}, "minItems": 1},
-        ]
-    },
-}
-SCHEMA: dict[str, Any] = {
-    "$schema": "https://json-schema.org/draft/2020-12/schema",
-    "type": "object",
-    "properties": {
-        "program": {**_TEXT, "description": "the Gwendolen program (.gwen), relative to the system's folder"},
-        "agent": {**_TEXT, "description": "the agent's name, as the properties use it"},
-        "environment": {**_TEXT, "description": "how percepts are drawn (YAML)"},
-        "predicates": {
-            "type": "object",
-            "additionalProperties": _TEXT,
-            "description": "RCL pattern → BDI formula; free variables of the pattern stand for terms",
-        },
-        "instances": {
-            **_RANGES,
-            "description": "index variable → its finite range: '1..12', 'table.column' or a list of numbers",
-        },
-        "variables": {
-            "type": "object",
-            "additionalProperties": {"enum": ["REAL", "NATURAL", "INTEGER", "BOOL", "STRING"]},
-            "description": "sorts of pattern variables that the node's own clauses do not bind",
-        },
-        "properties": {
-            "type": "object",
-            "description": "further properties: PSL text, or a mapping that attaches one to a guarantee",
-            "propertyNames": {"pattern": "^[A-Za-z][A-Za-z0-9_]*$"},
-            "additionalProperties": {
-                "anyOf": [
-                    _TEXT,
-                    {
-                        "type": "object",
-                        "properties": {
-                            "psl": _TEXT,
-                            "guarantee": {**_TEXT, "description": "whose verdict it belongs to"},
-                            "counts": {"type": "boolean", "description": "false: listed only; default true"},
-                            "instances": {**_RANGES, "description": "narrower ranges than the method's"},
-                            "because": _TEXT,
-                        },
-                        "required": ["psl"],
-                        "additionalProperties": False,
-                    },
-                ]
-            },
-        },
-        "semantics": {"enum": ["mcapl", "edge"], "description": "how percepts become events; default mcapl"},
-        "engine": {"enum": ["auto", "builtin", "ajpf", "spin"], "description": "default auto"},
-        "states": {"type": "integer", "minimum": 1, "description": "bound on the states explored"},
-        "environment_class": {**_TEXT, "description": "AJPF only: the Java class of the environment"},
-    },
-    "required": ["program", "environment", "predicates"],
-    "additionalProperties": False,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,12 +88,6 @@ def read(job: Job) -> Setup:
     if reader.faults or setup is None:
         raise Rejected(*reader.faults)
     return setup
-
-
-def named_files(job: Job) -> tuple[Path, ...]:
-    """The files that the options name, also where they are not in order."""
-    names = [v for key in ("program", "environment") if isinstance(v := job.options.get(key), str)]
-    return tuple(path for name in names if (path := inside(job.root, name)) is not None)
 
 
 class _Reader:

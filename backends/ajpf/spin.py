@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import re
 import shutil
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -49,17 +50,25 @@ def opinions(checker: Checker, properties: Sequence[Property], folder: Path, sec
     """Key → whether the property holds, says Spin. Raises NoOpinion."""
     if version() is None:
         raise NoOpinion("spin or gcc is not installed")
+    deadline = time.monotonic() + seconds
     write(folder / "graph.h", _tables(checker))
     write(folder / "agent.pml", _model(checker, properties))
-    for command in (["spin", "-a", "agent.pml"], ["gcc", "-O1", "-w", "-DNOREDUCE", "-o", "pan", "pan.c"]):
+    for command in (["spin", "-a", "agent.pml"], ["gcc", "-O0", "-w", "-DNOREDUCE", "-o", "pan", "pan.c"]):
         try:
-            done = run(command, cwd=folder, seconds=seconds)
+            done = run(command, cwd=folder, seconds=_left(deadline))
         except ToolMissing as error:
             raise NoOpinion(str(error)) from None
         if done.code != 0:
             raise NoOpinion(f"{command[0]} failed: {(done.stdout + done.stderr).strip()[:300]}")
     depth = 20 * len(checker.graph) + 10_000
-    return {p.key: _verdict(folder, f"c{number}", depth, seconds) for number, p in enumerate(properties)}
+    return {p.key: _verdict(folder, f"c{number}", depth, _left(deadline)) for number, p in enumerate(properties)}
+
+
+def _left(deadline: float) -> float:
+    left = deadline - time.monotonic()
+    if left <= 0:
+        raise NoOpinion("no time left")
+    return left
 
 
 def _verdict(folder: Path, claim: str, depth: int, seconds: float) -> bool:
