@@ -44,8 +44,9 @@ def _parser() -> lark.Lark:
     return lark.Lark(text, parser="lalr", propagate_positions=False, maybe_placeholders=False)
 
 
+@functools.lru_cache(maxsize=8)
 def read(text: str) -> Parsed:
-    """Parse and check names. Raises Malformed."""
+    """Parse and check names; the result is shared and not to be changed. Raises Malformed."""
     try:
         tree = _parser().parse(text)
     except lark.exceptions.UnexpectedInput as error:
