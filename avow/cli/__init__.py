@@ -25,6 +25,7 @@ COMMANDS = {
     "init": "a new workspace with a contract that verifies",
     "lsp": "the language server",
     "monitor": "judge a recorded trace against assumptions and guarantees",
+    "mutate": "would the evidence notice if the contract said something else?",
     "refines": "weaker assumptions, stronger guarantees?",
     "report": "render the reports, or check one against the ledger",
     "requirements": "requirements from CSV or ReqIF, as a plan's section",
@@ -53,7 +54,9 @@ class _Lazy(click.Group):
         with formatter.section("Commands"):
             formatter.write_dl(sorted(COMMANDS.items()))
 
-    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
         import difflib
 
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):

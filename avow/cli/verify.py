@@ -11,7 +11,9 @@ import click
 @click.argument("systems", nargs=-1)
 @click.option("--fresh", is_flag=True, help="Believe no earlier run: settle every obligation anew.")
 @click.option("-n", "jobs", default=2, show_default=True, help="How many tasks at once.")
-@click.option("--explain", is_flag=True, help="Say what each failing gate lacks, and the cheapest method that would close it.")
+@click.option(
+    "--explain", is_flag=True, help="Say what each failing gate lacks, and the cheapest method that would close it."
+)
 def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool) -> int:
     """Verify every system under contracts/, or only SYSTEMS (their names)."""
     from avow.cli.workspace import workspace

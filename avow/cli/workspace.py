@@ -38,5 +38,7 @@ def system_folder(name: str) -> Path:
         return found.contracts / name
     known = ", ".join(p.name for p in found.systems()) if found else ""
     raise Rejected(
-        Diagnostic("CLI002", f"there is no system '{name}'", hint=f"known here: {known}" if known else "give its folder")
+        Diagnostic(
+            "CLI002", f"there is no system '{name}'", hint=f"known here: {known}" if known else "give its folder"
+        )
     )

@@ -20,7 +20,6 @@ from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job
 from avow.verdict import Link, Outcome, Verdict
 from avow.workspace import Workspace
 
-
 RETRY = "retry"
 """Set in the details of a record that a later run must not be content with: the engine itself broke."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import sys
 import traceback
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,18 @@ GRACE = 90.0
 """Seconds above the tool's own limits that a worker gets to load, translate and write."""
 
 
-def run(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...], folder: Path) -> Report:
+@dataclass(frozen=True, slots=True)
+class Altered:
+    """Which mutant of which guarantee stands in for the guarantee (see `avow.pipeline.mutation`)."""
+
+    clause: str
+    number: int
+    limit: int
+
+
+def run(
+    workspace: Workspace, work: Work, obligations: tuple[Obligation, ...], folder: Path, altered: Altered | None = None
+) -> Report:
     """Settle the obligations in a process of their own. Never raises for what that process does."""
     request, response = folder / ".request.json", folder / ".response.json"
     response.unlink(missing_ok=True)
@@ -42,6 +53,7 @@ def run(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...], f
                 "obligations": [o.id for o in obligations],
                 "folder": str(folder),
                 "limits": asdict(work.limits),
+                "altered": asdict(altered) if altered else None,
             }
         ),
     )
@@ -125,9 +137,17 @@ def _execute(request: dict[str, Any]) -> Report:
 
             node = system.contract.node(request["node"])
             method = next(m for m in system.plan.node(node.name).methods if m.id == request["method"])
+            tool = method_backend(system, method)
+            if request["altered"]:
+                from avow.pipeline.mutation import alter
+
+                system = alter(system, node, Altered(**request["altered"]))
+                node = system.contract.node(node.name)
+                for name, text in tool.export(method_job(system, node, method)).items():
+                    write(folder / name, text)
             job = method_job(system, node, method)
             job = replace(job, obligations=tuple(o for o in job.obligations if o.id in wanted))
-            return method_backend(system, method).discharge(job, folder, limits)
+            return tool.discharge(job, folder, limits)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,116 @@
+"""Hunting hollow evidence: would a method that supports a guarantee notice if the guarantee said something else?
+
+For each guarantee that a method supports, near misses of it (`avow.logic.mutants`) are put in its place, and the method is run on
+them. A mutant that the method does not support is *killed*. Evidence that no mutant disturbs supports nothing: it is recorded as
+vacuous. The score is appended to the ledger with the evidence that it is about; methods that a person's judgement
+guides (reviews, measurements) do not read the formula and have no score.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from avow.evidence.obligation import Obligation
+from avow.evidence.record import Evidence
+from avow.language.contract import Clause, Node
+from avow.logic.mutants import Mutant, telling
+from avow.pipeline import worker
+from avow.pipeline.discharge import ledger_of
+from avow.pipeline.run_info import Run
+from avow.pipeline.work import Work, method_backend
+from avow.pipeline.worker import Altered
+from avow.system.plan import System
+from avow.verdict import Link
+from avow.workspace import Workspace
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """How many near misses of a guarantee a method noticed. `survivors` says what was changed in the others."""
+
+    obligation: str
+    method: str
+    mutants: int
+    survivors: tuple[str, ...]
+
+    @property
+    def killed(self) -> int:
+        return self.mutants - len(self.survivors)
+
+    @property
+    def hollow(self) -> bool:
+        """Not one of several mutants was noticed."""
+        return self.mutants > 0 and self.killed == 0
+
+
+def alter(system: System, node: Node, altered: Altered) -> System:
+    """The system with a mutant in place of a guarantee. Raises KeyError and IndexError for one that there is not."""
+    clause = node.clause(altered.clause)
+    mutant = chosen(node, clause, altered.limit)[altered.number]
+    guarantees = tuple(replace(c, formula=mutant.formula) if c.name == clause.name else c for c in node.guarantees)
+    changed = replace(node, guarantees=guarantees)
+    nodes = tuple(changed if n.name == node.name else n for n in system.contract.nodes)
+    return replace(system, contract=replace(system.contract, nodes=nodes))
+
+
+def chosen(node: Node, clause: Clause, limit: int) -> tuple[Mutant, ...]:
+    """The mutants that are tried: the same ones, in the same order, in every process."""
+    return telling(clause.formula, tuple(a.formula for a in node.assumptions), limit)
+
+
+def hunt(workspace: Workspace, works: tuple[Work, ...], run: Run, limit: int, jobs: int) -> tuple[Score, ...]:
+    """Score every piece of current, supporting evidence of these works, `jobs` mutants at once."""
+    tasks = [task for work in works if _reads_formulas(work) for task in _tasks(workspace, work)]
+    with ThreadPoolExecutor(jobs) as pool:
+        return tuple(pool.map(lambda task: _score(workspace, *task, run, limit), tasks))
+
+
+def _reads_formulas(work: Work) -> bool:
+    if work.is_engine:
+        return False
+    method = next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
+    return method_backend(work.system, method).link is not Link.GUIDED
+
+
+def _tasks(workspace: Workspace, work: Work) -> list[tuple[Work, Obligation, Evidence]]:
+    ledger = ledger_of(workspace.ledger(work.system.name))
+    found = []
+    for obligation in work.obligations:
+        records = [e.evidence for e in ledger.current(obligation.id, work.keys[obligation.id])]
+        if records and records[-1].verdict.supports and not records[-1].vacuous:
+            found.append((work, obligation, records[-1]))
+    return found
+
+
+def _score(workspace: Workspace, work: Work, obligation: Obligation, record: Evidence, run: Run, limit: int) -> Score:
+    node = work.system.contract.node(work.node)
+    mutants = chosen(node, node.clause(obligation.name), limit)
+    survivors = []
+    for number, mutant in enumerate(mutants):
+        folder = Path(tempfile.mkdtemp(prefix="avow-mutant-"))
+        try:
+            report = worker.run(workspace, work, (obligation,), folder, Altered(obligation.name, number, limit))
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+        if report.outcomes[0].verdict.supports and not report.outcomes[0].vacuous:
+            survivors.append(mutant.change)
+    score = Score(obligation.id, work.method, len(mutants), tuple(survivors))
+    ledger_of(workspace.ledger(work.system.name)).append(_scored(record, score, run))
+    return score
+
+
+def _scored(record: Evidence, score: Score, run: Run) -> Evidence:
+    details = {"killed": score.killed, "mutants": score.mutants, "survivors": list(score.survivors)}
+    return replace(
+        record,
+        details={**record.details, "mutation": details},
+        vacuous=score.hollow,
+        summary=f"{record.summary}; but it accepts every mutant of the guarantee" if score.hollow else record.summary,
+        started=datetime.now(UTC).isoformat(timespec="milliseconds"),
+        run=run.id,
+    )
