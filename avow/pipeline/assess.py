@@ -201,7 +201,7 @@ def _revision(workspace: Workspace) -> str:
 
 
 def _key(assessment: Assessment) -> str:
-    """The report depends on the texts, on what is planned, on all evidence, and on the day (reviews and risks expire)."""
+    """The report depends on the texts, the plan, all evidence, and the day (reviews and accepted risks expire)."""
     surveyed, ledger = assessment.surveyed, ledger_of(assessment.workspace.ledger(assessment.system))
     keys = sorted((*pair, key) for pair, key in surveyed.keys.items())
     damage = [str(d) for d in ledger.damage]

@@ -1,9 +1,10 @@
-"""The export stage: what each method generates, written so that it can be told whether it is still what was generated."""
+"""The export stage: what each method generates, written so that it shows whether it still is what was generated."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from avow.diagnostics import Diagnostic, Rejected
 from avow.files import digest, digest_file, write
@@ -30,7 +31,7 @@ def is_current(workspace: Workspace, work: Work, key: str) -> bool:
 
 
 def key(work: Work, contract: str) -> str:
-    """An artifact may show more than its obligations' meaning (names, sentences): it depends on contract and plan whole."""
+    """An artifact may show more than its obligations' meaning (names, sentences): it depends on the whole texts."""
     return digest(json.dumps([contract, sorted(work.keys.items())]))
 
 
@@ -54,7 +55,7 @@ def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:
     return tuple(sorted(files))
 
 
-def read_stamp(place: Path) -> dict[str, dict[str, str]] | None:
+def read_stamp(place: Path) -> dict[str, Any] | None:
     try:
         stamp = json.loads((place / STAMP).read_text())
     except (OSError, ValueError):

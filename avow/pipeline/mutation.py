@@ -1,9 +1,9 @@
 """Hunting hollow evidence: would a method that supports a guarantee notice if the guarantee said something else?
 
-For each guarantee that a method supports, near misses of it (`avow.logic.mutants`) are put in its place, and the method is run on
-them. A mutant that the method does not support is *killed*. Evidence that no mutant disturbs supports nothing: it is recorded as
-vacuous. The score is appended to the ledger with the evidence that it is about; methods that a person's judgement
-guides (reviews, measurements) do not read the formula and have no score.
+For each guarantee that a method supports, near misses of it (`avow.logic.mutants`) are put in its place, and the
+method is run on them. A mutant that the method does not support is *killed*. Evidence that no mutant disturbs supports
+nothing: it is recorded as vacuous. The score is appended to the ledger with the evidence that it is about; methods that
+a person's judgement guides (reviews, measurements) do not read the formula and have no score.
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ from avow.pipeline.worker import Altered
 from avow.system.plan import System
 from avow.verdict import Link
 from avow.workspace import Workspace
+
+
+_Task = tuple[Work, Obligation, Evidence]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +70,7 @@ def hunt(workspace: Workspace, works: tuple[Work, ...], run: Run, limit: int, jo
     """Score every piece of current, supporting evidence of these works, `jobs` mutants at once."""
     tasks = [task for work in works if _reads_formulas(work) for task in _tasks(workspace, work)]
     with ThreadPoolExecutor(jobs) as pool:
-        return tuple(pool.map(lambda task: _score(workspace, *task, run, limit), tasks))
+        return tuple(pool.map(lambda task: _score(workspace, task, run, limit), tasks))
 
 
 def _reads_formulas(work: Work) -> bool:
@@ -77,7 +80,7 @@ def _reads_formulas(work: Work) -> bool:
     return method_backend(work.system, method).link is not Link.GUIDED
 
 
-def _tasks(workspace: Workspace, work: Work) -> list[tuple[Work, Obligation, Evidence]]:
+def _tasks(workspace: Workspace, work: Work) -> list[_Task]:
     ledger = ledger_of(workspace.ledger(work.system.name))
     found = []
     for obligation in work.obligations:
@@ -87,7 +90,8 @@ def _tasks(workspace: Workspace, work: Work) -> list[tuple[Work, Obligation, Evi
     return found
 
 
-def _score(workspace: Workspace, work: Work, obligation: Obligation, record: Evidence, run: Run, limit: int) -> Score:
+def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
+    work, obligation, record = task
     node = work.system.contract.node(work.node)
     mutants = chosen(node, node.clause(obligation.name), limit)
     survivors = []

@@ -14,7 +14,7 @@ BAD = ("refuted", "contradictory", "error", "missing", "stale", "vacuous", "unkn
 
 
 def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, seconds: float, out: IO[str]) -> None:
-    """A row a system: what was proved, checked, tested, reviewed, refuted, not run; then failing gates and the reports."""
+    """A row a system: what was proved, checked, tested, reviewed, refuted, not run; then failing gates."""
     if not results and not broken:
         return
     from rich.console import Console

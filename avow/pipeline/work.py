@@ -1,7 +1,7 @@
 """What there is to do for a system: every obligation, who settles it, and on what the answer depends.
 
-The core's own engines (language, sanity, calculus) and the backends look alike from here: a `Work` is one method applied
-to the obligations that it takes on, with a key for each. A record of the ledger is current while its key is unchanged.
+The core's own engines (language, sanity, calculus) and the backends look alike from here: a `Work` is one method
+applied to the obligations that it takes on, with a key for each. A record is current while its key is unchanged.
 """
 
 from __future__ import annotations
