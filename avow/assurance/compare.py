@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from avow.assurance.model import Case
-from avow.assurance.naming import is_advice, requirement_claim
+from avow.assurance.naming import requirement_claim
 from avow.evidence.ledger import Entry
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, roll_up
@@ -46,7 +46,7 @@ class Change:
 
 
 def of_case(case: Case) -> Snapshot:
-    claims = {v.id: (v.obligation.digest, v.standing) for v in case.obligations if not is_advice(v.obligation)}
+    claims = {v.id: (v.obligation.digest, v.standing) for v in case.obligations if not v.advice}
     claims |= {requirement_claim(r.id): (r.text + r.formula + r.temporal, r.status) for r in case.requirements}
     return Snapshot(case.system, claims, {gate.title: gate.passed for gate in case.gates})
 

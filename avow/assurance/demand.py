@@ -118,6 +118,9 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             )
         case Status.CONTRADICTORY:
             return Suggestion("find out which tool is wrong: one proves the claim and another refutes it", cost=100)
+        case Status.ERROR:
+            again = f"`avow verify {facts.system}`"
+            return Suggestion(f"find out why the tool failed (its message and log are with the evidence), then {again}")
         case Status.VACUOUS:
             return Suggestion("give a scenario in which the claim's trigger is met", cost=50)
         case Status.STALE:

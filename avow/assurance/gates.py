@@ -9,7 +9,7 @@ from avow.assurance.demand import shortfall, suggest
 from avow.assurance.facts import Facts
 from avow.assurance.findings import FINDINGS
 from avow.assurance.model import DerivationView, Gate, Grade, Handled, ObligationView, RequirementView, Suggestion
-from avow.assurance.naming import derivation_claim, is_advice, requirement_claim, short
+from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 
@@ -64,9 +64,7 @@ def _findings(facts: Facts, findings: Sequence[Handled], obligations: Sequence[O
     if facts.expected is not None:
         absent = [f for f in findings if f.how == "expected" and not f.obligations]
         listed = {name for f in findings for name in f.obligations}
-        extra = [
-            v.id for v in obligations if v.status in FINDINGS and v.id not in listed and not is_advice(v.obligation)
-        ]
+        extra = [v.id for v in obligations if v.status in FINDINGS and v.id not in listed and not v.advice]
         reasons = [
             f"expected but not there: {f.pattern} {f.verdict}{f' by {f.method}' if f.method else ''}" for f in absent
         ]
@@ -93,7 +91,7 @@ def _until(finding: Handled) -> str:
 
 
 def _nothing_wrong(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Gate:
-    wrong = [v for v in obligations if v.status in FINDINGS and not is_advice(v.obligation)]
+    wrong = [v for v in obligations if v.status in FINDINGS and not v.advice]
     return _gate(
         facts,
         "refuted",
@@ -101,7 +99,9 @@ def _nothing_wrong(facts: Facts, obligations: Sequence[ObligationView], excused:
         wrong,
         excused,
         lambda view: view.status.value,
-        "no claim is refuted, contradicted or held up by a vacuous pass",
+        "nothing else is refuted, contradicted or vacuous"
+        if excused
+        else "no claim is refuted, contradicted or vacuous",
     )
 
 
@@ -113,7 +113,7 @@ def _kind(
     title: str,
     good: Sequence[Status],
 ) -> Gate:
-    of_kind = [v for v in obligations if v.obligation.kind is kind and not is_advice(v.obligation)]
+    of_kind = [v for v in obligations if v.obligation.kind is kind and not v.advice]
     failing = [v for v in of_kind if good and v.status not in good]
     return _gate(
         facts,
@@ -122,7 +122,7 @@ def _kind(
         failing,
         excused,
         lambda view: view.status.value,
-        f"{len(of_kind)} of {len(of_kind)} hold",
+        _holding([v.status.supports for v in of_kind], asked=bool(good)),
     )
 
 
@@ -142,7 +142,7 @@ def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: se
             failing,
             excused,
             lambda view, lacking=lacking: lacking[view.id] or "",  # type: ignore[misc]
-            f"{len(of_kind)} of {len(of_kind)} meet it",
+            _holding([v.status.supports for v in of_kind], asked=bool(demand.one_of)),
             demand.text(),
         )
 
@@ -165,7 +165,7 @@ def _derivations(
         "derivations",
         "Derivations rest on what is shown",
         not bad,
-        reason or f"{len(derivations)} of {len(derivations)} do" + (f" ({len(let_off)} excused)" if let_off else ""),
+        reason or _holding([d.status.supports for d in derivations], wanted, len(let_off)),
         names,
         (),
         let_off,
@@ -187,7 +187,7 @@ def _requirements(
         "requirements",
         "Every requirement is answered",
         not bad,
-        reason or f"{len(requirements)} of {len(requirements)} are" + (f" ({len(let_off)} excused)" if let_off else ""),
+        reason or _holding([r.status.supports for r in requirements], bool(good), len(let_off)),
         tuple(requirement_claim(r.id) for r in bad),
         tuple(suggestions.values())[:10],
         let_off,
@@ -220,7 +220,7 @@ def _gate(
     if bad:
         reason = shown + more
     elif let_off:
-        reason = f"{_count(len(let_off), 'finding')} excused by the plan; nothing else"
+        reason = f"{good}; {_count(len(let_off), 'finding')} excused by the plan"
     else:
         reason = good
     suggestions = {s.text: s for view in bad for s in _suggestion(view)}
@@ -237,6 +237,16 @@ def _gate(
     )
 
 
+def _holding(supported: Sequence[bool], asked: bool, excused: int = 0) -> str:
+    """What a gate that passes says: never more than is so."""
+    if not supported:
+        return "there are none"
+    counts = f"{sum(supported)} of {len(supported)} hold"
+    if not asked:
+        return f"nothing is asked of them; {counts}"
+    return f"{counts}; {excused} excused by the plan" if excused else counts
+
+
 def _suggestion(view: ObligationView) -> tuple[Suggestion, ...]:
     return (view.suggestion,) if view.suggestion else ()
 
@@ -249,7 +259,7 @@ def suggestion_for(view: ObligationView, facts: Facts, today: date) -> Suggestio
         lacking = shortfall(view, demand, facts.policy, today)
     else:
         demand = None
-        lacking = None if view.status.supports or is_advice(view.obligation) else view.status.value
+        lacking = None if view.status.supports or view.advice else view.status.value
     return suggest(view, demand, facts) if lacking else None
 
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from avow.assurance.naming import is_advice
 from avow.assurance.policy import Policy
 from avow.diagnostics import Span
 from avow.evidence.audit import Discrepancy
@@ -164,6 +165,11 @@ class ObligationView:
     @property
     def id(self) -> str:
         return self.obligation.id
+
+    @property
+    def advice(self) -> bool:
+        """Whether it is a claim whose failing is worth knowing, but makes nothing unsound."""
+        return is_advice(self.obligation)
 
     @property
     def counting(self) -> tuple[EvidenceView, ...]:

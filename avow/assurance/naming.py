@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from avow.evidence.obligation import Kind, Obligation
 
-ADVICE = ("redundant", "unconstrained", "undetermined")
+ADVICE = ("redundant", "unconstrained", "undetermined", "unneeded")
 """Sanity properties that are worth knowing, but that make nothing unsound."""
 
 FOUNDATION = ("assumptions-satisfiable", "consistent", "realizable")
@@ -36,7 +36,7 @@ def short(claim: str) -> str:
 
 def sanity_property(obligation: Obligation) -> str:
     """Which of the sanity properties an obligation is about: its name up to the clause, if it names one."""
-    for name in (*FOUNDATION, *ADVICE, "vacuous"):
+    for name in (*FOUNDATION, *ADVICE, "vacuous", "tautology"):
         if obligation.name == name or (obligation.name.startswith(name) and not obligation.name[len(name)].isalnum()):
             return name
     return obligation.name

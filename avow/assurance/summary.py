@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from avow.assurance.facts import Facts
 from avow.assurance.model import DerivationView, Handled, ObligationView, OpenItem, RequirementView
-from avow.assurance.naming import derivation_claim, is_advice, requirement_claim, short
+from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.verdict import Link, Verdict
@@ -34,7 +34,7 @@ def open_items(
     """Everything that a reader must know before believing the rest, worst first."""
     items = [OpenItem("discrepancy", d.subject, d.text, advice=not d.serious) for d in facts.discrepancies or ()]
     for status in _WORST_FIRST:
-        items += [_open(view) for view in views if view.status is status and not is_advice(view.obligation)]
+        items += [_open(view) for view in views if view.status is status and not view.advice]
     items += [_vacuous(view) for view in views if view.status is not Status.VACUOUS and _has_vacuous(view)]
     for d in derivations:
         if not d.status.supports and not d.below:
@@ -54,13 +54,13 @@ def open_items(
     items += [
         OpenItem("advice", view.id, f"{view.obligation.claim}: {_summary(view)}", advice=True, handled=view.handled)
         for view in views
-        if is_advice(view.obligation) and view.status is Status.REFUTED
+        if view.advice and view.status is Status.REFUTED
     ]
     return tuple(items)
 
 
 def _open(view: ObligationView) -> OpenItem:
-    suggestion = view.suggestion.text if view.suggestion else ""
+    suggestion = view.suggestion.text if view.suggestion and not view.handled else ""
     return OpenItem(view.status.value, view.id, _summary(view) or view.obligation.claim, suggestion, view.handled)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from avow.assurance.facts import Facts
-from avow.assurance.naming import derivation_claim, is_foundation, requirement_claim, sanity_property
+from avow.assurance.naming import derivation_claim, is_advice, is_foundation, requirement_claim, sanity_property
 from avow.evidence.claims import Claim
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.status import Status, weakest
@@ -30,7 +30,7 @@ class Names:
                 self.clause[f"{o.node}.{o.name}"] = o.id
             elif is_foundation(o):
                 self.foundation.setdefault(o.node, []).append(o.id)
-            elif o.kind is Kind.SANITY and sanity_property(o) == "vacuous":
+            elif o.kind is Kind.SANITY and sanity_property(o) in ("vacuous", "tautology") and not is_advice(o):
                 for clause in o.clauses:
                     self.vacuity.setdefault(clause, []).append(o.id)
         self.requirements = {r.id for r in facts.requirements}

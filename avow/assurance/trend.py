@@ -6,7 +6,6 @@ from collections import Counter
 from dataclasses import dataclass
 
 from avow.assurance.model import Case
-from avow.assurance.naming import is_advice
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, roll_up
 
@@ -29,10 +28,10 @@ def trend(case: Case) -> tuple[Point, ...]:
     """One point a run that left evidence, oldest first. As keys of the past are not kept, a method's newest record of
     the time is taken as current; for the last run see the case itself."""
     records = sorted(
-        (view.entry for o in case.obligations if not is_advice(o.obligation) for view in o.evidence),
+        (view.entry for o in case.obligations if not o.advice for view in o.evidence),
         key=lambda e: e.number,
     )
-    total = sum(not is_advice(o.obligation) for o in case.obligations)
+    total = sum(not o.advice for o in case.obligations)
     known: dict[str, dict[str, list[Evidence]]] = {}
     statuses: dict[str, Status] = {}
     points: list[Point] = []

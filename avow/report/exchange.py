@@ -11,7 +11,7 @@ from xml.sax.saxutils import escape, quoteattr
 from avow.assurance.argument import Argument, Shape
 from avow.assurance.codec import to_json
 from avow.assurance.model import Case, ObligationView
-from avow.assurance.naming import is_advice, sanity_property, short
+from avow.assurance.naming import sanity_property, short
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.files import digest
@@ -69,7 +69,7 @@ def _suite(case: Case, node: str, views: Iterable[ObligationView]) -> tuple[str,
         message = f"{view.standing}: {headline(view)}"
         text = escape(clean(message))
         inside = ""
-        if tone(view.status) == "bad" and not view.handled and not is_advice(view.obligation):
+        if tone(view.status) == "bad" and not view.handled and not view.advice:
             counts[1] += 1
             inside = f"<failure type={_attribute(view.status)} message={_attribute(message)}>{text}</failure>"
         elif view.status is Status.ERROR:
@@ -184,7 +184,7 @@ def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any
 def _sarif_level(view: ObligationView) -> tuple[str, str]:
     if view.standing.supports:
         return "pass", "none"
-    if is_advice(view.obligation):
+    if view.advice:
         return "informational", "none"
     if tone(view.status) == "bad":
         return "fail", "error"
@@ -201,7 +201,7 @@ def render_attestation(case: Case) -> str:
     every = [_statement(case, "", list(case.obligations), "PASSED" if case.good else "FAILED")]
     nodes = dict.fromkeys(view.obligation.node for view in case.obligations)
     for node in nodes:
-        views = [view for view in case.obligations if view.obligation.node == node and not is_advice(view.obligation)]
+        views = [view for view in case.obligations if view.obligation.node == node and not view.advice]
         good = all(view.standing.supports for view in views)
         bad = any(tone(view.status) == "bad" and not view.handled for view in views)
         every.append(_statement(case, node, views, "PASSED" if good else "FAILED" if bad else "WARNED"))
@@ -216,7 +216,7 @@ def _statement(case: Case, node: str, views: list[ObligationView], result: str) 
         subjects = {f"ledger/{case.system}": case.ledger_head}
     groups: dict[str, list[str]] = {"passedTests": [], "warnedTests": [], "failedTests": []}
     for view in views:
-        bad = tone(view.status) == "bad" and not view.handled and not is_advice(view.obligation)
+        bad = tone(view.status) == "bad" and not view.handled and not view.advice
         groups["passedTests" if view.standing.supports else "failedTests" if bad else "warnedTests"].append(view.id)
     return {
         "_type": "https://in-toto.io/Statement/v1",

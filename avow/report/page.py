@@ -15,7 +15,7 @@ from markupsafe import Markup, escape
 
 from avow.assurance.argument import Argument, Element, build_argument
 from avow.assurance.model import Case, ObligationView
-from avow.assurance.naming import is_advice, short
+from avow.assurance.naming import short
 from avow.assurance.policy import techniques
 from avow.assurance.traceability import COLUMNS, Row
 from avow.assurance.trend import trend
@@ -182,7 +182,7 @@ def _counts(views: Sequence[ObligationView]) -> list[tuple[Kind, list[tuple[Stat
 
 def _tones(case: Case) -> list[tuple[str, str, int]]:
     """(colour, word, number) of claims that hold, are open, are wrong."""
-    found = [wording.tone(view.standing) for view in case.obligations if not is_advice(view.obligation)]
+    found = [wording.tone(view.standing) for view in case.obligations if not view.advice]
     holding = found.count("good") + found.count("fair")
     return [("good", "hold", holding), ("open", "open", found.count("open")), ("bad", "wrong", found.count("bad"))]
 

@@ -108,6 +108,10 @@ def clean(text: str) -> str:
 def verdict_line(case: Case) -> str:
     """The case in a sentence."""
     failed = sum(not gate.passed for gate in case.gates)
+    if not failed and case.strict:
+        answered = sum(r.status.supports for r in case.requirements)
+        asked = f"; {answered} of {len(case.requirements)} requirements are answered" if case.requirements else ""
+        return f"The findings are exactly those that were expected, and all {len(case.gates)} gates pass{asked}."
     if not failed:
         return f"All {len(case.gates)} gates of the policy pass."
     return f"{failed} of {len(case.gates)} gates of the policy fail{'s' if failed == 1 else ''}."
