@@ -2,7 +2,7 @@
 
     python benchmarks/parse.py [--json]
 
-Ours is the whole check (tokens, trees, names, types, lints); the Earley parser only parses. CPU seconds of this process:
+Ours is the whole check (tokens, trees, names, types, lints); the Earley parser only parses. CPU seconds of the process:
 the best of several runs for what is short. The exit code is 1 where a bound of the design is not kept.
 """
 

@@ -120,7 +120,8 @@ class Checker:
     # --- names -------------------------------------------------------------------------------------------------------
 
     def _builtin(self, tree: Tree, expected: Sort | None) -> None:
-        self.error("RCL204", f"{tree.parts[0]} is a type, not a value", tree)
+        hint = "a type is declared with `:`, a constant with `=`" if not self.scope.node else None
+        self.error("RCL204", f"{tree.parts[0]} is a type, not a value", tree, hint=hint)
 
     def _name(self, tree: Tree, expected: Sort | None) -> Term | None:
         name: str = tree.parts[0]

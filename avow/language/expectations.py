@@ -21,24 +21,18 @@ _WORDS = {
     "UPTO": "`upto`",
 }
 _TERM = frozenset(("NAME", "NUMBER", "LBRACE", "LPAR"))
-_OPERATOR = frozenset(
-    ("AND", "OR", "IMPLIES", "IFF", "PLUS", "MINUS", "STAR", "SLASH", "EQ", "NE", "LE", "GE", "LT", "GT")
-)
 
 
 def explain(start: str, tokens: Sequence[Token], found: Token, expected: frozenset[str], reports: Reports) -> None:
     """Report the token `found`, where one of `expected` (terminals) should stand."""
-    words = "the end" if found.type == "$END" else f"`{found.text[:40]}`"
-    what = {"declaration": "of the declaration", "ports": "of the list", "topics": "of the list"}
-    if found.type == "$END":
-        words += " " + what.get(start, "of the formula")
-    message = f"expected {_expected(start, expected)} and not {words}"
     hint = _hint(start, tokens, found, expected)
-    begin, end = found.start, found.end
     if found.type == "$END" and tokens:
-        begin, end = tokens[-1].start, tokens[-1].end
-        message = f"{_expected(start, expected)} is missing after `{tokens[-1].text[:40]}`"
-    reports.error("RCL120", message, begin, end, hint=hint)
+        last = tokens[-1]
+        message = f"{_expected(start, expected)} is missing after `{last.text[:40]}`"
+        reports.error("RCL120", message, last.start, last.end, hint=hint)
+        return
+    message = f"expected {_expected(start, expected)} and not `{found.text[:40]}`"
+    reports.error("RCL120", message, found.start, found.end, hint=hint)
 
 
 def _expected(start: str, expected: frozenset[str]) -> str:
@@ -46,13 +40,15 @@ def _expected(start: str, expected: frozenset[str]) -> str:
         return "a formula" if "NOT" in expected else "a term"
     if start in ("declaration", "ports") and {"NAME", "BUILTIN"} <= expected:
         return "a type"
-    rest = expected - {"$END"}
-    if rest >= _OPERATOR or {"AND", "OR", "IMPLIES"} <= rest:
-        named = sorted(_WORDS[k] for k in rest & {"COMMA", "RPAR", "GT", "BAR", "RBRACE"} if k in _WORDS)
-        return " or ".join(["an operator", *(n for n in named if n != "`>`")])
-    named = sorted(_WORDS.get(kind, f"`{kind.lower()}`") for kind in rest)
-    if "$END" in expected and not named:
-        return "nothing more"
+    end = {"declaration": "`;`"}.get(start, "`)`")
+    ending = {end} if "$END" in expected else set()
+    if {"AND", "OR", "IMPLIES"} & expected:
+        closing = ending | {_WORDS[k] for k in expected & {"COMMA", "RPAR", "BAR", "RBRACE"}}
+        return " or ".join(["an operator", *sorted(closing)])
+    words = {kind: _WORDS.get(kind, f"`{kind.lower()}`") for kind in expected - {"$END"}}
+    if "ARROW" in expected and "NAME" in words:
+        words["NAME"] = "`x`"
+    named = sorted(ending | set(words.values()))
     if len(named) > 6:
         named = [*named[:6], "…"]
     return ", ".join(named[:-1]) + (" or " if len(named) > 1 else "") + named[-1] if named else "nothing more"
@@ -62,37 +58,91 @@ def _hint(start: str, tokens: Sequence[Token], found: Token, expected: frozenset
     position = next((i for i, t in enumerate(tokens) if t is found), len(tokens))
     before = tokens[position - 1] if position else None
     after = tokens[position + 1] if position + 1 < len(tokens) else None
-    if found.type == "EQUALS" and start == "formula":
-        return "equality is written `==`"
+    keyword = _about_keyword(found)
+    if start == "formula":
+        return _in_formula(tokens[:position], before, found, after, expected) or keyword
+    if start == "topics":
+        if found.type == "SEMICOLON":
+            return "separate topics by commas"
+        return "a topic is `package/Type name` with, if it carries a variable, `matches(in.v)` or `matches(out.v)`"
+    if start == "ports" and found.type in ("NAME", "BUILTIN") and expected == {"COLON"}:
+        return "write `name : type`"
+    if start == "ports" and "COMMA" in expected and found.type in ("NAME", "SEMICOLON"):
+        return "separate them by commas: `a : REAL, b : BOOL`"
+    if start == "declaration" and before is not None and before.type == "EQUALS":
+        return "equality is written `==`; a constant is `Name = value;`"
     if found.type == "EQUALS":
         return "a type is declared with `:`, a constant with `=`"
-    if found.type in ("BAR", "SEMICOLON") and expected <= {"IN", "COMMA"}:
-        return "say what each variable ranges over before the bar: `forall(x, y in REAL, i in NATURAL | …)`"
-    if found.type == "LPAR" and before is not None and before.type == "LPAR" and "NAME" in expected:
-        return "the variables stand without parentheses: `exists_unique(x, y in REAL | …)`"
-    if found.type == "NAME" and found.text == "x" and start == "formula":
-        return "a variable ranges over one type: write `x, y in REAL`, not `(x, y) in REAL x REAL`"
-    if found.type == "EMPTY_SEQUENCE":
-        return "unequal is written `!=`"
-    if before is not None and before.type == "EQUALS":
+    if found.type in ("STRING", "NUMBER") and before is not None and before.type in ("LBRACE", "COMMA"):
+        return "a set type lists names, as in `{red, green}`; a set of values is a constant: `Name = {1, 2};`"
+    if found.type in ("BAR", "IMPLIES", "COMMA") and expected & {"ARROW", "$END"}:
+        return "write a function as `A x B --> C`, and a choice of values as `{a, b}`"
+    return keyword
+
+
+def _in_formula(
+    earlier: Sequence[Token], before: Token | None, found: Token, after: Token | None, expected: frozenset[str]
+) -> str | None:
+    quantified = any(t.type in _QUANTIFIERS for t in earlier)
+    if found.type == "EQUALS" or (before is not None and before.type == "EQUALS"):
         return "equality is written `==`"
+    if before is not None and before.type in _QUANTIFIERS:
+        return f"write `{before.text}(x in S | …)`"
+    if quantified and expected <= {"IN", "COMMA"}:
+        if any(t.type == "IN" for t in earlier) and found.type in _RELATIONS:
+            return "a bar stands between the variables and the formula: `forall(x in REAL | …)`"
+        return "say what each variable ranges over before the bar: `forall(x, y in REAL, i in NATURAL | …)`"
+    if before is not None and before.type == "LPAR" and found.type == "LPAR" and expected == {"NAME"}:
+        return "the variables stand without parentheses: `exists_unique(x, y in REAL | …)`"
+    if found.text == "x" and quantified and "BAR" in expected:
+        return "a variable ranges over one type: write `x, y in REAL`, not `(x, y) in REAL x REAL`"
+    if found.type == "COLON" and quantified:
+        return "a bar stands between the variables and the formula: `forall(x in REAL | …)`"
+    if found.type == "EMPTY_SEQUENCE" and "NE" in expected:
+        return "unequal is written `!=`"
     if found.type == "NOT" and after is not None and after.type == "IN":
         return "write `!in`"
-    if found.type in ("BAR", "IMPLIES", "ARROW") and start in ("declaration", "ports") and found.type != "ARROW":
-        return "write a function as `A x B --> C`, and a choice of values as `{a, b}`"
-    if found.type == "ARROW" and start == "formula":
+    if expected == {"DOT"} and before is not None and found.type == "NAME":
+        return f"write `{before.text}.{found.text}`"
+    if found.type == "ARROW":
         return "implication is written `->`"
     if found.type == "SEMICOLON":
         return "no `;` here: it ends a declaration, or stands for the `|` of a quantifier"
-    if start == "topics":
-        return "a topic is `package/Type name` with, if it has one, `matches(in.variable)`"
-    if start == "ports" and found.type == "NAME" and "COMMA" in expected:
-        return "separate them by commas: `a : REAL, b : BOOL`"
+    if found.type == "DOT" and after is not None and after.type == "NUMBER":
+        return f"write `0.{after.text}`"
+    if earlier and earlier[0].text == "if":
+        return "write `A -> B` for: if A then B"
+    if found.type == "COMMA":
+        return "join formulas by `and`"
     if found.text in _ALIASES:
         return f"write `{_ALIASES[found.text]}`"
-    if found.type in ("CONTEXT", "NODE", "INPUTS", "OUTPUTS", "TOPICS", "MATCHES", "ASSUME", "GUARANTEE", "UPTO"):
-        return f"`{found.text}` is a keyword and cannot be a name"
+    if before is not None and before.text in _ALIASES:
+        return f"write `{_ALIASES[before.text]}`"
     return None
 
 
-_ALIASES = {"true": "TRUE", "false": "FALSE", "implies": "->", "iff": "<=>", "AND": "and", "OR": "or", "NOT": "not"}
+def _about_keyword(found: Token) -> str | None:
+    if found.type in ("CONTEXT", "NODE", "INPUTS", "OUTPUTS", "TOPICS", "MATCHES", "ASSUME", "GUARANTEE", "UPTO"):
+        return f"`{found.text}` is a keyword and cannot be a name"
+    if found.text in ("in", "out", "not", "and", "or", "forall", "exists"):
+        return f"`{found.text}` is a keyword"
+    return None
+
+
+_QUANTIFIERS = frozenset(("FORALL", "EXISTS", "UNIQUE"))
+_RELATIONS = frozenset(("EQ", "NE", "LE", "GE", "LT", "GT", "LPAR", "DOT", "PLUS", "MINUS"))
+_ALIASES = {
+    "true": "TRUE",
+    "false": "FALSE",
+    "implies": "->",
+    "iff": "<=>",
+    "AND": "and",
+    "OR": "or",
+    "NOT": "not",
+    "is": "==",
+    "equals": "==",
+    "then": "->",
+    "IN": "in",
+    "FORALL": "forall",
+    "EXISTS": "exists",
+}

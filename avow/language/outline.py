@@ -108,6 +108,14 @@ class _Reader:
                 self.context()
             elif self.kind() == "NODE":
                 self.node()
+            elif self.kind() == "NAME" and self.tokens[self.at].text.lower() in ("node", "context"):
+                word = self.tokens[self.at].text
+                self.complain("RCL111", f"`{word}` is not a clause of RCL", self.at, f"write `{word.lower()}`")
+                if word.lower() == "node":
+                    self.node()
+                else:
+                    self.at += 1
+                    self.context()
             elif self.kind() == "NAME" and self.kind(1) == "LBRACE":
                 word = self.tokens[self.at].text
                 if word in ("types", "constants", "type", "constant"):
@@ -341,7 +349,8 @@ class _Reader:
                 sentence = self.tokens[self.at]
                 self.at += 1
         if self.kind() != "LPAR":
-            self.complain("RCL113", f"expected `(` after `{(name or keyword).text}` and not %", self.at)
+            hint = f"write `{keyword.text}( … )`"
+            self.complain("RCL113", f"expected `(` after `{(name or keyword).text}` and not %", self.at, hint)
             if section not in ("ASSUME", "GUARANTEE"):
                 node.broken.add("*")
             while self.at < len(self.tokens) and self.kind() not in _TOP and self.kind() != "RBRACE":

@@ -30,7 +30,7 @@ def parse(start: str, tokens: Sequence[Token], reports: Reports, end: int) -> Tr
     if isinstance(tree, Token):
         from avow.language.expectations import explain
 
-        explain(start, tokens, tree, _accepted(start, tokens), reports)
+        explain(start, tokens, tree, _accepted(start, tokens, tree), reports)
         return None
     if tree.depth > MAX_DEPTH:
         reports.error(
@@ -117,16 +117,13 @@ def _tables(start: str) -> _Tables:
     return _Tables(configuration.start_state, configuration.end_state, shifts, reductions, gotos)
 
 
-def _accepted(start: str, tokens: Iterable[Token]) -> frozenset[str]:
-    """The terminals that could stand where the tokens cannot go on."""
-    from lark.exceptions import UnexpectedToken
-
+def _accepted(start: str, tokens: Iterable[Token], bad: Token) -> frozenset[str]:
+    """The terminals that could stand in the place of the bad token."""
     machine = _lark().parse_interactive("", start=start)
-    try:
-        for token in tokens:
-            machine.parser_state.feed_token(token)
-    except UnexpectedToken:
-        pass
+    for token in tokens:
+        if token is bad:
+            break
+        machine.parser_state.feed_token(token)
     return frozenset(machine.accepts())
 
 

@@ -1,0 +1,44 @@
+"""How long a case and its reports take for ten thousand obligations: ``python benchmarks/report_10000.py``."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from assurance.sample import case, evidence, guarantee, node_plan, system
+
+from avow.report import LeftOut, formats
+from avow.system.plan import Requirement
+from avow.verdict import Verdict
+
+
+def main() -> None:
+    nodes = {f"node{n}": [f"g{k}" for k in range(100)] for n in range(100)}
+    obligations = [
+        guarantee(n, g, f"{n} does {g}", "∀ x ∈ ℝ · in.x < 3 ⇒ out.y = 2") for n, gs in nodes.items() for g in gs
+    ]
+    records = [evidence(o) for o in obligations]
+    records += [evidence(o, Verdict.TESTED, "hypothesis", bound={"cases": 100}) for o in obligations[::2]]
+    requirements = [
+        Requirement(f"R{k}", "text", None, None, tuple(f"node{k}.g{j}" for j in range(100))) for k in range(100)
+    ]
+    subject = system(
+        nodes, plans=[node_plan(n, "high", "hoare", "hypothesis") for n in nodes], requirements=requirements
+    )
+    start = time.perf_counter()
+    found = case(subject, obligations, records)
+    print(
+        f"{'the case':18} {time.perf_counter() - start:6.2f} s   {len(obligations)} obligations, {len(records)} records"
+    )
+    start = time.perf_counter()
+    for name, content in formats(found):
+        size = content.reason if isinstance(content, LeftOut) else f"{len(content) / 1e6:.1f} MB"
+        print(f"{name:18} {time.perf_counter() - start:6.2f} s   {size}")
+        start = time.perf_counter()
+
+
+if __name__ == "__main__":
+    main()
