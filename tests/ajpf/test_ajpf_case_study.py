@@ -95,7 +95,7 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_seeded_faults_are_caught(rover, tmp_path, fault):
     change, caught = FAULTS[fault]
-    outcomes = settle(rover(*REPAIRED, {"states": 20_000}, program=change), tmp_path)
+    outcomes = settle(rover(*REPAIRED, {"states": 6_000}, program=change), tmp_path)
     refuted = {name for name, outcome in outcomes.items() if outcome.verdict is Verdict.REFUTED}
     assert refuted >= caught
     for name in refuted:

@@ -199,7 +199,7 @@ FORMULAS = st.recursive(
 ).filter(lambda f: len(temporal(core(f), [])) <= 4)
 
 
-@settings(max_examples=250, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 @given(graphs(), FORMULAS, st.booleans())
 def test_it_agrees_with_the_oracle(graph, formula, fair):
     expected = oracle(graph, formula, fair)
@@ -269,7 +269,7 @@ SHAPES = [
 ]
 
 
-@settings(max_examples=250, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
 @given(repetitive_graphs())
 def test_reduction_changes_nothing(graph):
     small = reduce(graph)
