@@ -14,7 +14,7 @@ MAX_DEPTH = 40
 
 @dataclass(frozen=True, slots=True)
 class Var:
-    """``Location``; an anonymous ``_`` gets a name of its own when it is read."""
+    """``Floor``; an anonymous ``_`` gets a name of its own when it is read."""
 
     name: str
 
@@ -43,7 +43,7 @@ class GoalKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """``inspect(1) [perform]``; without a kind it is performed."""
+    """``serve(1) [perform]``; without a kind it is performed."""
 
     term: Term
     kind: GoalKind = GoalKind.PERFORM
@@ -51,7 +51,7 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What triggers a plan: ``+danger``, ``-danger``, ``+!inspect(1)``, ``-!inspect(1)``."""
+    """What triggers a plan: ``+danger``, ``-danger``, ``+!serve(1)``, ``-!serve(1)``."""
 
     sign: Sign
     term: Term
@@ -62,7 +62,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """One conjunct of a guard or of a reasoning rule: ``~B danger``, ``G inspect(1)``; ``True`` has no term."""
+    """One conjunct of a guard or of a reasoning rule: ``~B danger``, ``G serve(1)``; ``True`` has no term."""
 
     term: Term | None
     positive: bool = True
