@@ -7,13 +7,13 @@ than three guarantees are found only at inputs that came up for another reason.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 from avow.language.sorts import DataSort, FunctionSort
 from avow.language.terms import Compare, Construct, Not, Quantified, Quantifier, Role, Term, Variable
+from avow.logic.clock import now
 from avow.logic.counterexample import show_values
 from avow.logic.formula import free_variables
 from avow.logic.realizability import Formulas, Given, Group, Search
@@ -45,7 +45,7 @@ def conflicts(
     seed: int = 0,
 ) -> tuple[Conflict, ...]:
     """The conflicts among a group's guarantees: those at the input `first`, and others found within the time."""
-    deadline = time.monotonic() + timeout_ms / 1000
+    deadline = now() + timeout_ms / 1000
     found: dict[frozenset[str], Mapping[Variable, Value]] = {}
 
     def learn(at: Mapping[Variable, Value]) -> None:
@@ -57,7 +57,7 @@ def conflicts(
     # Two guarantees against each other are what people want to see first, and what happens most.
     for size, patience in ((2, 1_500), (1, 400), (3, 400)):
         for chosen in combinations(labels, size):
-            left = int((deadline - time.monotonic()) * 1000)
+            left = int((deadline - now()) * 1000)
             if frozenset(chosen) in found or left <= 0:
                 continue
             formulas = {label: group.guarantees[label] for label in chosen}
@@ -81,7 +81,7 @@ def _minimal_sets(group: Group, at: Mapping[Variable, Value], deadline: float, s
         for chosen in map(frozenset, combinations(group.guarantees, size)):
             if any(smaller <= chosen for smaller in minimal):
                 continue
-            if time.monotonic() > deadline and size > 2:
+            if now() > deadline and size > 2:
                 return minimal
             formulas = {label: group.guarantees[label] for label in group.guarantees if label in chosen}
             if solve(formulas, given=at, variables=group.outputs, timeout_ms=500, seed=seed).status == "unsat":

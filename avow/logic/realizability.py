@@ -11,7 +11,6 @@ Guarantees that share no output are asked about apart: each group is realizable 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -19,6 +18,7 @@ import z3
 
 from avow.language.sorts import REAL, FunctionSort
 from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
+from avow.logic.clock import now
 from avow.logic.formula import conjunction, free_variables, negation, substitute
 from avow.logic.smt import Translator, Unsupported, check, entails, replay, search_tables, solve
 from avow.logic.translation import Expr, Meaning
@@ -131,14 +131,14 @@ class Search:
         self.assumptions = assumptions
         self.given = given
         self.inputs = tuple(v for v in inputs if v not in given)
-        self.deadline = time.monotonic() + timeout_ms / 1000
+        self.deadline = now() + timeout_ms / 1000
         self.seed = seed
         self.found = candidates(group.outputs, assumptions.values(), group.guarantees.values())
         self.witnesses: list[Witness] = witnesses(self.found)
         self.reason = ""
 
     def left(self) -> int:
-        return int((self.deadline - time.monotonic()) * 1000)
+        return int((self.deadline - now()) * 1000)
 
     def decide(self) -> Realizability:
         try:
@@ -252,9 +252,9 @@ class Search:
     def refute(self, possible: Sequence[Formulas], limit: int) -> Realizability | None:
         """Inputs without an output, at which each of the `possible` sets of guarantees could be met by itself; None
         if none are found in `limit` ms."""
-        end = time.monotonic() + limit / 1000
-        while time.monotonic() < end:
-            inputs = self._defeat(self.group.guarantees, possible, int((end - time.monotonic()) * 1000))
+        end = now() + limit / 1000
+        while now() < end:
+            inputs = self._defeat(self.group.guarantees, possible, int((end - now()) * 1000))
             if inputs is None:
                 return None
             before = len(self.witnesses)

@@ -1,4 +1,4 @@
-"""Questions to the solver: satisfiable? entailed? Every answer is bounded in time, and none is taken on trust.
+"""Questions to the solver: satisfiable? entailed? Every answer is bounded in (processor) time, none taken on trust.
 
 `solve` asks whether some formulas hold together, `entails` whether some imply another. A model is shown, and a
 refutation reported, only after it has been replayed: its values put into the formulas, and the result proved true under
@@ -10,10 +10,8 @@ functions with finitely many exceptions (a table and a default) are tried: what 
 
 from __future__ import annotations
 
-import contextlib
-import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import Literal as OneOf
@@ -22,6 +20,7 @@ import z3
 
 from avow.language.sorts import BOOL, DataSort, FunctionSort, OpaqueSort, SequenceSort, SetSort, Sort, TupleSort
 from avow.language.terms import Quantified, Term, Variable
+from avow.logic.clock import WALL, now, watchdog
 from avow.logic.counterexample import show_values
 from avow.logic.formula import free_variables, negation
 from avow.logic.models import Model
@@ -136,10 +135,10 @@ def _ask(
     engine: Engine,
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
     if engine == "qsat":
-        with _watchdog(translator, timeout_ms):
+        with watchdog(timeout_ms, translator.context.interrupt):
             return _ask_qsat(translator, assertions, tracked, timeout_ms)
     solver = z3.Solver(ctx=translator.context)
-    solver.set("timeout", max(1, int(timeout_ms)))
+    solver.set("timeout", _wall(timeout_ms))
     solver.set("random_seed", seed)
     solver.add(*assertions)
     switches = {}
@@ -147,7 +146,7 @@ def _ask(
         switch = z3.Bool(f"track!{number}", translator.context)
         solver.add(z3.Implies(switch, expr))
         switches[switch.get_id()] = (switch, label)
-    with _watchdog(translator, timeout_ms):
+    with watchdog(timeout_ms, translator.context.interrupt):
         result = solver.check(*(switch for switch, _ in switches.values()))
     if result == z3.sat:
         return "sat", solver.model(), (), ""
@@ -156,30 +155,15 @@ def _ask(
     return "unknown", None, (), str(solver.reason_unknown())
 
 
-@contextlib.contextmanager
-def _watchdog(translator: Translator, timeout_ms: int) -> Iterator[None]:
-    """Interrupt Z3 where it misses its own time limit, which it does: seen 84 s for 16 ms."""
-    done = threading.Event()
-
-    def bark() -> None:
-        wait = timeout_ms / 1000 + 0.05
-        while not done.wait(wait):
-            translator.context.interrupt()
-            wait = 0.05
-
-    dog = threading.Thread(target=bark, daemon=True)
-    dog.start()
-    try:
-        yield
-    finally:
-        done.set()
-        dog.join()
+def _wall(timeout_ms: int) -> int:
+    """Z3 counts wall-clock time: its limit is only for where the watchdog cannot help."""
+    return max(1, int(timeout_ms)) * WALL * 2
 
 
 def _ask_qsat(
     translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]], timeout_ms: int
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
-    solver = z3.TryFor(z3.Tactic("qsat", ctx=translator.context), max(1, int(timeout_ms))).solver()
+    solver = z3.TryFor(z3.Tactic("qsat", ctx=translator.context), _wall(timeout_ms)).solver()
     everything = [*assertions, *(expr for _, expr in tracked)]
     solver.add(*everything)
     result = solver.check()
@@ -449,9 +433,9 @@ def search_tables(
     """Values of the variables for which what `build` makes of the functions' meanings is satisfiable, with functions
     that are tables of few entries. A best effort: None proves nothing, and what is found wants replaying."""
     ordinary, functions = tuple(ordinary), sorted(functions, key=lambda v: v.qualified)
-    deadline = time.monotonic() + timeout_ms / 1000
+    deadline = now() + timeout_ms / 1000
     for tried, (size, sparse) in enumerate(_TABLES if functions else _TABLES[:1]):
-        left = (deadline - time.monotonic()) * 1000
+        left = (deadline - now()) * 1000
         if left < 1:
             return None
         limit = max(50, int(left / min(3, len(_TABLES) - tried)))
