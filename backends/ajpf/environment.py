@@ -110,8 +110,7 @@ class Environment:
             f"{name}: {' or '.join(NOTHING if p is None else show(p) for p in group)}" for name, group in self.groups
         )
         when = ["at the start"] if self.at_start else []
-        quiet = ", ".join(sorted(self.quiet))
-        when.append(f"at every action except {quiet}" if quiet else "at every action")
+        when.append(f"at every action except {', '.join(sorted({*self.quiet, 'print'}))}")
         if self.at_quiescence != "never":
             often = "once" if self.at_quiescence == "once" else "again and again"
             when.append(f"{often} when the agent has nothing to do")
