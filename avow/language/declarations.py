@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from avow.diagnostics import Span
-from avow.language.checker import BUILTINS, Checker
+from avow.language.check_names import BUILTINS
+from avow.language.checker import Checker
 from avow.language.environment import Environment, did_you_mean
 from avow.language.lexer import Token
 from avow.language.scope import Scope

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from avow.language.contract import Clause, Contract, Node, Port
-from avow.language.printer import latex_escape, latex_name, show_term, show_type
+from avow.language.printer import show_term, show_type
+from avow.language.styles import latex_escape, latex_name
 
 _HEAD = r"""\documentclass[a4paper]{article}
 \usepackage[T1]{fontenc}

@@ -5,12 +5,8 @@ Printing in the style ``rcl`` and reading that again gives the equal term (tests
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import Literal as OneOf
 
-from avow.language.lexer import quote
 from avow.language.sorts import (
     REAL,
     BoolSort,
@@ -27,6 +23,9 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+from avow.language.styles import STYLES, Style
+from avow.language.styles import StyleName as StyleName
+from avow.language.styles import latex_escape as latex_escape
 from avow.language.terms import (
     And,
     Apply,
@@ -44,7 +43,6 @@ from avow.language.terms import (
     Not,
     Or,
     Quantified,
-    Quantifier,
     Role,
     SequenceRange,
     SequenceTerm,
@@ -55,8 +53,6 @@ from avow.language.terms import (
     Widen,
 )
 
-StyleName = OneOf["unicode", "rcl", "latex", "text"]
-
 # How tightly a form binds; a part is put in parentheses where it binds less tightly than its place demands.
 IFF, IMPLIES, OR, AND, NOT, COMPARE, SUM, PRODUCT, UNARY, ATOM = range(10)
 _LOOSEST = -1
@@ -65,12 +61,12 @@ _UP, _DOWN = frozenset(("<", "<=", "==")), frozenset((">", ">=", "=="))
 
 def show_term(term: Term, style: StyleName = "unicode") -> str:
     """The term as text. `latex` is for mathematics mode, and escapes every name and string."""
-    return _Printer(_STYLES[style]).show(term, _LOOSEST)
+    return _Printer(STYLES[style]).show(term, _LOOSEST)
 
 
 def show_sort(sort: Sort, style: StyleName = "rcl") -> str:
     """A sort by its name, or written out where it has none."""
-    chosen = _STYLES[style]
+    chosen = STYLES[style]
     match sort:
         case BoolSort() | RealSort() | IntegerSort() | NaturalSort() | StringSort():
             return chosen.sorts[_BUILTIN[type(sort)]]
@@ -89,7 +85,7 @@ def show_sort(sort: Sort, style: StyleName = "rcl") -> str:
 
 def show_type(sort: Sort, style: StyleName = "rcl") -> str:
     """The sort as its declaration writes it: ``{red, orange, green}``, ``{}``."""
-    chosen = _STYLES[style]
+    chosen = STYLES[style]
     match sort:
         case EnumSort(members=members):
             return chosen.braces(", ".join(chosen.name(m) for m in members))
@@ -119,27 +115,8 @@ _BUILTIN = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class _Style:
-    words: dict[str, str]
-    quantifiers: dict[Quantifier, tuple[str, str, str]]
-    """Before the variables, after them, and after the body."""
-    sorts: dict[str, str]
-    times: str
-    arrow: str
-    unspecified: str
-    sequence: tuple[str, str]
-    name: Callable[[str], str]
-    string: Callable[[str], str]
-    braces: Callable[[str], str]
-    tight_quantifier: bool
-    """Whether a quantifier closes itself, so that it never needs parentheses."""
-    careful: bool = False
-    """Whether `and` and `or` stand in parentheses beside `->` and `<=>`, though they need none."""
-
-
 class _Printer:
-    def __init__(self, style: _Style) -> None:
+    def __init__(self, style: Style) -> None:
         self.style = style
 
     def show(self, term: Term, place: int, *, real: bool = False) -> str:
@@ -283,7 +260,7 @@ class _Printer:
                 groups[-1][0].append(self.style.name(variable.name))
             else:
                 groups.append(([self.style.name(variable.name)], variable.sort))
-        style_name = next(n for n, s in _STYLES.items() if s is self.style)
+        style_name = next(n for n, s in STYLES.items() if s is self.style)
         binders = ", ".join(
             f"{', '.join(names)}{self.style.words['in']}{show_sort(sort, style_name)}" for names, sort in groups
         )
@@ -346,192 +323,3 @@ def _bare(term: Term) -> Term:
     if isinstance(term, Literal) and not isinstance(term.value, bool | str):
         return Literal(Fraction(term.value), REAL)
     return term
-
-
-def latex_escape(text: str) -> str:
-    """Any text as LaTeX text that every pdflatex can set; what it has no sign for is shown by its number."""
-    return "".join(_LATEX_TEXT.get(c) or (c if " " <= c <= "ÿ" and c.isprintable() else _code_point(c)) for c in text)
-
-
-def _code_point(character: str) -> str:
-    return rf"\texttt{{U+{ord(character):04X}}}"
-
-
-_LATEX_TEXT = {
-    "\\": r"\textbackslash{}",
-    "{": r"\{",
-    "}": r"\}",
-    "$": r"\$",
-    "&": r"\&",
-    "#": r"\#",
-    "%": r"\%",
-    "_": r"\_",
-    "^": r"\textasciicircum{}",
-    "~": r"\textasciitilde{}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-    "|": r"\textbar{}",
-    '"': r"\textquotedbl{}",
-    "\n": " ",
-    "\t": " ",
-    "\u00a0": "~",
-    "–": "--",
-    "—": "---",
-    "“": "``",
-    "”": "''",
-    "‘": "`",
-    "’": "'",
-    "…": r"\ldots{}",
-    "≤": r"$\leq$",
-    "≥": r"$\geq$",
-    "≠": r"$\neq$",
-    "→": r"$\rightarrow$",
-    "∈": r"$\in$",
-    "∀": r"$\forall$",
-    "∃": r"$\exists$",
-    "∧": r"$\land$",
-    "∨": r"$\lor$",
-}
-
-
-def latex_name(name: str) -> str:
-    """A name for mathematics mode."""
-    body = name.rstrip("'")
-    if len(body) == 1 and body.isalpha():
-        return name
-    shown = body.replace("_", r"\_").replace("'", r"\textquotesingle{}")
-    return rf"\mathit{{{shown}}}{name[len(body) :]}"
-
-
-def _same(text: str) -> str:
-    return text
-
-
-_WORDS = {
-    **{operator: f" {operator} " for operator in ("+", "-", "*", "/", "==", "!=", "<", "<=", ">", ">=", "in", "!in")},
-    **{word: f" {word} " for word in ("and", "or", "->", "<=>", "upto")},
-    "not": "not ",
-    "TRUE": "TRUE",
-    "FALSE": "FALSE",
-}
-_SORTS = {name: name for name in ("BOOL", "REAL", "INTEGER", "NATURAL", "STRING")}
-_STYLES: dict[StyleName, _Style] = {
-    "rcl": _Style(
-        words=_WORDS,
-        quantifiers={q: (f"{q.value}(", " | ", ")") for q in Quantifier},
-        sorts=_SORTS,
-        times=" x ",
-        arrow=" --> ",
-        unspecified="{}",
-        sequence=("<", ">"),
-        name=_same,
-        string=quote,
-        braces=lambda inner: f"{{{inner}}}",
-        tight_quantifier=True,
-        careful=True,
-    ),
-    "unicode": _Style(
-        words={
-            **_WORDS,
-            "==": " = ",
-            "!=": " ≠ ",
-            "<=": " ≤ ",
-            ">=": " ≥ ",
-            "in": " ∈ ",
-            "!in": " ∉ ",
-            "*": " · ",
-            "and": " ∧ ",
-            "or": " ∨ ",
-            "not": "¬",
-            "->": " → ",
-            "<=>": " ↔ ",
-            "upto": " … ",
-            "TRUE": "true",
-            "FALSE": "false",
-        },
-        quantifiers={
-            Quantifier.FORALL: ("∀ ", " · ", ""),
-            Quantifier.EXISTS: ("∃ ", " · ", ""),
-            Quantifier.UNIQUE: ("∃! ", " · ", ""),
-        },
-        sorts={"BOOL": "𝔹", "REAL": "ℝ", "INTEGER": "ℤ", "NATURAL": "ℕ", "STRING": "String"},
-        times=" × ",
-        arrow=" → ",
-        unspecified="unspecified",
-        sequence=("⟨", "⟩"),
-        name=_same,
-        string=quote,
-        braces=lambda inner: f"{{{inner}}}",
-        tight_quantifier=False,
-    ),
-    "text": _Style(
-        words={
-            **_WORDS,
-            "==": " is ",
-            "!=": " is not ",
-            "<=": " <= ",
-            ">=": " >= ",
-            "in": " in ",
-            "!in": " not in ",
-            "->": " implies ",
-            "<=>": " if and only if ",
-            "TRUE": "true",
-            "FALSE": "false",
-            "upto": " to ",
-        },
-        quantifiers={
-            Quantifier.FORALL: ("for all ", ": ", ""),
-            Quantifier.EXISTS: ("for some ", ": ", ""),
-            Quantifier.UNIQUE: ("for exactly one ", ": ", ""),
-        },
-        sorts={"BOOL": "booleans", "REAL": "reals", "INTEGER": "integers", "NATURAL": "naturals", "STRING": "strings"},
-        times=" by ",
-        arrow=" to ",
-        unspecified="unspecified",
-        sequence=("<", ">"),
-        name=_same,
-        string=quote,
-        braces=lambda inner: f"{{{inner}}}",
-        tight_quantifier=False,
-    ),
-    "latex": _Style(
-        words={
-            **_WORDS,
-            "==": " = ",
-            "!=": r" \neq ",
-            "<=": r" \leq ",
-            ">=": r" \geq ",
-            "*": r" \cdot ",
-            "in": r" \in ",
-            "!in": r" \notin ",
-            "and": r" \land ",
-            "or": r" \lor ",
-            "not": r"\lnot ",
-            "->": r" \Rightarrow ",
-            "<=>": r" \Leftrightarrow ",
-            "upto": r" \ldots ",
-            "TRUE": r"\mathit{TRUE}",
-            "FALSE": r"\mathit{FALSE}",
-        },
-        quantifiers={
-            Quantifier.FORALL: (r"\forall ", r" \bullet ", ""),
-            Quantifier.EXISTS: (r"\exists ", r" \bullet ", ""),
-            Quantifier.UNIQUE: (r"\exists!\, ", r" \bullet ", ""),
-        },
-        sorts={
-            "BOOL": r"\mathbb{B}",
-            "REAL": r"\mathbb{R}",
-            "INTEGER": r"\mathbb{Z}",
-            "NATURAL": r"\mathbb{N}",
-            "STRING": r"\mathit{STRING}",
-        },
-        times=r" \times ",
-        arrow=r" \rightarrow ",
-        unspecified=r"\text{(unspecified)}",
-        sequence=(r"\langle ", r"\rangle "),
-        name=latex_name,
-        string=lambda value: rf"\text{{``{latex_escape(value)}''}}",
-        braces=lambda inner: rf"\{{{inner}\}}",
-        tight_quantifier=False,
-    ),
-}

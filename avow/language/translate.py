@@ -16,7 +16,7 @@ from avow.language.contract import Clause, Contract, Node, Port, Topic
 from avow.language.format import format_text
 from avow.language.latex import to_latex
 from avow.language.lexer import quote
-from avow.language.printer import StyleName, show_sort, show_term, show_type
+from avow.language.printer import show_sort, show_term, show_type
 from avow.language.sorts import (
     DataSort,
     EnumSort,
@@ -26,6 +26,7 @@ from avow.language.sorts import (
     Sort,
     TupleSort,
 )
+from avow.language.styles import StyleName
 from avow.language.terms import Term
 
 

@@ -1,0 +1,213 @@
+"""The formula checker, part two: functions and constructors applied, tuples, sets and sequences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from avow.language.check_base import count
+from avow.language.check_names import Names
+from avow.language.conversions import WHOLE, common, joined
+from avow.language.printer import show_sort
+from avow.language.sorts import (
+    INTEGER,
+    NATURAL,
+    EnumSort,
+    FunctionSort,
+    SequenceSort,
+    SetSort,
+    Sort,
+    TupleSort,
+)
+from avow.language.syntax import Tree
+from avow.language.terms import (
+    Apply,
+    Construct,
+    EnumValue,
+    Index,
+    Length,
+    SequenceRange,
+    SequenceTerm,
+    SetTerm,
+    Term,
+    TupleTerm,
+)
+
+
+class Applications(Names):
+    """Applications and collections."""
+
+    # --- applications ------------------------------------------------------------------------------------------------
+
+    def _application(self, tree: Tree, expected: Sort | None) -> Term | None:
+        head, arguments = tree.parts[0], tree.parts[1:]
+        while head.kind == "parenthesised":
+            head = head.parts[0]
+        if head.kind == "name":
+            name = head.parts[0]
+            if self.scope.taken(name) is None:
+                if name == "length":
+                    return self.length(tree, arguments)
+                if name not in self.scope.nodes:
+                    self.undeclared(name, head, "function or constructor")
+                    self.terms(arguments)
+                    return None
+            shadowed = name in self.scope.bound or name in self.scope.inputs or name in self.scope.outputs
+            if name in self.scope.environment.elements and not shadowed:
+                return self.construct(tree, name, arguments)
+        function = self.term(head)
+        if function is None:
+            self.terms(arguments)
+            return None
+        match function.sort:
+            case FunctionSort(parameters=parameters, result=result):
+                given = self.arguments(tree, arguments, parameters, self.text(head))
+                return None if given is None else Apply(function, given, result, self.span(tree))
+            case SequenceSort(item=item):
+                return self.index(tree, function, arguments, item)
+        self.terms(arguments)
+        message = f"`{self.text(head)}` is of type {show_sort(function.sort)}: it is no function and takes no arguments"
+        hint = None
+        if len(arguments) == 1:
+            hint = f"compare it: `{self.text(head)} == {self.text(arguments[0])}`"
+        self.error("RCL304", message, tree, hint=hint)
+        return None
+
+    def arguments(
+        self, tree: Tree, given: Sequence[Tree], parameters: Sequence[Sort], name: str
+    ) -> tuple[Term, ...] | None:
+        if len(given) != len(parameters):
+            self.terms(given)
+            shown = ", ".join(show_sort(p) for p in parameters)
+            wanted = count(len(parameters), "argument")
+            message = f"`{name}` takes {wanted} and is given {len(given) or 'none'}"
+            self.error("RCL305", message, tree, hint=f"its parameters are ({shown})" if parameters else None)
+            return None
+        made: list[Term | None] = []
+        for argument, parameter in zip(given, parameters, strict=True):
+            made.append(self.wanted(argument, parameter, f"this argument of `{name}`"))
+        done = tuple(m for m in made if m is not None)
+        return done if len(done) == len(made) else None
+
+    def construct(self, tree: Tree, name: str, arguments: Sequence[Tree]) -> Term | None:
+        sort = self.scope.environment.elements[name]
+        if isinstance(sort, EnumSort):
+            self.terms(arguments)
+            message = f"`{name}` is an element of {sort.name}: it is no function and takes no arguments"
+            self.error("RCL304", message, tree)
+            return None
+        given = self.arguments(tree, arguments, sort.constructor(name).parameters, name)
+        return None if given is None else Construct(name, given, sort, self.span(tree))
+
+    def index(self, tree: Tree, sequence: Term, arguments: Sequence[Tree], item: Sort) -> Term | None:
+        made = self.terms(arguments)
+        if len(made) != 1:
+            self.error("RCL305", f"a sequence takes one position and is given {len(made) or 'none'}", tree)
+            return None
+        index = made[0]
+        if index is None:
+            return None
+        if not isinstance(index.sort, WHOLE):
+            message = f"a position in a sequence is a whole number, and this is of type {show_sort(index.sort)}"
+            self.error("RCL303", message, arguments[0])
+            return None
+        return Index(sequence, index, item, self.span(tree))
+
+    def length(self, tree: Tree, arguments: Sequence[Tree]) -> Term | None:
+        made = self.terms(arguments)
+        if len(made) != 1:
+            self.error("RCL305", f"`length` takes one sequence and is given {len(made) or 'none'}", tree)
+            return None
+        if made[0] is None:
+            return None
+        if not isinstance(made[0].sort, SequenceSort):
+            message = f"`length` is of a sequence, and this is of type {show_sort(made[0].sort)}"
+            self.error("RCL303", message, arguments[0])
+            return None
+        return Length(made[0], NATURAL, self.span(tree))
+
+    # --- collections -------------------------------------------------------------------------------------------------
+
+    def _tuple(self, tree: Tree, expected: Sort | None) -> Term | None:
+        wanted: Sequence[Sort | None] = [None] * len(tree.parts)
+        if isinstance(expected, TupleSort) and len(expected.items) == len(tree.parts):
+            wanted = expected.items
+        made = [self.term(t, w) for t, w in zip(tree.parts, wanted, strict=True)]
+        items = tuple(m for m in made if m is not None)
+        if len(items) != len(made):
+            return None
+        return TupleTerm(items, TupleSort(tuple(i.sort for i in items)), self.span(tree))
+
+    def items(self, tree: Tree, what: str, expected: Sort | None) -> list[Term] | None:
+        made = [self.term(t, expected) for t in tree.parts]
+        items = [m for m in made if m is not None]
+        if len(items) != len(made):
+            return None
+        unified = common(items)
+        if unified is None:
+            at, first = next((t, i) for t, i in zip(tree.parts, items, strict=True) if common([items[0], i]) is None)
+            message = f"the items of a {what} are of one type: this is {show_sort(first.sort)}, "
+            self.error("RCL302", message + f"the first is {show_sort(items[0].sort)}", at)
+        return unified
+
+    def _sequence(self, tree: Tree, expected: Sort | None) -> Term | None:
+        item = expected.item if isinstance(expected, SequenceSort) else None
+        if not tree.parts:
+            if item is None:
+                self.error("RCL306", "the type of `<>` cannot be told here", tree, hint="compare it with a sequence")
+                return None
+            return SequenceTerm((), SequenceSort(item), self.span(tree))
+        items = self.items(tree, "sequence", item)
+        if items is None:
+            return None
+        return SequenceTerm(tuple(items), SequenceSort(joined(items)), self.span(tree))
+
+    def _range(self, tree: Tree, expected: Sort | None) -> Term | None:
+        low, high = self.term(tree.parts[0]), self.term(tree.parts[1])
+        if low is None or high is None:
+            return None
+        for part, term in zip(tree.parts, (low, high), strict=True):
+            if not isinstance(term.sort, WHOLE):
+                message = f"a range goes over whole numbers, and this is of type {show_sort(term.sort)}"
+                self.error("RCL303", message, part)
+                return None
+        sort = NATURAL if low.sort == NATURAL else INTEGER
+        return SequenceRange(low, high, SequenceSort(sort), self.span(tree))
+
+    def _set(self, tree: Tree, expected: Sort | None) -> Term | None:
+        item = expected.item if isinstance(expected, SetSort) else None
+        if not tree.parts:
+            if item is None:
+                self.error("RCL306", "the type of the empty set cannot be told here", tree)
+                return None
+            return SetTerm((), SetSort(item), self.span(tree))
+        items = self.items(tree, "set", item)
+        return None if items is None else SetTerm(tuple(items), SetSort(joined(items)), self.span(tree))
+
+    def collection(self, tree: Tree, item: Sort | None) -> Term | None:
+        """The right-hand side of ``in``, or a quantifier's domain that is no type: a set or a sequence."""
+        while tree.kind == "parenthesised":
+            tree = tree.parts[0]
+        if tree.kind == "name" and self.scope.taken(tree.parts[0]) is not None:
+            sort = self.scope.environment.sort(tree.parts[0])
+            if isinstance(sort, EnumSort) and tree.parts[0] not in self.scope.bound:
+                members = tuple(EnumValue(m, sort, self.span(tree)) for m in sort.members)
+                return SetTerm(members, SetSort(sort), self.span(tree))
+            if sort is not None and self.scope.environment.constants.get(tree.parts[0]) is None:
+                self.not_a_set(tree, show_sort(sort))
+                return None
+        if tree.kind == "builtin":
+            self.not_a_set(tree, tree.parts[0])
+            return None
+        expected: Sort | None = None
+        if item is not None:
+            expected = SetSort(item) if tree.kind == "set" else SequenceSort(item)
+        made = self.term(tree, expected)
+        if made is None or isinstance(made.sort, SetSort | SequenceSort):
+            return made
+        message = f"`in` wants a set or a sequence, and this is of type {show_sort(made.sort)}"
+        self.error("RCL307", message, tree, hint="write a set as `{a, b}`, a sequence as `<a, b>`")
+        return None
+
+    def not_a_set(self, tree: Tree, shown: str) -> None:
+        hint = "what a variable ranges over is said in its quantifier: `forall(x in REAL | …)`"
+        self.error("RCL307", f"the type {shown} is not a set of values that `in` can ask about", tree, hint=hint)

@@ -1,0 +1,89 @@
+"""What every part of the formula checker shares: reporting, and going from a tree to the method for its kind."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from avow.diagnostics import Span
+from avow.language.conversions import convert
+from avow.language.lexer import Token
+from avow.language.printer import show_sort
+from avow.language.scope import Scope
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    NATURAL,
+    FunctionSort,
+    Sort,
+)
+from avow.language.source import Reports
+from avow.language.syntax import Tree
+from avow.language.terms import (
+    Term,
+)
+
+
+class Base:
+    """A formula's scope, and where to report. The scope's `bound` variables change on the way and are as before
+    afterwards."""
+
+    def __init__(self, scope: Scope, reports: Reports) -> None:
+        self.scope = scope
+        self.reports = reports
+
+    def formula(self, tree: Tree) -> Term | None:
+        """A term of sort BOOL."""
+        term = self.term(tree, BOOL)
+        if term is None or term.sort == BOOL:
+            return term
+        shown = show_sort(term.sort)
+        hint = "compare it with something: `… == …`"
+        if isinstance(term.sort, FunctionSort) and term.sort.result == BOOL:
+            hint = f"apply it to its {len(term.sort.parameters)} argument(s)"
+        self.error("RCL301", f"this must be true or false, and it is of type {shown}", tree, hint=hint)
+        return None
+
+    def term(self, tree: Tree, expected: Sort | None = None) -> Term | None:
+        """A term of any sort; `expected` helps only where the text leaves the sort open (``<>``)."""
+        while tree.kind == "parenthesised":
+            tree = tree.parts[0]
+        return getattr(self, f"_{tree.kind}")(tree, expected)  # type: ignore[no-any-return]
+
+    def error(
+        self,
+        code: str,
+        message: str,
+        at: Tree | Token,
+        *,
+        hint: str | None = None,
+        notes: tuple[tuple[str, Span | None], ...] = (),
+    ) -> None:
+        self.reports.error(code, message, at.start, at.end, hint=hint, notes=notes)
+
+    def span(self, tree: Tree | Token) -> Span:
+        return self.reports.source.span(tree.start, tree.end)
+
+    def text(self, tree: Tree) -> str:
+        text = " ".join(self.reports.source.text[tree.start : tree.end].split())
+        return text if len(text) <= 40 else text[:39] + "…"
+
+    def terms(self, trees: Iterable[Tree]) -> list[Term | None]:
+        return [self.term(t) for t in trees]
+
+    def wanted(self, tree: Tree, sort: Sort, what: str) -> Term | None:
+        """The term, converted to the sort that its place asks for."""
+        term = self.term(tree, sort)
+        if term is None:
+            return None
+        converted = convert(term, sort)
+        if converted is None:
+            hint = None
+            if sort == NATURAL and term.sort == INTEGER:
+                hint = "it may be negative; say it the other way round, as in `exists(j in NATURAL | j + 1 == i and …)`"
+            message = f"{what} must be of type {show_sort(sort)} and is of type {show_sort(term.sort)}"
+            self.error("RCL303", message, tree, hint=hint)
+        return converted
+
+
+def count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -1,0 +1,167 @@
+"""The formula checker, part one: literals, and what names mean."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from avow.language.check_base import Base, count
+from avow.language.environment import did_you_mean
+from avow.language.lexer import unquote
+from avow.language.printer import show_sort
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    NATURAL,
+    REAL,
+    STRING,
+    EnumSort,
+    Sort,
+)
+from avow.language.syntax import Tree
+from avow.language.terms import (
+    Construct,
+    EnumValue,
+    Literal,
+    Role,
+    Term,
+    Variable,
+)
+
+BUILTINS: dict[str, Sort] = {"REAL": REAL, "INTEGER": INTEGER, "NATURAL": NATURAL, "BOOL": BOOL, "STRING": STRING}
+
+
+class Names(Base):
+    """Literals and names."""
+
+    # --- literals ----------------------------------------------------------------------------------------------------
+
+    def _number(self, tree: Tree, expected: Sort | None, sign: int = 1) -> Term:
+        text: str = tree.parts[0]
+        if "." in text:
+            return Literal(sign * Fraction(text), REAL, self.span(tree))
+        value = sign * int(text)
+        return Literal(value, NATURAL if value >= 0 else INTEGER, self.span(tree))
+
+    def _string(self, tree: Tree, expected: Sort | None) -> Term:
+        return Literal(unquote(tree.parts[0]), STRING, self.span(tree))
+
+    def _truth(self, tree: Tree, expected: Sort | None) -> Term:
+        return Literal(tree.parts[0] == "TRUE", BOOL, self.span(tree))
+
+    # --- names -------------------------------------------------------------------------------------------------------
+
+    def _builtin(self, tree: Tree, expected: Sort | None) -> None:
+        hint = "a type is declared with `:`, a constant with `=`" if not self.scope.node else None
+        self.error("RCL204", f"{tree.parts[0]} is a type, not a value", tree, hint=hint)
+
+    def _name(self, tree: Tree, expected: Sort | None) -> Term | None:
+        name: str = tree.parts[0]
+        scope, environment = self.scope, self.scope.environment
+        if name in scope.bound:
+            bound = scope.bound[name]
+            return Variable(bound.role, bound.name, bound.sort, self.span(tree))
+        candidates = [r for r in (Role.INPUT, Role.OUTPUT) if name in scope.ports(r) and r in scope.roles]
+        if len(candidates) == 2:
+            hint = f"write `in.{name}` or `out.{name}`"
+            self.error("RCL202", f"`{name}` is both an input and an output of node `{scope.node}`", tree, hint=hint)
+            return None
+        if candidates:
+            return self.port(candidates[0], name, tree)
+        if name in environment.elements:
+            return self.element(name, tree)
+        if name in environment.constants:
+            return environment.constants[name]
+        if environment.sort(name) is not None:
+            self.error("RCL204", f"`{name}` is a type, not a value", tree)
+        elif name in scope.nodes:
+            hint = f"name one of its inputs or outputs: `{name}.…`"
+            self.error("RCL204", f"`{name}` is a node, not a value", tree, hint=hint)
+        else:
+            self.undeclared(name, tree)
+        return None
+
+    def undeclared(self, name: str, tree: Tree, what: str = "name") -> None:
+        if self.scope.is_broken(name):
+            return
+        hint = did_you_mean(name, self.scope.known()) or _FOREIGN_NAMES.get(name)
+        self.error("RCL201", f"the {what} `{name}` is not declared", tree, hint=hint)
+
+    def element(self, name: str, tree: Tree) -> Term | None:
+        sort = self.scope.environment.elements[name]
+        if isinstance(sort, EnumSort):
+            return EnumValue(name, sort, self.span(tree))
+        wanted = len(sort.constructor(name).parameters)
+        if wanted:
+            shown = ", ".join(show_sort(p) for p in sort.constructor(name).parameters)
+            hint = f"write `{name}({shown})` with a term for each type"
+            self.error("RCL305", f"`{name}` needs {count(wanted, 'argument')}", tree, hint=hint)
+            return None
+        return Construct(name, (), sort, self.span(tree))
+
+    def port(self, role: Role, name: str, tree: Tree) -> Term | None:
+        port = self.scope.ports(role).get(name)
+        if port is None or role not in self.scope.roles:
+            self.no_port(role, name, tree)
+            return None
+        return Variable(role, name, port.sort, self.span(tree))
+
+    def no_port(self, role: Role, name: str, tree: Tree) -> None:
+        scope = self.scope
+        if scope.is_broken(name):
+            return
+        words = {Role.INPUT: "input", Role.OUTPUT: "output"}
+        other = Role.OUTPUT if role is Role.INPUT else Role.INPUT
+        if scope.node is None:
+            self.error(
+                "RCL203", f"no node is meant here, so `{role}.{name}` has no meaning", tree, hint="write `node.port`"
+            )
+            return
+        hint: str | None = did_you_mean(name, scope.ports(role))
+        if name in scope.ports(role):
+            self.error("RCL203", f"the {words[role]}s of a node have no place here: `{role}.{name}`", tree)
+            return
+        if name in scope.ports(other):
+            hint = f"it is an {words[other]}: write `{other}.{name}`"
+        elif scope.environment.sort(name) is not None or name in scope.environment.constants:
+            hint = f"`{name}` is declared in the context: write `{name}` alone"
+        elif name in scope.environment.elements:
+            hint = f"`{name}` is an element of a type: write `{name}` alone"
+        self.error("RCL203", f"node `{scope.node}` has no {words[role]} `{name}`", tree, hint=hint)
+
+    def _port_name(self, tree: Tree, expected: Sort | None) -> Term | None:
+        role, name = tree.parts
+        return self.port(Role(role), name, tree)
+
+    def _node_port(self, tree: Tree, expected: Sort | None) -> Term | None:
+        node_name, role_text, name = tree.parts
+        scope = self.scope
+        if not scope.nodes:
+            hint = f"write `in.{name}` or `out.{name}`: a contract speaks of its own inputs and outputs only"
+            self.error("RCL205", f"`{node_name}.{name}` has no meaning inside a node", tree, hint=hint)
+            return None
+        node = scope.nodes.get(node_name)
+        if node is None:
+            self.error("RCL206", f"there is no node `{node_name}`", tree, hint=did_you_mean(node_name, scope.nodes))
+            return None
+        roles = [Role(role_text)] if role_text else [Role.INPUT, Role.OUTPUT]
+        ports = [
+            p for p in (*node.inputs, *node.outputs) if p.name == name and p.role in roles and p.role in scope.roles
+        ]
+        if not ports:
+            near = did_you_mean(name, (p.name for p in (*node.inputs, *node.outputs)))
+            self.error("RCL203", f"node `{node_name}` has no input or output `{name}`", tree, hint=near)
+            return None
+        if len(ports) > 1:
+            hint = f"write `{node_name}.in.{name}` or `{node_name}.out.{name}`"
+            self.error("RCL202", f"`{name}` is both an input and an output of node `{node_name}`", tree, hint=hint)
+            return None
+        return Variable(ports[0].role, f"{node_name}.{name}", ports[0].sort, self.span(tree))
+
+
+_FOREIGN_NAMES = {
+    "true": "write `TRUE`",
+    "True": "write `TRUE`",
+    "false": "write `FALSE`",
+    "False": "write `FALSE`",
+    "EmptySet": "the empty set is written `{}`",
+}

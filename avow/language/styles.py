@@ -1,0 +1,220 @@
+"""How each notation writes what a term is made of: signs, words, names, and the escaping that LaTeX needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal as OneOf
+
+from avow.language.lexer import quote
+from avow.language.terms import Quantifier
+
+StyleName = OneOf["unicode", "rcl", "latex", "text"]
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    words: dict[str, str]
+    quantifiers: dict[Quantifier, tuple[str, str, str]]
+    """Before the variables, after them, and after the body."""
+    sorts: dict[str, str]
+    times: str
+    arrow: str
+    unspecified: str
+    sequence: tuple[str, str]
+    name: Callable[[str], str]
+    string: Callable[[str], str]
+    braces: Callable[[str], str]
+    tight_quantifier: bool
+    """Whether a quantifier closes itself, so that it never needs parentheses."""
+    careful: bool = False
+    """Whether `and` and `or` stand in parentheses beside `->` and `<=>`, though they need none."""
+
+
+def latex_escape(text: str) -> str:
+    """Any text as LaTeX text that every pdflatex can set; what it has no sign for is shown by its number."""
+    return "".join(_LATEX_TEXT.get(c) or (c if " " <= c <= "ÿ" and c.isprintable() else _code_point(c)) for c in text)
+
+
+def _code_point(character: str) -> str:
+    return rf"\texttt{{U+{ord(character):04X}}}"
+
+
+_LATEX_TEXT = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "%": r"\%",
+    "_": r"\_",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': r"\textquotedbl{}",
+    "\n": " ",
+    "\t": " ",
+    "\u00a0": "~",
+    "–": "--",
+    "—": "---",
+    "“": "``",
+    "”": "''",
+    "‘": "`",
+    "’": "'",
+    "…": r"\ldots{}",
+    "≤": r"$\leq$",
+    "≥": r"$\geq$",
+    "≠": r"$\neq$",
+    "→": r"$\rightarrow$",
+    "∈": r"$\in$",
+    "∀": r"$\forall$",
+    "∃": r"$\exists$",
+    "∧": r"$\land$",
+    "∨": r"$\lor$",
+}
+
+
+def latex_name(name: str) -> str:
+    """A name for mathematics mode."""
+    body = name.rstrip("'")
+    if len(body) == 1 and body.isalpha():
+        return name
+    shown = body.replace("_", r"\_").replace("'", r"\textquotesingle{}")
+    return rf"\mathit{{{shown}}}{name[len(body) :]}"
+
+
+def _same(text: str) -> str:
+    return text
+
+
+_WORDS = {
+    **{operator: f" {operator} " for operator in ("+", "-", "*", "/", "==", "!=", "<", "<=", ">", ">=", "in", "!in")},
+    **{word: f" {word} " for word in ("and", "or", "->", "<=>", "upto")},
+    "not": "not ",
+    "TRUE": "TRUE",
+    "FALSE": "FALSE",
+}
+_SORTS = {name: name for name in ("BOOL", "REAL", "INTEGER", "NATURAL", "STRING")}
+STYLES: dict[StyleName, Style] = {
+    "rcl": Style(
+        words=_WORDS,
+        quantifiers={q: (f"{q.value}(", " | ", ")") for q in Quantifier},
+        sorts=_SORTS,
+        times=" x ",
+        arrow=" --> ",
+        unspecified="{}",
+        sequence=("<", ">"),
+        name=_same,
+        string=quote,
+        braces=lambda inner: f"{{{inner}}}",
+        tight_quantifier=True,
+        careful=True,
+    ),
+    "unicode": Style(
+        words={
+            **_WORDS,
+            "==": " = ",
+            "!=": " ≠ ",
+            "<=": " ≤ ",
+            ">=": " ≥ ",
+            "in": " ∈ ",
+            "!in": " ∉ ",
+            "*": " · ",
+            "and": " ∧ ",
+            "or": " ∨ ",
+            "not": "¬",
+            "->": " → ",
+            "<=>": " ↔ ",
+            "upto": " … ",
+            "TRUE": "true",
+            "FALSE": "false",
+        },
+        quantifiers={
+            Quantifier.FORALL: ("∀ ", " · ", ""),
+            Quantifier.EXISTS: ("∃ ", " · ", ""),
+            Quantifier.UNIQUE: ("∃! ", " · ", ""),
+        },
+        sorts={"BOOL": "𝔹", "REAL": "ℝ", "INTEGER": "ℤ", "NATURAL": "ℕ", "STRING": "String"},
+        times=" × ",
+        arrow=" → ",
+        unspecified="unspecified",
+        sequence=("⟨", "⟩"),
+        name=_same,
+        string=quote,
+        braces=lambda inner: f"{{{inner}}}",
+        tight_quantifier=False,
+    ),
+    "text": Style(
+        words={
+            **_WORDS,
+            "==": " is ",
+            "!=": " is not ",
+            "<=": " <= ",
+            ">=": " >= ",
+            "in": " in ",
+            "!in": " not in ",
+            "->": " implies ",
+            "<=>": " if and only if ",
+            "TRUE": "true",
+            "FALSE": "false",
+            "upto": " to ",
+        },
+        quantifiers={
+            Quantifier.FORALL: ("for all ", ": ", ""),
+            Quantifier.EXISTS: ("for some ", ": ", ""),
+            Quantifier.UNIQUE: ("for exactly one ", ": ", ""),
+        },
+        sorts={"BOOL": "booleans", "REAL": "reals", "INTEGER": "integers", "NATURAL": "naturals", "STRING": "strings"},
+        times=" by ",
+        arrow=" to ",
+        unspecified="unspecified",
+        sequence=("<", ">"),
+        name=_same,
+        string=quote,
+        braces=lambda inner: f"{{{inner}}}",
+        tight_quantifier=False,
+    ),
+    "latex": Style(
+        words={
+            **_WORDS,
+            "==": " = ",
+            "!=": r" \neq ",
+            "<=": r" \leq ",
+            ">=": r" \geq ",
+            "*": r" \cdot ",
+            "in": r" \in ",
+            "!in": r" \notin ",
+            "and": r" \land ",
+            "or": r" \lor ",
+            "not": r"\lnot ",
+            "->": r" \Rightarrow ",
+            "<=>": r" \Leftrightarrow ",
+            "upto": r" \ldots ",
+            "TRUE": r"\mathit{TRUE}",
+            "FALSE": r"\mathit{FALSE}",
+        },
+        quantifiers={
+            Quantifier.FORALL: (r"\forall ", r" \bullet ", ""),
+            Quantifier.EXISTS: (r"\exists ", r" \bullet ", ""),
+            Quantifier.UNIQUE: (r"\exists!\, ", r" \bullet ", ""),
+        },
+        sorts={
+            "BOOL": r"\mathbb{B}",
+            "REAL": r"\mathbb{R}",
+            "INTEGER": r"\mathbb{Z}",
+            "NATURAL": r"\mathbb{N}",
+            "STRING": r"\mathit{STRING}",
+        },
+        times=r" \times ",
+        arrow=r" \rightarrow ",
+        unspecified=r"\text{(unspecified)}",
+        sequence=(r"\langle ", r"\rangle "),
+        name=latex_name,
+        string=lambda value: rf"\text{{``{latex_escape(value)}''}}",
+        braces=lambda inner: rf"\{{{inner}\}}",
+        tight_quantifier=False,
+    ),
+}
