@@ -30,8 +30,13 @@ _OPEN_AT_ONCE = 60
 _IN_FULL = 1500
 """So many obligations are shown with everything, those with something to tell first; the others in brief, so that a
 page over ten thousand is still a page that opens."""
+_ROWS = 600
+"""So many guarantees have a row of their own in the summary; beyond that a node has one."""
 _DRAWN = 2500
 """So many elements of the argument are drawn on one page; the other pictures are in gsn.svg and gsn.yaml."""
+
+
+_Matrix = list[tuple[str, str, list[tuple[ObligationView, list[Status | None]]]]]
 
 
 @cache
@@ -66,6 +71,9 @@ def environment() -> Environment:
 def render_page(case: Case) -> str:
     """The whole page. Deterministic: same case, same bytes."""
     argument = build_argument(case)
+    known, single = {view.id for view in case.obligations}, set(case.single_method)
+    matrix = _matrix(case)
+    rows = sum(len(found) for _, _, found in matrix)
     views = sorted(case.obligations, key=_reading_order(case))
     return (
         environment()
@@ -77,16 +85,17 @@ def render_page(case: Case) -> str:
             script=Markup(_asset("script.js")),
             arrows=Markup(picture.ARROWS),
             views=views,
-            known={view.id for view in case.obligations},
+            known=known,
             counts=_counts(case.obligations),
-            matrix=_matrix(case),
+            matrix=matrix if rows <= _ROWS else [],
+            condensed=_condensed(matrix) if rows > _ROWS else [],
             pictures=_pictures(case, argument),
             outline_of=_outlines(argument),
             graph=_graph(case),
             failed=[gate for gate in case.gates if not gate.passed],
             open_items=[item for item in case.open_items if not item.advice],
             advice=[item for item in case.open_items if item.advice],
-            single=[view for view in case.obligations if view.id in set(case.single_method)],
+            single=[view for view in case.obligations if view.id in single],
             justified=_justified(case),
             nodes=list(dict.fromkeys(view.obligation.node for view in views)),
             used_methods=_used_methods(case),
@@ -96,7 +105,6 @@ def render_page(case: Case) -> str:
             brief=_brief,
             kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in views)],
             open_at_once=_OPEN_AT_ONCE,
-            has_claim=lambda claim: claim in {v.id for v in case.obligations},
         )
     )
 
@@ -194,7 +202,7 @@ def _used_methods(case: Case) -> list[str]:
     return list(dict.fromkeys((*in_plan, *planned)))
 
 
-def _matrix(case: Case) -> list[tuple[str, str, list[tuple[ObligationView, list[Status | None]]]]]:
+def _matrix(case: Case) -> _Matrix:
     """Node by node: each guarantee with the status that each method gives it (None: the method is not used for it)."""
     methods = _used_methods(case)
     rows: dict[str, list[tuple[ObligationView, list[Status | None]]]] = {}
@@ -203,6 +211,16 @@ def _matrix(case: Case) -> list[tuple[str, str, list[tuple[ObligationView, list[
             rows.setdefault(view.obligation.node, []).append((view, [_cell(view, method) for method in methods]))
     levels = {node.name: node.criticality for node in case.nodes}
     return [(node, levels.get(node, ""), found) for node, found in rows.items()]
+
+
+def _condensed(matrix: _Matrix) -> list[tuple[str, str, list[list[tuple[Status, int]]]]]:
+    """A row a node where there are too many guarantees: for each method, and for all together, how many stand where."""
+    table = []
+    for node, level, rows in matrix:
+        columns = [*zip(*(cells for _, cells in rows), strict=True), [view.standing for view, _ in rows]]
+        counts = [[(s, list(column).count(s)) for s in Status if s in column] for column in columns]
+        table.append((node, level, counts))
+    return table
 
 
 def _cell(view: ObligationView, method: str) -> Status | None:
