@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from avow.calculus.derivation import Goal
+from avow.calculus.derivation import Goal, Settled, SideCondition
 from avow.calculus.discharge import Answers, Bounds, settle
 from avow.calculus.meaning import Meanings
 from avow.calculus.rules import WHOLE, derive
@@ -32,6 +33,11 @@ class Composition:
         if goal.name not in self._answers:
             self._answers[goal.name] = settle(self.frame, goal, bounds)
         return self._answers[goal.name]
+
+    def known(self, goal: Goal) -> Mapping[SideCondition, Settled]:
+        """The side conditions of a goal that have been settled; none if it was not asked for."""
+        answers = self._answers.get(goal.name)
+        return answers.settled if answers is not None else {}
 
     def machine(self, seed: int = 0) -> Machine:
         """The composed contracts as a transition system, made once. Raises CannotRun."""

@@ -60,8 +60,13 @@ def requirement_obligations(system: System) -> tuple[Obligation, ...]:
 
 def discharge(system: System, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
     """Settle obligations made by the two functions above, one outcome for each, in their order."""
-    composition = compose(system)
+    return settle_all(compose(system), obligations, limits)
+
+
+def settle_all(composition: Composition, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
+    """As `discharge`, of derivations that are made already (they remember what was settled)."""
     bounds = Bounds(int(limits.seconds * 1000), limits.seed)
+
     tasks = {task.obligation.id: task for task in (*_tasks(composition), *_requirements(composition))}
     outcomes: list[Outcome] = []
     for obligation in obligations:

@@ -1,0 +1,328 @@
+"""Derivations as the paper writes them: premises, linking equations, side conditions, a line, the conclusion.
+
+One structure (`Lines`) is printed in three ways, as text, as an HTML fragment and as LaTeX, so that they cannot differ.
+Names come from contracts and are escaped by each printer.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from avow.calculus.derivation import Derivation, Goal, Rule, Settled, SideCondition
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind
+from avow.language.styles import latex_escape
+from avow.system.graph import Edge
+from avow.verdict import Verdict
+
+MAX_NODES_WRITTEN = 40
+"""A rule over more nodes is shown in its first and last lines."""
+
+
+# -- a little mathematics ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """𝒜, 𝒢, i or o of a node: ``𝒢_navigation(o_navigation)``, a vector, or a word."""
+
+    kind: str
+    node: str
+
+
+Part = str | Symbol
+"""A piece of a line: a symbol of the calculus, or one of the connectives below as plain text."""
+
+_LATEX = {
+    "∀": r"\forall ",
+    "⇒": r"\Rightarrow ",
+    "◇": r"\lozenge ",
+    "∧": r"\land ",
+    "∪": r"\cup ",
+    "=": "=",
+    "⊆": r"\subseteq ",
+    "⊢": r"\vdash ",
+    "·": r"\cdot ",
+    "⊤": r"\top ",
+    ",": ",",
+    "(": "(",
+    ")": ")",
+    "…": r"\ldots ",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of a derivation. `remark` is in words."""
+
+    parts: tuple[Part, ...]
+    remark: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """One rule instance as it is written."""
+
+    rule: str
+    name: str
+    above: tuple[Line, ...]
+    below: tuple[Line, ...]
+    hypotheses: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A side condition in words, with the local id of the obligation that settles it."""
+
+    text: str
+    obligation: str
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A derivation, ready to be shown: the whole of it (`name` is the goal's) or one instance within it."""
+
+    name: str
+    rule: str
+    text: str
+    html: str
+    latex: str
+    conclusion: str
+    premises: tuple[str, ...]
+    """Nodes, or names of other derivations of this system."""
+    side_conditions: tuple[Condition, ...]
+    conditional: tuple[str, ...]
+    """Hypotheses of the conclusion: local ids of obligations where there are such, else words."""
+    findings: tuple[str, ...] = ()
+
+
+def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = None) -> Written:
+    """A goal's derivation with all its rule instances, innermost first."""
+    instances = [part for part in goal.root.walk() if part.rule is not Rule.PREMISE]
+    names = {id(part): f"{goal.name}.{number}" for number, part in enumerate(instances[:-1], start=1)}
+    if instances:
+        names[id(instances[-1])] = goal.name
+    written = [_lines(part, names, settled or {}) for part in instances or [goal.root]]
+    conclusion = _conclusion(goal.root)
+    conditions = tuple(
+        Condition(_condition_text(condition), f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/{goal.name}.{condition.about}")
+        for condition in goal.conditions
+    )
+    conditional: list[str] = []
+    prefix = f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}"
+    if goal.needs_persistence:
+        conditional += [f"{prefix}/{goal.name}.persistence", f"{prefix}/{goal.name}.one-output"]
+    conditional += [f"assumed: {name}" for name in goal.root.assumed]
+    return Written(
+        goal.name,
+        goal.root.rule.value,
+        "\n\n".join(map(as_text, written)),
+        "\n".join(map(as_html, written)),
+        "\n\n".join(map(as_latex, written)),
+        _plain(conclusion.parts),
+        tuple(dict.fromkeys(node for part in goal.root.walk() if part.rule is Rule.PREMISE for node in part.nodes)),
+        conditions,
+        tuple(conditional),
+        tuple(finding.message for finding in goal.findings),
+    )
+
+
+# -- lines -------------------------------------------------------------------------------------------------------------
+
+
+def _lines(part: Derivation, names: Mapping[int, str], settled: Mapping[SideCondition, Settled]) -> Lines:
+    above: list[Line] = []
+    for child in _shortened(part.children):
+        if child is None:
+            above.append(Line(("…",)))
+        elif child.rule is Rule.PREMISE:
+            above.append(_contract(child.nodes[0]))
+        else:
+            conclusion = _conclusion(child)
+            above.append(Line(conclusion.parts, f"by {child.rule} ({names.get(id(child), '')})"))
+    above += _linking(part)
+    above += _condition_lines(part, settled)
+    kept = _conclusion(part)
+    return Lines(part.rule.value, names.get(id(part), ""), tuple(above), (kept,), part.hypotheses)
+
+
+def _shortened(children: tuple[Derivation, ...]) -> Iterator[Derivation | None]:
+    if len(children) <= MAX_NODES_WRITTEN:
+        yield from children
+        return
+    yield from children[:3]
+    yield None
+    yield from children[-3:]
+
+
+def _contract(node: str) -> Line:
+    i, o = Symbol("i", node), Symbol("o", node)
+    return Line(("∀", i, ",", o, "·", *_applied("A", node), "⇒", "◇", *_applied("G", node)))
+
+
+def _applied(kind: str, node: str) -> tuple[Part, ...]:
+    return Symbol(kind, node), "(", Symbol("i" if kind == "A" else "o", node), ")"
+
+
+def _linking(part: Derivation) -> Iterator[Line]:
+    """``i_A = o_N ∪ o_R``, one line for each consumer; what the paper leaves out is remarked."""
+    by_consumer: dict[str, list[Edge]] = {}
+    for edge in part.linking:
+        by_consumer.setdefault(edge.target.node, []).append(edge)
+    for number, (consumer, edges) in enumerate(by_consumer.items()):
+        if number >= MAX_NODES_WRITTEN:
+            yield Line(("…",))
+            return
+        parts: list[Part] = [Symbol("i", consumer), "="]
+        for k, provider in enumerate(dict.fromkeys(edge.source.node for edge in edges)):
+            parts += ["∪", Symbol("o", provider)] if k else [Symbol("o", provider)]
+        outside = [text for text in part.outside if text.startswith(f"{consumer}.")]
+        remarks = [f"{edge.source} one step before" for edge in edges if edge.delayed]
+        remarks += [f"up to {text}" for text in outside]
+        yield Line(tuple(parts), "; ".join(remarks))
+
+
+def _condition_lines(part: Derivation, settled: Mapping[SideCondition, Settled]) -> Iterator[Line]:
+    """One line for each consumer, as the paper has it; which of its assumptions rests on what is remarked."""
+    consumers = tuple(dict.fromkeys(condition.consumer for condition in part.side_conditions))
+    for number, consumer in enumerate(consumers):
+        if number >= MAX_NODES_WRITTEN:
+            yield Line(("…",))
+            return
+        conditions = [condition for condition in part.side_conditions if condition.consumer == consumer]
+        parts: list[Part] = ["⊢", "("]
+        for k, provider in enumerate(dict.fromkeys(e.source.node for e in part.linking if e.target.node == consumer)):
+            parts += ["∧", *_applied("G", provider)] if k else list(_applied("G", provider))
+        parts += ["⇒", *_applied("A", consumer), ")"]
+        yield Line(tuple(parts), "; ".join(_condition_remark(c, settled.get(c)) for c in conditions))
+
+
+def _condition_remark(condition: SideCondition, settled: Settled | None) -> str:
+    if settled is None:
+        given = [*condition.providers, *(f"environment {port}" for port in condition.environment)]
+        return f"{condition.clause} from {', '.join(given) or 'the types'}"
+    if settled.verdict is not Verdict.PROVED:
+        return f"{condition.clause} {settled.verdict}"
+    needed = f"from {', '.join(settled.needed)}" if settled.needed else "by the types"
+    return f"{condition.clause} {needed}" + (": no guarantee carries it" if settled.trivial else "")
+
+
+def _condition_text(condition: SideCondition) -> str:
+    given = " ∧ ".join(f"𝒢_{provider}" for provider in condition.providers) or "⊤"
+    assumed = "".join(f" ∧ environment {port}" for port in condition.environment)
+    return f"{given}{assumed} ⇒ {condition.about}"
+
+
+def _conclusion(part: Derivation) -> Line:
+    assumed = tuple(dict.fromkeys(name.node for name in part.assumed))
+    parts: list[Part] = ["∀"]
+    for node in _few(assumed):
+        parts += [Symbol("i", node), ","]
+    for node in _few(part.guaranteed):
+        parts += [Symbol("o", node), ","]
+    parts[-1] = "·"
+    for k, node in enumerate(_few(assumed)):
+        parts += ["∧", *_applied("A", node)] if k else list(_applied("A", node))
+    if not assumed:
+        parts.append("⊤")
+    parts.append("⇒")
+    for k, node in enumerate(_few(part.guaranteed)):
+        parts += ["∧", "◇", *_applied("G", node)] if k else ["◇", *_applied("G", node)]
+    clauses = [str(name) for name in part.assumed]
+    shown = ", ".join(clauses) if len(clauses) <= 8 else f"{', '.join(clauses[:8])}, … ({len(clauses)} in all)"
+    return Line(tuple(parts), f"assuming {shown}" if clauses else "")
+
+
+def _few(nodes: tuple[str, ...]) -> tuple[str, ...]:
+    return nodes if len(nodes) <= 12 else (*nodes[:6], "…", *nodes[-2:])
+
+
+# -- printers ----------------------------------------------------------------------------------------------------------
+
+_KINDS = {"A": "𝒜", "G": "𝒢", "i": "i", "o": "o"}
+_SPACED = ("⇒", "∧", "∪", "=", "⊆")
+
+
+def _plain(parts: tuple[Part, ...]) -> str:
+    text = ""
+    for part in parts:
+        if isinstance(part, Symbol):
+            text += "…" if part.node == "…" else f"{_KINDS[part.kind]}_{part.node}"
+        elif part in _SPACED:
+            text += f" {part} "
+        elif part in (",", "·"):
+            text += ", " if part == "," else " · "
+        elif part in ("⊢", "∀"):
+            text += f"{part} "
+        else:
+            text += part
+    return text
+
+
+def as_text(lines: Lines) -> str:
+    """Unicode text for a terminal or a fixed-width font."""
+    above = [_remarked(_plain(line.parts), line.remark) for line in lines.above]
+    below = [_remarked(_plain(line.parts), line.remark) for line in lines.below]
+    width = min(100, max((len(line) for line in [*above, *below]), default=10))
+    title = f"{lines.rule} ({lines.name})" if lines.name else lines.rule
+    provided = [f"  provided that {hypothesis}" for hypothesis in lines.hypotheses]
+    return "\n".join([title, *above, "─" * width, *below, *provided])
+
+
+def as_html(lines: Lines) -> str:
+    """An HTML fragment; everything escaped."""
+
+    def shown(line: Line) -> str:
+        remark = f' <span class="remark">{html.escape(line.remark)}</span>' if line.remark else ""
+        return f"<div>{''.join(map(_html_part, line.parts))}{remark}</div>"
+
+    title = html.escape(f"{lines.rule} ({lines.name})" if lines.name else lines.rule)
+    provided = "".join(f"<div>provided that {html.escape(text)}</div>" for text in lines.hypotheses)
+    return (
+        f'<div class="rule"><div class="rule-name">{title}</div>'
+        f'<div class="premises">{"".join(map(shown, lines.above))}</div><hr>'
+        f'<div class="conclusion">{"".join(map(shown, lines.below))}</div>'
+        f'<div class="hypotheses">{provided}</div></div>'
+    )
+
+
+def as_latex(lines: Lines) -> str:
+    """An array as in the paper; needs `amsmath` and `amssymb`."""
+
+    def shown(line: Line) -> str:
+        remark = rf"\quad\text{{\footnotesize {latex_escape(line.remark)}}}" if line.remark else ""
+        return "".join(map(_latex_part, line.parts)) + remark
+
+    title = latex_escape(f"{lines.rule} ({lines.name})" if lines.name else lines.rule)
+    rows = [shown(line) for line in lines.above]
+    rows[-1:] = [rows[-1] + r" \\ \hline"] if rows else [r"\hline"]
+    body = [*(row + r" \\" for row in rows[:-1]), rows[-1], *(shown(line) + r" \\" for line in lines.below)]
+    provided = [rf"\text{{\footnotesize provided that {latex_escape(text)}}} \\" for text in lines.hypotheses]
+    array = "\n".join([r"\begin{array}{l}", *body, *provided, r"\end{array}"])
+    return f"\\textbf{{{title}}}\n\\[\n{array}\n\\]"
+
+
+def _html_part(part: Part) -> str:
+    if not isinstance(part, Symbol):
+        return html.escape(f" {part} " if part in _SPACED or part in ("⊢", "·") else part)
+    if part.node == "…":
+        return "…"
+    letter = f"<i>{part.kind}</i>" if part.kind in ("i", "o") else _KINDS[part.kind]
+    over = f'<span style="text-decoration:overline">{letter}</span>' if part.kind in ("i", "o") else letter
+    return f"{over}<sub>{html.escape(part.node)}</sub>"
+
+
+def _latex_part(part: Part) -> str:
+    if not isinstance(part, Symbol):
+        return _LATEX[part]
+    if part.node == "…":
+        return r"\ldots "
+    name = rf"\mathrm{{{latex_escape(part.node)}}}"
+    if part.kind in ("i", "o"):
+        return rf"\overline{{{part.kind}_{{{name}}}}}"
+    return rf"\mathcal{{{part.kind}}}_{{{name}}}"
+
+
+def _remarked(text: str, remark: str) -> str:
+    return f"{text}    [{remark}]" if remark else text

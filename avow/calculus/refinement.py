@@ -1,0 +1,156 @@
+"""Refinement: may one node stand in for another? Weaker assumptions, stronger guarantees.
+
+A refines B if whatever B's environment provides is enough for A, and whatever A then guarantees is what B promises:
+assumptions of B imply those of A; these and A's guarantees imply B's guarantees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from avow.calculus.discharge import Bounds
+from avow.calculus.entailment import implied
+from avow.diagnostics import Diagnostic
+from avow.language.contract import Clause, Node, Port
+from avow.language.sorts import FunctionSort, SequenceSort, Sort, TupleSort
+from avow.language.terms import Quantified, Term
+from avow.logic.formula import sort_digest, transform
+from avow.system.graph import fits
+from avow.verdict import Counterexample, Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """One clause that has to follow: an assumption of the refining node, or a guarantee of the refined one."""
+
+    node: str
+    clause: Clause
+    verdict: Verdict
+    needed: tuple[str, ...]
+    counterexample: Counterexample | None
+    reason: str
+    vacuous: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Refinement:
+    """Whether `concrete` refines `abstract`. `faults`: ports that do not fit; then nothing else is asked."""
+
+    concrete: str
+    abstract: str
+    faults: tuple[Diagnostic, ...]
+    demands: tuple[Demand, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        verdicts = {demand.verdict for demand in self.demands}
+        if self.faults or Verdict.REFUTED in verdicts:
+            return Verdict.REFUTED
+        return Verdict.UNKNOWN if verdicts - {Verdict.PROVED} else Verdict.PROVED
+
+
+def refines(concrete: Node, abstract: Node, bounds: Bounds | None = None) -> Refinement:
+    """Does the first node refine the second? Ports are matched by name; types by what they are, not by their names."""
+    bounds = bounds or Bounds()
+    faults = _ports(concrete, abstract)
+    if faults:
+        return Refinement(concrete.name, abstract.name, faults, ())
+    recast = _recasting(concrete, abstract)
+    given = {f"{abstract.name}.{a.name} (assumed)": a.formula for a in abstract.assumptions}
+    demands: list[Demand] = []
+
+    def ask(node: str, clause: Clause, goal: Term, hypotheses: dict[str, Term]) -> None:
+        answer = implied(hypotheses, goal, timeout_ms=bounds.milliseconds, seed=bounds.seed)
+        shown = answer.counterexample
+        if shown is not None:
+            shown = Counterexample(shown.values, f"{node}.{clause.name} is false")
+        demands.append(Demand(node, clause, answer.verdict, answer.needed, shown, answer.reason, answer.vacuous))
+
+    for clause in concrete.assumptions:
+        ask(concrete.name, clause, recast(clause.formula), given)
+    offered = dict(given)
+    offered |= {f"{concrete.name}.{a.name} (assumed)": recast(a.formula) for a in concrete.assumptions}
+    offered |= {f"{concrete.name}.{g.name}": recast(g.formula) for g in concrete.guarantees}
+    for clause in abstract.guarantees:
+        ask(abstract.name, clause, clause.formula, offered)
+    return Refinement(concrete.name, abstract.name, (), tuple(demands))
+
+
+def _ports(concrete: Node, abstract: Node) -> tuple[Diagnostic, ...]:
+    faults: list[Diagnostic] = []
+    inputs = {port.name: port for port in abstract.inputs}
+    outputs = {port.name: port for port in concrete.outputs}
+    for port in concrete.inputs:
+        given = inputs.get(port.name)
+        if given is None:
+            message = f"{concrete.name} wants an input {port.name!r} that {abstract.name} does not have"
+            faults.append(Diagnostic("PLAN126", message, port.span))
+        elif not _same(given.sort, port.sort):
+            faults.append(_other_type(concrete, port, abstract, given))
+    for port in abstract.outputs:
+        made = outputs.get(port.name)
+        if made is None:
+            message = f"{concrete.name} has no output {port.name!r}, which {abstract.name} gives"
+            faults.append(Diagnostic("PLAN126", message, concrete.span))
+        elif not _same(made.sort, port.sort):
+            faults.append(_other_type(concrete, made, abstract, port))
+    return tuple(faults)
+
+
+def _other_type(concrete: Node, port: Port, abstract: Node, other: Port) -> Diagnostic:
+    message = f"{port.name!r} is {port.type_name} in {concrete.name} and {other.type_name} in {abstract.name}"
+    return Diagnostic("PLAN126", message, port.span)
+
+
+def _same(given: Sort, wanted: Sort) -> bool:
+    return fits(given, wanted) or sort_digest(given) == sort_digest(wanted)
+
+
+def _recasting(concrete: Node, abstract: Node) -> Callable[[Term], Term]:
+    """Terms of one file in the sorts of the other: the same type may be declared in each, perhaps by another name."""
+    others = {port.name: port.sort for port in (*abstract.inputs, *abstract.outputs)}
+    mapping: dict[Sort, Sort] = {}
+    for port in (*concrete.inputs, *concrete.outputs):
+        if port.name in others:
+            _match(port.sort, others[port.name], mapping)
+    if all(old == new for old, new in mapping.items()):
+        return lambda term: term
+
+    def change(term: Term) -> Term:
+        changes: dict[str, Any] = {"sort": _mapped(term.sort, mapping)}
+        if isinstance(term, Quantified):
+            changes["variables"] = tuple(replace(v, sort=_mapped(v.sort, mapping)) for v in term.variables)
+        return replace(term, **changes)
+
+    return lambda term: transform(term, change)
+
+
+def _match(one: Sort, other: Sort, mapping: dict[Sort, Sort]) -> None:
+    if one == other or sort_digest(one) != sort_digest(other):
+        return
+    match one, other:
+        case FunctionSort(), FunctionSort():
+            for a, b in zip((*one.parameters, one.result), (*other.parameters, other.result), strict=True):
+                _match(a, b, mapping)
+        case TupleSort(), TupleSort():
+            for a, b in zip(one.items, other.items, strict=True):
+                _match(a, b, mapping)
+        case SequenceSort(), SequenceSort():
+            _match(one.item, other.item, mapping)
+    mapping[one] = other
+
+
+def _mapped(sort: Sort, mapping: dict[Sort, Sort]) -> Sort:
+    if sort in mapping:
+        return mapping[sort]
+    match sort:
+        case FunctionSort():
+            return FunctionSort(tuple(_mapped(p, mapping) for p in sort.parameters), _mapped(sort.result, mapping))
+        case TupleSort():
+            return TupleSort(tuple(_mapped(item, mapping) for item in sort.items))
+        case SequenceSort():
+            return SequenceSort(_mapped(sort.item, mapping))
+        case _:
+            return sort

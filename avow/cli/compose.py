@@ -1,0 +1,179 @@
+"""``avow compose``: the derivation of a system's properties and its side conditions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from avow.calculus.composition import Composition
+    from avow.calculus.derivation import Goal
+    from avow.evidence.obligation import Obligation
+    from avow.verdict import Outcome
+
+
+@click.command()
+@click.argument("path", type=click.Path(path_type=Path))
+@click.option("--goal", "goals", multiple=True, metavar="NAME", help="Only this derivation (may be repeated).")
+@click.option("--json", "as_json", is_flag=True, help="For machines: see docs/schemas/compose.schema.json.")
+@click.option("--latex", "as_latex", is_flag=True, help="The derivations as LaTeX, nothing else.")
+@click.option("--rcl", "as_rcl", is_flag=True, help="The derived system-level contract as RCL, nothing else.")
+@click.option("--graph", "as_graph", is_flag=True, help="The dataflow graph as text, nothing else.")
+@click.option("--seconds", default=10.0, show_default=True, help="Time for one question to the solver.")
+@click.option("--seed", default=0, show_default=True, help="The solver's seed.")
+def command(
+    path: Path,
+    goals: tuple[str, ...],
+    as_json: bool,
+    as_latex: bool,
+    as_rcl: bool,
+    as_graph: bool,
+    seconds: float,
+    seed: int,
+) -> int:
+    """Combine the contracts of a system's nodes by the rules R1-R4, and discharge the side conditions.
+
+    PATH is a system's folder, its name in this workspace, or an .rcl file (without a plan, names link). Code 1 where a
+    side condition is refuted or a loop cannot start, 2 for bad input.
+    """
+    from avow.calculus.composition import compose
+    from avow.calculus.obligations import composition_obligations, settle_all
+    from avow.cli.workspace import system_folder
+    from avow.diagnostics import Diagnostic, Rejected
+    from avow.system.load import load_path
+    from avow.verdict import Verdict
+
+    if seconds <= 0:
+        raise Rejected(Diagnostic("CLI004", f"--seconds {seconds}: a time above 0 is wanted"))
+    system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
+    composition = compose(system)
+    errors = [finding for finding in composition.frame.graph.findings if finding.is_error]
+    if errors:
+        raise Rejected(*errors)
+    known = [goal.name for goal in composition.goals]
+    if unknown := [name for name in goals if name not in known]:
+        hint = f"known: {', '.join(known)}"
+        raise Rejected(Diagnostic("CLI005", f"there is no derivation '{unknown[0]}'", hint=hint))
+
+    chosen = [goal for goal in composition.goals if not goals or goal.name in goals]
+    if as_graph:
+        from avow.system.picture import text
+
+        click.echo(text(composition.frame.graph))
+        return 0
+    if as_latex:
+        from avow.calculus.notation import write_goal
+
+        click.echo("\n\n".join(write_goal(goal).latex for goal in chosen))
+        return 0
+    if as_rcl:
+        from avow.calculus.export import derived_contract
+        from avow.language.translate import to_rcl
+
+        goal = chosen[-1] if goals else composition.whole
+        click.echo(to_rcl(derived_contract(composition, goal)), nl=False)
+        return 0
+    obligations = [o for o in composition_obligations(system) if not goals or o.name.split(".")[0] in goals]
+    limits = _Limits(seconds, seed)
+    outcomes = settle_all(composition, obligations, limits)
+    if as_json:
+        click.echo(json.dumps(to_json(composition, chosen, obligations, outcomes), indent=1, ensure_ascii=False))
+    else:
+        _listing(composition, chosen, obligations, outcomes)
+    return 1 if any(outcome.verdict is Verdict.REFUTED for outcome in outcomes) else 0
+
+
+class _Limits:
+    def __init__(self, seconds: float, seed: int) -> None:
+        self.seconds = seconds
+        self.seed = seed
+
+
+def to_json(
+    composition: Composition, goals: list[Goal], obligations: list[Obligation], outcomes: tuple[Outcome, ...]
+) -> dict[str, Any]:
+    """As docs/schemas/compose.schema.json describes it."""
+    from avow.calculus.notation import write_goal
+
+    written = [write_goal(goal, composition.known(goal)) for goal in goals]
+    graph = composition.frame.graph
+    return {
+        "system": composition.frame.system.name,
+        "graph": {
+            "nodes": list(graph.nodes),
+            "edges": [
+                {"from": str(e.source), "to": str(e.target), "delayed": e.delayed, "declared": e.declared}
+                for e in graph.edges
+            ],
+            "environment": [str(endpoint) for endpoint in graph.environment],
+            "dangling": [str(endpoint) for endpoint in graph.dangling],
+            "findings": [{"code": f.code, "severity": str(f.severity), "message": f.message} for f in graph.findings],
+        },
+        "derivations": [
+            {
+                "name": w.name,
+                "rule": w.rule,
+                "text": w.text,
+                "latex": w.latex,
+                "conclusion": w.conclusion,
+                "premises": list(w.premises),
+                "side_conditions": [{"text": c.text, "obligation": c.obligation} for c in w.side_conditions],
+                "conditional": list(w.conditional),
+                "findings": list(w.findings),
+            }
+            for w in written
+        ],
+        "obligations": [
+            {
+                "id": obligation.local_id,
+                "claim": obligation.claim,
+                "formula": obligation.formula,
+                "digest": obligation.digest,
+                "verdict": str(outcome.verdict),
+                "summary": outcome.summary,
+                "vacuous": outcome.vacuous,
+                "hypotheses": list(outcome.hypotheses),
+                "counterexample": dict(outcome.counterexample.values) if outcome.counterexample else None,
+                "details": outcome.details,
+            }
+            for obligation, outcome in zip(obligations, outcomes, strict=True)
+        ],
+    }
+
+
+_COLOURS = {"proved": "green", "justified": "cyan", "unknown": "yellow", "refuted": "red"}
+
+
+def _listing(
+    composition: Composition, goals: list[Goal], obligations: list[Obligation], outcomes: tuple[Outcome, ...]
+) -> None:
+    from rich.console import Console
+    from rich.padding import Padding
+    from rich.text import Text
+
+    from avow.calculus.notation import write_goal
+    from avow.rendering import render
+
+    console = Console(highlight=False)
+    findings = [*composition.frame.graph.findings, *(f for goal in goals for f in goal.findings)]
+    if findings:
+        click.echo(render(findings), err=True)
+    for goal in goals:
+        # Text, not markup: names come from the contract.
+        console.print(Text(write_goal(goal, composition.known(goal)).text), soft_wrap=True)
+        console.print()
+    for obligation, outcome in zip(obligations, outcomes, strict=True):
+        line = Text.assemble((f"{outcome.verdict:9}", _COLOURS.get(str(outcome.verdict), "")), f" {obligation.name}")
+        line.append(f": {outcome.summary}")
+        if outcome.vacuous:
+            line.append(" (vacuous)", style="yellow")
+        console.print(line)
+        if outcome.counterexample is not None and outcome.counterexample.values:
+            console.print(Padding(Text(outcome.counterexample.text()), (0, 0, 0, 10)))
+    counts: dict[str, int] = {}
+    for outcome in outcomes:
+        counts[str(outcome.verdict)] = counts.get(str(outcome.verdict), 0) + 1
+    console.print(", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items())) or "nothing to show")

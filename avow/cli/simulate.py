@@ -1,0 +1,61 @@
+"""``avow simulate``: a run of the composed contracts over the plan's scenario."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("system")
+@click.option("--seed", default=0, show_default=True, help="Another seed, another run; the same seed, the same run.")
+@click.option("--steps", type=click.IntRange(1, 100_000), help="How many steps; by default the plan's, or 20.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a step (JSON lines).")
+@click.option("--all", "everything", is_flag=True, help="Show also inputs that never change.")
+def command(system: str, seed: int, steps: int | None, as_json: bool, everything: bool) -> int:
+    """Run the contracts: the environment gives values of the plan's scenario, each node answers with any output that
+    meets its guarantees. SYSTEM is a folder or a name in this workspace.
+
+    Code 1 where the system gets stuck: a node has no answer that its contract allows. Code 2 without a usable scenario.
+    """
+    from random import Random
+
+    from avow.calculus.scenario import CannotRun, world
+    from avow.calculus.transition import Machine
+    from avow.calculus.variables import frame
+    from avow.cli.workspace import system_folder
+    from avow.diagnostics import Diagnostic, Rejected
+    from avow.logic.values import show
+    from avow.system.load import load_path
+
+    path = Path(system)
+    loaded = load_path(path if path.suffix == ".rcl" else system_folder(system))
+    try:
+        machine = Machine(world(frame(loaded)), seed)
+        scenario = loaded.plan.scenario
+        length = steps or (scenario.steps if scenario else None) or 20
+        walk = machine.walk(Random(seed), length)
+    except CannotRun as reason:
+        raise Rejected(Diagnostic("CLI006", f"{loaded.name} cannot be run: {reason}")) from None
+    given = [values for choices in machine.environment.values() for values in choices]
+    fixed = {name for name in given[0] if all(values[name] == given[0][name] for values in given)}
+    names = [name for name in given[0] if everything or name not in fixed]
+    names += [f"{node}.{port.name}" for node in machine.order for port in loaded.contract.node(node).outputs]
+    for number, step in enumerate(walk.steps, start=1):
+        values = {name: show(step.values[name]) for name in names}
+        if as_json:
+            click.echo(json.dumps({"step": number, "values": values, "broken": list(step.broken)}, ensure_ascii=False))
+            continue
+        click.echo(f"step {number}")
+        width = max(map(len, values))
+        for name, value in values.items():
+            click.echo(f"  {name:{width}}  {value}")
+        for clause in step.broken:
+            click.echo(f"  the assumption {clause} does not hold")
+    if walk.stuck is not None:
+        told = walk.stuck.text()
+        click.echo(json.dumps({"stuck": told}, ensure_ascii=False) if as_json else f"stuck: {told}")
+        return 1
+    return 0
