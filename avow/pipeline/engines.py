@@ -10,12 +10,14 @@ from avow.language.contract import Node
 from avow.system.plan import System
 
 
-def discharge_sanity(node: Node, obligations: Sequence[Obligation], limits: Limits) -> Report:
+def discharge_sanity(system: System, node: Node, obligations: Sequence[Obligation], limits: Limits) -> Report:
     """Settle sanity claims of one node by the solver."""
+    from avow.calculus.interpretation import interpretation
     from avow.logic.sanity import Bounds, outcomes
     from avow.logic.smt import z3_version
 
-    found = outcomes(node, {o.id: o.name for o in obligations}, bounds=Bounds(seed=limits.seed))
+    given = interpretation(node, system.plan.scenario)
+    found = outcomes(node, {o.id: o.name for o in obligations}, scenario=given, bounds=Bounds(seed=limits.seed))
     return Report(found, "z3", z3_version())
 
 

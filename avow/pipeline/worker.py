@@ -123,7 +123,7 @@ def _execute(request: dict[str, Any]) -> Report:
             node = system.contract.node(request["node"])
             work = sanity_work(system, node)
             claims = tuple(o for o in work.obligations if o.id in wanted)
-            return discharge_sanity(node, claims, limits)
+            return discharge_sanity(system, node, claims, limits)
         case "compose":
             from avow.pipeline.engines import discharge_composition
             from avow.pipeline.work import compose_work
