@@ -2,15 +2,35 @@
 
 from __future__ import annotations
 
-from avow.assurance.model import Derivation
+from avow.assurance.model import Derivation, SideCondition
+from avow.calculus.composition import compose
+from avow.calculus.notation import Written, write_goal
+from avow.system.graph import dataflow
+from avow.system.picture import svg
 from avow.system.plan import System
 
 
 def derivation_views(system: System) -> tuple[Derivation, ...]:
-    """One for each goal of the plan, and the whole system's."""
-    return ()
+    """One for each goal of the plan, the whole system's last; with the rule instances that they are made of."""
+    return tuple(_view(system, write_goal(goal)) for goal in compose(system).goals)
 
 
 def graph_svg(system: System) -> str:
     """The dataflow picture."""
-    return ""
+    return svg(dataflow(system))
+
+
+def _view(system: System, written: Written) -> Derivation:
+    return Derivation(
+        written.name,
+        written.rule,
+        written.text,
+        written.conclusion,
+        written.premises,
+        tuple(
+            SideCondition(c.text, f"{system.name}/{c.obligation}" if c.obligation else "")
+            for c in written.side_conditions
+        ),
+        written.latex,
+        written.conditional,
+    )
