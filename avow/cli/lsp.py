@@ -12,9 +12,10 @@ def command() -> int:
 
     try:
         from avow.lsp.server import serve
+        from avow.lsp.standing import standing
     except ImportError:
         raise Rejected(
             Diagnostic("CLI010", "the language server needs pygls", hint="pip install 'avow[lsp]'")
         ) from None
-    serve()
+    serve(standing)
     return 0

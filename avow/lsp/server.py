@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +32,12 @@ _KINDS = {
 }
 
 
-def make_server(status: StatusLookup = lambda node, clause: None) -> LanguageServer:
-    """A server with every answer registered; `status` says how a clause of a node stands in the ledger."""
+def _nothing(file: str) -> StatusLookup:
+    return lambda node, clause: None
+
+
+def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageServer:
+    """A server with every answer registered; `status` gives, for a file, how the clauses in it stand in the ledger."""
     server = LanguageServer("avow", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Full)
     documents: dict[str, Document] = {}
 
@@ -66,7 +71,7 @@ def make_server(status: StatusLookup = lambda node, clause: None) -> LanguageSer
 
     def hover(params: types.HoverParams) -> types.Hover | None:
         document = current(params.text_document.uri)
-        said = answers.hover(document, _offset(document.text, params.position), status)
+        said = answers.hover(document, _offset(document.text, params.position), status(document.file))
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, said)) if said else None
 
     def definition(params: types.DefinitionParams) -> types.Location | None:
@@ -108,7 +113,7 @@ def make_server(status: StatusLookup = lambda node, clause: None) -> LanguageSer
     return server
 
 
-def serve(status: StatusLookup = lambda node, clause: None) -> None:
+def serve(status: Callable[[str], StatusLookup] = _nothing) -> None:
     """Run on standard input and output until the editor leaves."""
     make_server(status).start_io()
 

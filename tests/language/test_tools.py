@@ -208,6 +208,30 @@ def test_answers_while_typing() -> None:
             definition(document, offset)
 
 
+def test_standing_of_a_guarantee(workspace: Path) -> None:
+    """Hovering shows each method's latest verdict from the ledger, and nothing where there is none."""
+    from avow.evidence.ledger import Ledger
+    from avow.evidence.record import Evidence
+    from avow.lsp.standing import standing
+    from avow.verdict import Link, Verdict
+    from avow.workspace import Workspace
+
+    folder = workspace / "contracts" / "s"
+    folder.mkdir(parents=True)
+    assert standing(str(folder / "f.rcl"))("n", "fine") is None
+    ledger = Ledger(Workspace(workspace).ledger("s"))
+    for verdict in (Verdict.REFUTED, Verdict.PROVED):
+        ledger.append(
+            Evidence(
+                *("s/n/guarantee/fine", "d", "k", "dafny", "dafny", "dafny", "2", (), verdict, Verdict.PROVED),
+                *(Link.GENERATED, "", "2026-11-21T10:00:00Z", 1.0),
+            )
+        )
+    assert standing(str(folder / "f.rcl"))("n", "fine") == "last time: proved by dafny (2026-11-21 10:00)"
+    assert standing(str(folder / "f.rcl"))("n", "other") is None
+    assert standing(str(workspace / "f.rcl"))("n", "fine") is None
+
+
 def test_server_speaks_the_protocol(tmp_path: Path) -> None:
     pytest.importorskip("pygls")
     path = tmp_path / "f.rcl"
