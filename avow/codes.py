@@ -158,7 +158,7 @@ _NAMES = (
     Code(
         "RCL202",
         "input or output?",
-        "A bare name is allowed where exactly one of input and output has it.",
+        "A bare name is allowed where exactly one thing has it: an input or an output, an element or a constant.",
         _node("b : BOOL", clauses="guarantee(b)"),
     ),
     Code(
@@ -216,6 +216,12 @@ _NAMES = (
         _node(topics="bool t matches(out.c)"),
     ),
     Code("RCL219", "node declared twice", "Nodes have different names.", _node() + _node()),
+    Code(
+        "RCL220",
+        "quantified constant",
+        "A constant is a value; quantified formulas stand in clauses.",
+        "context { C = (exists(x in REAL | x > 0)); }",
+    ),
 )
 
 _SORTS = (

@@ -45,9 +45,9 @@ def command(
         files += len(group)
         found.extend(check_paths(group, off=group_off | frozenset(off))[1])
     if as_json:
-        click.echo(json.dumps(to_json(found), indent=1, ensure_ascii=False))
+        click.echo(json.dumps(to_json(found), indent=1))
     elif sarif:
-        click.echo(json.dumps(to_sarif(found, version=__version__), indent=1, ensure_ascii=False))
+        click.echo(json.dumps(to_sarif(found, version=__version__), indent=1))
     else:
         tint = sys.stdout.isatty() if colour is None else colour
         if found:

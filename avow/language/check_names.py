@@ -65,6 +65,15 @@ class Names(Base):
             hint = f"write `in.{name}` or `out.{name}`"
             self.error("RCL202", f"`{name}` is both an input and an output of node `{scope.node}`", tree, hint=hint)
             return None
+        if candidates and (name in environment.elements or name in environment.constants):
+            what = "an element of a type" if name in environment.elements else "a constant"
+            port = f"{candidates[0]}.{name}"
+            message = (
+                f"`{name}` is {what}, and an {'in' if candidates[0] is Role.INPUT else 'out'}put of node `{scope.node}`"
+            )
+            hint = f"write `{port}` for that; to speak of the other, rename one of them"
+            self.error("RCL202", message, tree, hint=hint)
+            return None
         if candidates:
             return self.port(candidates[0], name, tree)
         if name in environment.elements:

@@ -28,7 +28,7 @@ from avow.language.sorts import (
 )
 from avow.language.source import Reports
 from avow.language.syntax import Tree
-from avow.language.terms import EnumValue, SetTerm
+from avow.language.terms import EnumValue, Quantified, SetTerm, Term, children
 
 _FOREIGN_TYPES = {
     **dict.fromkeys(("string", "str"), "STRING"),
@@ -132,6 +132,10 @@ class Declarations:
             environment.constants[name] = SetTerm(tuple(EnumValue(m, sort) for m in sort.members), SetSort(sort), span)
             return
         term = Checker(Scope(environment), declared.reports).term(value)
+        if term is not None and _has_quantifier(term):
+            message = "a constant is a value: no quantifier stands in it"
+            declared.reports.error("RCL220", message, value.start, value.end, hint="write the formula where it is used")
+            term = None
         if term is None:
             environment.broken.add(name)
         else:
@@ -310,6 +314,16 @@ def _shape(tree: Tree | Token | str) -> object:
     if isinstance(tree, Tree):
         return tree.kind, tuple(_shape(p) for p in tree.parts)
     return tree.text if isinstance(tree, Token) else tree
+
+
+def _has_quantifier(term: Term) -> bool:
+    stack = [term]
+    while stack:
+        part = stack.pop()
+        if isinstance(part, Quantified):
+            return True
+        stack.extend(children(part))
+    return False
 
 
 def _elements(tree: Tree) -> set[str]:

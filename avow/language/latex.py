@@ -21,6 +21,7 @@ _HEAD = r"""\documentclass[a4paper]{article}
 \usepackage{longtable}
 \usepackage[margin=2cm]{geometry}
 \setlength{\parindent}{0pt}
+\setlength{\extrarowheight}{2pt}
 \begin{document}
 """
 _TABLE = r"""

@@ -212,6 +212,15 @@ def test_nesting_up_to_the_limit_works() -> None:
         assert errors(FRAME % text) == []
 
 
+def test_a_name_with_two_meanings_is_not_guessed() -> None:
+    text = (
+        "context {{ C : {{go, stop}}; L = 3; }} node n {{ inputs(go : BOOL, L : REAL) outputs(c : C) topics() G({}) }}"
+    )
+    assert any("RCL202 `go` is an element of a type, and an input" in e for e in errors(text.format("c == go")))
+    assert any("RCL202 `L` is a constant, and an input" in e for e in errors(text.format("L > 1")))
+    assert errors(text.format("in.go -> c == stop and in.L > 1")) == []
+
+
 def test_circles_among_constants_and_types() -> None:
     assert any("RCL212" in e for e in errors("context { A = B + 1; B = A + 1; }"))
     assert any("RCL212" in e for e in errors("context { A : B; B : A; }"))
