@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from html import escape
+from itertools import pairwise
 
 from avow.system.graph import Edge, Graph, components
 
 _WIDTH, _HEIGHT = 150, 46
 _GAP_X, _GAP_Y = 110, 34
 _MARGIN = 30
+_LANE = 26
+_FONT = 'role="img" font-family="sans-serif" font-size="13"'
 _ARROWHEAD = (
     '<defs><marker id="arrow" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
     '<path d="M0,0 L8,4 L0,8 z" fill="#444"/></marker></defs>'
@@ -19,28 +23,94 @@ MAX_DRAWN = 200
 
 
 def svg(graph: Graph) -> str:
-    """The graph as SVG. Delayed edges are dashed; inputs from the environment stand at the left, in italics."""
+    """The graph as SVG. Delayed edges are dashed; inputs from the environment are in italics, before who reads them."""
     if len(graph.nodes) > MAX_DRAWN:
         return _message(f"{len(graph.nodes)} nodes, {len(graph.edges)} edges: too many to draw")
-    outside = tuple(dict.fromkeys(endpoint.port for endpoint in graph.environment))
-    layers = _layers(graph)
-    sources = [f"in.{port}" for port in outside]
-    columns = ([sources] if sources else []) + layers
+    columns, links = _columns(graph)
     place = _places(columns)
-    height = max((len(column) for column in columns), default=1) * (_HEIGHT + _GAP_Y) + 2 * _MARGIN
+    bottom = max((y for _, y in place.values()), default=0) + _HEIGHT
+    backward = [link for link in links if len(link.through) == 0 and place[link.source][0] >= place[link.target][0]]
+    height = bottom + _MARGIN + (_LANE * (len(backward) + 1) if backward else 0)
     width = len(columns) * (_WIDTH + _GAP_X) - _GAP_X + 2 * _MARGIN
-    below = _lanes(graph, place, layers)
-    box = f'viewBox="0 0 {width} {height + below}"'
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" {box} role="img" font-family="sans-serif" font-size="13">',
-        f"<title>{escape(_summary(graph))}</title>",
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" {_FONT}>',
+        f"<title>{escape(f'{len(graph.nodes)} nodes, {len(graph.edges)} edges')}</title>",
         _ARROWHEAD,
     ]
-    for number, ((source, target), labels, delayed) in enumerate(_links(graph, sources)):
-        parts.append(_arrow(place[source], place[target], labels, delayed, height, number, source == target))
-    for name, (x, y) in place.items():
-        parts.append(_box(name, x, y, environment=name in sources and name not in graph.nodes))
+    lane = 0
+    for link in links:
+        if link in backward:
+            lane += 1
+            parts.append(_back(link, place, bottom + _LANE * lane))
+        else:
+            parts.append(_forward(link, place))
+    parts += [_box(name, *place[name]) for name in graph.nodes]
+    inputs = [name for column in columns for name in column if name.startswith(_INPUT)]
+    parts += [_word(name.split(_GAP)[-1], *place[name]) for name in inputs]
+
     return "\n".join([*parts, "</svg>"])
+
+
+@dataclass(frozen=True, slots=True)
+class _Link:
+    """Edges between the same two nodes, drawn as one line; `through` are the gaps between boxes that it takes."""
+
+    source: str
+    target: str
+    labels: tuple[str, ...]
+    delayed: bool
+    through: tuple[str, ...] = ()
+
+
+_INPUT = "in\0"
+_GAP = "\0"
+
+
+def _columns(graph: Graph) -> tuple[list[list[str]], list[_Link]]:
+    """What stands in each column, and the lines; a line over several columns keeps a gap free in each between."""
+    layers = _layers(graph)
+    columns: list[list[str]] = [[], *(list(layer) for layer in layers)]
+    level = {name: k + 1 for k, layer in enumerate(layers) for name in layer}
+    labels: dict[tuple[str, str, bool], dict[str, None]] = {}
+    for edge in graph.edges:
+        labels.setdefault((edge.source.node, edge.target.node, edge.delayed), {})[edge.source.port] = None
+    links = [_Link(source, target, tuple(found), delayed) for (source, target, delayed), found in labels.items()]
+    inputs: dict[str, list[str]] = {}
+    for endpoint in graph.environment:
+        inputs.setdefault(endpoint.node, []).append(endpoint.port)
+    for node, ports in inputs.items():
+        # one word for all that a node reads from outside, beside it: a shared one would draw lines across everything
+        name = f"{_INPUT}{node}{_GAP}{', '.join(ports)}"
+        level[name] = level[node] - 1
+        columns[level[name]].append(name)
+        links.append(_Link(name, node, (), False))
+
+    routed: list[_Link] = []
+    for number, link in enumerate(links):
+        gaps = tuple(f"{_GAP}{number}.{k}" for k in range(level[link.source] + 1, level[link.target]))
+        for gap, k in zip(gaps, range(level[link.source] + 1, level[link.target]), strict=True):
+            columns[k].append(gap)
+        routed.append(replace(link, through=gaps))
+    if not columns[0]:
+        columns = columns[1:]
+    return _ordered(columns, routed), routed
+
+
+def _ordered(columns: list[list[str]], links: Sequence[_Link]) -> list[list[str]]:
+    """Each column in the order in which its members are reached from the column before: fewer crossings."""
+    before: dict[str, list[str]] = {}
+    for link in links:
+        for one, other in pairwise((link.source, *link.through, link.target)):
+            before.setdefault(other, []).append(one)
+    row: dict[str, float] = {}
+    for column in columns:
+        column.sort(key=lambda name: _middle([row[p] for p in before.get(name, ()) if p in row]))
+        row.update({name: k - len(column) / 2 for k, name in enumerate(column)})
+    return columns
+
+
+def _middle(rows: Sequence[float]) -> float:
+    return sum(rows) / len(rows) if rows else 0.0
 
 
 def text(graph: Graph) -> str:
@@ -88,72 +158,54 @@ def _places(columns: Sequence[Sequence[str]]) -> dict[str, tuple[int, int]]:
     return place
 
 
-def _links(graph: Graph, sources: Sequence[str]) -> list[tuple[tuple[str, str], list[str], bool]]:
-    """Edges between the same two nodes are drawn as one."""
-    found: dict[tuple[str, str, bool], list[str]] = {}
-    for edge in graph.edges:
-        labels = found.setdefault((edge.source.node, edge.target.node, edge.delayed), [])
-        if edge.source.port not in labels:
-            labels.append(edge.source.port)
-    links = [((source, target), labels, delayed) for (source, target, delayed), labels in found.items()]
-    known = set(sources)
-    links += [((f"in.{e.port}", e.node), [], False) for e in graph.environment if f"in.{e.port}" in known]
-    return links
-
-
-def _lanes(graph: Graph, place: Mapping[str, tuple[int, int]], layers: Sequence[Sequence[str]]) -> int:
-    """Room below the boxes for edges that run back."""
-    backward = sum(place[e.source.node][0] >= place[e.target.node][0] for e in graph.edges)
-    return 16 * min(backward, 40) + (20 if backward else 0)
-
-
-def _arrow(
-    start: tuple[int, int],
-    end: tuple[int, int],
-    labels: Sequence[str],
-    delayed: bool,
-    bottom: int,
-    number: int,
-    itself: bool,
-) -> str:
-    dash = ' stroke-dasharray="6 4"' if delayed else ""
-    y1, y2 = start[1] + _HEIGHT // 2, end[1] + _HEIGHT // 2
-    if end[0] > start[0]:
-        x1, x2 = start[0] + _WIDTH, end[0]
+def _forward(link: _Link, place: Mapping[str, tuple[int, int]]) -> str:
+    points = [(place[link.source][0] + _WIDTH, place[link.source][1] + _HEIGHT // 2)]
+    for gap in link.through:
+        x, y = place[gap]
+        points += [(x, y + _HEIGHT // 2), (x + _WIDTH, y + _HEIGHT // 2)]
+    points.append((place[link.target][0], place[link.target][1] + _HEIGHT // 2))
+    path = f"M{points[0][0]},{points[0][1]}"
+    for (x1, y1), (x2, y2) in pairwise(points):
         middle = (x1 + x2) // 2
-        path = f"M{x1},{y1} C{middle},{y1} {middle},{y2} {x2},{y2}"
-        label = (middle, (y1 + y2) // 2 - 5)
-    else:
-        lane = bottom + 14 * (number % 40)
-        x1, x2 = start[0] + _WIDTH // 2 + (20 if itself else 0), end[0] + _WIDTH // 2 - 20
-        path = f"M{x1},{start[1] + _HEIGHT} C{x1},{lane} {x2},{lane} {x2},{end[1] + _HEIGHT}"
-        label = ((x1 + x2) // 2, (3 * lane + max(start[1], end[1]) + _HEIGHT) // 4 - 4)
+        path += f" C{middle},{y1} {middle},{y2} {x2},{y2}"
+    (x1, y1), (x2, y2) = points[0], points[1]
+    if link.through:  # a long line has room for its words above its level part
+        (x1, y1), (x2, y2) = points[1], points[2]
+    return _line(path, link, ((x1 + x2) // 2, (y1 + y2) // 2 - 5))
+
+
+def _back(link: _Link, place: Mapping[str, tuple[int, int]], lane: int) -> str:
+    """A line that runs back, below all boxes."""
+    start, end = place[link.source], place[link.target]
+    itself = link.source == link.target
+    x1, x2 = start[0] + _WIDTH // 2 + 24, end[0] + _WIDTH // 2 - 24
+    path = f"M{x1},{start[1] + _HEIGHT} C{x1},{lane} {x1},{lane} {x1 - 24},{lane} L{x2 + 24},{lane} "
+    path += f"C{x2},{lane} {x2},{lane} {x2},{end[1] + _HEIGHT}"
+    return _line(path, link, ((x1 + x2) // 2, lane - 4 if not itself else lane + 12))
+
+
+def _line(path: str, link: _Link, label: tuple[int, int]) -> str:
+    dash = ' stroke-dasharray="6 4"' if link.delayed else ""
     drawn = f'<path d="{path}" fill="none" stroke="#444"{dash} marker-end="url(#arrow)"/>'
-    if not labels:
+    if not link.labels:
         return drawn
-    words = escape(", ".join(labels))
+    words = escape(", ".join(link.labels))
     return drawn + f'<text x="{label[0]}" y="{label[1]}" text-anchor="middle" font-size="11" fill="#222">{words}</text>'
 
 
-def _box(name: str, x: int, y: int, *, environment: bool) -> str:
-    shown = name[3:] if environment else name
-    if len(shown) > 20:
-        shown = shown[:19] + "…"
-    if environment:
-        style = 'fill="none" stroke="none"'
-        font = ' font-style="italic"'
-    else:
-        style = 'fill="#eef3fa" stroke="#335" rx="6"'
-        font = ""
+def _box(name: str, x: int, y: int) -> str:
+    shown = name if len(name) <= 20 else f"{name[:19]}…"
     middle = f'x="{x + _WIDTH // 2}" y="{y + _HEIGHT // 2 + 5}" text-anchor="middle"'
     return (
-        f'<rect x="{x}" y="{y}" width="{_WIDTH}" height="{_HEIGHT}" {style}><title>{escape(name)}</title></rect>'
-        f"<text {middle}{font}>{escape(shown)}</text>"
+        f'<rect x="{x}" y="{y}" width="{_WIDTH}" height="{_HEIGHT}" fill="#eef3fa" stroke="#335" rx="6">'
+        f"<title>{escape(name)}</title></rect><text {middle}>{escape(shown)}</text>"
     )
 
 
-def _summary(graph: Graph) -> str:
-    return f"{len(graph.nodes)} nodes, {len(graph.edges)} edges"
+def _word(name: str, x: int, y: int) -> str:
+    shown = name if len(name) <= 24 else f"{name[:23]}…"
+    place = f'x="{x + _WIDTH - 6}" y="{y + _HEIGHT // 2 + 5}" text-anchor="end" font-style="italic"'
+    return f"<text {place}>{escape(shown)}<title>{escape(name)}</title></text>"
 
 
 def _message(words: str) -> str:

@@ -1,0 +1,240 @@
+"""The paper's step 1 as data: a ROS graph, and how the system model was made of it.
+
+A graph is read from DOT as rqt_graph writes it, from the output of ``rosnode info`` or ``ros2 node info``, or from
+plain lines ``a -> b : topic``. The plan says which of its nodes were dropped, which make up a compound node, and which
+nodes of the model are on no ROS graph; `account` holds the two against each other: nothing goes missing in between.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.system.graph import Graph
+from avow.system.plan import System
+from avow.system.schema import suggest
+
+MAX_BYTES = 5_000_000
+
+_TOKEN = re.compile(
+    r'\s+|//[^\n]*|\#[^\n]*|/\*.*?\*/|(?P<string>"(?:[^"\\]|\\.)*")|(?P<arrow>->|--)'
+    r"|(?P<word>[A-Za-z0-9_.\u0080-\uffff-]+)|(?P<sign>[\[\]{}=;,:])|(?P<html><[^>]*>)|(?P<other>.)",
+    re.DOTALL,
+)
+_LINE = re.compile(r"\s*(/?[\w/.-]+)\s*->\s*(/?[\w/.-]+)\s*(?::\s*(\S+))?\s*\Z")
+_HEADER = re.compile(r"(?:Node\s+\[(?P<ros1>[^\]]+)\]|(?P<ros2>/\S*))\s*\Z")
+_SECTION = re.compile(r"\s*(Publications|Publishers|Subscriptions|Subscribers|[A-Z][A-Za-z ]*)\s*:")
+_TOPIC = re.compile(r"\s+(?:\*\s+)?(/\S+?)(?::|\s|\Z)")
+
+
+@dataclass(frozen=True, slots=True)
+class RosGraph:
+    """Nodes without their leading slash; arcs (publisher, subscriber, topic)."""
+
+    nodes: tuple[str, ...]
+    arcs: tuple[tuple[str, str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """How a ROS graph became a system model."""
+
+    graph: RosGraph
+    home: dict[str, str]
+    """ROS node → node of the model."""
+    dropped: dict[str, str]
+    external: dict[str, str]
+    findings: tuple[Diagnostic, ...]
+
+
+def read_ros_graph(path: Path) -> RosGraph:
+    """Raises Rejected, located, for a file that is none of the known forms."""
+    try:
+        data = path.read_bytes()[: MAX_BYTES + 1]
+        text = data.decode("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise Rejected(_fault(path, 1, f"the ROS graph cannot be read: {error}")) from None
+    if len(data) > MAX_BYTES:
+        raise Rejected(_fault(path, 1, f"the ROS graph has more than {MAX_BYTES} bytes"))
+    if re.search(r"\b(di)?graph\b[^{\n]*\{", text):
+        return _from_dot(text, path)
+    if any(_HEADER.match(line) for line in text.splitlines()):
+        return _from_info(text)
+    return _from_lines(text, path)
+
+
+def account(system: System, dataflow: Graph) -> Account | None:
+    """The plan's `model` held against its ROS graph; None without a graph. Raises Rejected for an unreadable one."""
+    model = system.plan.model.data
+    if not isinstance(model, dict) or "graph" not in model:
+        return None
+    graph = read_ros_graph(system.plan.root / str(model["graph"]))
+    dropped: dict[str, str] = dict(model.get("dropped", {}))
+    external: dict[str, str] = dict(model.get("external", {}))
+    compound = {name: [m] if isinstance(m, str) else list(m) for name, m in dict(model.get("compound", {})).items()}
+    known = {node.name for node in system.contract.nodes}
+    at = system.plan.model.at
+    home: dict[str, str] = {node: node for node in graph.nodes if node in known}
+    findings: list[Diagnostic] = []
+    for name, members in compound.items():
+        for k, member in enumerate(members):
+            bare = member.lstrip("/")
+            if bare not in graph.nodes:
+                hint = suggest(bare, graph.nodes)
+                message = f"model.compound.{name}: {member!r} is not on the ROS graph"
+                findings.append(Diagnostic("PLAN127", message, at("compound", name, k), hint=hint))
+            elif home.get(bare, name) != name:
+                message = f"model.compound.{name}: {member!r} belongs to {home[bare]} already"
+                findings.append(Diagnostic("PLAN127", message, at("compound", name, k)))
+            home[bare] = name
+    gone = {name.lstrip("/"): why for name, why in dropped.items()}
+    for name in gone:
+        if name not in graph.nodes:
+            message = f"model.dropped: {name!r} is not on the ROS graph"
+            findings.append(
+                Diagnostic("PLAN127", message, at("dropped", name), Severity.WARNING, suggest(name, graph.nodes))
+            )
+        elif name in home:
+            message = f"model.dropped: {name!r} is also part of {home[name]}"
+            findings.append(Diagnostic("PLAN127", message, at("dropped", name)))
+    lost = [node for node in graph.nodes if node not in home and node not in gone]
+    if lost:
+        message = f"the ROS graph's {', '.join(lost)} are neither dropped nor part of a node of the model"
+        findings.append(Diagnostic("PLAN127", message, at("graph"), Severity.WARNING))
+    made = set(home.values()) | set(external)
+    for node in system.contract.nodes:
+        if node.name not in made:
+            message = f"{node.name} is not on the ROS graph, is no compound and is not external"
+            findings.append(Diagnostic("PLAN127", message, at("graph"), Severity.WARNING))
+    findings += _flows(graph, home, external, dataflow, at("graph"))
+    return Account(graph, home, gone, external, tuple(findings))
+
+
+def _flows(
+    graph: RosGraph, home: dict[str, str], external: dict[str, str], dataflow: Graph, span: Span
+) -> Iterator[Diagnostic]:
+    """Data that flows between two nodes of the model according to ROS alone."""
+    linked = {(edge.source.node, edge.target.node) for edge in dataflow.edges}
+    found: dict[tuple[str, str], dict[str, None]] = {}
+    for publisher, subscriber, topic in graph.arcs:
+        one, other = home.get(publisher), home.get(subscriber)
+        if one and other and one != other and (one, other) not in linked:
+            found.setdefault((one, other), {})[topic] = None
+    for (one, other), topics in found.items():
+        message = f"ROS sends {', '.join(topics)} from {one} to {other}; the contracts link nothing there"
+        yield Diagnostic("PLAN127", message, span, Severity.NOTE)
+
+
+# -- forms -------------------------------------------------------------------------------------------------------------
+
+
+def _from_dot(text: str, path: Path) -> RosGraph:
+    labels: dict[str, str] = {}
+    boxes: set[str] = set()
+    links: list[tuple[str, str, str]] = []
+    tokens = list(_dot_tokens(text, path))
+    at = 0
+    while at < len(tokens):
+        names = [tokens[at]] if tokens[at][0] == "name" else []
+        at += 1
+        while names and at + 1 < len(tokens) and tokens[at][1] == "->" and tokens[at + 1][0] == "name":
+            names.append(tokens[at + 1])
+            at += 2
+        if not names or (at < len(tokens) and tokens[at][1] in ("=", "{")):
+            continue
+        attributes: dict[str, str] = {}
+        if at < len(tokens) and tokens[at][1] == "[":
+            at += 1
+            while at < len(tokens) and tokens[at][1] != "]":
+                if at + 2 < len(tokens) and tokens[at + 1][1] == "=":
+                    attributes[tokens[at][1]] = tokens[at + 2][1]
+                    at += 2
+                at += 1
+        ids = [name for _, name in names]
+        if len(ids) > 1:
+            links += [(a, b, attributes.get("label", "")) for a, b in pairwise(ids)]
+        elif ids[0] not in ("graph", "node", "edge", "digraph", "strict", "subgraph"):
+            labels[ids[0]] = attributes.get("label", ids[0]).replace("\\N", ids[0])
+            if attributes.get("shape") == "box":
+                boxes.add(ids[0])
+    for a, b, _ in links:
+        for name in (a, b):
+            labels.setdefault(name, name)
+    topics = {name for name in labels if name in boxes or name.startswith("t_")}
+    arcs: dict[tuple[str, str, str], None] = {}
+    bare = {name: label.lstrip("/") for name, label in labels.items()}
+    for a, b, label in links:
+        if a not in topics and b not in topics:
+            arcs[(bare[a], bare[b], label)] = None
+        elif b in topics:
+            for c, d, _ in links:
+                if c == b and d not in topics:
+                    arcs[(bare[a], bare[d], labels[b])] = None
+    return RosGraph(tuple(dict.fromkeys(bare[n] for n in labels if n not in topics)), tuple(arcs))
+
+
+def _dot_tokens(text: str, path: Path) -> Iterator[tuple[str, str]]:
+    for found in _TOKEN.finditer(text):
+        if found["string"] is not None:
+            yield "name", re.sub(r"\\(.)", r"\1", found["string"][1:-1]) if "\\N" not in found[0] else found[0][1:-1]
+        elif found["word"] is not None:
+            yield "name", found["word"]
+        elif found["arrow"] is not None:
+            yield "sign", "->"
+        elif found["sign"] is not None:
+            yield "sign", found["sign"]
+        elif found["html"] is not None:
+            yield "name", found["html"]
+        elif found["other"] is not None:
+            line = text.count("\n", 0, found.start()) + 1
+            raise Rejected(_fault(path, line, f"{found['other']!r} does not belong in a DOT graph"))
+
+
+def _from_info(text: str) -> RosGraph:
+    nodes: dict[str, None] = {}
+    publishes: list[tuple[str, str]] = []
+    subscribes: list[tuple[str, str]] = []
+    current, into = "", None
+    for line in text.splitlines():
+        header = _HEADER.match(line)
+        if header:
+            current = (header["ros1"] or header["ros2"]).lstrip("/")
+            nodes[current] = None
+            into = None
+            continue
+        section = _SECTION.match(line)
+        topic = _TOPIC.match(line)
+        if section and not topic:
+            kind = section[1]
+            into = publishes if kind.startswith("Publi") else subscribes if kind.startswith("Subscri") else None
+        elif topic and into is not None and current:
+            into.append((current, topic[1]))
+    arcs = [(p, s, topic) for p, topic in publishes for s, other in subscribes if other == topic]
+    return RosGraph(tuple(nodes), tuple(dict.fromkeys(arcs)))
+
+
+def _from_lines(text: str, path: Path) -> RosGraph:
+    nodes: dict[str, None] = {}
+    arcs: dict[tuple[str, str, str], None] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        bare = line.split("#")[0].strip()
+        if not bare:
+            continue
+        found = _LINE.match(bare)
+        if found:
+            one, other = found[1].lstrip("/"), found[2].lstrip("/")
+            nodes.update({one: None, other: None})
+            arcs[(one, other, found[3] or "")] = None
+        elif re.fullmatch(r"/?[\w/.-]+", bare):
+            nodes[bare.lstrip("/")] = None
+        else:
+            raise Rejected(_fault(path, number, "neither DOT, nor `ros2 node info`, nor a line `a -> b : topic`"))
+    return RosGraph(tuple(nodes), tuple(arcs))
+
+
+def _fault(path: Path, line: int, message: str) -> Diagnostic:
+    return Diagnostic("PLAN127", message, Span(str(path), line, 1, line, 2))
