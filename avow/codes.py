@@ -319,3 +319,48 @@ _LINTS = (
 
 CODES: dict[str, Code] = {c.code: c for c in (*_FILE, *_SYNTAX, *_NAMES, *_SORTS, *_LINTS)}
 """Every code, in order."""
+
+
+# --- plans, systems, the calculus: their examples are plans, and stand in tests/system -------------------------------------
+
+PLAN_CODES: dict[str, Code] = {
+    c.code: c
+    for c in (
+        Code(
+            "PLAN100", "no plan", "There is no system here: no folder, or neither a plan.yaml nor an .rcl file in it."
+        ),
+        Code("PLAN101", "not YAML", "The file is not one plain YAML document, or too large, too deep, or empty."),
+        Code("PLAN102", "a key", "A key is given twice, is a merge key, or is not plain text."),
+        Code("PLAN103", "unknown key", "The plan has no such key at this place."),
+        Code("PLAN104", "missing key", "A key that is needed here is missing."),
+        Code("PLAN105", "wrong value", "The value has the wrong type or form, or is not one of those allowed."),
+        Code("PLAN106", "unknown name", "The plan names a node, port or guarantee that the contract does not have."),
+        Code("PLAN107", "no such file", "The plan names a file that is not there."),
+        Code("PLAN108", "path outside", "A path leads out of the system's folder."),
+        Code("PLAN109", "scenario", "A table, an interpretation or a domain of the scenario cannot be used."),
+        Code("PLAN110", "contradiction", "Two things that the plan says do not go together."),
+        Code("PLAN112", "initial value", "An initial value is no value of its output and no formula about it."),
+        Code("PLAN113", "environment", "An environment assumption speaks of more than the environment's inputs."),
+        Code("PLAN114", "temporal property", "The text is no temporal property."),
+        Code("PLAN121", "types clash", "An output and the input that it would feed have different types."),
+        Code(
+            "PLAN122", "several providers", "More than one output could feed an input; a connection has to say which."
+        ),
+        Code(
+            "PLAN123",
+            "start-up deadlock",
+            "Nodes in a loop wait for one another, and no delayed edge has an initial value.",
+            severity=Severity.WARNING,
+        ),
+        Code(
+            "PLAN124",
+            "memory",
+            "A node has an input and an output of one name; it feeds itself only by a connection.",
+            severity=Severity.WARNING,
+        ),
+        Code("PLAN125", "rule does not fit", "The selected nodes are not connected as the rule wants them."),
+        Code("PLAN126", "ports do not fit", "A node cannot stand in for another that has other inputs or outputs."),
+        Code("PLAN127", "ROS graph", "The ROS graph and the plan's account of it do not agree."),
+    )
+}
+"""Every code of plans and systems, in order."""

@@ -127,12 +127,12 @@ def requirement_question(frame: Frame, requirement: Requirement) -> FormulaQuest
     """The question behind a requirement; None where it is prose. Raises Rejected for a formula that is wrong."""
     contract = frame.system.contract
     if requirement.formula is not None:
-        term = parse_state(requirement.formula, contract, requirement.span)
+        term = parse_state(requirement.formula, contract, requirement.formula_span)
         support = tuple(name for entry in requirement.supported_by for name in _expand(frame, entry))
         shown = show_term(system_term(frame, term))
         return FormulaQuestion(requirement.id, term, shown, digest(term), tuple(dict.fromkeys(support)))
     if requirement.temporal is not None:
-        formula = parse_property(requirement.temporal, contract, requirement.span)
+        formula = parse_property(requirement.temporal, contract, requirement.formula_span)
         return TemporalQuestion(requirement.id, formula, show_property(formula), sha256(_meaning(formula)))
     return None
 

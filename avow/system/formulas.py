@@ -11,6 +11,7 @@ from avow.language.sorts import BOOL
 from avow.language.terms import Role, Term, Variable, children
 from avow.system.graph import Edge, Graph
 from avow.system.plan import Endpoint, EnvironmentInput, System
+from avow.system.temporal import parse_property, parse_state
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,7 @@ def initial_condition(system: System, edge: Edge) -> Term | None:
     failures: list[Rejected] = []
     for attempt in attempts:
         try:
-            term = _parse(system, attempt, node.name, edge.span)
+            term = _parse(system, attempt, node.name, edge.initial_span)
         except Rejected as rejected:
             failures.append(rejected)
             continue
@@ -66,7 +67,7 @@ def initial_condition(system: System, edge: Edge) -> Term | None:
     message = (
         f"{text!r} is neither a value of {edge.source} ({port.type_name}) nor a formula about out.{port.name}: {what}"
     )
-    raise Rejected(Diagnostic("PLAN112", message, edge.span))
+    raise Rejected(Diagnostic("PLAN112", message, edge.initial_span))
 
 
 def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]:
@@ -85,7 +86,7 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
             continue
         owner = outside[0].node
         try:
-            term = _parse(system, entry.assume, owner, entry.span)
+            term = _parse(system, entry.assume, owner, entry.assume_span)
         except Rejected as rejected:
             faults += rejected.diagnostics
             continue
@@ -103,7 +104,7 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
 
 
 def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
-    """Every fault in the plan's initial values and environment assumptions."""
+    """Every fault in the formulas of the plan: initial values, environment assumptions, requirements."""
     faults: list[Diagnostic] = []
     first: dict[Endpoint, Edge] = {}
     for edge in graph.edges:
@@ -114,6 +115,14 @@ def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
         if edge.delayed and first.setdefault(edge.source, edge).initial != edge.initial:
             message = f"{edge.source} has more than one initial value; all its delayed edges carry the same"
             faults.append(Diagnostic("PLAN112", message, edge.span))
+    for requirement in system.plan.requirements:
+        try:
+            if requirement.formula is not None:
+                parse_state(requirement.formula, system.contract, requirement.formula_span)
+            if requirement.temporal is not None:
+                parse_property(requirement.temporal, system.contract, requirement.formula_span)
+        except Rejected as rejected:
+            faults += rejected.diagnostics
     try:
         environment_assumptions(system, graph)
     except Rejected as rejected:

@@ -27,6 +27,7 @@ class Edge:
     initial: str | None = None
     declared: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
+    initial_span: Span | None = field(default=None, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.source} → {self.target}" + (" (delayed)" if self.delayed else "")
@@ -130,7 +131,9 @@ def _declared(system: System, faults: list[Diagnostic]) -> list[Edge]:
             notes = (("first connected here", edges[target].span),)
             faults.append(Diagnostic("PLAN122", message, connection.span, notes=notes))
             continue
-        edges[target] = Edge(source, target, connection.delayed, connection.initial, True, connection.span)
+        edges[target] = Edge(
+            source, target, connection.delayed, connection.initial, True, connection.span, connection.initial_span
+        )
     return list(edges.values())
 
 

@@ -56,6 +56,7 @@ class Connection:
     initial: str | None = None
     """An RCL formula over ``out.<port>`` of the source or a value, as text; None: any value."""
     span: Span | None = field(default=None, compare=False, repr=False)
+    initial_span: Span | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +70,7 @@ class EnvironmentInput:
     span: Span | None = field(default=None, compare=False, repr=False)
     constant: bool = False
     """Whether its value is the same at every step (a map, a setting)."""
+    assume_span: Span | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +145,8 @@ class Requirement:
     temporal: str | None
     supported_by: tuple[str, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
+    formula_span: Span | None = field(default=None, compare=False, repr=False)
+    """Where the formula or the temporal property stands."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -181,6 +181,7 @@ class _Reader:
                     bool(delayed and delayed.value),
                     _value(initial) if initial is not None else None,
                     target.span,
+                    initial.span if initial is not None else None,
                 )
 
     def environment(self) -> Iterator[EnvironmentInput]:
@@ -194,6 +195,7 @@ class _Reader:
                 because.text if because else None,
                 piece.span,
                 bool(constant and constant.value),
+                assume.span if assume else None,
             )
 
     def scenario(self) -> Scenario | None:
@@ -255,6 +257,7 @@ class _Reader:
                 temporal.text if temporal else None,
                 tuple(_texts(piece.at("supported_by"))),
                 piece.span,
+                (formula or temporal or piece).span,
             )
 
     def goals(self) -> Iterator[ComposeGoal]:
