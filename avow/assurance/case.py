@@ -67,7 +67,7 @@ from avow.evidence.ledger import GENESIS, Entry
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.status import Status, best_link, effective, hypotheses, roll_up, weigh
 from avow.system.plan import Requirement, System
-from avow.verdict import Link
+from avow.verdict import Link, Verdict
 
 
 def build_case(
@@ -191,25 +191,43 @@ def _evidence(facts: Facts) -> tuple[dict[str, tuple[EvidenceView, ...]], tuple[
 
 
 def _views(entries: list[Entry], digest: str, planned: Mapping[str, str], run: RunInfo) -> list[EvidenceView]:
-    views: list[EvidenceView] = []
-    newest: set[str] = set()
-    for entry in reversed(entries):
+    """Where each record stands in time. All answers to today's question count, so that none hides a refutation; but of
+    several that say the same only the newest, and none that failed to answer where the same method did answer: leaving
+    these out cannot change the status."""
+
+    def currency(entry: Entry) -> Currency:
         record = entry.evidence
         if record.method not in planned:
-            currency = Currency.WITHDRAWN
-        elif planned[record.method] != record.key or record.obligation_digest != digest:
-            currency = Currency.STALE
-        else:
-            currency = Currency.REPEATED if record.method in newest else Currency.CURRENT
-            newest.add(record.method)
-        # the same question was answered more than once: all answers count, so that none can hide a refutation; but a
-        # fresh run believes no support that it did not see itself
-        counts = currency in (Currency.CURRENT, Currency.REPEATED)
+            return Currency.WITHDRAWN
+        if planned[record.method] != record.key or record.obligation_digest != digest:
+            return Currency.STALE
         if run.fresh and record.run != run.id and not weigh(record).refuted:
-            counts = False
-        cut = effective(record)
-        views.append(EvidenceView(entry, currency, counts, cut if cut is not record.verdict else None))
-    return views[::-1]
+            return Currency.SET_ASIDE
+        return Currency.CURRENT
+
+    standing = [currency(entry) for entry in entries]
+    answered = {
+        e.evidence.method for e, c in zip(entries, standing, strict=True) if c is Currency.CURRENT and not _failed(e)
+    }
+    said: set[tuple[str, Verdict, bool]] = set()
+    for at in range(len(entries) - 1, -1, -1):
+        record = entries[at].evidence
+        words = (record.method, effective(record), record.vacuous)
+        if standing[at] is Currency.CURRENT:
+            if words in said or (_failed(entries[at]) and record.method in answered):
+                standing[at] = Currency.SUPERSEDED
+            said.add(words)
+    views = []
+    for entry, found in zip(entries, standing, strict=True):
+        cut = effective(entry.evidence)
+        views.append(
+            EvidenceView(entry, found, found is Currency.CURRENT, cut if cut is not entry.evidence.verdict else None)
+        )
+    return views
+
+
+def _failed(entry: Entry) -> bool:
+    return entry.evidence.verdict in (Verdict.ERROR, Verdict.NOT_RUN, Verdict.UNKNOWN)
 
 
 def _hypotheses(entries: tuple[Entry, ...]) -> tuple[str, ...]:

@@ -6,16 +6,18 @@ That it can be taken from a finished case as well is what lets ``avow report --c
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
+from pathlib import Path
 
 from avow.assurance.model import Case, Derivation, EnvironmentView, MethodInfo, NodeView, RunInfo, ToolInfo
 from avow.assurance.policy import Policy, read_policy
+from avow.diagnostics import Span
 from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.language.contract import Clause
-from avow.system.plan import Finding, Requirement, System
+from avow.system.plan import Finding, Plan, Requirement, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +83,12 @@ def facts_of_system(
         policy=read_policy(plan.policy),
         ledger_head=ledger_head,
         digests=tuple(sorted(digests.items())),
-        requirements=plan.requirements,
+        requirements=tuple(replace(r, span=_relative(r.span, plan)) for r in plan.requirements),
         nodes=nodes,
         environment=tuple(EnvironmentView(e.port, e.assume or "", e.because or "") for e in plan.environment),
         expected=plan.expected,
         accepted=plan.accepted,
-        obligations=tuple({o.id: o for o in obligations}.values()),
+        obligations=tuple({o.id: replace(o, span=_relative(o.span, plan)) for o in obligations}.values()),
         planned=planned,
         entries=tuple(sorted(records, key=lambda e: (e.number, e.hash))),
         derivations=tuple(derivations),
@@ -141,6 +143,15 @@ def facts_of_case(case: Case) -> Facts:
         discrepancies=case.discrepancies if case.audited else None,
         graph_svg=case.graph_svg,
     )
+
+
+def _relative(span: Span | None, plan: Plan) -> Span | None:
+    """A place relative to the workspace (the folder above ``contracts/``): a report is the same on every machine."""
+    if span is None or not Path(span.file).is_absolute() or len(plan.path.resolve().parents) < 3:
+        return span
+    root = plan.path.resolve().parents[2]
+    path = Path(span.file)
+    return replace(span, file=path.relative_to(root).as_posix()) if path.is_relative_to(root) else span
 
 
 def _say(clause: Clause) -> str:

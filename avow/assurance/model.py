@@ -96,8 +96,10 @@ class Currency(StrEnum):
     """Where a record stands in time; computed, never stored."""
 
     CURRENT = "current"
-    REPEATED = "repeated"
-    """Answers the same question as a newer record, and counts as that does."""
+    SUPERSEDED = "superseded"
+    """A newer attempt at the same question said the same, or did answer where this one failed to."""
+    SET_ASIDE = "set aside"
+    """Not of this run, which believes no earlier support (``--fresh``)."""
     STALE = "stale"
     """The claim, an input, an option or a tool has changed since."""
     WITHDRAWN = "withdrawn"
@@ -109,7 +111,7 @@ class EvidenceView:
     entry: Entry
     currency: Currency
     counts: bool
-    """Whether it takes part in the claim's status (current or repeated)."""
+    """Whether it takes part in the claim's status: exactly if it is current."""
     cut_to: Verdict | None = None
     """Set where the record claims more than its method can show: what it counts as instead."""
 

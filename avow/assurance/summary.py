@@ -99,9 +99,14 @@ def limits(facts: Facts, views: Sequence[ObligationView]) -> tuple[tuple[str, st
         for v in view.counting:
             record = v.entry.evidence
             if record.bound:
-                text = ", ".join(f"{name} = {value}" for name, value in record.bound.items())
+                text = ", ".join(f"{name} = {_short(value)}" for name, value in record.bound.items())
                 found.append((f"{view.obligation.node}: {record.method}", text))
     return tuple(dict.fromkeys(found))
+
+
+def _short(value: object) -> str:
+    """A mapping by its keys (files and their digests stand with the evidence)."""
+    return ", ".join(map(str, value)) if isinstance(value, dict | list | tuple) else str(value)
 
 
 def not_shown(

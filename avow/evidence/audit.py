@@ -15,7 +15,6 @@ from pathlib import Path
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.status import effective
 from avow.files import digest_file
-from avow.verdict import Verdict
 
 
 class Fault(StrEnum):
@@ -100,9 +99,6 @@ def _impossible(entries: tuple[Entry, ...]) -> Iterable[Discrepancy]:
                 f"than '{record.strength}': it counts as '{counts_as}'"
             )
             yield Discrepancy(Fault.IMPOSSIBLE, record.obligation, text)
-        if record.verdict is Verdict.PROVED and record.vacuous:
-            text = f"record {entry.number + 1} is a proof whose trigger is never met: it supports nothing"
-            yield Discrepancy(Fault.IMPOSSIBLE, record.obligation, text, serious=False)
 
 
 def _files(entries: tuple[Entry, ...], root: Path, keys: Mapping[tuple[str, str], str] | None) -> Iterable[Discrepancy]:

@@ -178,13 +178,15 @@ def _brief(view: ObligationView) -> Markup:
     )
 
 
-def _counts(views: Sequence[ObligationView]) -> list[tuple[Kind, list[tuple[Status, int]], int]]:
+def _counts(views: Sequence[ObligationView]) -> list[tuple[str, list[tuple[Status, int]], int]]:
     """GNATprove's table: for each kind of claim, how many stand where."""
     table = []
     for kind in KINDS:
-        of_kind = [view.status for view in views if view.obligation.kind is kind]
-        if of_kind:
-            table.append((kind, [(s, of_kind.count(s)) for s in Status if s in of_kind], len(of_kind)))
+        for advice in (False, True):
+            of_kind = [v.status for v in views if v.obligation.kind is kind and v.advice is advice]
+            if of_kind:
+                label = f"{kind}, as advice" if advice else kind.value
+                table.append((label, [(s, of_kind.count(s)) for s in Status if s in of_kind], len(of_kind)))
     return table
 
 

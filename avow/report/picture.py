@@ -14,7 +14,8 @@ from avow.assurance.argument import Argument, Element, Shape
 from avow.report.wording import MARKS, clean, tone
 
 LIMIT = 400
-_LINE, _PAD, _GAP, _COLUMN_GAP, _RADIUS = 15.0, 9.0, 14.0, 46.0, 39.0
+_BESIDE = 4
+_LINE, _PAD, _GAP, _COLUMN_GAP, _RADIUS = 15.0, 9.0, 14.0, 46.0, 43.0
 _WIDTH = {Shape.GOAL: 244.0, Shape.STRATEGY: 206.0, Shape.SOLUTION: 2 * _RADIUS}
 _ASIDE_WIDTH = 206.0
 _CHARACTER = 6.35
@@ -106,7 +107,7 @@ def _tree(argument: Argument, start: str) -> tuple[list[_Box], int, list[tuple[_
 def _box(element: Element, depth: int) -> _Box:
     width = _WIDTH.get(element.shape, _ASIDE_WIDTH)
     if element.shape is Shape.SOLUTION:
-        return _Box(element, depth, [], _cut(element.title, 11), False, width, width)
+        return _Box(element, depth, [], _cut(element.title, 13), False, width, width)
     inner = width - 2 * _inset(element)
     taken = len(element.id) + len(element.status or "") + 4
     apart = len(element.title) * _BOLD > inner - taken * _CHARACTER
@@ -124,7 +125,7 @@ def _inset(element: Element) -> float:
 def _measure(boxes: list[_Box]) -> None:
     for box in reversed(boxes):
         below = sum(child.tall for child in box.children) + _GAP * max(0, len(box.children) - 1)
-        rows = (len(box.row) + 2) // 3
+        rows = (len(box.row) + _BESIDE - 1) // _BESIDE
         solutions = rows * (2 * _RADIUS + 6)
         box.tall = max(_own(box), below + solutions + (_GAP if box.children and box.row else 0))
 
@@ -146,14 +147,14 @@ def _place(boxes: list[_Box], root: _Box) -> None:
     for box in reversed(boxes):  # children first: a parent stands in the middle of what it rests on
         top, own = tops[id(box)], _own(box)
         box.x = at[box.depth]
-        rows = (len(box.row) + 2) // 3
+        rows = (len(box.row) + _BESIDE - 1) // _BESIDE
         solutions = rows * (2 * _RADIUS + 6)
         if box.children:
             start = top + sum(child.tall + _GAP for child in box.children)
         else:
             start = top if box.asides else top + max(0.0, box.tall - solutions) / 2
         for number, solution in enumerate(box.row):
-            row, column = divmod(number, 3)
+            row, column = divmod(number, _BESIDE)
             solution.x = at[box.depth + 1] + column * (2 * _RADIUS + 8)
             solution.y = start + row * (2 * _RADIUS + 6)
         middles = [child.y + child.height / 2 for child in box.children]

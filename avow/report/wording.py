@@ -118,7 +118,8 @@ def verdict_line(case: Case) -> str:
 
 
 def bound_text(bound: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name} {_number(value)}" for name, value in bound.items())
+    """``cases 2000, seed 0``."""
+    return ", ".join(f"{name.replace('_', ' ')} {_plain(value)}" for name, value in bound.items())
 
 
 def mutation(evidence: Evidence) -> str:
@@ -159,7 +160,17 @@ def count(number: int, one: str, many: str = "") -> str:
     return f"{number:,} {one if number == 1 else many or one + 's'}".replace(",", " ")
 
 
-def _number(value: object) -> str:
-    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10_000:
-        return f"{value:,}".replace(",", " ")
-    return str(value)
+def _plain(value: object) -> str:
+    match value:
+        case bool():
+            return "yes" if value else "no"
+        case int() if abs(value) >= 10_000:
+            return f"{value:,}".replace(",", " ")
+        case float():
+            return f"{value:.4g}"
+        case dict():
+            return ", ".join(map(str, value))
+        case list() | tuple():
+            return ", ".join(map(_plain, value))
+        case _:
+            return str(value)

@@ -26,6 +26,7 @@ from assurance.sample import (
 from avow.assurance.case import conclude_again
 from avow.assurance.codec import case_schema, evidence_schema, from_json, to_json
 from avow.assurance.model import Case, Currency, Derivation, Grade, SideCondition
+from avow.diagnostics import Span
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.encoding import Unreadable
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
@@ -74,7 +75,26 @@ def test_a_newer_pass_does_not_hide_an_older_refutation_of_the_same_question() -
     assert status_of(found) is Status.CONTRADICTORY
     tested = [evidence(G, Verdict.REFUTED, "hypothesis", run="1"), evidence(G, Verdict.TESTED, "hypothesis", run="2")]
     assert status_of(case(SYSTEM, [G], tested)) is Status.REFUTED
-    assert found.obligations[0].evidence[0].currency is Currency.REPEATED
+    assert all(item.counts for item in found.obligations[0].evidence)
+
+
+def test_what_a_newer_attempt_says_too_is_superseded_and_changes_nothing() -> None:
+    failed = evidence(G, Verdict.ERROR, run="1")
+    found = case(
+        SYSTEM, [G], [failed, evidence(G, run="2"), evidence(G, run="3"), evidence(G, Verdict.UNKNOWN, run="4")]
+    )
+    superseded = Currency.SUPERSEDED
+    assert [i.currency for i in found.obligations[0].evidence] == [superseded, superseded, Currency.CURRENT, superseded]
+    assert status_of(found) is Status.PROVED
+    idle = case(SYSTEM, [G], [failed, evidence(G, Verdict.UNKNOWN, run="2"), evidence(G, Verdict.ERROR, run="3")])
+    assert [i.counts for i in idle.obligations[0].evidence] == [False, True, True]
+
+
+def test_places_are_relative_to_the_workspace() -> None:
+    place = Path.cwd() / "contracts" / "rover" / "system.rcl"
+    span = Span(str(place), 3, 1, 3, 9)
+    found = case(SYSTEM, [replace(G, span=span)], [evidence(G)])
+    assert found.obligations[0].obligation.span == replace(span, file="contracts/rover/system.rcl")
 
 
 def test_deleting_a_record_is_never_having_had_it() -> None:

@@ -181,7 +181,7 @@ def test_boxes_do_not_overlap_and_stay_within_the_picture() -> None:
             )
         ]
         for x, y in re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', svg):
-            boxes.append((float(x) - 39, float(y) - 39, 78, 78))
+            boxes.append((float(x) - 43, float(y) - 43, 86, 86))
         for points in re.findall(r'<polygon points="([^"]+)"', svg):
             xs, ys = zip(*(map(float, p.split(",")) for p in points.split()), strict=True)
             boxes.append((min(xs), min(ys), max(xs) - min(xs), max(ys) - min(ys)))
