@@ -144,7 +144,8 @@ class Applications(Names):
             return None
         unified = common(items)
         if unified is None:
-            at, first = next((t, i) for t, i in zip(tree.parts, items, strict=True) if common([items[0], i]) is None)
+            wrong = [(t, i) for t, i in zip(tree.parts, items, strict=True) if common([items[0], i]) is None]
+            at, first = wrong[0] if wrong else (tree.parts[-1], items[-1])
             message = f"the items of a {what} are of one type: this is {show_sort(first.sort)}, "
             self.error("RCL302", message + f"the first is {show_sort(items[0].sort)}", at)
         return unified

@@ -74,20 +74,34 @@ def convert(term: Term, wanted: Sort) -> Term | None:
     return None
 
 
+def widest(left: Sort, right: Sort) -> Sort | None:
+    """The sort in which both have a place, if there is one."""
+    if left == right:
+        return left
+    if isinstance(left, NUMERIC) and isinstance(right, NUMERIC):
+        return REAL if REAL in (left, right) else INTEGER
+    match left, right:
+        case TupleSort(items=a), TupleSort(items=b) if len(a) == len(b):
+            items = [widest(x, y) for x, y in zip(a, b, strict=True)]
+            return None if None in items else TupleSort(tuple(i for i in items if i is not None))
+        case SequenceSort(item=a_), SequenceSort(item=b_):
+            item = widest(a_, b_)
+            return None if item is None else SequenceSort(item)
+    return None
+
+
 def common(terms: list[Term]) -> list[Term] | None:
     """The terms brought to one sort, or None."""
-    if not terms:
+    if not terms or all(alike(t.sort, terms[0].sort) for t in terms):
         return terms
-    first = terms[0].sort
-    if all(alike(t.sort, first) for t in terms):
-        return terms
-    for candidate in terms:
-        made = [t if alike(t.sort, candidate.sort) else convert(t, candidate.sort) for t in terms]
-        if all(m is not None for m in made):
-            return [m for m in made if m is not None]
-    if all(isinstance(t.sort, NUMERIC) for t in terms):
-        return [widen(t) for t in terms]
-    return None
+    target: Sort | None = terms[0].sort
+    for term in terms:
+        target = widest(target, term.sort) if target is not None else None
+    if target is None:
+        return None
+    made = [t if alike(t.sort, target) else convert(t, target) for t in terms]
+    kept = [m for m in made if m is not None]
+    return kept if len(kept) == len(made) else None
 
 
 def joined(terms: list[Term]) -> Sort:

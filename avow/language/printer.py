@@ -199,8 +199,10 @@ class _Printer:
 
     def side(self, term: Term, place: int) -> str:
         """A side of `->` or `<=>`. RCL has parentheses round `and` and `or` there, as the lint RCL401 asks for."""
-        level = self.form(term, False)[1] if self.style.careful and isinstance(term, And | Or) else ATOM
-        return self.show(term, ATOM if level in (AND, OR) else place)
+        bare = (
+            isinstance(term, And | Or) and len(term.items) > 1 and not (isinstance(term, And) and _is_chain(term.items))
+        )
+        return self.show(term, ATOM if bare and self.style.careful else place)
 
     def literal(self, term: Literal, real: bool) -> tuple[str, int]:
         value = term.value

@@ -186,6 +186,13 @@ def test_sequences_and_tuples(read) -> None:  # type: ignore[no-untyped-def]
     assert read("<r, 1> == sq") == read("< r , 1 > == sq")
 
 
+def test_items_come_to_one_sort(read) -> None:  # type: ignore[no-untyped-def]
+    mixed = read("(r, 1) in {(1, 1), (1.5, 1), (1, 2.5)}")
+    assert {i.sort for i in mixed.collection.items} == {TupleSort((REAL, REAL))}
+    with pytest.raises(Rejected, match="RCL302"):
+        read("in.k in {" + ", ".join(map(str, range(3000))) + ', "a"}')
+
+
 def test_every_form_of_type() -> None:
     contract = load(
         "context { Fn : REAL x (NATURAL) --> REAL x REAL; Tu : (REAL, BOOL); Se : <(REAL, REAL)>; Op : {}; "

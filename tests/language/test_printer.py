@@ -95,3 +95,13 @@ def test_numbers_and_sorts() -> None:
     assert show_type(sorts["Cmd"]) == "{move(REAL, REAL), inspect(NATURAL), halt}"
     assert show_sort(OpaqueSort("O")) == "O"
     assert show_type(OpaqueSort("O")) == "{}"
+
+
+def test_printing_takes_linear_time() -> None:
+    text = "b"
+    for _ in range(36):
+        text = f"b or (b and b -> {text})"
+    term = parse_formula(text, NODE, LOADED)
+    for style in ("rcl", "unicode", "latex", "text"):
+        assert len(show_term(term, style)) < 5000  # type: ignore[arg-type]
+    assert parse_formula(show_term(term, "rcl"), NODE, LOADED) == term
