@@ -58,6 +58,7 @@ def environment() -> Environment:
         "bound_text": wording.bound_text,
         "count": wording.count,
         "mutation": wording.mutation,
+        "details_text": wording.details_text,
         "outline": wording.outline,
         "rerun": wording.rerun,
         "short": short,

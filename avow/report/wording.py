@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 from urllib.parse import quote
 
@@ -54,6 +54,7 @@ MEANINGS = {
     Status.CONTRADICTORY: "one tool proves it, another refutes it: one of them is wrong",
 }
 
+_MOST_DETAILS = 6000
 _GOOD = frozenset({Status.PROVED, Status.CHECKED})
 _BAD = frozenset({Status.REFUTED, Status.CONTRADICTORY, Status.CIRCULAR})
 
@@ -137,14 +138,46 @@ def mutation(evidence: Evidence) -> str:
 
 
 def outline(evidence: Evidence) -> str:
-    """A proof outline, where the method left one (details: ``outline`` or ``proof_outline``)."""
+    """A proof outline, where the method left one (details: ``outline`` or ``proof_outline``, or ``triples``)."""
     for key in ("outline", "proof_outline"):
         match evidence.details.get(key):
             case str(text):
                 return text
             case list() as lines if all(isinstance(line, str) for line in lines):
                 return "\n".join(lines)
+    match evidence.details.get("triples"):
+        case list() as triples if all(isinstance(t, dict) for t in triples):
+            return "\n".join(
+                f"{{ {t.get('pre')} }}  …  {{ {t.get('post')} }}   {t.get('verdict', '')}" for t in triples
+            )
     return ""
+
+
+def details_text(evidence: Evidence) -> str:
+    """Whatever else a method left in its details, as indented text."""
+    shown = {"outline", "proof_outline", "triples", "mutation", "retry"}
+    rest = {
+        key: value for key, value in evidence.details.items() if key not in shown and value not in ("", [], {}, None)
+    }
+    text = "\n".join(_indented(rest, ""))
+    return text if len(text) <= _MOST_DETAILS else text[:_MOST_DETAILS] + "\n… (all of it is in report.json)"
+
+
+def _indented(value: object, margin: str) -> Iterator[str]:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if isinstance(item, dict | list):
+                yield f"{margin}{key}:"
+                yield from _indented(item, margin + "  ")
+            else:
+                yield f"{margin}{key}: {_plain(item)}"
+    elif isinstance(value, list):
+        for item in value:
+            if isinstance(item, dict | list):
+                inner = list(_indented(item, margin + "  "))
+                yield from [f"{margin}- {inner[0].lstrip()}", *inner[1:]] if inner else []
+            else:
+                yield f"{margin}- {_plain(item)}"
 
 
 def history(view: ObligationView) -> tuple[EvidenceView, ...]:

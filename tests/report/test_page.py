@@ -166,6 +166,17 @@ def test_ten_thousand_obligations_stay_a_page() -> None:
     assert all(wording.anchor(o.id) in set(page.ids) for o in obligations)
 
 
+def test_details_are_told_readably() -> None:
+    record = evidence(
+        "n.g", details={"reviewer": "A", "checklist": [{"question": "q?", "answer": True}], "retry": True}
+    )
+    assert wording.details_text(record) == "reviewer: A\nchecklist:\n  - question: q?\n    answer: yes"
+    triple = evidence("n.g", details={"triples": [{"pre": "p", "post": "q", "verdict": "proved"}]})
+    assert wording.outline(triple) == "{ p }  …  { q }   proved"
+    assert wording.details_text(triple) == ""
+    assert len(wording.details_text(evidence("n.g", details={"x": "y" * 10_000}))) < 6100
+
+
 # -- the picture ----------------------------------------------------------------------------------------------------
 
 
