@@ -12,8 +12,6 @@ from itertools import product
 from random import Random
 from typing import Any
 
-import z3
-
 from avow.calculus.scenario import CannotRun, Point, World, key
 from avow.language.contract import Clause, Node, Port
 from avow.language.sorts import FunctionSort
@@ -21,6 +19,7 @@ from avow.language.terms import Apply, Iff, Quantified, Quantifier, Role, Term, 
 from avow.logic.evaluate import NotEvaluable, compile_term
 from avow.logic.formula import free_variables, substitute
 from avow.logic.models import Model
+from avow.logic.solver import z3
 from avow.logic.translation import Translator, Unsupported
 from avow.logic.values import FunctionValue, Value, show
 from avow.system.formulas import initial_condition, ports_of

@@ -11,8 +11,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-import z3
-
 from avow.language.sorts import (
     BOOL,
     INTEGER,
@@ -44,6 +42,7 @@ from avow.language.terms import (
 from avow.logic.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.logic.normal import push_negations
 from avow.logic.smt import entails, solve
+from avow.logic.solver import z3
 from avow.logic.translation import Expr, Translator, Unsupported
 from avow.verdict import Verdict
 

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-import z3
-
 from avow.language.sorts import (
     BoolSort,
     DataSort,
@@ -30,6 +28,7 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.terms import Variable
+from avow.logic.solver import z3
 from avow.logic.translation import Expr, Translator, Unsupported
 from avow.logic.values import Data, Element, FunctionValue, Opaque, Sequence, Value
 

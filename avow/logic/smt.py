@@ -16,14 +16,13 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import Literal as OneOf
 
-import z3
-
 from avow.language.sorts import BOOL, DataSort, FunctionSort, OpaqueSort, SequenceSort, SetSort, Sort, TupleSort
 from avow.language.terms import Quantified, Term, Variable
 from avow.logic.clock import WALL, now, watchdog
 from avow.logic.counterexample import show_values
 from avow.logic.formula import free_variables, negation
 from avow.logic.models import Model
+from avow.logic.solver import z3
 from avow.logic.translation import Expr, Meaning, Translator, Unsupported
 from avow.logic.traversal import subterms
 from avow.logic.values import FunctionValue, Value

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-import z3
-
 from avow.language.terms import Term
 from avow.logic.formula import free_variables
+from avow.logic.solver import z3
 from avow.logic.translation import Translator, Unsupported
 
 

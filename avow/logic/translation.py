@@ -13,8 +13,6 @@ from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
-import z3
-
 from avow.diagnostics import Span
 from avow.language.sorts import (
     FunctionSort,
@@ -49,6 +47,7 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+from avow.logic.solver import z3
 from avow.logic.traversal import Steps, run
 from avow.logic.z3_sorts import Expr, Meaning, Sorts, Unsupported
 

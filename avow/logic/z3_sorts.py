@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
-import z3
-
 from avow.diagnostics import Span
 from avow.language.sorts import (
     BoolSort,
@@ -24,6 +22,7 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+from avow.logic.solver import z3
 from avow.logic.values import Data, Element, FunctionValue, Opaque, Value
 from avow.logic.values import Sequence as SequenceValue
 
