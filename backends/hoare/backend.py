@@ -40,7 +40,11 @@ class Work:
     @cached_property
     def triples(self) -> dict[str, tuple[Triple, ...]]:
         """Obligation id → its triples. Raises Rejected."""
-        return {o.id: triples(o, self.job.clause(o), self.job.node, self.checked) for o in self.job.obligations}
+        try:
+            return {o.id: triples(o, self.job.clause(o), self.job.node, self.checked) for o in self.job.obligations}
+        except RecursionError:
+            message = "a clause of this node is nested too deeply for this method"
+            raise Rejected(Diagnostic("HOARE100", message, self.job.node.span)) from None
 
 
 def load(job: Job) -> Work:
@@ -111,7 +115,7 @@ def files(job: Job) -> Mapping[str, str]:
                 made[f"{_stem(triple)}.outline.txt"] = outline(triple, work.checked.program.body)
                 for condition in conditions(triple, work.checked.program.body):
                     made[f"{_stem(triple)}.{condition.name}.smt2"] = _script(triple, condition)
-            except TooLarge as error:
+            except (TooLarge, RecursionError) as error:
                 made[f"{_stem(triple)}.outline.txt"] = f"no outline: {error}\n"
     return made
 
@@ -171,7 +175,7 @@ def _obligation(
     obligation: Obligation, found: Sequence[Triple], work: Work, limits: Limits, logs: dict[str, str]
 ) -> Outcome:
     deadline = time.monotonic() + limits.seconds
-    settled = [_triple(triple, work, limits, deadline) for triple in found]
+    settled = [_guarded(triple, work, limits, deadline) for triple in found]
     log = [f"{s.triple.name}: {s.verdict} - {s.why}{f' ({s.vacuous})' if s.vacuous else ''}" for s in settled]
     logs[f"{_stem(found[0])}.log" if found else f"{obligation.digest[:12]}.log"] = "\n".join(log) + "\n"
     worst = next(
@@ -217,6 +221,13 @@ def _termination(work: Work) -> tuple[str, ...]:
         for s in statements(work.checked.program.body)
         if isinstance(s, While) and s.variant is None
     )
+
+
+def _guarded(triple: Triple, work: Work, limits: Limits, deadline: float) -> Settled:
+    try:
+        return _triple(triple, work, limits, deadline)
+    except RecursionError:
+        return Settled(triple, Verdict.UNKNOWN, "its formulas are nested too deeply for this method")
 
 
 def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Settled:

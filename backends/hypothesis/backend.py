@@ -116,8 +116,9 @@ def _silence(done: Completed | None, limits: Limits) -> str:
 def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Outcome:
     own = answer["guarantees"][obligation.name]
     valid, rejected, wanted = answer["valid"], answer["rejected"], answer["wanted"]
-    bound: dict[str, object] = {"cases": valid, "rejected": rejected, "seed": seed}
-    triggers = [{"trigger": t, "met": n} for t, n in zip(own["triggers"], own["hits"], strict=True)]
+    bound: dict[str, object] = {"cases": valid, "edge_cases": answer["edges"], "rejected": rejected, "seed": seed}
+    met = zip(own["triggers"], own["hits"], own["edge_hits"], strict=True)
+    triggers = [{"trigger": t, "met": n, "met_at_edges": m} for t, n, m in met]
     details: dict[str, object] = {"triggers": triggers}
     outcome = Outcome(obligation.id, Verdict.UNKNOWN, "", bound=bound, details=details)
     if own["failure"] is not None:
@@ -131,9 +132,9 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Ou
     why = _doubt(answer, own, valid, rejected, wanted)
     if why:
         return replace(outcome, summary=why)
-    unmet = [t["trigger"] for t in triggers if not t["met"]]
+    unmet = [t["trigger"] for t in triggers if not (t["met"] or t["met_at_edges"])]
     if unmet:
-        why = f"in none of {valid} cases was its condition met: {unmet[0]}"
+        why = f"in none of {valid + answer['edges']} cases was its condition met: {unmet[0]}"
         return replace(outcome, summary=why, vacuous=True)
     least = min((n for n in own["hits"]), default=valid)
     bound["confidence"] = CONFIDENCE
@@ -145,7 +146,9 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Ou
         "if the cases were independent: with this confidence, a case drawn as these were fails with a probability "
         "below the bound; it is no probability about the robot's own inputs"
     )
-    summary = f"{valid} cases, none breaks it (seed {seed}; 95 %: below {failure_bound(least):.2g} of such cases fail)"
+    edges = f" and {answer['edges']} at thresholds" if answer["edges"] else ""
+    chance = f"95 %: below {failure_bound(least):.2g} of such cases fail"
+    summary = f"{valid} drawn cases{edges}, none breaks it (seed {seed}; {chance})"
     if valid < wanted:
         summary += f"; the generator has no more than these, of {wanted} wanted"
     return replace(outcome, verdict=Verdict.TESTED, summary=summary)

@@ -21,14 +21,14 @@ from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 
 from avow.backends.hypothesis import wire
 from avow.backends.hypothesis.convention import Malformed, outputs
-from avow.backends.hypothesis.generate import Failing, Generator, Impossible, Inputs
+from avow.backends.hypothesis.generate import BYTES, Failing, Generator, Impossible, Inputs, Source
 from avow.backends.hypothesis.judging import Trigger, blamed, guarantee, judged
 from avow.backends.hypothesis.pools import parse_cell, pools
 from avow.backends.hypothesis.process import PATIENCE, Subject, SubjectFailed
 from avow.language.sorts import FunctionSort, Sort
 from avow.logic.values import Value, show
 
-SHRINKING = 3.0
+SHRINKING = 4.0
 """Seconds spent on making a failing case simpler."""
 
 BATCH = 50
@@ -57,7 +57,7 @@ class Bench:
         self.generator = Generator(self.inputs_sorts, pools(formulas, self._rows()))
         self.subject = Subject(_find(data, folder), data["subject"]["function"], PATIENCE)
         self._aims = tuple(_aim(t) for g in self.guarantees.values() for t in g.triggers)
-        self.valid = self.rejected = self.undecided = 0
+        self.valid = self.edges = self.rejected = self.undecided = 0
         self.crash: tuple[Inputs, str] | None = None
         self.end: float | None = None
 
@@ -72,11 +72,8 @@ class Bench:
     def inputs(self) -> st.SearchStrategy[Inputs]:
         """Inputs that meet the assumptions, mostly: `check` rejects the others."""
 
-        @st.composite
-        def drawn(draw: Any) -> Inputs:
-            return self.generator.case(draw, self._blamed, self._aims)
-
-        return drawn()
+        text = st.binary(min_size=BYTES, max_size=BYTES)
+        return text.map(lambda data: self.generator.case(Source(data), self._blamed, self._aims))
 
     def configured(self, test: Callable[..., None]) -> Callable[..., None]:
         """As many cases as the plan wants, from the plan's seed, without Hypothesis' own database or deadline."""
@@ -146,6 +143,7 @@ class Bench:
                 self._try(cases)
 
         try:
+            self._edges()
             every()
             if queue:
                 self._try(queue)
@@ -159,7 +157,13 @@ class Bench:
             return f"no values: {error}"
         return ""
 
-    def _try(self, cases: list[Inputs]) -> None:
+    def _edges(self) -> None:
+        """The cases at thresholds, before any is drawn; no more than are drawn."""
+        cases = [inputs for inputs in self.generator.edges(self._blamed) if self._assumed(inputs)]
+        for at in range(0, min(len(cases), self.cases), BATCH):
+            self._try(cases[at : min(at + BATCH, self.cases)], edge=True)
+
+    def _try(self, cases: list[Inputs], edge: bool = False) -> None:
         """Ask the subject, and judge each guarantee of each answer."""
         for inputs, reply in zip(cases, self.subject.ask_all(cases), strict=False):
             self._in_time()
@@ -168,8 +172,9 @@ class Bench:
             except SubjectFailed as error:
                 self.crash = (inputs, str(error))
                 raise _Enough from error
-            self.valid += 1
-            self._judge(inputs, found)
+            self.valid += not edge
+            self.edges += edge
+            self._judge(inputs, found, edge)
             if all(g.failure is not None for g in self.guarantees.values()):
                 raise _Enough
 
@@ -177,11 +182,12 @@ class Bench:
         if self.end is not None and time.monotonic() > self.end:
             raise OutOfTime
 
-    def _judge(self, inputs: Inputs, found: dict[str, Value]) -> None:
+    def _judge(self, inputs: Inputs, found: dict[str, Value], edge: bool) -> None:
         values = valuation(inputs, found)
         for each in self.guarantees.values():
+            hits = each.edge_hits if edge else each.hits
             for k, trigger in enumerate(each.triggers):
-                each.hits[k] += trigger.whole.holds(values) is True
+                hits[k] += trigger.whole.holds(values) is True
             if each.failure is not None:
                 continue
             held = each.judged.holds(values)
@@ -234,7 +240,7 @@ class Bench:
             assume(self._assumed(inputs))
             case = broken(inputs)
             if case is not None:
-                best[0] = case
+                best[0] = min(best[0], case, key=lambda c: (len(told(*c)), told(*c)))
                 raise _Broken
 
         with contextlib.suppress(_Broken, OutOfTime, Flaky, Unsatisfiable, FailedHealthCheck):
@@ -244,6 +250,7 @@ class Bench:
     def _report(self, stopped: str, smaller: Mapping[str, Case]) -> dict[str, Any]:
         return {
             "valid": self.valid,
+            "edges": self.edges,
             "rejected": self.rejected,
             "undecided": self.undecided,
             "wanted": self.cases,
@@ -252,6 +259,7 @@ class Bench:
             "guarantees": {
                 name: {
                     "hits": each.hits,
+                    "edge_hits": each.edge_hits,
                     "triggers": [t.whole.text for t in each.triggers],
                     "undecided": each.undecided,
                     "failure": _pairs(*smaller[name]) if name in smaller else None,

@@ -51,6 +51,9 @@ class Guarantee:
     judged: Judged
     triggers: tuple[Trigger, ...]
     hits: list[int] = field(default_factory=list)
+    """How often each trigger was met by a drawn case."""
+    edge_hits: list[int] = field(default_factory=list)
+    """How often by a case at a threshold, which was not drawn."""
     undecided: int = 0
     failure: tuple[Inputs, dict[str, Value]] | None = None
 
@@ -71,7 +74,7 @@ def _ready(name: str, formula: Term, text: str) -> Judged:
 def guarantee(clause: Judged) -> Guarantee:
     """The guarantee with its triggers."""
     found = tuple(_trigger(clause.name, outer, conditions) for outer, conditions in triggers(clause.formula))
-    return Guarantee(clause, found, [0] * len(found))
+    return Guarantee(clause, found, [0] * len(found), [0] * len(found))
 
 
 def blamed(parts: Iterable[Judged], values: Mapping[str, Value]) -> tuple[str, ...] | None:

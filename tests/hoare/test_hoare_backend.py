@@ -10,6 +10,7 @@ import pytest
 
 from avow.backend import Backend, Job, Limits
 from avow.backends.hoare import BACKEND
+from avow.diagnostics import Rejected
 from avow.verdict import Link, Outcome, Verdict
 from hoare.systems import make_job, sensor
 
@@ -378,3 +379,15 @@ def test_hostile_names_stay_names(tmp_path: Path) -> None:
     made = BACKEND.export(wanted)
     assert all("/" not in name and ".." not in name for name in made)
     assert set(verdicts(wanted).values()) == {Verdict.PROVED}
+
+
+@pytest.mark.parametrize("depth", [60, 400, 3000])
+def test_deep_contracts_do_not_crash(tmp_path: Path, depth: int) -> None:
+    deep = "not (" * depth + "out.ok" + ")" * depth
+    try:
+        wanted = job(tmp_path, small(f"out.y == in.a and {deep}"), "y := a\nok := TRUE")
+    except Rejected:
+        return  # the language has its own limit
+    BACKEND.export(wanted)
+    report = BACKEND.discharge(wanted, tmp_path, Limits(seconds=20))
+    assert {o.verdict for o in report.outcomes} <= {Verdict.PROVED, Verdict.UNKNOWN, Verdict.ERROR}
