@@ -33,7 +33,7 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
         export.files(job, subject(job))
     except Rejected as rejected:
         return rejected.diagnostics
-    except wire.TooDeep:
+    except (wire.TooDeep, RecursionError):
         return (Diagnostic("HYPO105", "a formula of this node is nested too deeply to be tested", job.node.span),)
     return ()
 
@@ -41,7 +41,7 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
 def files(job: Job) -> Mapping[str, str]:
     try:
         return export.files(job, subject(job))
-    except (Rejected, wire.TooDeep):
+    except (Rejected, wire.TooDeep, RecursionError):
         return {}
 
 

@@ -16,6 +16,7 @@ from hoare.systems import make_job, sensor
 from avow.backend import Backend, Job, Limits, Report
 from avow.backends.hypothesis import BACKEND
 from avow.backends.hypothesis.backend import failure_bound
+from avow.diagnostics import Rejected
 from avow.verdict import Outcome, Verdict
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -366,3 +367,13 @@ def test_the_contracts_text_never_becomes_code(tmp_path: Path, text: str) -> Non
     assert text not in made["test_n.py"]
     assert {o.verdict for o in settle(wanted).values()} == {Verdict.TESTED}
     assert json.loads(made["contract.json"])["node"] == "n"
+
+
+@pytest.mark.parametrize("depth", [100, 250, 3000])
+def test_deep_contracts_do_not_crash(tmp_path: Path, depth: int) -> None:
+    deep = "not (" * depth + "out.y == 0" + ")" * depth
+    try:
+        found = free(tmp_path, deep, "def step(a): return 0", cases=5)
+    except Rejected:
+        return  # the language has its own limit
+    assert found.verdict in {Verdict.TESTED, Verdict.UNKNOWN, Verdict.ERROR}
