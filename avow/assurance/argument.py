@@ -152,7 +152,7 @@ class _Builder:
         self.by_claim[claim] = name
         conditions = ", ".join(condition.text for condition in d.side_conditions)
         context = [self.add(Shape.JUSTIFICATION, "Side conditions", conditions)] if conditions else []
-        context += [self.add(Shape.ASSUMPTION, "Conditional", text) for text in d.conditional]
+        context += [self.add(Shape.ASSUMPTION, "Conditional", text) for text in view.conditional]
         self.change(name, in_context_of=tuple(context))
         below = []
         for rest in view.rests_on:

@@ -58,6 +58,7 @@ from avow.assurance.support import (
     criticality,
     derivation_claims,
     obligation_claim,
+    open_conditions,
     requirement_claim_of,
     requirement_support,
 )
@@ -137,7 +138,7 @@ def conclude(facts: Facts) -> Case:
         for o in facts.obligations
     )
     requirements = tuple(_requirement(r, names, standings, statuses) for r in facts.requirements)
-    derived = tuple(_derivation(d, standings, rests) for d in facts.derivations)
+    derived = tuple(_derivation(d, standings, rests, names) for d in facts.derivations)
     grade, reason = _grade(facts, views)
     found = gates(facts, views, requirements, derived, findings, grade)
     return Case(
@@ -324,11 +325,13 @@ def _answer(
 
 
 def _derivation(
-    derivation: Derivation, standings: Mapping[str, Standing], rests: Mapping[str, tuple[str, ...]]
+    derivation: Derivation, standings: Mapping[str, Standing], rests: Mapping[str, tuple[str, ...]], names: Names
 ) -> DerivationView:
     claim = derivation_claim(derivation.name)
     standing = standings[claim]
-    return DerivationView(derivation, standing.status, *standing.weakest, standing.below, rests[claim])
+    return DerivationView(
+        derivation, standing.status, *standing.weakest, standing.below, rests[claim], open_conditions(derivation, names)
+    )
 
 
 def _assumed(views: Sequence[ObligationView], derived: Sequence[DerivationView]) -> tuple[HypothesisView, ...]:
@@ -337,7 +340,7 @@ def _assumed(views: Sequence[ObligationView], derived: Sequence[DerivationView])
         for text in dict.fromkeys(h for v in view.counting for h in v.entry.evidence.hypotheses):
             found.setdefault(text, []).append(view.id)
     for d in derived:
-        for text in d.derivation.conditional:
+        for text in d.conditional:
             found.setdefault(text, []).append(derivation_claim(d.derivation.name))
     return tuple(HypothesisView(text, tuple(claims)) for text, claims in sorted(found.items()))
 

@@ -207,12 +207,15 @@ class RequirementView:
 
 @dataclass(frozen=True, slots=True)
 class DerivationView:
+    """A derivation and where it stands. `conditional` is what no obligation settles."""
+
     derivation: Derivation
     status: Status
     weakest: str
     weakest_status: Status
     below: tuple[str, ...]
     rests_on: tuple[str, ...]
+    conditional: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from avow.assurance.facts import Facts
+from avow.assurance.model import Derivation
 from avow.assurance.naming import derivation_claim, is_advice, is_foundation, requirement_claim, sanity_property
 from avow.evidence.claims import Claim
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
@@ -55,6 +56,10 @@ class Names:
             return (known.id,)
         return (self.local[name],) if name in self.local else None
 
+    def obligation_named(self, text: str) -> str | None:
+        """The obligation that a hypothesis names, whole or without the system; None where it is just a sentence."""
+        return text if text in self.obligations else self.local.get(text)
+
     def every_guarantee(self) -> tuple[str, ...]:
         return tuple(name for names in self.guarantees.values() for name in names)
 
@@ -77,7 +82,7 @@ def obligation_claim(
         rests += [names.clause[clause] for clause in obligation.clauses if clause in names.clause]
     open_hypotheses = []
     for text in hypotheses:
-        claim = text if text in names.obligations else names.local.get(text)
+        claim = names.obligation_named(text)
         if claim is None:
             open_hypotheses.append(text)
         else:
@@ -120,13 +125,21 @@ def derivation_claims(facts: Facts, names: Names) -> Iterable[Claim]:
     """A derivation rests on its side conditions, and on the guarantees of the nodes (or derivations) it combines."""
     for derivation in facts.derivations:
         rests: list[str] = [condition.obligation for condition in derivation.side_conditions if condition.obligation]
+        rests += [claim for text in derivation.conditional if (claim := names.obligation_named(text))]
         lost = False
         for premise in derivation.premises:
             found = names.claims(premise)
             rests += found or ()
             lost = lost or found is None
         own = Status.MISSING if lost or not rests else None
-        yield Claim(derivation_claim(derivation.name), own, tuple(dict.fromkeys(rests)), derivation.conditional)
+        yield Claim(
+            derivation_claim(derivation.name), own, tuple(dict.fromkeys(rests)), open_conditions(derivation, names)
+        )
+
+
+def open_conditions(derivation: Derivation, names: Names) -> tuple[str, ...]:
+    """What a derivation is conditional on without an obligation that would settle it."""
+    return tuple(text for text in derivation.conditional if names.obligation_named(text) is None)
 
 
 def criticality(obligation: Obligation, facts: Facts) -> str:

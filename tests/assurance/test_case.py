@@ -196,6 +196,10 @@ def test_a_derivation_rests_on_side_conditions_and_premises() -> None:
     assert good.requirements[0].status is Status.LINKED
     bad = case(subject, [G, side], [evidence(G), evidence(side, Verdict.REFUTED, "compose")], derivations=[d1])
     assert bad.derivations[0].status is Status.UNSUPPORTED
+    named = replace(d1, conditional=("system/composition/side", "a mere sentence"), side_conditions=())
+    told = case(subject, [G, side], [evidence(G), evidence(side, Verdict.REFUTED, "compose")], derivations=[named])
+    assert told.derivations[0].below == (side.id,)  # a condition that an obligation settles is no mere hypothesis
+    assert told.derivations[0].conditional == ("a mere sentence",)
     lost = case(
         subject, [G, side], [evidence(G), evidence(side, method="compose")], derivations=[replace(d1, premises=("x",))]
     )

@@ -64,6 +64,11 @@
       picture.setAttribute("height", height * scale);
     };
     if (width > box.clientWidth) zoom(Math.max(0.72, (box.clientWidth - 24) / width));
+    const root = picture.querySelector("g.goal");
+    if (root) {
+      const place = root.getBBox();
+      box.scrollTop = (place.y + place.height / 2) * scale - box.clientHeight / 2;
+    }
     box.addEventListener("keydown", (event) => {
       if (event.key === "+" || event.key === "=") zoom(1.2);
       else if (event.key === "-") zoom(1 / 1.2);
