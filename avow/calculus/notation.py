@@ -138,6 +138,8 @@ def _lines(part: Derivation, names: Mapping[int, str], settled: Mapping[SideCond
             above.append(Line(("…",)))
         elif child.rule is Rule.PREMISE:
             above.append(_contract(child.nodes[0]))
+            above += _condition_lines(child, settled)
+
         else:
             conclusion = _conclusion(child)
             above.append(Line(conclusion.parts, f"by {child.rule} ({names.get(id(child), '')})"))
@@ -194,6 +196,8 @@ def _condition_lines(part: Derivation, settled: Mapping[SideCondition, Settled])
         parts: list[Part] = ["⊢", "("]
         for k, provider in enumerate(dict.fromkeys(e.source.node for e in part.linking if e.target.node == consumer)):
             parts += ["∧", *_applied("G", provider)] if k else list(_applied("G", provider))
+        if len(parts) == 2:
+            parts.append("⊤")
         parts += ["⇒", *_applied("A", consumer), ")"]
         yield Line(tuple(parts), "; ".join(_condition_remark(c, settled.get(c)) for c in conditions))
 

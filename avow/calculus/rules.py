@@ -114,6 +114,18 @@ class _Builder:
         assumed = tuple(ClauseName(node, clause.name) for clause in self.frame.node(node).assumptions)
         return Derivation(Rule.PREMISE, (node,), assumed=assumed, guaranteed=(node,))
 
+    def rooted(self, node: str) -> Derivation:
+        """A node that no selected node feeds: what the plan's environment gives of its assumptions is shown."""
+        conditions, kept = self.conditions(node, ())
+        return Derivation(
+            Rule.PREMISE,
+            (node,),
+            outside=self.outside(node, ()),
+            side_conditions=conditions,
+            assumed=kept,
+            guaranteed=(node,),
+        )
+
     def sequence(self, before: Derivation, provider: str, node: str) -> Derivation:
         """R1: one node more at the end of a sequence, or a sequence of two."""
         conditions, kept = self.conditions(node, (provider,))
@@ -233,7 +245,7 @@ class _Builder:
                 whole = self.loop(before, group, entries)
                 made.update(dict.fromkeys(group, whole))
             elif not entries:
-                made[group[0]] = self.premise(group[0])
+                made[group[0]] = self.rooted(group[0])
             elif len(entries) == 1:
                 leaves = self.leaves(entries[0], home)
                 if len(leaves) > 1:
