@@ -35,7 +35,7 @@ def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool) -> 
 
     from avow.pipeline.tasks import config, pipeline
 
-    tasks = {"DOIT_CONFIG": config(place.root), "task_avow": lambda: pipeline(place.root)}
     wanted = [f"verify:{name}" for name in systems] or ["verify"]
+    tasks = {"DOIT_CONFIG": config(place.root), "task_avow": lambda: pipeline(place.root, wanted)}
     code = DoitMain(ModuleTaskLoader(tasks)).run(["run", "-n", str(jobs), *wanted])
     return int(code or 0)

@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from pathlib import Path
@@ -20,6 +19,7 @@ from avow.diagnostics import Rejected
 from avow.files import digest, digest_file, write
 from avow.pipeline import check as checking
 from avow.pipeline.discharge import ledger_of
+from avow.pipeline.results import Result, finished, note, read_result
 from avow.pipeline.run_info import EXPLAIN, Run, seconds_so_far
 from avow.pipeline.survey import Survey
 from avow.registry import backend, names
@@ -43,25 +43,8 @@ class Assessment:
         return self.workspace.artifacts / self.system / "report.json"
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """What the terminal shows of one assessed system."""
-
-    system: str
-    exit_code: int
-    counts: Mapping[str, int]
-    """Status → how many obligations have it."""
-    grade: str
-    report: str
-    gates: tuple[tuple[str, bool, str], ...]
-    """(title, passed, reason and what would close it)."""
-    left_out: tuple[tuple[str, str], ...] = ()
-
-
 _known: list[Assessment] = []
-_finished: list[Result] = []
 _changed: list[str] = []
-_gated: list[str] = []
 
 
 def register(assessment: Assessment) -> Assessment:
@@ -75,14 +58,9 @@ def known() -> tuple[Assessment, ...]:
     return tuple(_known)
 
 
-def finished() -> tuple[Result, ...]:
-    """The systems assessed in this process so far."""
-    return tuple(_finished)
-
-
 def index_is_due() -> bool:
     """Whether the page over all systems no longer shows what its systems' reports show."""
-    return bool(_changed) or any(not (a.workspace.reports / "index.html").is_file() for a in _known if _finished)
+    return bool(_changed) or any(not (a.workspace.reports / "index.html").is_file() for a in _known if finished())
 
 
 def render(assessment: Assessment) -> Result:
@@ -90,7 +68,7 @@ def render(assessment: Assessment) -> Result:
     key = _key(assessment)
     known = _read(assessment)
     if known is not None and known["key"] == key and _is_intact(assessment, known["files"]):
-        result = _result(known)
+        result = read_result(known)
     else:
         from avow.report import render_all
 
@@ -98,29 +76,24 @@ def render(assessment: Assessment) -> Result:
         rendered = render_all(case, assessment.workspace.report(assessment.system))
         result = _summarise(assessment, case, rendered.left_out)
         files = {assessment.workspace.relative(p): digest_file(p) for p in rendered.written}
-        write(assessment.stamp, json.dumps({"key": key, "files": files, **_result_json(result)}, indent=1))
+        write(assessment.stamp, json.dumps({"key": key, "files": files, **result.json()}, indent=1))
         _changed.append(assessment.system)
-    _finished.append(result)
     return result
 
 
+def report(assessment: Assessment) -> bool:
+    """Render the report, whatever the gates say."""
+    return note(render(assessment), gated=False)
+
+
 def gate(assessment: Assessment) -> TaskError | bool:
-    """Render the report and note whether the policy's gates pass: `exit_code` tells, once all systems are through."""
+    """Render the report and note whether the policy's gates pass: the run's exit code follows from all of them."""
     try:
-        render(assessment)
+        return note(render(assessment), gated=True)
     except Rejected as rejected:
         return checking.refuse(rejected)
     except OSError as error:
         return TaskError(f"the report cannot be written: {error}")
-    _gated.append(assessment.system)
-    return True
-
-
-def exit_code() -> int:
-    """0: every gate passes; 1: one fails; 3: one fails for want of a tool, and no other. Only systems that were to be
-    verified count: `doit report` shows failing gates and ends with 0."""
-    codes = {r.exit_code for r in _finished if r.system in _gated}
-    return 1 if 1 in codes else max(codes, default=0)
 
 
 def build(assessment: Assessment) -> Case:
@@ -220,34 +193,10 @@ def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, st
     return Result(case.system, case.exit_code, dict(counts), case.grade.value, index, tuple(gates), left_out)
 
 
-def _result_json(result: Result) -> dict[str, Any]:
-    return {
-        "system": result.system,
-        "exit_code": result.exit_code,
-        "counts": dict(result.counts),
-        "grade": result.grade,
-        "report": result.report,
-        "gates": [list(g) for g in result.gates],
-        "left_out": [list(pair) for pair in result.left_out],
-    }
-
-
-def _result(data: dict[str, Any]) -> Result:
-    return Result(
-        data["system"],
-        data["exit_code"],
-        data["counts"],
-        data["grade"],
-        data["report"],
-        tuple((title, passed, reason) for title, passed, reason in data["gates"]),
-        tuple((name, why) for name, why in data["left_out"]),
-    )
-
-
 def _read(assessment: Assessment) -> dict[str, Any] | None:
     try:
         data = json.loads(assessment.stamp.read_text())
-        _result(data)
+        read_result(data)
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return data if isinstance(data, dict) and isinstance(data.get("files"), dict) else None

@@ -28,7 +28,6 @@ from avow.system.plan import System
 from avow.verdict import Link
 from avow.workspace import Workspace
 
-
 _Task = tuple[Work, Obligation, Evidence]
 
 

@@ -14,6 +14,9 @@ from typing import IO, Any
 from doit.reporter import ConsoleReporter
 
 from avow import process
+from avow.pipeline import shortcut
+from avow.pipeline.results import exit_code, finished
+from avow.workspace import Workspace
 
 _SILENT = ("verify",)
 """Stages whose result is the final table, not a line of its own."""
@@ -76,15 +79,12 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         self.runtime_errors.append(msg)
 
     def complete_run(self) -> None:
-        from avow.pipeline.assess import exit_code, finished, index_is_due, known
-        from avow.pipeline.overview import write_overview
         from avow.pipeline.summary import print_obligations, print_summary
 
         process.kill_all()  # nothing of ours may outlive the run, also when it was interrupted
         with self._lock:
             self._clear()
-        if index_is_due():
-            write_overview(known())
+        self._write_index()
         if any(name.split(":")[0] == "obligations" for name in self._selected):
             print_obligations(self._selected, self.outstream)
         broken = sorted(
@@ -94,11 +94,32 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         print_summary(finished(), broken, self._done, time.monotonic() - self._start, self.outstream)
         for message in self.runtime_errors:
             self.outstream.write(message + "\n")
+        self._keep()
         if self._run_lock is not None:
             self._run_lock.close()
         # A failing gate is no failing task: doit would call its group an error (2), and it knows no code 3.
         if not self.failures and not self.runtime_errors and exit_code():
             raise SystemExit(exit_code())
+
+    def _write_index(self) -> None:
+        if "avow.pipeline.assess" in sys.modules:  # else nothing was read, so nothing can have changed
+            from avow.pipeline.assess import index_is_due, known
+            from avow.pipeline.overview import write_overview
+
+            if index_is_due():
+                write_overview(known())
+
+    def _keep(self) -> None:
+        """Note that all is settled, for the next run, or that it is not."""
+        workspace = Workspace(Path.cwd())
+        if "avow.pipeline.assess" not in sys.modules:
+            return
+        from avow.pipeline.assess import known
+
+        complete = {a.system for a in known()} == {r.system for r in finished()}
+        plugins = any(a.surveyed.system.plan.plugins for a in known())  # their code may be anywhere
+        if "verify" in self._selected and complete and not plugins and not self.failures and not self.runtime_errors:
+            shortcut.keep(workspace, finished())
 
     def _line(self, text: str) -> None:
         self._clear()

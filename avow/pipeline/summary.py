@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from avow.pipeline.assess import Result
+from avow.pipeline.results import Result
 
 GOOD = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
 BAD = ("refuted", "contradictory", "error", "missing", "stale", "vacuous", "unknown", "not-run", "unsupported")

@@ -1,42 +1,20 @@
-"""The stages as doit tasks, one for each system, node and method: what `dodo.py` yields.
-
-Whether a task is up to date is decided by the content that it depends on, never by time stamps or by doit's own
-memory: by the keys in the ledger, and by the digests of what stands on disk. So an interrupted run loses only the
-attempts in flight, and a run with nothing to do does nothing.
-"""
+"""What `dodo.py` yields: every stage as a doit task. Light, so that a run with nothing to do costs next to nothing;
+the stages themselves are in `avow.pipeline.stages`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from doit.exceptions import TaskError
-
-from avow.diagnostics import Rejected
-from avow.pipeline import check as checking
-from avow.pipeline import export as exporting
-from avow.pipeline.assess import Assessment, gate, register, render
-from avow.pipeline.discharge import discharge, open_obligations
+from avow.pipeline import shortcut
 from avow.pipeline.reporter import PipelineReporter
-from avow.pipeline.run_info import this_run
-from avow.pipeline.survey import Survey, survey, write_obligations
-from avow.pipeline.work import COMPOSE, LANGUAGE, SANITY, Work
+from avow.pipeline.results import note
 from avow.workspace import Workspace
 
 Task = dict[str, Any]
-
-STAGES = {
-    "check": "parse and check the contract and the plan",
-    "sanity": "is each node's contract worth verifying?",
-    "compose": "derive system-level properties and prove their side conditions",
-    "obligations": "write every proof obligation",
-    "export": "generate each method's input from the contract",
-    "discharge": "run each method's tool and record the evidence",
-    "report": "render the assurance reports from the ledger",
-    "verify": "everything, and the policy's gates",
-}
 
 
 def config(root: Path) -> dict[str, Any]:
@@ -54,115 +32,33 @@ def config(root: Path) -> dict[str, Any]:
     }
 
 
-def pipeline(root: Path) -> Iterator[Task]:
-    """All tasks for all systems under `root`/contracts."""
+def pipeline(root: Path, wanted: Sequence[str] | None = None) -> Iterator[Task]:
+    """All tasks for all systems under `root`/contracts; `wanted` are the names of those that will be run (by default,
+    as doit's command line has them)."""
     workspace = Workspace(root)
-    for stage, doc in STAGES.items():
-        yield {"basename": stage, "name": None, "doc": doc}
-    for folder in workspace.systems():
-        surveyed = survey(folder)
-        if isinstance(surveyed, Rejected):
-            yield from _rejected(folder.name, surveyed)
+    settled = shortcut.nothing_to_do(workspace, _wanted(sys.argv[1:]) if wanted is None else wanted)
+    if settled is not None:
+        for result in settled:
+            action = partial(note, result, gated=True)
+            yield {"basename": "verify", "name": result.system, "actions": [action], "uptodate": [False]}
+        return
+    from avow.pipeline.stages import stages
+
+    yield from stages(workspace)
+
+
+def _wanted(arguments: Sequence[str]) -> tuple[str, ...]:
+    """The tasks that doit is asked to run; empty for anything that is not plainly a run."""
+    names: list[str] = []
+    rest = list(arguments[1:] if arguments[:1] == ["run"] else arguments)
+    while rest:
+        word = rest.pop(0)
+        if word in ("-n", "--process", "-P", "--parallel-type"):
+            rest[:1] = []
+        elif word.startswith("-n") or word in ("-c", "--continue"):
+            continue
+        elif word.startswith("-") or "=" in word:
+            return ()
         else:
-            yield from _system(workspace, surveyed)
-
-
-def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
-    """A system that cannot be read: its stages say so, the other systems go on."""
-    for stage in STAGES:
-        action = (
-            partial(checking.refuse, rejected)
-            if stage in ("check", "verify")
-            else partial(checking.refuse_quietly, name)
-        )
-        yield {"basename": stage, "name": name, "actions": [action], "uptodate": [False]}
-
-
-def _system(workspace: Workspace, surveyed: Survey) -> Iterator[Task]:
-    name = surveyed.system.name
-    check = f"check:{name}"
-    done = []
-    yield {
-        "basename": "check",
-        "name": name,
-        "actions": [
-            partial(_act, partial(checking.check, workspace, surveyed)),
-            _discharge(workspace, surveyed.work(LANGUAGE)),
-        ],
-        "uptodate": [partial(checking.is_current, workspace, surveyed), _settled(workspace, surveyed.work(LANGUAGE))],
-    }
-    for work in surveyed.catalogue.works:
-        match work.engine:
-            case "language":
-                continue
-            case "sanity":
-                basename, title = "sanity", f"{name}:{work.node}"
-            case "compose":
-                basename, title = "compose", name
-            case _:
-                basename, title = "discharge", f"{name}:{work.node}:{work.method}"
-                key = exporting.key(work, surveyed.digest)
-                yield {
-                    "basename": "export",
-                    "name": title,
-                    "actions": [partial(_act, partial(exporting.export, workspace, work, key))],
-                    "task_dep": [check],
-                    "uptodate": [partial(exporting.is_current, workspace, work, key)],
-                }
-        yield {
-            "basename": basename,
-            "name": title,
-            "actions": [_discharge(workspace, work)],
-            "task_dep": [f"export:{title}"] if basename == "discharge" else [check],
-            "uptodate": [_settled(workspace, work)],
-        }
-        done.append(f"{basename}:{title}")
-    yield {
-        "basename": "obligations",
-        "name": name,
-        "actions": [partial(_act, partial(write_obligations, workspace, surveyed))],
-        "task_dep": [check],
-        "uptodate": [partial(write_obligations, workspace, surveyed, dry=True)],
-    }
-    assessment = register(Assessment(workspace, surveyed, this_run()))
-    yield {
-        "basename": "report",
-        "name": name,
-        "actions": [partial(_act, partial(render, assessment))],
-        "task_dep": [check],
-        # of the ledger as it stands: `doit report` runs no tool; `verify` renders once all evidence is in
-        "uptodate": [False],
-    }
-    yield {
-        "basename": "verify",
-        "name": name,
-        "doc": surveyed.system.plan.title,
-        "actions": [partial(gate, assessment)],
-        "task_dep": [*done, f"obligations:{name}"],
-        "uptodate": [False],
-    }
-
-
-def _discharge(workspace: Workspace, work: Work) -> Callable[[], TaskError | bool]:
-    return partial(_act, partial(discharge, workspace, work, this_run()))
-
-
-def _settled(workspace: Workspace, work: Work) -> Callable[[], bool]:
-    def settled() -> bool:
-        return not open_obligations(workspace, work, this_run())
-
-    return settled
-
-
-def _act(action: Callable[[], object]) -> TaskError | bool:
-    """Bad input and a fault of ours become a failed task with a message; what a stage returns is not for doit."""
-    try:
-        action()
-    except Rejected as rejected:
-        return checking.refuse(rejected)
-    except OSError as error:
-        return TaskError(f"{type(error).__name__}: {error}")
-    return True
-
-
-__all__ = ["COMPOSE", "SANITY", "config", "pipeline"]
+            names.append(word)
+    return tuple(names) or ("verify",)

@@ -226,4 +226,4 @@ def _scenario(system: System) -> str:
 @functools.cache
 def _z3_version() -> str:
     # importing z3 to ask it would cost more than all the rest of a run with nothing to do
-    return f"z3 {metadata.version('z3-solver')}"
+    return f"avow {__version__}, z3 {metadata.version('z3-solver')}"

@@ -1,0 +1,75 @@
+"""What came of each system in this run, and the exit code that follows. Light: an idle run needs it too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What the terminal shows of one assessed system."""
+
+    system: str
+    exit_code: int
+    counts: Mapping[str, int]
+    """Status → how many obligations have it."""
+    grade: str
+    report: str
+    gates: tuple[tuple[str, bool, str], ...]
+    """(title, passed, reason and what would close it)."""
+    left_out: tuple[tuple[str, str], ...] = ()
+
+    def json(self) -> dict[str, Any]:
+        return {
+            "system": self.system,
+            "exit_code": self.exit_code,
+            "counts": dict(self.counts),
+            "grade": self.grade,
+            "report": self.report,
+            "gates": [list(g) for g in self.gates],
+            "left_out": [list(pair) for pair in self.left_out],
+        }
+
+
+def read_result(data: Mapping[str, Any]) -> Result:
+    """Raises KeyError, TypeError or ValueError for what `Result.json` did not make."""
+    return Result(
+        data["system"],
+        data["exit_code"],
+        data["counts"],
+        data["grade"],
+        data["report"],
+        tuple((title, passed, reason) for title, passed, reason in data["gates"]),
+        tuple((name, why) for name, why in data["left_out"]),
+    )
+
+
+@dataclass(slots=True)
+class _Run:
+    finished: list[Result] = field(default_factory=list)
+    gated: list[str] = field(default_factory=list)
+
+
+_run = _Run()
+
+
+def note(result: Result, *, gated: bool) -> bool:
+    """Remember a result; with `gated`, the system was to be verified, not only reported. True: an action's answer."""
+    _run.finished = [r for r in _run.finished if r.system != result.system] + [result]
+    if gated:
+        _run.gated.append(result.system)
+    return True
+
+
+def finished() -> tuple[Result, ...]:
+    """The systems assessed in this process so far."""
+    return tuple(_run.finished)
+
+
+def exit_code() -> int:
+    """0: every gate passes; 1: one fails; 3: one fails for want of a tool, and no other. Only systems that were to be
+    verified count: `doit report` shows failing gates and ends with 0."""
+    codes = {r.exit_code for r in _run.finished if r.system in _run.gated}
+    return 1 if 1 in codes else max(codes, default=0)

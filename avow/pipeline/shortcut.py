@@ -1,0 +1,100 @@
+"""A run with nothing to do, found out by looking at files' identities only, without reading a contract.
+
+After a complete run of everything, `keep` notes the identity (inode, size, times of change) of every file that the
+answer depends on: contracts, artifacts, reports, Avow's own code, and the folders in which tools and packages would
+appear; and the environment. While all that is the same, the next `doit verify` has nothing to do and says so. Times of
+*change* (ctime) cannot be set back, so an edit is never missed; a touched file only costs the long way.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from pathlib import Path
+
+from avow.files import write
+from avow.pipeline.results import Result, read_result
+from avow.pipeline.run_info import EXPLAIN, FRESH
+from avow.workspace import Workspace
+
+_ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH)
+_PACKAGE = Path(__file__).parent.parent
+
+
+def nothing_to_do(workspace: Workspace, wanted: Sequence[str]) -> tuple[Result, ...] | None:
+    """The results of the last run, if only verification is `wanted` and nothing has changed since; else None."""
+    if not wanted or any(name.split(":")[0] != "verify" for name in wanted) or os.environ.get(FRESH):
+        return None
+    try:
+        kept = json.loads(_stamp(workspace).read_text())
+        results = tuple(read_result(r) for r in kept["results"])
+        if kept["identity"] != _identity(workspace):
+            return None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    names = {r.system for r in results}
+    asked = {name.partition(":")[2] for name in wanted}
+    return results if asked - {""} <= names else None
+
+
+def keep(workspace: Workspace, results: Sequence[Result]) -> None:
+    """Note that everything is settled as things stand. Without effect where a link leads out of the workspace."""
+    try:
+        identity = _identity(workspace)
+        write(_stamp(workspace), json.dumps({"identity": identity, "results": [r.json() for r in results]}))
+    except OSError:
+        return
+
+
+def drop(workspace: Workspace) -> None:
+    """A run begins, or some of it failed."""
+    _stamp(workspace).unlink(missing_ok=True)
+
+
+def _stamp(workspace: Workspace) -> Path:
+    return workspace.artifacts / ".settled.json"
+
+
+def _identity(workspace: Workspace) -> str:
+    """Raises OSError for anything that cannot be looked at."""
+    digest = hashlib.sha256()
+    environment = [(name, os.environ.get(name)) for name in _ENVIRONMENT]
+    today = str(datetime.now().astimezone().date())
+    digest.update(json.dumps([environment, today, sys.version, sys.executable, sys.path]).encode())
+    for folder in (workspace.contracts, workspace.artifacts, workspace.reports, _PACKAGE, _PACKAGE.parent / "backends"):
+        for line in _files(folder):
+            digest.update(line.encode("utf-8", "surrogateescape"))
+    for name in dict.fromkeys([*os.environ.get("PATH", "").split(os.pathsep), *sys.path]):
+        digest.update(f"{name} {_mark(name) if Path(name).is_dir() else ''}\n".encode("utf-8", "surrogateescape"))
+    return digest.hexdigest()
+
+
+def _files(folder: Path) -> Iterator[str]:
+    stack = [str(folder)]
+    while stack:
+        current = stack.pop()
+        with os.scandir(current) as entries:
+            for entry in sorted(entries, key=lambda e: e.name):
+                # doit's own memory and our locks change with every run; caches are nobody's input
+                if entry.name in (".doit.json", ".lock", ".settled.json", "__pycache__"):
+                    continue
+                if entry.is_dir(follow_symlinks=False):
+                    stack.append(entry.path)
+                elif entry.is_dir():
+                    if not _is_backends(entry.path):
+                        raise OSError(f"{entry.path} leads elsewhere")
+                else:
+                    yield f"{entry.path} {_mark(entry.path)}\n"
+
+
+def _is_backends(path: str) -> bool:
+    return Path(path) == _PACKAGE / "backends"
+
+
+def _mark(path: str) -> str:
+    stat = Path(path).stat()
+    return f"{stat.st_ino} {stat.st_size} {stat.st_mtime_ns} {stat.st_ctime_ns}"
