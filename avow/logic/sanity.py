@@ -268,12 +268,15 @@ class _Analysis:
         clause = self.node.clause(name)
         if clause.kind is ClauseKind.ASSUMPTION:
             return self._fails_somewhere({}, clause.formula, "every input meets it: it assumes nothing", "")
-        return self._fails_somewhere(
+        finding = self._fails_somewhere(
             self.assumptions,
             clause.formula,
             "it holds of all inputs and outputs: it demands nothing",
             "it follows from {}: it demands nothing of any output",
         )
+        if finding.verdict is not Verdict.REFUTED:
+            return finding
+        return replace(finding, because=self._if_refuted("assumptions-satisfiable"))
 
     def _vacuous(self, name: str) -> _Finding:
         impossible = []

@@ -139,6 +139,8 @@ def _ask(
     solver = z3.Solver(ctx=translator.context)
     solver.set("timeout", _wall(timeout_ms))
     solver.set("random_seed", seed)
+    # Its Gröbner bases of non-linear integer terms cannot be interrupted: Z3 would hang.
+    solver.set("smt.arith.nl.grobner", False)
     solver.add(*assertions)
     switches = {}
     for number, (label, expr) in enumerate(tracked):
