@@ -9,13 +9,14 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from avow import __version__
 from avow.backend import Backend, Job, Limits
-from avow.diagnostics import Severity
+from avow.diagnostics import Diagnostic, Rejected, Severity
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.files import digest, digest_file
 from avow.language.contract import Contract, Node
@@ -124,12 +125,29 @@ def method_work(system: System, node: Node, method: Method) -> Work:
         _files(tool, job),
         _scenario(system),
     )
-    limits = Limits(
-        seconds=float(options.get("seconds", Limits().seconds)),
-        megabytes=int(options.get("megabytes", Limits().megabytes)),
-        seed=int(options.get("seed", Limits().seed)),
+    return _work(
+        system, node.name, method.id, job.obligations, *parts, engine=tool.name, limits=_limits(method, options)
     )
-    return _work(system, node.name, method.id, job.obligations, *parts, engine=tool.name, limits=limits)
+
+
+_BOUNDS = {"seconds": (0.1, 604_800), "megabytes": (64, 10_000_000), "seed": (0, 2**31 - 1)}
+"""Least and greatest value of each limit: beyond them a slip of the pen, or what the system's calls do not take."""
+
+
+def _limits(method: Method, options: Mapping[str, Any]) -> Limits:
+    """Raises Rejected, as every stage needs them and none may guess."""
+    wrong = []
+    for name, (least, most) in _BOUNDS.items():
+        value = options.get(name, least)
+        number = isinstance(value, int) or (isinstance(value, float) and name == "seconds")
+        if isinstance(value, bool) or not number or not least <= value <= most:
+            kind = "a number" if name == "seconds" else "a whole number"
+            message = f"{method.id}: {name} must be {kind} from {least} to {most}"
+            wrong.append(Diagnostic("PLAN105", message, method.options.at(name)))
+    if wrong:
+        raise Rejected(*wrong)
+    given = {name: options[name] for name in _BOUNDS if name in options}
+    return replace(Limits(), **given)
 
 
 def method_backend(system: System, method: Method) -> Backend:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import sys
 import traceback
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +19,17 @@ from avow.diagnostics import Rejected
 from avow.evidence.obligation import Obligation
 from avow.files import write
 from avow.pipeline.wire import report_from_json, report_to_json
-from avow.pipeline.work import Work
+from avow.pipeline.work import Work, compose_work, method_backend, method_job, method_work, sanity_work
+from avow.system.load import load_system
+from avow.system.plan import System
 from avow.verdict import Outcome, Verdict
 from avow.workspace import Workspace
 
 GRACE = 90.0
 """Seconds above the tool's own limits that a worker gets to load, translate and write."""
+
+CHANGED = 75
+"""Exit code: what was to be verified is not what stands on the disk any more, so that the answer is of neither."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +55,7 @@ def run(
                 "node": work.node,
                 "method": work.method,
                 "engine": work.engine,
-                "obligations": [o.id for o in obligations],
+                "keys": {o.id: work.keys[o.id] for o in obligations},
                 "folder": str(folder),
                 "limits": asdict(work.limits),
                 "altered": asdict(altered) if altered else None,
@@ -65,6 +70,9 @@ def run(
     try:
         if done.timed_out:
             return _failed(obligations, work, Verdict.UNKNOWN, f"no answer within {limit:.0f} s", log)
+        if done.code == CHANGED:
+            why = "contract, plan or a model changed while it was being verified; run it again"
+            return _failed(obligations, work, Verdict.ERROR, why, log)
         if done.code != 0 or not response.is_file():
             last = done.stderr.strip().splitlines()[-1:] or [f"the worker ended with code {done.code}"]
             return _failed(obligations, work, Verdict.ERROR, f"the engine crashed: {last[0][:300]}", log)
@@ -101,61 +109,85 @@ def _failed(
     return Report(outcomes, work.engine, __version__, logs=logs)
 
 
+class Changed(Exception):  # noqa: N818 - it names what happened
+    """The files are no longer those that the keys are of."""
+
+
 def main(arguments: list[str]) -> int:
     request = json.loads(Path(arguments[0]).read_text())
-    report = _execute(request)
+    system, work = _asked(request)
+    report = _execute(request, system, work)
+    _asked(request)  # tools read the plan's files by themselves, at any time until now
     write(Path(arguments[1]), json.dumps(report_to_json(report), default=str))
     return 0
 
 
-def _execute(request: dict[str, Any]) -> Report:
-    from avow.system.load import load_system
+def _asked(request: dict[str, Any]) -> tuple[System, Work]:
+    """The work as the disk has it now. Raises Changed where that is not the work that was asked for: its answer would
+    be recorded under a key that it does not answer."""
+    try:
+        system = load_system(Path(request["system"]))
+        work = _work(request, system)
+    except (Rejected, KeyError) as problem:
+        raise Changed from problem
+    if any(work.keys.get(name) != key for name, key in request["keys"].items()):
+        raise Changed
+    return system, work
 
-    system = load_system(Path(request["system"]))
+
+def _work(request: dict[str, Any], system: System) -> Work:
+    """Raises KeyError for a node or method that there is not any more."""
+    match request["engine"]:
+        case "sanity":
+            return sanity_work(system, system.contract.node(request["node"]))
+        case "compose":
+            return compose_work(system)
+        case _:
+            node = system.contract.node(request["node"])
+            for method in system.plan.node(node.name).methods:
+                if method.id == request["method"]:
+                    return method_work(system, node, method)
+            raise KeyError(request["method"])
+
+
+def _execute(request: dict[str, Any], system: System, work: Work) -> Report:
     limits = Limits(**request["limits"])
-    folder = Path(request["folder"])
-    wanted = set(request["obligations"])
+    claims = tuple(o for o in work.obligations if o.id in request["keys"])
     match request["engine"]:
         case "sanity":
             from avow.pipeline.engines import discharge_sanity
-            from avow.pipeline.work import sanity_work
 
-            node = system.contract.node(request["node"])
-            work = sanity_work(system, node)
-            claims = tuple(o for o in work.obligations if o.id in wanted)
-            return discharge_sanity(system, node, claims, limits)
+            return discharge_sanity(system, system.contract.node(work.node), claims, limits)
         case "compose":
             from avow.pipeline.engines import discharge_composition
-            from avow.pipeline.work import compose_work
 
-            claims = tuple(o for o in compose_work(system).obligations if o.id in wanted)
             return discharge_composition(system, claims, limits)
         case _:
-            from dataclasses import replace
+            return _discharge(request, system, work, limits)
 
-            from avow.pipeline.work import method_backend, method_job
 
-            node = system.contract.node(request["node"])
-            method = next(m for m in system.plan.node(node.name).methods if m.id == request["method"])
-            tool = method_backend(system, method)
-            if request["altered"]:
-                from avow.pipeline.mutation import alter
+def _discharge(request: dict[str, Any], system: System, work: Work, limits: Limits) -> Report:
+    folder = Path(request["folder"])
+    node = system.contract.node(work.node)
+    method = next(m for m in system.plan.node(node.name).methods if m.id == work.method)
+    tool = method_backend(system, method)
+    if request["altered"]:
+        from avow.pipeline.mutation import alter
 
-                system = alter(system, node, Altered(**request["altered"]))
-                node = system.contract.node(node.name)
-                for name, text in tool.export(method_job(system, node, method)).items():
-                    write(folder / name, text)
-            job = method_job(system, node, method)
-            job = replace(job, obligations=tuple(o for o in job.obligations if o.id in wanted))
-            return tool.discharge(job, folder, limits)
+        system = alter(system, node, Altered(**request["altered"]))
+        node = system.contract.node(node.name)
+        for name, text in tool.export(method_job(system, node, method)).items():
+            write(folder / name, text)
+    job = method_job(system, node, method)
+    job = replace(job, obligations=tuple(o for o in job.obligations if o.id in request["keys"]))
+    return tool.discharge(job, folder, limits)
 
 
 if __name__ == "__main__":
     try:
         code = main(sys.argv[1:])
-    except Rejected as rejected:  # the input changed under us since the pipeline read it
-        print(rejected, file=sys.stderr)
-        code = 2
+    except Changed:
+        code = CHANGED
     except Exception:
         traceback.print_exc()
         code = 1
