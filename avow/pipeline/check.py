@@ -79,7 +79,8 @@ def show(found: Iterable[Diagnostic]) -> None:
 
 def refuse(rejected: Rejected) -> TaskError:
     show(rejected.diagnostics)
-    return TaskError(f"{len(rejected.diagnostics)} error(s) in the input")
+    errors = sum(d.is_error for d in rejected.diagnostics)
+    return TaskError(f"{errors} error(s) in the input")
 
 
 def refuse_quietly(name: str) -> TaskError:
