@@ -56,7 +56,7 @@ def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False)
     for work in surveyed.catalogue.works:
         for obligation in work.obligations:
             methods.setdefault(obligation.id, []).append(work.method)
-    listed = [obligation_json(o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations]
+    listed = [obligation_json(workspace, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations]
     text = json.dumps({"system": surveyed.system.name, "obligations": listed}, indent=1, ensure_ascii=False) + "\n"
     path = workspace.artifacts / surveyed.system.name / "obligations.json"
     if dry:
@@ -64,7 +64,8 @@ def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False)
     return write(path, text)
 
 
-def obligation_json(obligation: Obligation, methods: list[str]) -> dict[str, Any]:
+def obligation_json(workspace: Workspace, obligation: Obligation, methods: list[str]) -> dict[str, Any]:
+    span = obligation.span
     return {
         "id": obligation.id,
         "kind": obligation.kind.value,
@@ -72,6 +73,6 @@ def obligation_json(obligation: Obligation, methods: list[str]) -> dict[str, Any
         "formula": obligation.formula,
         "digest": obligation.digest,
         "clauses": list(obligation.clauses),
-        "at": str(obligation.span) if obligation.span else None,
+        "at": f"{workspace.relative(Path(span.file))}:{span.line}:{span.column}" if span else None,
         "methods": methods,
     }
