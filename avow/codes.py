@@ -1,7 +1,8 @@
-"""Every diagnostic code of the language, declared once: what it means, and a text that brings it about.
+"""Every diagnostic code of the language and of plans, declared once: what it means, and a text that brings it about.
 
 Numbers: 0xx the file, 1xx the syntax, 2xx names, 3xx sorts, 4xx lints (warnings that can be switched off).
-The tests check every example, and docs/language.md lists every code.
+The tests check every example, and docs/language.md lists every code. The codes of everything else stand in
+`avow.codes_workspace` and with the backends; docs/diagnostics.md has them all in one table.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ class Code:
     explanation: str
     example: str = ""
     severity: Severity = Severity.ERROR
+    remedy: str = ""
+    """What to do; empty where the example or the message says it."""
 
     @property
     def text(self) -> str:
@@ -49,6 +52,21 @@ class Code:
     def is_lint(self) -> bool:
         """Whether a plan's `lints_off` or a comment ``// avow: allow CODE`` can switch it off."""
         return self.severity is Severity.WARNING
+
+
+def declare(code: str, title: str, explanation: str, remedy: str, *, warning: bool = False) -> Code:
+    """A code whose example is no text of RCL."""
+    return Code(code, title, explanation, "", Severity.WARNING if warning else Severity.ERROR, remedy)
+
+
+def register(*codes: Code) -> dict[str, Code]:
+    """Codes by name, in order. Raises ValueError where one is declared twice."""
+    found: dict[str, Code] = {}
+    for code in codes:
+        if code.code in found:
+            raise ValueError(f"{code.code} is declared twice")
+        found[code.code] = code
+    return found
 
 
 _NODE = "node n {{ inputs({}) outputs({}) topics({}) {} }}"
@@ -321,46 +339,136 @@ CODES: dict[str, Code] = {c.code: c for c in (*_FILE, *_SYNTAX, *_NAMES, *_SORTS
 """Every code, in order."""
 
 
-# --- plans, systems, the calculus: their examples are plans, and stand in tests/system -------------------------------------
+# --- plans, systems, the calculus: their examples are plans, and stand in tests/system ------------------------------
 
 PLAN_CODES: dict[str, Code] = {
     c.code: c
     for c in (
         Code(
-            "PLAN100", "no plan", "There is no system here: no folder, or neither a plan.yaml nor an .rcl file in it."
+            "PLAN100",
+            "no plan",
+            "There is no system here: neither a plan.yaml nor an .rcl file.",
+            remedy="Give the folder that has the `plan.yaml`.",
         ),
-        Code("PLAN101", "not YAML", "The file is not one plain YAML document, or too large, too deep, or empty."),
-        Code("PLAN102", "a key", "A key is given twice, is a merge key, or is not plain text."),
-        Code("PLAN103", "unknown key", "The plan has no such key at this place."),
-        Code("PLAN104", "missing key", "A key that is needed here is missing."),
-        Code("PLAN105", "wrong value", "The value has the wrong type or form, or is not one of those allowed."),
-        Code("PLAN106", "unknown name", "The plan names a node, port or guarantee that the contract does not have."),
-        Code("PLAN107", "no such file", "The plan names a file that is not there."),
-        Code("PLAN108", "path outside", "A path leads out of the system's folder."),
-        Code("PLAN109", "scenario", "A table, an interpretation or a domain of the scenario cannot be used."),
-        Code("PLAN110", "contradiction", "Two things that the plan says do not go together."),
-        Code("PLAN112", "initial value", "An initial value is no value of its output and no formula about it."),
-        Code("PLAN113", "environment", "An environment assumption speaks of more than the environment's inputs."),
-        Code("PLAN114", "temporal property", "The text is no temporal property."),
-        Code("PLAN121", "types clash", "An output and the input that it would feed have different types."),
         Code(
-            "PLAN122", "several providers", "More than one output could feed an input; a connection has to say which."
+            "PLAN101",
+            "not YAML",
+            "The file is not one plain YAML document, or too large, too deep, or empty.",
+            remedy="Write one YAML document without anchors, tags or merge keys; `docs/plan.md` has the form.",
+        ),
+        Code(
+            "PLAN102",
+            "a key",
+            "A key is given twice, is a merge key, or is not plain text.",
+            remedy="Give each key once, as plain text.",
+        ),
+        Code(
+            "PLAN103",
+            "unknown key",
+            "The plan has no such key at this place.",
+            remedy="Use one of the keys in the hint.",
+        ),
+        Code(
+            "PLAN104",
+            "missing key",
+            "A key that is needed here is missing.",
+            remedy="Add the key; `docs/plan.md` says what it means.",
+        ),
+        Code(
+            "PLAN105",
+            "wrong value",
+            "The value has the wrong type or form, or is not one of those allowed.",
+            remedy="Write what the message wants.",
+        ),
+        Code(
+            "PLAN106",
+            "unknown name",
+            "The plan names a node, port or guarantee that the contract does not have.",
+            remedy="Correct the name, or declare it in the contract.",
+        ),
+        Code(
+            "PLAN107",
+            "no such file",
+            "The plan names a file that is not there.",
+            remedy="Correct the path, which is relative to the system's folder, or add the file.",
+        ),
+        Code(
+            "PLAN108",
+            "path outside",
+            "A path leads out of the system's folder.",
+            remedy="Move the file into the folder: evidence covers nothing outside it.",
+        ),
+        Code(
+            "PLAN109",
+            "scenario",
+            "A table, an interpretation or a domain of the scenario cannot be used.",
+            remedy="Correct the place in the `scenario` or its table.",
+        ),
+        Code(
+            "PLAN110",
+            "contradiction",
+            "Two things that the plan says do not go together.",
+            remedy="Decide for one of the two.",
+        ),
+        Code(
+            "PLAN112",
+            "initial value",
+            "An initial value is no value of its output and no formula about it.",
+            remedy="Give a value of the output's type, or a formula about that output only.",
+        ),
+        Code(
+            "PLAN113",
+            "environment",
+            "An environment assumption speaks of more than the environment's inputs.",
+            remedy="Speak only of inputs that no node provides.",
+        ),
+        Code(
+            "PLAN114", "temporal property", "The text is no temporal property.", remedy="Write it as in `docs/plan.md`."
+        ),
+        Code(
+            "PLAN121",
+            "types clash",
+            "An output and the input that it would feed have different types.",
+            remedy="Correct one of the types, or connect other ports.",
+        ),
+        Code(
+            "PLAN122",
+            "several providers",
+            "More than one output could feed an input: a connection has to say which.",
+            remedy="Say under `connections` which output it is.",
         ),
         Code(
             "PLAN123",
             "start-up deadlock",
             "Nodes in a loop wait for one another, and no delayed edge has an initial value.",
             severity=Severity.WARNING,
+            remedy="Give one delayed output of the loop an initial value.",
         ),
         Code(
             "PLAN124",
             "memory",
             "A node has an input and an output of one name; it feeds itself only by a connection.",
             severity=Severity.WARNING,
+            remedy="Connect them if memory is meant; otherwise rename one.",
         ),
-        Code("PLAN125", "rule does not fit", "The selected nodes are not connected as the rule wants them."),
-        Code("PLAN126", "ports do not fit", "A node cannot stand in for another that has other inputs or outputs."),
-        Code("PLAN127", "ROS graph", "The ROS graph and the plan's account of it do not agree."),
+        Code(
+            "PLAN125",
+            "rule does not fit",
+            "The selected nodes are not connected as the rule wants them.",
+            remedy="Use a rule for this shape, or select other nodes.",
+        ),
+        Code(
+            "PLAN126",
+            "ports do not fit",
+            "A node cannot stand in for another that has other inputs or outputs.",
+            remedy="Give both nodes the same ports.",
+        ),
+        Code(
+            "PLAN127",
+            "ROS graph",
+            "The ROS graph and the plan's account of it do not agree.",
+            remedy="Correct the plan's `model`, or record the graph again.",
+        ),
     )
 }
 """Every code of plans and systems, in order."""

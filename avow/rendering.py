@@ -12,7 +12,7 @@ from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
 
-from avow.codes import CODES
+from avow.codes_workspace import CORE_CODES
 from avow.diagnostics import Diagnostic, Severity, Span
 
 _WIDTH = 100
@@ -152,8 +152,8 @@ def to_sarif(diagnostics: Sequence[Diagnostic], *, version: str = "") -> dict[st
     rules = []
     for code in used:
         rule: dict[str, Any] = {"id": code}
-        if code in CODES:
-            known = CODES[code]
+        if code in CORE_CODES:
+            known = CORE_CODES[code]
             rule["shortDescription"] = {"text": known.title}
             rule["fullDescription"] = {"text": known.explanation}
             rule["defaultConfiguration"] = {"level": str(known.severity)}

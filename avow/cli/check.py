@@ -59,10 +59,10 @@ def command(
 
 
 def _explain(found: list[Diagnostic]) -> None:
-    from avow.codes import CODES
+    from avow.codes_workspace import CORE_CODES
 
-    for code in sorted({d.code for d in found} & set(CODES)):
-        click.echo(f"{code} ({CODES[code].title}): {CODES[code].explanation}\n")
+    for code in sorted({d.code for d in found} & set(CORE_CODES)):
+        click.echo(f"{code} ({CORE_CODES[code].title}): {CORE_CODES[code].explanation}\n")
 
 
 def _groups(

@@ -32,7 +32,7 @@ def command(directory: Path) -> int:
 
     if directory.exists() and any(directory.iterdir()):
         raise Rejected(
-            Diagnostic("CLI003", f"{directory} is not empty", hint="give the name of a new folder, or of an empty one")
+            Diagnostic("CLI007", f"{directory} is not empty", hint="give the name of a new folder, or of an empty one")
         )
     template = Path(str(resources.files("avow.cli") / "template"))
     for source in sorted(template.rglob("*")):

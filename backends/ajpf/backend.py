@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend import Job, Limits, Report, Tool
+from avow.backends.ajpf.codes import CODES
 from avow.backends.ajpf.schema import SCHEMA
 from avow.diagnostics import Diagnostic, Rejected
 from avow.system.paths import inside
@@ -25,6 +26,7 @@ class AjpfBackend:
     strength = Verdict.CHECKED
     link = Link.MAPPED
     options_schema: Mapping[str, Any] = SCHEMA
+    codes = CODES
     green_means = (
         "Every property that the guarantee became, through the plan's table and for the plan's instances, holds in "
         "every run of the agent program in the stated environment, explored exhaustively. It shows nothing of other "

@@ -8,6 +8,7 @@ from typing import Any
 
 from avow import process
 from avow.backend import Job, Limits, Report, Tool
+from avow.backends.dafny.codes import CODES
 from avow.backends.dafny.judge import Settled, settle
 from avow.backends.dafny.modules import Generated, generate, lines_map
 from avow.backends.dafny.printer import NotExpressible
@@ -46,6 +47,7 @@ class DafnyBackend:
     strength = Verdict.PROVED
     link = Link.GENERATED
     options_schema: Mapping[str, Any] = SCHEMA
+    codes = CODES
     green_means = (
         "Dafny proved that the implementation's Step meets this guarantee for all inputs that meet the assumptions "
         "(and Env, where it says more), that it always ends, and that such inputs exist. "

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend import Job, Limits, Report, Tool
+from avow.backends.experiment.codes import CODES
 from avow.backends.experiment.figures import Figures, read_figures
 from avow.backends.experiment.judge import Judgement, judge_figures, judge_runs
 from avow.backends.experiment.options import SCHEMA, Experiment, read
@@ -27,6 +28,7 @@ class ExperimentBackend:
     strength = Verdict.TESTED
     link = Link.GUIDED
     options_schema: Mapping[str, Any] = SCHEMA
+    codes = CODES
     green_means = (
         "The runs in the data set stayed within the stated tolerance, often enough for the stated confidence. "
         "It shows nothing of other conditions; that the measure is what the guarantee means is a person's judgement."

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend import Job, Limits, Report, Tool
+from avow.backends.hoare.codes import CODES
 from avow.diagnostics import Diagnostic, Rejected
 from avow.verdict import Link, Verdict
 
@@ -34,6 +35,7 @@ class Hoare:
         "required": ["program"],
         "additionalProperties": False,
     }
+    codes = CODES
     green_means = (
         "Every run of the program that starts in an input allowed by the assumptions ends in outputs that meet the "
         "guarantee. It is about the program as written in the imperative language, over exact numbers, and says "

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend import Job, Limits, Report, Tool
+from avow.backends.hypothesis.codes import CODES
 from avow.diagnostics import Diagnostic, Rejected
 from avow.verdict import Link, Verdict
 
@@ -33,6 +34,7 @@ class HypothesisBackend:
         "required": ["subject"],
         "additionalProperties": False,
     }
+    codes = CODES
     green_means = (
         "On so many generated inputs that meet the assumptions the function returned outputs that meet the guarantee, "
         "and the guarantee's condition was met in some of them. It says nothing certain of other inputs; the bound on "

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend import Job, Limits, Report, Tool
+from avow.backends.review.codes import CODES
 from avow.backends.review.freshness import current_meaning, stale_clause, stale_files
 from avow.backends.review.record import CONCLUSIONS, Judged, Record, read_record
 from avow.diagnostics import Diagnostic, Rejected
@@ -40,6 +41,7 @@ class ReviewBackend:
     strength = Verdict.REVIEWED
     link = Link.GUIDED
     options_schema: Mapping[str, Any] = SCHEMA
+    codes = CODES
     green_means = (
         "A named person read exactly these files, answered every question of the checklist and accepted this "
         "guarantee in exactly this meaning. It shows what that person saw, no more."

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from avow.backend import Job, Limits, Report, Tool
+from avow.backends.rosmonitoring.codes import CODES
 from avow.backends.rosmonitoring.schema import SCHEMA
 from avow.diagnostics import Diagnostic, Rejected, Severity
 from avow.system.paths import inside
@@ -32,6 +33,7 @@ class RosMonitoringBackend:
     strength = Verdict.MONITORED
     link = Link.MAPPED
     options_schema: Mapping[str, Any] = SCHEMA
+    codes = CODES
     green_means = (
         "On the recorded events the guarantee held at every judgement, by exact evaluation. It shows nothing of other "
         "runs; that the mapping reads the messages rightly is a person's judgement."

@@ -1,0 +1,32 @@
+"""The diagnostic codes of this backend."""
+
+from __future__ import annotations
+
+from avow.codes import declare, register
+
+CODES = register(
+    declare(
+        "HOARE100",
+        "not a program",
+        "Something else has to stand here, the layout is not consistent, or the program is nested too deeply.",
+        "Write what the hint wants; `docs/backends/hoare.md` has the language.",
+    ),
+    declare(
+        "HOARE200",
+        "wrong name",
+        "A name is unknown, declared twice, in use already, or belongs into formulas only.",
+        "Declare it, or use another name.",
+    ),
+    declare(
+        "HOARE300",
+        "wrong type",
+        "An expression has another type than its place wants, or one that programs cannot compute.",
+        "Correct the expression or the declaration.",
+    ),
+    declare(
+        "HOARE400",
+        "program and contract do not fit",
+        "The program's file is not there, or an input, output or relation of the contract has nothing in the program.",
+        "Map it under `variables`, or use a variable of that name.",
+    ),
+)

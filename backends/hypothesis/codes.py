@@ -1,0 +1,39 @@
+"""The diagnostic codes of this backend."""
+
+from __future__ import annotations
+
+from avow.codes import declare, register
+
+CODES = register(
+    declare(
+        "HYPO100",
+        "no subject",
+        "The option `subject` is missing, or not of the form file.py:function.",
+        "Name the function to be tested.",
+    ),
+    declare(
+        "HYPO101",
+        "no such file",
+        "The subject's file is not in the system's folder.",
+        "Correct the path, which is relative to the system's folder.",
+    ),
+    declare("HYPO102", "no such function", "The file defines no function of that name.", "Correct the name."),
+    declare(
+        "HYPO103",
+        "not Python",
+        "The subject's file cannot be read, or does not parse.",
+        "Correct it at the place named.",
+    ),
+    declare(
+        "HYPO104",
+        "arguments do not fit",
+        "The function wants an argument that is no input of the node, or is async.",
+        "Name the arguments as the inputs; inputs may be left out.",
+    ),
+    declare(
+        "HYPO105",
+        "nested too deeply",
+        "A formula of the node is nested too deeply for a test to compute it.",
+        "Split the guarantee, or verify this node with another method.",
+    ),
+)

@@ -1,0 +1,51 @@
+"""The diagnostic codes of this backend: 10x the options, 20x traces, 30x serving."""
+
+from __future__ import annotations
+
+from avow.codes import declare, register
+
+CODES = register(
+    declare(
+        "MON101",
+        "wrong mapping",
+        "An entry of `mapping` does not say how an input or output is read from the messages of a topic.",
+        "Write what the message wants; `docs/backends/rosmonitoring.md` has the form.",
+    ),
+    declare(
+        "MON102",
+        "no such trace",
+        "A recorded trace is not in the system's folder.",
+        "Correct the path, which is relative to the system's folder.",
+    ),
+    declare(
+        "MON103",
+        "cannot be monitored",
+        "The guarantee speaks of something that no topic shows.",
+        "Map it to a topic, or verify the guarantee with another method.",
+        warning=True,
+    ),
+    declare("MON104", "no such node", "The system has no node of that name.", "Use the name from the hint."),
+    declare("MON201", "unreadable trace", "The trace's file cannot be read.", "Correct the path."),
+    declare(
+        "MON202",
+        "bags not installed",
+        "Reading bags needs a package that is not installed.",
+        "`pip install 'avow[bags]'`.",
+    ),
+    declare(
+        "MON203", "not a bag", "The file is no ROS bag that can be read.", "Record it again, or export JSON lines."
+    ),
+    declare(
+        "MON204",
+        "wrong event",
+        "A line of the trace is too long, not UTF-8, or no JSON object.",
+        "Correct the line; none is left out silently.",
+    ),
+    declare(
+        "MON301",
+        "serving not installed",
+        "Serving an oracle needs a package that is not installed.",
+        "`pip install 'avow[monitor]'`.",
+    ),
+    declare("MON302", "cannot listen", "The port is taken or not allowed.", "Choose another with `--serve`."),
+)

@@ -1,0 +1,160 @@
+"""Diagnostic codes: each is declared once, used, and listed. AVOW_REFRESH=1 rewrites docs/diagnostics.md."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import pytest
+
+from avow.codes import CODES, PLAN_CODES, Code, declare, register
+from avow.codes_workspace import CORE_CODES, WORKSPACE_CODES, of_backend, page_rows
+from avow.registry import backend, names
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "diagnostics.md"
+FORM = re.compile(r"[A-Z]{2,}[0-9]{3}")
+RANK = {"Severity.NOTE": 0, "Severity.WARNING": 1, "Severity.ERROR": 2}
+INTRO = """\
+# Diagnostics
+
+Every diagnostic has a code. It keeps its meaning from version to version: search for it here, let
+`avow check --explain` say it, or take it from the JSON and SARIF output. An error stops what it is about (exit code
+2); a warning does not. The severity given is the greatest that the code can have.
+
+[language.md](language.md#every-code) has an example of each code of the language.
+"""
+
+
+def parsed() -> Iterator[tuple[Path, ast.Module]]:
+    """The modules that speak of codes, but for those that declare them."""
+    for folder in ("avow", "backends"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            text = path.read_text("utf-8")
+            if "avow/backends" not in path.as_posix() and not path.name.startswith("codes") and FORM.search(text):
+                yield path, ast.parse(text)
+
+
+def code_of(node: ast.AST) -> str | None:
+    """The code that a node is, where it is one."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str) and FORM.fullmatch(node.value):
+        return node.value
+    return None
+
+
+def used(modules: Iterable[tuple[Path, ast.Module]]) -> dict[str, set[str]]:
+    """Code → the folders in which it stands as a string."""
+    found: dict[str, set[str]] = {}
+    for path, module in modules:
+        for node in ast.walk(module):
+            code = code_of(node)
+            if code is not None:
+                found.setdefault(code, set()).add(
+                    path.relative_to(ROOT).parts[0] + "/" + path.relative_to(ROOT).parts[1]
+                )
+    return found
+
+
+def severities(modules: Iterable[tuple[Path, ast.Module]]) -> dict[str, int]:
+    """Code → the greatest severity with which a `Diagnostic(…)` names it; those made by way of helpers are not here."""
+    found: dict[str, int] = {}
+    for _, module in modules:
+        for node in ast.walk(module):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Diagnostic":
+                parts = [*node.args, *(k.value for k in node.keywords)]
+                code = code_of(parts[0]) if parts else None
+                said = [RANK[text] for text in map(ast.unparse, parts) if text in RANK]
+                if code is not None:
+                    found[code] = max(found.get(code, 0), *said, 2 if not said else 0)
+    return found
+
+
+def backends() -> dict[str, dict[str, Code]]:
+    return {name: dict(of_backend(backend(name))) for name in names() if (ROOT / "backends" / name).is_dir()}
+
+
+def declared() -> dict[str, Code]:
+    return register(*CORE_CODES.values(), *(code for codes in backends().values() for code in codes.values()))
+
+
+@pytest.fixture(scope="module")
+def sources() -> list[tuple[Path, ast.Module]]:
+    return list(parsed())
+
+
+def test_codes_are_found_where_they_stand() -> None:
+    text = 'fail("NEW001", f"NEW002")\nDiagnostic("NEW003", m, span, Severity.WARNING)\nx = Diagnostic("NEW004", m)'
+    sown = [(ROOT / "backends" / "x" / "y.py", ast.parse(text))]
+    assert used(sown) == {f"NEW00{n}": {"backends/x"} for n in (1, 2, 3, 4)}
+    assert severities(sown) == {"NEW003": 1, "NEW004": 2}
+
+
+def test_every_code_used_is_declared(sources: list[tuple[Path, ast.Module]]) -> None:
+    assert sorted(set(used(sources)) - set(declared())) == []
+
+
+def test_every_code_declared_is_used(sources: list[tuple[Path, ast.Module]]) -> None:
+    assert sorted(set(declared()) - set(used(sources))) == []
+
+
+def test_no_code_is_declared_twice() -> None:
+    code = declare("A001", "a", "a", "a")
+    with pytest.raises(ValueError, match="A001 is declared twice"):
+        register(code, code)
+    assert len(declared()) == len(CORE_CODES) + sum(map(len, backends().values()))
+
+
+def test_backends_declare_their_own(sources: list[tuple[Path, ast.Module]]) -> None:
+    """A backend uses only its own codes; of the core, only the commands that are its own may use them."""
+    where = used(sources)
+    for name, codes in backends().items():
+        assert codes, name
+        for code in codes:
+            assert f"backends/{name}" in where[code]
+            assert where[code] <= {f"backends/{name}", "avow/cli"}, code
+    for code in CORE_CODES:
+        assert not any(place.startswith("backends/") for place in where[code]), code
+
+
+def test_severities_are_those_declared(sources: list[tuple[Path, ast.Module]]) -> None:
+    known, rank = declared(), {"note": 0, "warning": 1, "error": 2}
+    found = severities(sources)
+    assert len(found) > 60
+    for code, greatest in found.items():
+        assert greatest <= rank[known[code].severity], code
+
+
+def test_every_code_says_what_it_means() -> None:
+    for code in declared().values():
+        assert FORM.fullmatch(code.code)
+        assert code.title
+        assert code.explanation.endswith((".", "`)", ".)")), code.code
+        assert code.remedy.endswith((".", "`")) or code.code in CODES, code.code
+
+
+def test_a_backend_may_have_no_codes() -> None:
+    assert of_backend(object()) == {}
+
+    class Odd:
+        codes = {"X001": "not a code"}
+
+    assert of_backend(Odd()) == {}
+
+
+def test_the_page_is_in_step() -> None:
+    sections = {
+        "The language": CODES,
+        "Plans and systems": PLAN_CODES,
+        "Backends, policies, requirements, ledgers, commands": WORKSPACE_CODES,
+        **{f"The backend {name}": codes for name, codes in backends().items()},
+    }
+    head = "| code | severity | meaning | what to do |\n|---|---|---|---|\n"
+    page = INTRO
+    for title, codes in sections.items():
+        page += f"\n## {title}\n\n{head}" + "\n".join(page_rows(codes.values())) + "\n"
+    if os.environ.get("AVOW_REFRESH"):
+        PAGE.write_text(page, "utf-8")
+    assert PAGE.read_text("utf-8") == page
