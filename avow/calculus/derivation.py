@@ -52,7 +52,7 @@ class Phase(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ClauseName:
-    """``agent.one_waypoint``."""
+    """``agent.one_place``."""
 
     node: str
     clause: str

@@ -46,7 +46,7 @@ class Port:
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """``gazebo_radiation_plugins/Snapshot at matches(in.at)``; `port` is the matched input or output."""
+    """``sensor_msgs/Snapshot at matches(in.at)``; `port` is the matched input or output."""
 
     ros_type: str
     name: str

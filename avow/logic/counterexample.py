@@ -1,4 +1,4 @@
-"""Values in the contract's own words: ``in.radiationStatus = red, in.at = {(0, 0)}``."""
+"""Values in the contract's own words: ``in.status = red, in.at = {(0, 0)}``."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ class Scenario:
     """A finite interpretation, used by every bounded check; a verdict from it says that it is bounded.
 
     `interpret` says of a relation- or function-typed port at which rows it holds (``in.wayP`` → table, columns);
-    `domains` gives a quantified sort or an input its finite range (``NATURAL`` → ``waypoints.id`` or a list of values).
+    `domains` gives a quantified sort or an input its finite range (``NATURAL`` → ``places.id`` or a list of values).
     """
 
     tables: tuple[Table, ...] = ()
@@ -136,7 +136,7 @@ class NodePlan:
 class Requirement:
     """A system requirement in a person's words; a formula or a temporal property where there is one.
 
-    `supported_by` names guarantees (``agent.next_waypoint``), derivations (``D1``) or whole nodes (``agent``).
+    `supported_by` names guarantees (``agent.next_place``), derivations (``D1``) or whole nodes (``agent``).
     """
 
     id: str
@@ -151,7 +151,7 @@ class Requirement:
 
 @dataclass(frozen=True, slots=True)
 class ComposeGoal:
-    """``D1: {select: [navigation, radiationSensor, agent], rule: R3}``; `rule` None lets the calculus choose."""
+    """``D1: {select: [navigation, sensor, agent], rule: R3}``; `rule` None lets the calculus choose."""
 
     name: str
     select: tuple[str, ...]

@@ -86,7 +86,7 @@ def cell_text(piece: Piece) -> str:
 
 
 def interpretation(text: str, tables: dict[str, Table]) -> tuple[str, tuple[str, ...]] | str:
-    """``waypoints(x, y, id)`` → table and columns, or what is wrong with it."""
+    """``places(x, y, id)`` → table and columns, or what is wrong with it."""
     found = _COLUMNS_OF.match(text)
     if not found:
         return f"{text!r} has not the form table(column, …)"
@@ -124,7 +124,7 @@ def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
 
 
 def _each_row(text: str, tables: dict[str, Table]) -> tuple[str, ...] | str:
-    """``waypoints.id`` or ``move(waypoints.x, waypoints.y)`` with every row's cells; other text as it stands."""
+    """``places.id`` or ``move(places.x, places.y)`` with every row's cells; other text as it stands."""
     places = [found for found in _CELL.finditer(text) if found[1] in tables]
     if not places:
         return (text,)

@@ -163,7 +163,7 @@ def _filled(values: Mapping[Variable, Value], wanted: Iterable[Variable]) -> dic
 
 
 def _observed(formulas: Sequence[Term], program: Program) -> list[Term]:
-    """What is compared of the inputs' numbers: ``r``, ``radiation_at(i)``."""
+    """What is compared of the inputs' numbers: ``r``, ``level_at(i)``."""
     found: dict[Term, None] = {}
     inputs = frozenset(program.state)
     for formula in formulas:

@@ -3,7 +3,7 @@
 One draw for a case in place of dozens makes it several times as fast.
 
 One case draws a few places and numbers first, and every relation and every value takes its parts from these: so that a
-robot is often at a waypoint, and a command often names one. Where an assumption fails, an input that it speaks of is
+robot is often at a known place, and a command often names one. Where an assumption fails, an input that it speaks of is
 drawn again, a few times; what still fails is rejected, and counted.
 """
 

@@ -14,7 +14,7 @@ from avow.system.paths import inside
 
 @dataclass(frozen=True, slots=True)
 class SubjectFile:
-    """``models/radiation_sensor.py:step``."""
+    """``models/sensor.py:step``."""
 
     name: str
     path: Path

@@ -29,7 +29,7 @@ class Hold(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Lookup:
-    """The cell of a table in the row that a field names: the coordinates of the waypoint with this id."""
+    """The cell of a table in the row that a field names: the coordinates of the place with this id."""
 
     table: str
     key: Path
