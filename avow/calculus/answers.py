@@ -223,7 +223,7 @@ class ArgumentQuestion:
             where = f"compose: {{{self.goal}: {{{self.key}: {{because: …}}}}}}"
         return Answer(
             Verdict.UNKNOWN,
-            f"the plan gives no reason; the conclusion is conditional on it (say why in the plan: {where})",
+            f"the plan gives no reason for it, so that what follows is conditional (to say why: {where})",
             link=Link.GUIDED,
         )
 

@@ -285,7 +285,7 @@ def as_html(lines: Lines) -> str:
     provided = "".join(f"<div>provided that {html.escape(text)}</div>" for text in lines.hypotheses)
     return (
         f'<div class="rule"><div class="rule-name">{title}</div>'
-        f'<div class="premises">{"".join(map(shown, lines.above))}</div><hr>'
+        f'<div class="premises">{"".join(map(shown, lines.above))}</div><hr/>'
         f'<div class="conclusion">{"".join(map(shown, lines.below))}</div>'
         f'<div class="hypotheses">{provided}</div></div>'
     )

@@ -1,0 +1,183 @@
+"""avow compose, simulate and refines, as users meet them; the proofs; and that it scales."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from click.testing import CliRunner
+
+from avow.calculus.composition import compose
+from avow.calculus.notation import as_html, write_goal
+from avow.calculus.obligations import composition_obligations, discharge
+from avow.cli.compose import command as compose_command
+from avow.cli.refines import command as refines_command
+from avow.cli.simulate import command as simulate_command
+from avow.process import run
+from avow.system.graph import dataflow
+from avow.system.picture import svg, text
+from avow.verdict import Verdict
+
+from .make import Limits, make, node
+
+PROOFS = Path(__file__).parents[2] / "avow/calculus/proofs"
+
+GOOD = node("a", "", "x : REAL", "G: out.x < 1") + node("b", "x : REAL", "y : REAL", "A: in.x < 2", "G: out.y == 0")
+
+
+def invoke(command: object, *arguments: str) -> tuple[object, str]:
+    result = CliRunner().invoke(command, list(arguments), standalone_mode=False)  # type: ignore[arg-type]
+    if result.exception is not None:
+        raise result.exception
+    return result.return_value, result.output
+
+
+def test_compose_prints_and_decides(tmp_path: Path) -> None:
+    make(tmp_path, GOOD)
+    code, output = invoke(compose_command, str(tmp_path))
+    assert code == 0
+    assert "R1 (whole)" in output
+    assert "follows from a.G1" in output
+    (tmp_path / "system.rcl").write_text(GOOD.replace("< 2", "< 0"))
+    code, output = invoke(compose_command, str(tmp_path / "system.rcl"))
+    assert code == 1
+    assert "a.x = " in output
+
+
+def test_compose_json(tmp_path: Path) -> None:
+    make(tmp_path, GOOD)
+    code, output = invoke(compose_command, str(tmp_path), "--json", "--goal", "whole")
+    assert code == 0
+    document = json.loads(output)
+    assert document["derivations"][0]["rule"] == "R1"
+    (side,) = [o for o in document["obligations"] if o["id"] == "system/composition/whole.b.A1"]
+    assert side["verdict"] == "proved"
+    assert side["details"]["needed"] == ["a.G1"]
+
+
+def test_compose_other_outputs(tmp_path: Path) -> None:
+    make(tmp_path, GOOD)
+    assert invoke(compose_command, str(tmp_path), "--latex")[1].startswith("\\textbf{R1 (whole)}")
+    assert "← x of a" in invoke(compose_command, str(tmp_path), "--graph")[1]
+    assert "guarantee b_G1" in invoke(compose_command, str(tmp_path), "--rcl")[1]
+
+
+def test_simulate(tmp_path: Path) -> None:
+    text_ = node("a", "e : BOOL", "x : BOOL", "G: out.x == in.e")
+    make(tmp_path, text_, "scenario: {steps: 3}")
+    code, output = invoke(simulate_command, str(tmp_path), "--seed", "1")
+    assert code == 0
+    assert output.count("step ") == 3
+    code, output = invoke(simulate_command, str(tmp_path), "--json", "--steps", "2")
+    assert [json.loads(line)["step"] for line in output.splitlines()] == [1, 2]
+    make(tmp_path, text_.replace("out.x == in.e", "out.x and not out.x"), "scenario: {}")
+    code, output = invoke(simulate_command, str(tmp_path))
+    assert code == 1
+    assert "stuck: no output of a meets G1" in output
+
+
+def test_refines(tmp_path: Path) -> None:
+    one, other = tmp_path / "one.rcl", tmp_path / "other.rcl"
+    one.write_text(GOOD.replace("< 1", "< 0"))
+    other.write_text(GOOD)
+    assert invoke(refines_command, str(one), str(other))[0] == 0
+    code, output = invoke(refines_command, str(other), str(one), "--json")
+    assert code == 1
+    assert json.loads(output)["nodes"][0]["clauses"][0]["counterexample"] == {"out.x": "0"}
+
+
+@pytest.mark.needs_dafny
+@pytest.mark.parametrize("name", ["calculus", "r4", "relational", "steps"])
+def test_the_rules_are_proved(tmp_path: Path, name: str) -> None:
+    completed = run(["dafny", "/compile:0", str(PROOFS / f"{name}.dfy")], seconds=120)
+    assert " verified, 0 errors" in completed.stdout
+    assert " with 0 verified" not in completed.stdout
+
+
+@pytest.mark.needs_dafny
+def test_dafny_would_notice(tmp_path: Path) -> None:
+    """The same proof without its persistence premise does not verify."""
+    source = (PROOFS / "calculus.dfy").read_text()
+    broken = source.replace("requires forall k: nat :: k < |G| ==> Persists(G[k])       //", "//")
+    assert broken != source
+    (tmp_path / "broken.dfy").write_text(broken)
+    completed = run(["dafny", "/compile:0", str(tmp_path / "broken.dfy")], seconds=120)
+    assert ", 0 errors" not in completed.stdout
+
+
+def test_names_are_escaped_everywhere(tmp_path: Path) -> None:
+    system = make(tmp_path, node("a_1", "", "x' : REAL") + node("b", "x' : REAL", "", "A low_: in.x' < 1"))
+    composition = compose(system)
+    written = write_goal(composition.goal("whole"))
+    ElementTree.fromstring(written.html)
+    assert "a\\_1" in written.latex
+    assert "a_1" not in written.latex
+    ElementTree.fromstring(svg(dataflow(system)))
+
+
+def test_hostile_remarks_stay_text() -> None:
+    from avow.calculus.notation import Line, Lines, Symbol, as_latex
+
+    lines = Lines(
+        "R1", "<b>\\input{x}", (Line((Symbol("G", "<script>$"),), "</div><script>%"),), (Line(("◇",)),), ("&",)
+    )
+    shown = as_html(lines)
+    assert "<script>" not in shown
+    ElementTree.fromstring(shown)
+    assert "\\input{x}" not in as_latex(lines)
+    assert "$" not in as_latex(lines).replace("\\$", "")
+
+
+def test_pictures(tmp_path: Path) -> None:
+    plan = "connections: [{from: b.y, to: b.last, delayed: true, initial: 1}]"
+    system = make(
+        tmp_path, GOOD.replace("x : REAL )\n  outputs( y", "x : REAL, last : REAL, e : REAL )\n  outputs( y"), plan
+    )
+    picture = svg(dataflow(system))
+    assert ElementTree.fromstring(picture).tag.endswith("svg")
+    assert picture.count("<rect") == 2
+    assert picture.count("stroke-dasharray") == 1
+    drawn = text(dataflow(system))
+    assert "← last from y of b, one step later, first 1" in drawn
+    assert "← e (environment)" in drawn
+
+
+def synthetic(count: int) -> str:
+    """Chains, fans and joins: node k reads the outputs of k - 1 and of k // 2."""
+    parts = [node("n0", "", "x0 : INTEGER", "G: out.x0 >= 0")]
+    for k in range(1, count):
+        reads = sorted({k - 1, k // 2})
+        inputs = ", ".join(f"x{r} : INTEGER" for r in reads)
+        assumed = " and ".join(f"in.x{r} >= 0" for r in reads)
+        parts.append(node(f"n{k}", inputs, f"x{k} : INTEGER", f"A: {assumed}", f"G: out.x{k} >= in.x{k - 1}"))
+    return "".join(parts)
+
+
+def test_a_chain_of_twenty_is_quick(tmp_path: Path) -> None:
+    text_ = node("n0", "", "x0 : INTEGER", "G: out.x0 >= 0")
+    for k in range(1, 20):
+        text_ += node(
+            f"n{k}", f"x{k - 1} : INTEGER", f"x{k} : INTEGER", f"A: in.x{k - 1} >= 0", f"G: out.x{k} >= in.x{k - 1}"
+        )
+    system = make(tmp_path, text_)
+    start = time.process_time()
+    obligations = composition_obligations(system)
+    found = discharge(system, obligations, Limits())
+    assert all(outcome.verdict is Verdict.PROVED for outcome in found)
+    assert time.process_time() - start < 2.5
+
+
+@pytest.mark.slow
+def test_a_thousand_nodes(tmp_path: Path) -> None:
+    system = make(tmp_path, synthetic(1000))
+    start = time.process_time()
+    obligations = composition_obligations(system)
+    found = discharge(system, obligations, Limits())
+    verdicts = [o.verdict for o, ob in zip(found, obligations, strict=True) if ob.name.count(".") == 2]
+    assert len(verdicts) == 999
+    assert set(verdicts) == {Verdict.PROVED}
+    write_goal(compose(system).goal("whole"))
+    assert time.process_time() - start < 60
