@@ -1,4 +1,4 @@
-"""The rover's components as they run: inputs by name, outputs as a dictionary. Maps come as functions of cells."""
+"""The rover's components as they run: inputs by name, outputs as a dictionary. The map comes as tables over cells."""
 
 from collections import deque
 from fractions import Fraction
@@ -7,32 +7,49 @@ USE = Fraction(3, 100)
 MARGIN = Fraction(95, 100)
 
 
-def goal_reasoning(position, charger, free, heat, recharge, atGoal, goals, last):
-    remaining = [c for c in goals.points() if goals(c) and not (atGoal and c == last)]
-    goal = charger if recharge or not remaining else max(remaining, key=heat)
-    return {"start": position, "goal": goal, "remaining": lambda c: c in remaining}
+def goal_reasoning(position, charger, points, count, recharge, atGoal, last, visited):  # noqa: N803 - ports' names
+    """The next heat point, or the charging station."""
+    reached = atGoal and visited < count and last == points(visited)
+    done = visited + 1 if reached else visited
+    goal = charger if recharge or done >= count else points(done)
+    return {"start": position, "goal": goal, "done": done}
+
+
+def plan_to_charging(start, charger, free, step):
+    """A shortest way to the charging station."""
+    plan = shortest_plan(start, charger, free, step)
+    return {"planC": table(plan), "lengthC": len(plan) - 1}
+
+
+def plan_to_destination(start, goal, free, step):
+    """A shortest way to the destination."""
+    plan = shortest_plan(start, goal, free, step)
+    return {"planD": table(plan), "lengthD": len(plan) - 1}
 
 
 def battery_monitor(charge):
     return MARGIN * charge
 
 
-def interface(planC, lengthC, planD, lengthD, battery, position, charger):
-    recharge = battery <= (lengthC + 2) * USE or (position == charger and battery < MARGIN)
+def interface(planC, lengthC, planD, lengthD, battery):  # noqa: N803 - ports' names
+    """When to recharge, and where to move."""
+    recharge = battery <= (lengthC + 2) * USE or (lengthC == 0 and battery < MARGIN)
     plan, length = (planC, lengthC) if recharge else (planD, lengthD)
-    return {
-        "movement": plan(1) if length > 0 else position,
-        "recharge": recharge,
-        "atGoal": lengthD == 0,
-    }
+    return {"movement": plan(1 if length > 0 else 0), "recharge": recharge, "atGoal": lengthD == 0}
 
 
-def hardware(movement, place, energy, charger, free, step):
-    return {"position": movement, "charge": 1 if movement == charger else energy - USE}
+def hardware(movement, place, energy, charger):
+    """The worst that the contract allows: every step costs all that it may."""
+    position = movement if energy >= USE else place
+    return {"position": position, "charge": Fraction(1) if position == charger else max(energy - USE, Fraction(0))}
 
 
-def shortest_plan(start, goal, step, cells):
-    """Breadth-first search: the cells from start to goal, both included; None where there is no way."""
+def shortest_plan(start, goal, free, step):
+    """Breadth-first search: the cells from start to goal, both included; start alone where there is no way."""
+    following = {}
+    for a, b in sorted(step.points()):
+        if free(b):
+            following.setdefault(a, []).append(b)
     before = {start: None}
     queue = deque([start])
     while queue:
@@ -42,8 +59,13 @@ def shortest_plan(start, goal, step, cells):
             while before[plan[-1]] is not None:
                 plan.append(before[plan[-1]])
             return plan[::-1]
-        for other in cells:
-            if step(cell, other) and other not in before:
+        for other in following.get(cell, ()):
+            if other not in before:
                 before[other] = cell
                 queue.append(other)
-    return None
+    return [start]
+
+
+def table(plan):
+    """A plan as the function that the contract speaks of."""
+    return {**dict(enumerate(plan)), ...: plan[-1]}
