@@ -67,7 +67,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
                 return
             stage, _, subject = task.name.partition(":")
             message = fail.get_msg().strip().splitlines()
-            if type(fail).__name__ != "UnmetDependency" and message and stage not in _SILENT:
+            if type(fail).__name__ != "UnmetDependency" and message:
                 self._line(f"  {stage:<11} {subject:<40} {message[-1]}")
             self.failures.append({"task": task, "exception": fail})
             self._status()
