@@ -16,6 +16,7 @@ from typing import Any
 from avow import __version__, process
 from avow.backend import Limits, Report
 from avow.diagnostics import Rejected
+from avow.evidence.encoding import Unreadable
 from avow.evidence.obligation import Obligation
 from avow.files import write
 from avow.pipeline.wire import report_from_json, report_to_json
@@ -24,6 +25,9 @@ from avow.system.load import load_system
 from avow.system.plan import System
 from avow.verdict import Outcome, Verdict
 from avow.workspace import Workspace
+
+_KEEP_BYTE_CODE = {"PYTHONDONTWRITEBYTECODE": ""}
+"""A run starts dozens of workers: each would compile the same modules again."""
 
 GRACE = 90.0
 """Seconds above the tool's own limits that a worker gets to load, translate and write."""
@@ -64,7 +68,10 @@ def run(
     )
     limit = work.limits.seconds * max(2, len(obligations)) + GRACE
     done = process.run(
-        [sys.executable, "-m", "avow.pipeline.worker", str(request), str(response)], cwd=workspace.root, seconds=limit
+        [sys.executable, "-m", "avow.pipeline.worker", str(request), str(response)],
+        cwd=workspace.root,
+        seconds=limit,
+        env=_KEEP_BYTE_CODE,
     )
     log = {"worker.log": done.stderr} if done.stderr.strip() else {}
     try:
@@ -77,6 +84,8 @@ def run(
             last = done.stderr.strip().splitlines()[-1:] or [f"the worker ended with code {done.code}"]
             return _failed(obligations, work, Verdict.ERROR, f"the engine crashed: {last[0][:300]}", log)
         report = report_from_json(json.loads(response.read_text()))
+    except (Unreadable, ValueError, TypeError, LookupError) as error:
+        return _failed(obligations, work, Verdict.ERROR, f"the engine's answer is not one: {error}"[:300], log)
     finally:
         request.unlink(missing_ok=True)
         response.unlink(missing_ok=True)
