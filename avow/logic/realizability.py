@@ -17,12 +17,13 @@ from dataclasses import dataclass, field
 from avow.language.sorts import REAL, FunctionSort
 from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
 from avow.logic.clock import now
+from avow.logic.demands import Definition, candidates
 from avow.logic.formula import conjunction, free_variables, negation, substitute
 from avow.logic.smt import Translator, Unsupported, check, entails, replay, search_tables, solve
 from avow.logic.solver import z3
 from avow.logic.translation import Expr, Meaning
 from avow.logic.values import Value
-from avow.logic.witness import Cases, Definition, Fixed, Witness, candidates, instantiate, witnesses
+from avow.logic.witness import Cases, Fixed, Witness, instantiate, witnesses
 from avow.verdict import Verdict
 
 Formulas = Mapping[str, Term]

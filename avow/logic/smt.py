@@ -14,11 +14,11 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Literal as OneOf
 
 from avow.language.sorts import BOOL, DataSort, FunctionSort, OpaqueSort, SequenceSort, SetSort, Sort, TupleSort
 from avow.language.terms import Quantified, Term, Variable
-from avow.logic.clock import WALL, now, watchdog
+from avow.logic.checking import DEFAULT_TIMEOUT_MS, Answer, Engine, Status, check, z3_version
+from avow.logic.clock import now
 from avow.logic.counterexample import show_values
 from avow.logic.formula import free_variables, negation
 from avow.logic.models import Model
@@ -42,23 +42,6 @@ __all__ = [
     "solve",
     "z3_version",
 ]
-
-Status = OneOf["sat", "unsat", "unknown"]
-
-Engine = OneOf["smt", "qsat"]
-
-DEFAULT_TIMEOUT_MS = 10_000
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """Z3's answer to one question about expressions. `core` are the labels of tracked assertions that conflict."""
-
-    status: Status
-    model: Model | None = None
-    core: tuple[str, ...] = ()
-    reason: str = ""
-    seconds: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,129 +72,6 @@ class Entailment:
     reason: str = ""
     engine: str = "z3"
     seconds: float = 0.0
-
-
-def z3_version() -> str:
-    return str(z3.get_version_string())
-
-
-# -- expressions -------------------------------------------------------------------------------------------------------
-
-
-def check(
-    translator: Translator,
-    assertions: Iterable[Expr],
-    *,
-    timeout_ms: int = DEFAULT_TIMEOUT_MS,
-    seed: int = 0,
-    tracked: Iterable[tuple[str, Expr]] = (),
-    engine: Engine = "smt",
-) -> Answer:
-    """Are the assertions satisfiable together? With `unsat`, `core` is a minimal set of tracked labels (each is needed,
-    as far as the solver can tell in time). Crashes of the solver are `unknown`.
-
-    The engine `qsat` decides quantified linear arithmetic, where the usual one mostly gives up; it knows no functions.
-    """
-    start = time.monotonic()
-    assertions, tracked = list(assertions), list(tracked)
-    try:
-        status, model, core, reason = _ask(translator, assertions, tracked, timeout_ms, seed, engine)
-        if status == "unsat" and len(core) > 1:
-            core = _minimal(translator, assertions, tracked, core, timeout_ms, seed, engine)
-    except z3.Z3Exception as error:
-        status, model, core, reason = "unknown", None, (), f"Z3: {error}"
-    found = Model(translator, model) if model is not None else None
-    order = [label for label, _ in tracked if label in core]
-    return Answer(status, found, tuple(dict.fromkeys(order)), reason, time.monotonic() - start)
-
-
-def _ask(
-    translator: Translator,
-    assertions: Sequence[Expr],
-    tracked: Sequence[tuple[str, Expr]],
-    timeout_ms: int,
-    seed: int,
-    engine: Engine,
-) -> tuple[Status, object | None, tuple[str, ...], str]:
-    if engine == "qsat":
-        with watchdog(timeout_ms, translator.context.interrupt):
-            return _ask_qsat(translator, assertions, tracked, timeout_ms)
-    solver = z3.Solver(ctx=translator.context)
-    solver.set("timeout", _wall(timeout_ms))
-    solver.set("random_seed", seed)
-    # Its Gröbner bases of non-linear integer terms cannot be interrupted: Z3 would hang.
-    solver.set("smt.arith.nl.grobner", False)
-    solver.add(*assertions)
-    switches = {}
-    for number, (label, expr) in enumerate(tracked):
-        switch = z3.Bool(f"track!{number}", translator.context)
-        solver.add(z3.Implies(switch, expr))
-        switches[switch.get_id()] = (switch, label)
-    with watchdog(timeout_ms, translator.context.interrupt):
-        result = solver.check(*(switch for switch, _ in switches.values()))
-    if result == z3.sat:
-        return "sat", solver.model(), (), ""
-    if result == z3.unsat:
-        return "unsat", None, tuple(switches[s.get_id()][1] for s in solver.unsat_core()), ""
-    return "unknown", None, (), str(solver.reason_unknown())
-
-
-def _wall(timeout_ms: int) -> int:
-    """Z3 counts wall-clock time: its limit is only for where the watchdog cannot help."""
-    return max(1, int(timeout_ms)) * WALL * 2
-
-
-def _ask_qsat(
-    translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]], timeout_ms: int
-) -> tuple[Status, object | None, tuple[str, ...], str]:
-    solver = z3.TryFor(z3.Tactic("qsat", ctx=translator.context), _wall(timeout_ms)).solver()
-    everything = [*assertions, *(expr for _, expr in tracked)]
-    solver.add(*everything)
-    result = solver.check()
-    if result == z3.sat:
-        return "sat", solver.model(), (), ""
-    if result == z3.unsat and _arithmetic_only(everything):
-        return "unsat", None, tuple(label for label, _ in tracked), ""
-    return "unknown", None, (), str(solver.reason_unknown())
-
-
-def _arithmetic_only(exprs: Iterable[Expr]) -> bool:
-    """Whether only numbers and truth values occur: where qsat is complete, and its `unsat` taken."""
-    seen: set[int] = set()
-    stack = list(exprs)
-    while stack:
-        expr = stack.pop()
-        if expr.get_id() in seen:
-            continue
-        seen.add(expr.get_id())
-        if z3.is_quantifier(expr):
-            stack.append(expr.body())
-        elif not (z3.is_bool(expr) or z3.is_arith(expr)):
-            return False
-        elif z3.is_app(expr):
-            if expr.num_args() and expr.decl().kind() == z3.Z3_OP_UNINTERPRETED:
-                return False
-            stack.extend(expr.children())
-    return True
-
-
-def _minimal(
-    translator: Translator,
-    assertions: Sequence[Expr],
-    tracked: Sequence[tuple[str, Expr]],
-    core: tuple[str, ...],
-    timeout_ms: int,
-    seed: int,
-    engine: Engine,
-) -> tuple[str, ...]:
-    """Drop what is not needed, one label at a time."""
-    kept = list(core)
-    for label in core:
-        rest = [(name, expr) for name, expr in tracked if name in kept and name != label]
-        status, _, smaller, _ = _ask(translator, assertions, rest, min(timeout_ms, 2_000), seed, engine)
-        if status == "unsat":
-            kept = [name for name in kept if name in smaller]
-    return tuple(kept)
 
 
 # -- terms -------------------------------------------------------------------------------------------------------------
