@@ -175,6 +175,21 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
+class Picture:
+    """How the report draws a counterexample's places: the scenario's table that holds them, and its columns.
+
+    `places` are words of calls whose only argument is a label: with ``inspect`` among them, ``inspect(3)`` is place 3.
+    """
+
+    name: str
+    table: str
+    x: str
+    y: str
+    label: str | None = None
+    places: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """A whole plan.yaml, checked against its schema and against the contract's names."""
 
@@ -197,6 +212,7 @@ class Plan:
     plugins: tuple[str, ...]
     """Modules that hold further backends."""
     lints_off: tuple[str, ...]
+    pictures: tuple[Picture, ...] = ()
 
     @property
     def root(self) -> Path:

@@ -25,6 +25,7 @@ from avow.system.plan import (
     Located,
     Method,
     NodePlan,
+    Picture,
     Plan,
     Requirement,
     Scenario,
@@ -101,6 +102,7 @@ class _Reader:
             key: (self.root.at(key) or Piece(self.root.span, value=None)).located() for key in ("model", "policy")
         }
         self.model_graph()
+        scenario = self.scenario()
         return Plan(
             system=name,
             title=self.text("title") or name,
@@ -110,7 +112,7 @@ class _Reader:
             messages=tuple(path for piece, path in self.paths("messages") if self.present(piece, path)),
             connections=tuple(self.connections()),
             environment=tuple(self.environment()),
-            scenario=self.scenario(),
+            scenario=scenario,
             requirements=tuple(self.requirements()),
             compose=tuple(self.goals()),
             nodes=tuple(self.nodes()),
@@ -119,7 +121,26 @@ class _Reader:
             accepted=tuple(self.findings("accepted")),
             plugins=tuple(_texts(self.root.at("plugins"))),
             lints_off=tuple(_texts(self.root.at("lints_off"))),
+            pictures=tuple(self.pictures(scenario)),
         )
+
+    def pictures(self, scenario: Scenario | None) -> Iterator[Picture]:
+        tables = {table.name: table for table in scenario.tables} if scenario else {}
+        for name, piece in self.entries("pictures"):
+            source = piece.at("table") or piece
+            table = tables.get(source.text)
+            if table is None:
+                self.fault("PLAN109", f"pictures.{name}: the scenario has no table {source.text!r}", source.span)
+                continue
+            columns = {key: found for key in ("x", "y", "label") if (found := piece.at(key)) is not None}
+            missing = [c for c in columns.values() if c.text not in table.columns]
+            for column in missing:
+                message = f"pictures.{name}: table {table.name!r} has no column {column.text!r}"
+                self.fault("PLAN109", message, column.span)
+            if not missing:
+                texts = {key: column.text for key, column in columns.items()}
+                places = tuple(_texts(piece.at("places")))
+                yield Picture(name, table.name, texts["x"], texts["y"], texts.get("label"), places)
 
     def text(self, *keys: str) -> str | None:
         piece = self.root.at(*keys)

@@ -53,6 +53,7 @@ Property = State | Temporal
 MAX_DEPTH = 60
 MAX_LENGTH = 50_000
 
+_TEMPORAL = ("always", "eventually", "next", "until")
 _UNARY = ("not", "always", "eventually", "next")
 _BINARY = ("<=>", "->", "or", "and", "until")
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[A-Za-z_][A-Za-z0-9_\']*|<=>|->|[()\[\]{}]|[^\sA-Za-z_"]|"')
@@ -96,7 +97,7 @@ def states_of(formula: Property) -> tuple[State, ...]:
 def is_temporal(text: str) -> bool:
     """Whether a text uses a temporal operator at all."""
     tokens = _tokens(text)
-    return any(_is_operator(tokens, k) in ("always", "eventually", "next", "until") for k in range(len(tokens)))
+    return any(_is_operator(tokens, k) in _TEMPORAL for k in range(len(tokens)))
 
 
 def parse_state(text: str, contract: Contract, span: Span | None = None) -> Term:
@@ -158,9 +159,9 @@ class _Parser:
             raise self.fault("nested too deeply", start)
         if start >= end:
             raise self.fault("a formula is missing here", start)
-        if not any(
-            _is_operator(self.tokens, k) in ("always", "eventually", "next", "until") for k in range(start, end)
-        ):
+        if self.wrapped(start, end):
+            return self.parse(start + 1, end - 1, depth + 1)
+        if not any(_is_operator(self.tokens, k) in _TEMPORAL for k in range(start, end)):
             return self.state(start, end)
         for operator in _BINARY:
             places = list(self.places(operator, start, end))
@@ -177,9 +178,19 @@ class _Parser:
         first = _is_operator(self.tokens, start)
         if first in _UNARY:
             return Temporal(Operator(first), (self.parse(start + 1, end, depth + 1),))
-        if self.tokens[start].text == "(" and self.tokens[end - 1].text == ")":
-            return self.parse(start + 1, end - 1, depth + 1)
         raise self.fault("a temporal operator cannot stand inside a state formula or a quantifier", start)
+
+    def wrapped(self, start: int, end: int) -> bool:
+        """Whether one pair of parentheses encloses it all."""
+        if self.tokens[start].text != "(" or self.tokens[end - 1].text != ")":
+            return False
+        level = 0
+        for k in range(start, end):
+            text = self.tokens[k].text
+            level += 1 if text in _OPENING else -1 if text in _CLOSING else 0
+            if level == 0:
+                return k == end - 1
+        return False
 
     def places(self, operator: str, start: int, end: int) -> Iterator[int]:
         """Where an operator stands outside all brackets."""
