@@ -1,4 +1,4 @@
-"""A system with other names and other types works without touching the code: Hoare, Hypothesis and the agent checker."""
+"""A system with other names and types works without touching the code: Hoare, Hypothesis and the agent checker."""
 
 from __future__ import annotations
 

@@ -1,0 +1,100 @@
+"""A run with nothing to do is recognised by the identity of files, and nothing less."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from avow.pipeline import shortcut
+from avow.pipeline.results import Result
+from avow.pipeline.tasks import _wanted
+from avow.workspace import Workspace
+
+RESULT = Result("crane", 0, {"proved": 3}, "CHECKED", "reports/crane/index.html", (("all", True, "fine"),))
+
+
+@pytest.fixture
+def settled(tmp_path: Path) -> Workspace:
+    workspace = Workspace(tmp_path)
+    for name in ("contracts/crane/plan.yaml", "artifacts/ledger/crane.jsonl", "reports/index.html"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("text")
+    shortcut.keep(workspace, [RESULT])
+    return workspace
+
+
+def test_nothing_changed(settled: Workspace) -> None:
+    assert shortcut.nothing_to_do(settled, ("verify",)) == (RESULT,)
+    assert shortcut.nothing_to_do(settled, ("verify:crane",)) == (RESULT,)
+
+
+@pytest.mark.parametrize("wanted", [(), ("report",), ("verify", "check"), ("verify:other",), ("obligations",)])
+def test_only_verification_of_known_systems_is_short(settled: Workspace, wanted: tuple[str, ...]) -> None:
+    assert shortcut.nothing_to_do(settled, wanted) is None
+
+
+@pytest.mark.parametrize("name", ["contracts/crane/plan.yaml", "artifacts/ledger/crane.jsonl", "reports/index.html"])
+def test_an_edit_of_the_same_length_under_an_old_time_is_seen(settled: Workspace, name: str) -> None:
+    path = settled.root / name
+    before = path.stat()
+    path.write_text("tExt")
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert path.stat().st_mtime_ns == before.st_mtime_ns
+    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+
+
+def test_new_and_deleted_files_are_seen(settled: Workspace) -> None:
+    extra = settled.contracts / "crane" / "new.rcl"
+    extra.write_text("")
+    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    extra.unlink()
+    (settled.root / "reports" / "index.html").unlink()
+    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+
+
+def test_a_tool_that_appears_on_the_path_is_seen(
+    tmp_path: Path, settled: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tools = tmp_path.parent / f"{tmp_path.name}-tools"
+    tools.mkdir()
+    monkeypatch.setenv("PATH", f"{tools}:{os.environ['PATH']}")
+    shortcut.keep(settled, [RESULT])
+    assert shortcut.nothing_to_do(settled, ("verify",)) == (RESULT,)
+    (tools / "dafny").write_text("#!/bin/sh\n")
+    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+
+
+def test_a_link_that_leads_elsewhere_is_never_short(tmp_path: Path, settled: Workspace) -> None:
+    elsewhere = tmp_path.parent / f"{tmp_path.name}-elsewhere"
+    elsewhere.mkdir()
+    (settled.contracts / "crane" / "models").symlink_to(elsewhere)
+    shortcut.keep(settled, [RESULT])
+    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+
+
+def test_fresh_runs_and_damaged_notes_go_the_long_way(settled: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AVOW_FRESH", "1")
+    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    monkeypatch.delenv("AVOW_FRESH")
+    (settled.artifacts / ".settled.json").write_text('{"identity": 7}')
+    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+
+
+@pytest.mark.parametrize(
+    ("line", "names"),
+    [
+        ("", ("verify",)),
+        ("verify", ("verify",)),
+        ("-n 2 verify", ("verify",)),
+        ("-n2 verify:crane", ("verify:crane",)),
+        ("run verify -n 4 -P thread", ("verify",)),
+        ("list --all", ()),
+        ("-a verify", ()),
+        ("-f other.py verify", ()),
+        ("x=1 verify", ()),
+    ],
+)
+def test_what_doit_was_asked_for(line: str, names: tuple[str, ...]) -> None:
+    assert _wanted(line.split()) == names
