@@ -6,6 +6,7 @@ A declared name is a name for a sort; sets of names become `EnumSort`, sets of c
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 
@@ -117,3 +118,23 @@ REAL = RealSort()
 INTEGER = IntegerSort()
 NATURAL = NaturalSort()
 STRING = StringSort()
+
+
+def components(*sorts: Sort) -> Iterator[Sort]:
+    """The sorts given and those that they are made of, each once."""
+    stack, seen = list(sorts), set[Sort]()
+    while stack:
+        sort = stack.pop()
+        if sort in seen:
+            continue
+        seen.add(sort)
+        yield sort
+        match sort:
+            case DataSort(constructors=constructors):
+                stack.extend(p for c in constructors for p in c.parameters)
+            case FunctionSort(parameters=parameters, result=result):
+                stack.extend((*parameters, result))
+            case TupleSort(items=items):
+                stack.extend(items)
+            case SequenceSort(item=item) | SetSort(item=item):
+                stack.append(item)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from avow.backend import Report
-from avow.verdict import Counterexample, Link, Outcome, Verdict
+from avow.evidence.encoding import decode_counterexample, encode_counterexample
+from avow.verdict import Link, Outcome, Verdict
 
 
 def report_to_json(report: Report) -> dict[str, Any]:
@@ -33,7 +34,7 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
         "obligation": outcome.obligation,
         "verdict": outcome.verdict.value,
         "summary": outcome.summary,
-        "counterexample": _counterexample_to_json(outcome.counterexample),
+        "counterexample": encode_counterexample(outcome.counterexample),
         "hypotheses": list(outcome.hypotheses),
         "bound": outcome.bound,
         "details": outcome.details,
@@ -47,32 +48,10 @@ def outcome_from_json(data: dict[str, Any]) -> Outcome:
         data["obligation"],
         Verdict(data["verdict"]),
         data["summary"],
-        _counterexample_from_json(data["counterexample"]),
+        decode_counterexample(data["counterexample"]),
         tuple(data["hypotheses"]),
         data["bound"],
         data["details"],
         Link(data["link"]) if data["link"] else None,
         data["vacuous"],
-    )
-
-
-def _counterexample_to_json(example: Counterexample | None) -> dict[str, Any] | None:
-    if example is None:
-        return None
-    return {
-        "values": [list(pair) for pair in example.values],
-        "explanation": example.explanation,
-        "trace": [[list(pair) for pair in step] for step in example.trace],
-        "loop": example.loop,
-    }
-
-
-def _counterexample_from_json(data: dict[str, Any] | None) -> Counterexample | None:
-    if data is None:
-        return None
-    return Counterexample(
-        tuple((name, value) for name, value in data["values"]),
-        data["explanation"],
-        tuple(tuple((name, value) for name, value in step) for step in data["trace"]),
-        data["loop"],
     )

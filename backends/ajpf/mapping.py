@@ -114,17 +114,11 @@ class Mapper:
         return found + [(self.map(item), (item,)) for item in rest]
 
     def _atom(self, term: Term) -> Mapped:
-        made = self._whole(term)
-        if made is not None:
-            return made
-        truth = self._decided(term)
-        if truth is not None:
-            return YES if truth else NO
-        if isinstance(term, Not):
-            made = self._whole(term.body)
-            if made is not None:
-                return _negated(made)
-        raise NotCovered(f"no mapping for {show_term(term)}", term.span or _first_span(term))
+        made = self._at_once(term)
+        if made is None and isinstance(term, Not):
+            body = self._whole(term.body)
+            made = _negated(body) if body is not None else None
+        return made if made is not None else self._fail(term)
 
     def _whole(self, term: Term) -> Mapped | None:
         """By a row that covers just this."""
@@ -134,18 +128,23 @@ class Mapper:
                 return self._unit(row, binding, (term,))
         return None
 
-    def _decided(self, term: Term) -> bool | None:
-        return None if free(term) else self.decide(term)
-
-    def _quantified(self, term: Quantified) -> Mapped:
+    def _at_once(self, term: Term) -> Mapped | None:
+        """By one row, or because the term is true or false of every agent."""
         made = self._whole(term)
         if made is not None:
             return made
         truth = self._decided(term)
-        if truth is not None:
-            return YES if truth else NO
+        return None if truth is None else YES if truth else NO
+
+    def _decided(self, term: Term) -> bool | None:
+        return None if free(term) else self.decide(term)
+
+    def _quantified(self, term: Quantified) -> Mapped:
+        made = self._at_once(term)
+        if made is not None:
+            return made
         if term.quantifier is Quantifier.UNIQUE:
-            raise NotCovered(f"no mapping for {show_term(term)}", term.span or _first_span(term))
+            return self._fail(term)
         exists = term.quantifier is Quantifier.EXISTS
         for variable in term.variables:
             if isinstance(variable.sort, IntegerSort | NaturalSort):

@@ -37,9 +37,8 @@ from avow.language.sorts import (
     DataSort,
     EnumSort,
     FunctionSort,
-    SequenceSort,
     Sort,
-    TupleSort,
+    components,
 )
 from avow.language.terms import EnumValue, Term
 
@@ -71,25 +70,12 @@ def vocabulary(contract: Contract, node: Node) -> Vocabulary:
     types.update(contract.types)
     values: dict[str, Term] = dict(contract.constants)
     constructors: dict[str, tuple[DataSort, Constructor]] = {}
-    stack: list[Sort] = [*types.values(), *(port.sort for port in (*node.inputs, *node.outputs))]
-    seen: set[Sort] = set()
-    while stack:
-        sort = stack.pop()
-        if sort in seen:
-            continue
-        seen.add(sort)
+    for sort in components(*types.values(), *(port.sort for port in (*node.inputs, *node.outputs))):
         match sort:
             case EnumSort(members=members):
                 values.update((member, EnumValue(member, sort)) for member in members)
             case DataSort(constructors=made):
                 constructors.update((c.name, (sort, c)) for c in made)
-                stack.extend(p for c in made for p in c.parameters)
-            case FunctionSort(parameters=parameters, result=result):
-                stack.extend((*parameters, result))
-            case TupleSort(items=items):
-                stack.extend(items)
-            case SequenceSort(item=item):
-                stack.append(item)
             case _:
                 pass
     return Vocabulary(types, values, constructors)
