@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 from click.testing import CliRunner
+from jsonschema import Draft202012Validator
 
 from avow.calculus.composition import compose
 from avow.calculus.notation import as_html, write_goal
@@ -52,6 +53,8 @@ def test_compose_json(tmp_path: Path) -> None:
     code, output = invoke(compose_command, str(tmp_path), "--json", "--goal", "whole")
     assert code == 0
     document = json.loads(output)
+    schema = json.loads((PROOFS.parents[2] / "docs/schemas/compose.schema.json").read_text())
+    assert not list(Draft202012Validator(schema).iter_errors(document))
     assert document["derivations"][0]["rule"] == "R1"
     (side,) = [o for o in document["obligations"] if o["id"] == "system/composition/whole.b.A1"]
     assert side["verdict"] == "proved"
