@@ -347,20 +347,20 @@ class _Analysis:
 
     def _undetermined(self, name: str) -> _Finding:
         from avow.logic.counterexample import show_values
+        from avow.logic.realizability import Group, groups
         from avow.logic.smt import solve
 
         output = self.node.output(name).variable
-        again = {v: Variable(Role.OUTPUT, f"{v.name} (another)", v.sort) for v in self.outputs}
-        group = [f for f in self.guarantees.values() if output in free_variables(f)]
+        alone = Group({}, (output,))
+        # Outputs that hang together with this one by shared guarantees may differ too; all others stay the same.
+        group = next((g for g in groups(self.guarantees, self.outputs) if output in g.outputs), alone)
+        again = {v: Variable(Role.OUTPUT, f"{v.name} (another)", v.sort) for v in group.outputs}
         question = {
             **self.assumptions,
             **self.guarantees,
-            **{f"{label} again": substitute(f, again) for label, f in self.guarantees.items() if f in group},
+            **{f"{label} again": substitute(f, again) for label, f in group.guarantees.items()},
             "different": Not(Compare("==", output, again[output])),
         }
-        # Outputs that share no guarantee with this one stay the same in both.
-        same = {again[v]: v for v in self.outputs if not any(v in free_variables(f) for f in group) and v != output}
-        question = {label: substitute(f, same) for label, f in question.items()}
         for given in self._attempts():
             answer = solve(question, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed, given=given)
             if answer.status == "unsat" and not given:
