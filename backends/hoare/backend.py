@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -242,7 +242,11 @@ def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Sett
         if answer.verdict is not Verdict.PROVED:
             failed.append((condition, answer))
     if not failed:
-        return Settled(triple, Verdict.PROVED, "proved", None, _vacuous(triple, deadline, limits), len(wanted))
+        vacuous = _vacuous(triple, deadline, limits)
+        if not vacuous and _endless(triple, work, deadline, limits):
+            why = "its loops never end where it applies, and a node that never answers guarantees nothing"
+            return Settled(triple, Verdict.UNKNOWN, why)
+        return Settled(triple, Verdict.PROVED, "proved", None, vacuous, len(wanted))
     shown = breach(triple, program, [c for c, _ in failed], max(1000, _left(deadline)))
     if shown is not None:
         return Settled(triple, Verdict.REFUTED, shown.why, shown)
@@ -265,6 +269,16 @@ def _vacuous(triple: Triple, deadline: float, limits: Limits) -> str:
     if always.verdict is Verdict.PROVED:
         return "it holds whatever a program does: it says nothing of this one"
     return ""
+
+
+def _endless(triple: Triple, work: Work, deadline: float, limits: Limits) -> bool:
+    """Whether no run from the precondition ends: "terminates" would be a hypothesis that is known to be false."""
+    if not _termination(work):
+        return False
+    return all(
+        entails(c.hypotheses, c.goal, timeout_ms=min(2000, _left(deadline)), seed=limits.seed).verdict is Verdict.PROVED
+        for c in conditions(replace(triple, post=FALSE), work.checked.program.body)
+    )
 
 
 def _left(deadline: float) -> int:

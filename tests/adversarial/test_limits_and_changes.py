@@ -1,4 +1,4 @@
-"""Limits that are no numbers are told at their place; an answer to a question that has changed is not recorded as its."""
+"""Limits that are no numbers are told at their place; an answer is recorded only of the question that was asked."""
 
 from __future__ import annotations
 
@@ -25,9 +25,11 @@ def thermostat(workspace: Path) -> Path:
 
 @pytest.mark.parametrize(
     "wrong",
-    ["seconds: abc", "seconds: -1", "seconds: 0", "seconds: .nan", "seconds: {}", "seconds: 1e999", "seconds: '60'"]
-    + ["megabytes: 1.5", "megabytes: -3", "megabytes: 99999999999999999999", "megabytes: true"]
-    + ["seed: [1]", "seed: 1.5", "seed: -1", "seed: 99999999999999999999"],
+    [
+        *("seconds: abc", "seconds: -1", "seconds: 0", "seconds: .nan", "seconds: {}", "seconds: 1e999"),
+        *("seconds: '60'", "megabytes: 1.5", "megabytes: -3", "megabytes: 99999999999999999999", "megabytes: true"),
+        *("seed: [1]", "seed: 1.5", "seed: -1", "seed: 99999999999999999999"),
+    ],
 )
 def test_a_limit_that_is_none_is_told_at_its_place(thermostat: Path, wrong: str) -> None:
     plan = thermostat / "plan.yaml"
@@ -35,7 +37,8 @@ def test_a_limit_that_is_none_is_told_at_its_place(thermostat: Path, wrong: str)
     found = survey(thermostat)
     assert isinstance(found, Rejected)
     (problem,) = found.diagnostics
-    assert problem.span is not None and "hoare:" in plan.read_text().splitlines()[problem.span.line - 1]
+    assert problem.span is not None
+    assert "hoare:" in plan.read_text().splitlines()[problem.span.line - 1]
     assert wrong.partition(":")[0] in problem.message
 
 
@@ -61,4 +64,5 @@ def test_a_contract_edited_between_question_and_answer(thermostat: Path, tmp_pat
     report = worker.run(Workspace(tmp_path), asked, asked.obligations, tmp_path / "artifacts")
     (outcome,) = report.outcomes
     assert outcome.verdict is Verdict.ERROR
-    assert outcome.details["retry"] and "changed while" in outcome.summary
+    assert outcome.details["retry"]
+    assert "changed while" in outcome.summary

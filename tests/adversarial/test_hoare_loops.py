@@ -1,0 +1,26 @@
+"""A loop without a variant may be assumed to end, but not where it is known never to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.verdict import Verdict
+
+from .settling import settle
+
+CONTRACT = "node n { inputs( k : NATURAL ) outputs( m : NATURAL ) topics() guarantee g ( k > 3 -> m == k ) }"
+
+
+@pytest.mark.parametrize(
+    ("loop", "verdict"),
+    [
+        ("WHILE TRUE INVARIANT TRUE DO\n   m := 0\n", Verdict.UNKNOWN),
+        ("WHILE m < k + 1 INVARIANT m == 0 DO\n   m := 0\n", Verdict.UNKNOWN),
+        ("WHILE m < k INVARIANT m <= k DO\n   m := m + 1\n", Verdict.PROVED),
+    ],
+)
+def test_a_loop_that_never_ends_proves_nothing(tmp_path: Path, loop: str, verdict: Verdict) -> None:
+    outcome = settle(tmp_path, CONTRACT, "hoare: {program: p.imp}", {"p.imp": f"m := 0\n{loop}"})["g"]
+    assert outcome.verdict is verdict, outcome.summary
