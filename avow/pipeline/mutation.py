@@ -17,14 +17,11 @@ from pathlib import Path
 
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import Evidence
-from avow.language.contract import Clause, Node
-from avow.logic.mutants import Mutant, telling
 from avow.pipeline import worker
+from avow.pipeline.altered import Altered, chosen
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work, method_backend
-from avow.pipeline.worker import Altered
-from avow.system.plan import System
 from avow.verdict import Link
 from avow.workspace import Workspace
 
@@ -48,21 +45,6 @@ class Score:
     def hollow(self) -> bool:
         """Not one of several mutants was noticed."""
         return self.mutants > 0 and self.killed == 0
-
-
-def alter(system: System, node: Node, altered: Altered) -> System:
-    """The system with a mutant in place of a guarantee. Raises KeyError and IndexError for one that there is not."""
-    clause = node.clause(altered.clause)
-    mutant = chosen(node, clause, altered.limit)[altered.number]
-    guarantees = tuple(replace(c, formula=mutant.formula) if c.name == clause.name else c for c in node.guarantees)
-    changed = replace(node, guarantees=guarantees)
-    nodes = tuple(changed if n.name == node.name else n for n in system.contract.nodes)
-    return replace(system, contract=replace(system.contract, nodes=nodes))
-
-
-def chosen(node: Node, clause: Clause, limit: int) -> tuple[Mutant, ...]:
-    """The mutants that are tried: the same ones, in the same order, in every process."""
-    return telling(clause.formula, tuple(a.formula for a in node.assumptions), limit)
 
 
 def hunt(workspace: Workspace, works: tuple[Work, ...], run: Run, limit: int, jobs: int) -> tuple[Score, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import sys
 import traceback
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from avow.diagnostics import Rejected
 from avow.evidence.encoding import Unreadable
 from avow.evidence.obligation import Obligation
 from avow.files import write
+from avow.pipeline.altered import Altered, alter
 from avow.pipeline.wire import report_from_json, report_to_json
 from avow.pipeline.work import Work, compose_work, method_backend, method_job, method_work, sanity_work
 from avow.system.load import load_system
@@ -34,15 +35,6 @@ GRACE = 90.0
 
 CHANGED = 75
 """Exit code: what was to be verified is not what stands on the disk any more, so that the answer is of neither."""
-
-
-@dataclass(frozen=True, slots=True)
-class Altered:
-    """Which mutant of which guarantee stands in for the guarantee (see `avow.pipeline.mutation`)."""
-
-    clause: str
-    number: int
-    limit: int
 
 
 def run(
@@ -181,8 +173,6 @@ def _discharge(request: dict[str, Any], system: System, work: Work, limits: Limi
     method = next(m for m in system.plan.node(node.name).methods if m.id == work.method)
     tool = method_backend(system, method)
     if request["altered"]:
-        from avow.pipeline.mutation import alter
-
         system = alter(system, node, Altered(**request["altered"]))
         node = system.contract.node(node.name)
         for name, text in tool.export(method_job(system, node, method)).items():
