@@ -171,6 +171,7 @@ def conclude(facts: Facts) -> Case:
         strict=facts.expected is not None,
         orphans=orphans,
         graph_svg=facts.graph_svg,
+        maps=facts.maps,
     )
 
 

@@ -139,10 +139,17 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
     if demand is None:
         if view.obligation.kind is Kind.REQUIREMENT:
             return Suggestion("add what it rests on under `supported_by`, or state it as a formula", cost=20)
+        if view.obligation.kind is Kind.COMPOSITION and _wants_a_reason(view):
+            return Suggestion("give a dated reason in the plan, where the evidence says", cost=5)
         return Suggestion(
             "narrow the question (a scenario in the plan), raise the time limit, or accept it with a reason", cost=20
         )
     return _new_method(view, demand, used, facts)
+
+
+def _wants_a_reason(view: ObligationView) -> bool:
+    """A condition that no tool settles, only a person's reason; the evidence says where it belongs."""
+    return not view.obligation.formula or view.obligation.name.startswith("environment.")
 
 
 def _planned(view: ObligationView, facts: Facts) -> Mapping[str, str]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
-from avow.assurance.model import Case, Derivation, EnvironmentView, MethodInfo, NodeView, RunInfo, ToolInfo
+from avow.assurance.model import Case, Derivation, EnvironmentView, MapView, MethodInfo, NodeView, RunInfo, ToolInfo
 from avow.assurance.policy import Policy, read_policy
 from avow.diagnostics import Span
 from avow.evidence.audit import Discrepancy
@@ -43,6 +43,7 @@ class Facts:
     tools: tuple[ToolInfo, ...]
     discrepancies: tuple[Discrepancy, ...] | None
     graph_svg: str
+    maps: tuple[MapView, ...] = ()
 
 
 def facts_of_system(
@@ -96,7 +97,20 @@ def facts_of_system(
         tools=tuple(sorted(tools, key=lambda t: (t.name, t.version or ""))),
         discrepancies=None if discrepancies is None else tuple(discrepancies),
         graph_svg=graph_svg,
+        maps=_maps(plan),
     )
+
+
+def _maps(plan: Plan) -> tuple[MapView, ...]:
+    found = []
+    if plan.scenario is None:
+        return ()
+    for picture in plan.pictures:
+        table = plan.scenario.table(picture.table)
+        labels = table.column(picture.label) if picture.label else ("",) * len(table.rows)
+        points = zip(table.column(picture.x), table.column(picture.y), labels, strict=True)
+        found.append(MapView(picture.name, tuple(points), picture.places))
+    return tuple(found)
 
 
 def facts_of_case(case: Case) -> Facts:
@@ -142,6 +156,7 @@ def facts_of_case(case: Case) -> Facts:
         tools=case.tools,
         discrepancies=case.discrepancies if case.audited else None,
         graph_svg=case.graph_svg,
+        maps=case.maps,
     )
 
 

@@ -123,6 +123,7 @@ def _kind(
         excused,
         lambda view: view.status.value,
         _holding([v.status.supports for v in of_kind], asked=bool(good)),
+        idle=not good,
     )
 
 
@@ -143,7 +144,8 @@ def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: se
             excused,
             lambda view, lacking=lacking: lacking[view.id] or "",  # type: ignore[misc]
             _holding([v.status.supports for v in of_kind], asked=bool(demand.one_of)),
-            demand.text(),
+            demand.text() if demand.one_of else "",
+            idle=not demand.one_of,
         )
 
 
@@ -171,6 +173,7 @@ def _derivations(
         let_off,
         "",
         bool(bad) and all(_tool_only(d.below, views) for d in bad),
+        idle=not wanted,
     )
 
 
@@ -193,6 +196,7 @@ def _requirements(
         let_off,
         "",
         bool(bad) and all(_tool_only(r.below, views) for r in bad),
+        idle=not good,
     )
 
 
@@ -212,6 +216,7 @@ def _gate(
     why: Callable[[ObligationView], str],
     good: str,
     asks: str = "",
+    idle: bool = False,
 ) -> Gate:
     bad = [view for view in failing if view.id not in excused]
     let_off = tuple(view.id for view in failing if view.id in excused)
@@ -234,6 +239,7 @@ def _gate(
         let_off,
         asks,
         bool(bad) and all(view.status in _TOOL for view in bad),
+        idle and not bad,
     )
 
 
@@ -243,7 +249,7 @@ def _holding(supported: Sequence[bool], asked: bool, excused: int = 0) -> str:
         return "there are none"
     counts = f"{sum(supported)} of {len(supported)} hold"
     if not asked:
-        return f"nothing is asked of them; {counts}"
+        return f"the policy asks nothing of them; {counts}"
     return f"{counts}; {excused} excused by the plan" if excused else counts
 
 

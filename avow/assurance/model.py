@@ -245,6 +245,16 @@ class EnvironmentView:
 
 
 @dataclass(frozen=True, slots=True)
+class MapView:
+    """Places that counterexamples may speak of: (x, y, label) as exact text, from a table of the plan's scenario."""
+
+    name: str
+    points: tuple[tuple[str, str, str], ...]
+    places: tuple[str, ...] = ()
+    """Words of calls whose argument is a label."""
+
+
+@dataclass(frozen=True, slots=True)
 class OpenItem:
     """Something that a reader must know before believing the rest. `kind` is a status word, ``expired`` or the like."""
 
@@ -255,6 +265,10 @@ class OpenItem:
     handled: str = ""
     advice: bool = False
     """Worth knowing, but nothing fails for it."""
+    title: str = ""
+    """What the claim says, in a sentence."""
+    reason: str = ""
+    """Why it is so, in the words of the plan's `expected` or `accepted`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,6 +286,8 @@ class Gate:
     """What the policy asks here, as a phrase, where the title does not say it all."""
     tool_failure: bool = False
     """It fails only because a tool is missing or broke (exit code 3)."""
+    idle: bool = False
+    """The policy asks nothing here: that it does not fail says nothing."""
 
 
 class Grade(StrEnum):
@@ -321,6 +337,7 @@ class Case:
     """Evidence for claims that no longer exist."""
     graph_svg: str = ""
     """The dataflow picture; shown as an image, never as markup."""
+    maps: tuple[MapView, ...] = ()
 
     def obligation(self, name: str) -> ObligationView:
         """The obligation of that id. Raises KeyError."""
@@ -328,6 +345,11 @@ class Case:
             if view.id == name:
                 return view
         raise KeyError(name)
+
+    def said(self, name: str) -> Handled | None:
+        """What the plan says of a claim's finding: the first entry with a reason that matches it, else any."""
+        matching = [finding for finding in self.findings if name in finding.obligations]
+        return next((f for f in matching if f.reason), matching[0] if matching else None)
 
     @property
     def good(self) -> bool:

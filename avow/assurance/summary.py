@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from avow.assurance.facts import Facts
 from avow.assurance.model import DerivationView, Handled, ObligationView, OpenItem, RequirementView
@@ -32,9 +32,13 @@ def open_items(
     findings: Sequence[Handled],
 ) -> tuple[OpenItem, ...]:
     """Everything that a reader must know before believing the rest, worst first."""
+    said: dict[str, str] = {}
+    for f in findings:
+        for name in f.obligations:
+            said[name] = said.get(name) or f.reason
     items = [OpenItem("discrepancy", d.subject, d.text, advice=not d.serious) for d in facts.discrepancies or ()]
     for status in _WORST_FIRST:
-        items += [_open(view) for view in views if view.status is status and not view.advice]
+        items += [_open(view, said) for view in views if view.status is status and not view.advice]
     items += [_vacuous(view) for view in views if view.status is not Status.VACUOUS and _has_vacuous(view)]
     for d in derivations:
         if not d.status.supports and not d.below:
@@ -52,16 +56,32 @@ def open_items(
                 OpenItem("unused", f.pattern, f"accepted as {f.verdict}, but nothing is so: remove it", advice=True)
             )
     items += [
-        OpenItem("advice", view.id, f"{view.obligation.claim}: {_summary(view)}", advice=True, handled=view.handled)
+        OpenItem(
+            "advice",
+            view.id,
+            _summary(view),
+            advice=True,
+            handled=view.handled,
+            title=view.obligation.claim,
+            reason=said.get(view.id, ""),
+        )
         for view in views
         if view.advice and view.status is Status.REFUTED
     ]
     return tuple(items)
 
 
-def _open(view: ObligationView) -> OpenItem:
+def _open(view: ObligationView, said: Mapping[str, str]) -> OpenItem:
     suggestion = view.suggestion.text if view.suggestion and not view.handled else ""
-    return OpenItem(view.status.value, view.id, _summary(view) or view.obligation.claim, suggestion, view.handled)
+    return OpenItem(
+        view.status.value,
+        view.id,
+        _summary(view),
+        suggestion,
+        view.handled,
+        title=view.obligation.claim,
+        reason=said.get(view.id, ""),
+    )
 
 
 def _summary(view: ObligationView) -> str:
@@ -88,7 +108,11 @@ def _has_vacuous(view: ObligationView) -> bool:
 def _vacuous(view: ObligationView) -> OpenItem:
     methods = ", ".join(v.entry.evidence.method for v in view.counting if v.entry.evidence.vacuous)
     return OpenItem(
-        "vacuous", view.id, f"{methods} passed without its trigger ever being met: that supports nothing", advice=True
+        "vacuous",
+        view.id,
+        f"{methods} passed without its trigger ever being met: that supports nothing",
+        advice=True,
+        title=view.obligation.claim,
     )
 
 

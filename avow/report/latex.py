@@ -23,7 +23,7 @@ _SYMBOLS = _read(
 × \times  ÷ \div  − -  ∪ \cup  ∩ \cap  ⊆ \subseteq  ∅ \emptyset  ∞ \infty  ⟨ \langle  ⟩ \rangle
 ℝ \mathbb{R}  ℕ \mathbb{N}  ℤ \mathbb{Z}  𝔹 \mathbb{B}  ′ '  ″ ''  ‴ '''  … \ldots  λ \lambda
 φ \varphi  ψ \psi  σ \sigma  ⁻ ^{-}  ¹ ^{1}  ₁ _{1}  ₂ _{2}  ₃ _{3}  ↦ \mapsto  ⊎ \uplus  ∘ \circ
-─ -  — -  – -"""
+─ -  — -  – -  𝒜 \mathcal{A}  𝒢 \mathcal{G}"""
 )
 """Characters of formulas, set in mathematics."""
 
@@ -50,7 +50,7 @@ def _latex_character(c: str) -> str:
     if c in _SYMBOLS:
         return rf"\ensuremath{{{_SYMBOLS[c]}}}"
     if c == "\n":
-        return r"\\ "
+        return r"\hspace*{0pt}\newline "  # not \\: it would end a table's row
     if c.isascii():
         return c if c.isprintable() else " "
     return c if "\u00c0" <= c <= "\u017f" else rf"\texttt{{U+{ord(c):04X}}}"
@@ -60,8 +60,11 @@ def render_latex(case: Case) -> str:
     """An appendix: requirements, derivations, obligations with formulas and evidence."""
     lines = [
         r"\documentclass[10pt,a4paper]{article}",
-        r"\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}\usepackage{amsmath,amssymb,longtable,geometry,proof}",
+        r"\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}\usepackage{amsmath,amssymb,graphicx,longtable,geometry}",
+        r"\IfFileExists{proof.sty}{\usepackage{proof}}{\newcommand{\infer}[3][]{\frac{#3}{#2}\,#1}}",
         r"\geometry{margin=22mm}\setlength{\parindent}{0pt}\setlength{\parskip}{4pt}\sloppy",
+        r"\newsavebox{\fitbox}\newcommand{\fitted}[1]{\sbox{\fitbox}{$\displaystyle #1$}%",
+        r"\par\medskip\ifdim\wd\fitbox>\linewidth\resizebox{\linewidth}{!}{\usebox{\fitbox}}\else\usebox{\fitbox}\fi\par}",
         rf"\title{{{latex(case.title)}: assurance case}}\date{{{latex(case.today)}}}",
         rf"\author{{Avow {latex(case.run.avow_version)}}}",
         r"\begin{document}\maketitle",
@@ -92,10 +95,12 @@ def _latex_derivation(view: DerivationView) -> Iterable[str]:
     d = view.derivation
     yield rf"\subsection*{{{latex(d.name)} (rule {latex(d.rule)}): {view.status}}}"
     if d.latex and not _DANGEROUS.search(d.latex):
-        yield rf"\[{d.latex}\]"
+        start = d.latex.find(r"\[")  # the calculus sets its displays itself, under a title that stands above already
+        shown = d.latex[start + 2 :].replace(r"\[", r"\fitted{").replace(r"\]", "}") if start >= 0 else d.latex + "}"
+        yield r"\fitted{" + shown  # a premise may be wider than the page
     else:
         yield from (rf"\texttt{{{latex(line)}}}\\" for line in d.text.splitlines() if line.strip())
-    yield latex(d.conclusion)
+    yield ""
     conditions = "; ".join(c.text for c in d.side_conditions)
     if conditions:
         yield rf"Side conditions: {latex(conditions)}."

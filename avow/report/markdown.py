@@ -30,12 +30,19 @@ def render_markdown(case: Case) -> str:
         "## Gates",
         _table(
             ("gate", "", "why"),
-            ((_md(g.title), "passes" if g.passed else "**fails**", _md(g.reason)) for g in case.gates),
+            (
+                (_md(g.title), "not asked" if g.idle else "passes" if g.passed else "**fails**", _md(g.reason))
+                for g in case.gates
+            ),
         ),
         "## Open items",
         _table(
-            ("", "claim", "what", "next"),
-            ((i.kind, _md(short(i.claim)), _md(i.text), _md(i.suggestion)) for i in case.open_items if not i.advice),
+            ("", "claim", "why", "what was found", "next"),
+            (
+                (i.kind, f"{_md(i.title)} ({_md(short(i.claim))})", _md(i.reason), _md(i.text), _md(i.suggestion))
+                for i in case.open_items
+                if not i.advice
+            ),
         ),
         "## Guarantees",
         _table(("guarantee", "criticality", "status", "evidence", "at"), (_row(view) for view in _guarantees(case))),

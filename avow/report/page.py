@@ -22,6 +22,7 @@ from avow.assurance.trend import trend
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.report import picture, wording
+from avow.report.maps import draw_map
 from avow.report.wording import history
 
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.WELL_FORMED)
@@ -55,7 +56,11 @@ def environment() -> Environment:
         "Status": Status,
         "anchor": wording.anchor,
         "ticks": _ticks,
+        "banner_tone": wording.banner_tone,
         "bound_text": wording.bound_text,
+        "derivation": _derivation,
+        "draw_map": draw_map,
+        "in_lines": wording.in_lines,
         "count": wording.count,
         "mutation": wording.mutation,
         "details_text": wording.details_text,
@@ -108,6 +113,30 @@ def render_page(case: Case) -> str:
             open_at_once=_OPEN_AT_ONCE,
         )
     )
+
+
+_SUBSCRIPT = re.compile(r"([𝒜𝒢io])_([A-Za-z0-9_]+)")
+_RULE = re.compile(r"^[─—-]{5,}$")
+
+
+def _derivation(text: str, title: str) -> Markup:
+    """A derivation as the paper sets it: premises over a line over the conclusion, with subscripts."""
+    rows = []
+    below = False
+    for line in text.splitlines():
+        if line == title:
+            continue
+        if _RULE.match(line.strip()):
+            below = True
+            continue
+        shown, _, remark = str(escape(line)).partition("    [")
+        note = f' <span class="quiet">[{remark}</span>' if remark else ""
+        prose = line.lstrip().startswith("provided")
+        kind = ("said" if prose else "line") + (" under" if below else "")
+        below = False
+        shown = shown if prose else _SUBSCRIPT.sub(r"\1<sub>\2</sub>", shown)
+        rows.append(f'<div class="{kind}">{shown}{note}</div>')
+    return Markup("\n".join(rows))  # escaped line by line above
 
 
 def _ticks(text: str) -> Markup:

@@ -12,12 +12,17 @@ from avow.assurance.naming import short
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report import picture
-from avow.report.wording import MARKS, bound_text, clean, tone, verdict_line
+from avow.report.wording import MARKS, banner_tone, bound_text, clean, in_lines, tone, verdict_line
 
 _MOST = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
 
 _MOST_IN_A_PICTURE = 90
+_GATE = {
+    "passes": {"word": "passes", "tone": "good"},
+    "fails": {"word": "fails", "tone": "bad"},
+    "not asked": {"word": "not asked", "tone": "plain"},
+}
 
 
 class NoTypst(Exception):  # noqa: N818 - it says what is missing
@@ -47,7 +52,7 @@ def _data(case: Case) -> dict[str, Any]:
     more = [f"{left_out} obligations are left out of this document: see report.json."] if left_out else []
     found: dict[str, Any] = {
         "title": case.title,
-        "good": case.good,
+        "tone": banner_tone(case),
         "grade": str(case.grade),
         "line": verdict_line(case),
         "facts": [*facts, *case.digests],
@@ -59,12 +64,19 @@ def _data(case: Case) -> dict[str, Any]:
             {
                 "title": g.title,
                 "reason": g.reason,
-                "status": {"word": "passes" if g.passed else "fails", "tone": "good" if g.passed else "bad"},
+                "status": _GATE["not asked" if g.idle else "passes" if g.passed else "fails"],
             }
             for g in case.gates
         ],
         "open": [
-            {"claim": short(i.claim), "text": i.text, "next": i.suggestion, "status": _word(i.kind)}
+            {
+                "claim": short(i.claim),
+                "title": i.title,
+                "reason": i.reason,
+                "text": i.text,
+                "next": i.suggestion,
+                "status": _word(i.kind),
+            }
             for i in case.open_items[:_MOST]
             if not i.advice
         ],
@@ -88,7 +100,7 @@ def _data(case: Case) -> dict[str, Any]:
             }
             for d in case.derivations
         ],
-        "obligations": [_obligation(view) for view in views],
+        "obligations": [_obligation(case, view) for view in views],
         "hypotheses": [f"{h.text} ({', '.join(map(short, h.claims[:6]))})" for h in case.hypotheses],
         "environment": [(e.port, e.assume or "nothing is assumed", e.because) for e in case.environment],
         "findings": [
@@ -115,12 +127,14 @@ def _pictures(case: Case) -> list[dict[str, str]]:
     return drawn
 
 
-def _obligation(view: ObligationView) -> dict[str, Any]:
+def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
+    said = case.said(view.id)
     evidence = [item.entry.evidence for item in view.counting]
     return {
         "name": short(view.id),
         "claim": view.obligation.claim,
-        "formula": view.obligation.formula,
+        "formula": in_lines(view.obligation.formula),
+        "reason": f"{said.how.capitalize()}: {said.reason}" if said and said.reason else "",
         "status": _chip(view.standing),
         "evidence": [
             {

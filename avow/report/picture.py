@@ -113,7 +113,11 @@ def _box(element: Element, depth: int) -> _Box:
     apart = len(element.title) * _BOLD > inner - taken * _CHARACTER
     lines = _wrap(element.text, inner)
     if element.shape not in (Shape.GOAL, Shape.STRATEGY):
-        lines = lines[:4]
+        lines = (
+            [*lines[:3], lines[3] if len(lines) == 4 else _cut(lines[3] + " …", int(inner / _CHARACTER))]
+            if len(lines) > 3
+            else lines
+        )
     height = 2 * _PAD + _LINE * (1 + apart + len(lines))
     return _Box(element, depth, lines, _cut(element.title, int(inner / _BOLD)), apart, width, height)
 
@@ -293,12 +297,14 @@ def _wrap(text: str, width: float) -> list[str]:
             break
     if line:
         lines.append(line)
-    if len(lines) > _MOST_LINES:
-        lines = lines[:_MOST_LINES]
-        lines[-1] = _cut(lines[-1] + " …", most)
-        if not lines[-1].endswith("…"):
-            lines[-1] = lines[-1][: most - 1] + "…"
-    return lines
+    return _first(lines, _MOST_LINES, most)
+
+
+def _first(lines: list[str], number: int, most: int) -> list[str]:
+    """So many lines, with a sign that there are more."""
+    if len(lines) <= number:
+        return lines
+    return [*lines[: number - 1], _cut(lines[number - 1], most - 2).removesuffix("…") + " …"]
 
 
 def _cut(text: str, most: int) -> str:

@@ -9,7 +9,18 @@ from rich.table import Table
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.evidence.status import Status
-from avow.report.wording import MARKS, MEANINGS, bound_text, history, outline, rerun, tone, tool_command, where
+from avow.report.wording import (
+    MARKS,
+    MEANINGS,
+    bound_text,
+    history,
+    in_lines,
+    outline,
+    rerun,
+    tone,
+    tool_command,
+    where,
+)
 from avow.verdict import Counterexample
 
 _COLOURS = {"good": "green", "fair": "blue", "open": "yellow", "bad": "red"}
@@ -22,7 +33,12 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
     out.print(f"[bold]{escape(view.id)}[/]   {_status(view.standing)} [dim]{MEANINGS[view.standing]}[/]")
     out.print(escape(o.claim))
     if o.formula:
-        out.print(f"\n    {escape(o.formula)}\n")
+        out.print("\n" + "\n".join(f"    {escape(line)}" for line in in_lines(o.formula).splitlines()) + "\n")
+    said = case.said(view.id)
+    if said:
+        by = f" by {escape(said.who)}" if said.who else ""
+        until = f" until {said.expires}" if said.expires else ""
+        out.print(f"[bold]{said.how}{by}{until}[/] by the plan{f': {escape(said.reason)}' if said.reason else ''}")
     place = where(view)
     at = f"{place}, " if place else ""
     out.print(f"[dim]{escape(at)}meaning {o.digest[:12]}, criticality {escape(view.criticality)}[/]")
@@ -58,8 +74,6 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
             out.print(f"[dim]  {e.started[:16]} {escape(e.method)}: {e.verdict} ({item.currency})[/]")
     if view.suggestion:
         out.print(f"\nnext: {escape(view.suggestion.text)}")
-    if view.handled:
-        out.print(f"the plan says of this finding: {view.handled}")
     needed_by = [r.id for r in case.requirements if view.id in r.rests_on or view.id in r.below]
     if needed_by:
         out.print(f"[dim]needed by {escape(', '.join(needed_by))}[/]")

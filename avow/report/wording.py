@@ -112,10 +112,61 @@ def verdict_line(case: Case) -> str:
     if not failed and case.strict:
         answered = sum(r.status.supports for r in case.requirements)
         asked = f"; {answered} of {len(case.requirements)} requirements are answered" if case.requirements else ""
-        return f"The findings are exactly those that were expected, and all {len(case.gates)} gates pass{asked}."
+        found = count(sum(f.how == "expected" for f in case.findings), "expected finding")
+        return f"Examined, not relied upon: there are exactly the {found}, and no others{asked}."
     if not failed:
         return f"All {len(case.gates)} gates of the policy pass."
     return f"{failed} of {len(case.gates)} gates of the policy fail{'s' if failed == 1 else ''}."
+
+
+def banner_tone(case: Case) -> str:
+    """Green is for a case that supports what is asked; known-bad material that is as bad as expected is none."""
+    if not case.good:
+        return "bad"
+    return "open" if case.strict and not all(r.status.supports for r in case.requirements) else "good"
+
+
+_CONNECTIVE = re.compile(r" (?=[→↔⇒⇔∧∨] )")
+_LONG_FORMULA = 88
+
+
+def in_lines(formula: str) -> str:
+    """A long formula broken before its connectives, the weakest outermost; not a character but blanks is changed."""
+    if "\n" in formula:
+        return formula
+    lines: list[str] = []
+    stack = [(0, formula)]
+    while stack:
+        margin, text = stack.pop()
+        if len(text) + margin <= _LONG_FORMULA or margin > 24:
+            lines.append(" " * margin + text)
+            continue
+        head, *parts = _split(text)
+        rest = [(margin + (0 if part[0] in "→↔⇒⇔" else 2), part) for part in parts]
+        if not rest:
+            lines.append(" " * margin + head)
+            continue
+        lines.append(" " * margin + head)
+        stack += reversed(rest)
+    return "\n".join(lines)
+
+
+def _split(text: str) -> list[str]:
+    """Cut before every connective outside parentheses, and after the first quantifier's dot."""
+    cuts, depth, dotted = [0], 0, False
+    for at, c in enumerate(text):
+        if c in "([{":
+            depth += 1
+        elif c in ")]}":
+            depth -= 1
+        elif depth == 0 and c == " ":
+            if _CONNECTIVE.match(text, at):
+                cuts.append(at + 1)
+            elif not dotted and text[at - 1] == "·":
+                dotted = True
+                cuts.append(at + 1)
+    parts = [text[a:b].rstrip() for a, b in zip(cuts, [*cuts[1:], len(text)], strict=True)]
+    return [part for part in parts if part]
 
 
 def bound_text(bound: Mapping[str, Any]) -> str:
