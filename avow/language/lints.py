@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from avow.codes import CODES
 from avow.diagnostics import Diagnostic, Severity, Span
@@ -69,15 +68,6 @@ def lint(files: Sequence[LintedFile], contract: Contract | None, off: frozenset[
         if any(diagnostic.code in codes and a <= line <= b for codes, a, b in allowances[diagnostic.span.file]):
             continue
         by_name[diagnostic.span.file].reports.add(diagnostic)
-
-
-def lint_contract(contract: Contract, files: Sequence[Path]) -> list[Diagnostic]:
-    """The warnings about a contract that has been read from these files. They are read again, for their comments and
-    parentheses, which a checked contract does not have."""
-    from avow.language.load import check_paths  # which uses this module
-
-    del contract
-    return [d for d in check_paths(files)[1] if not d.is_error]
 
 
 def _warning(
