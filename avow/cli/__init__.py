@@ -97,4 +97,7 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:  # the reader of our output has left: `avow … | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
+    except OSError as error:  # a full disk, a folder that cannot be written: where no command knows better
+        print(f"error: {error}", file=sys.stderr)
+        code = 2
     sys.exit(code)

@@ -28,9 +28,10 @@ def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
         return _check(Path(folder), as_json)
     import os
 
-    from avow.cli.workspace import workspace
+    from avow.cli.workspace import require_systems, workspace
 
     place = workspace()
+    require_systems(place, systems)
     os.chdir(place.root)
     from doit.cmd_base import ModuleTaskLoader
     from doit.doit_cmd import DoitMain

@@ -10,21 +10,17 @@ import click
 @click.command()
 @click.argument("systems", nargs=-1)
 @click.option("--fresh", is_flag=True, help="Believe no earlier run: settle every obligation anew.")
-@click.option("-n", "jobs", default=2, show_default=True, help="How many tasks at once.")
+@click.option("-n", "jobs", type=click.IntRange(0), default=2, show_default=True, help="How many tasks at once.")
 @click.option(
     "--explain", is_flag=True, help="Say what each failing gate lacks, and the cheapest method that would close it."
 )
 def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool) -> int:
     """Verify every system under contracts/, or only SYSTEMS (their names)."""
-    from avow.cli.workspace import workspace
-    from avow.diagnostics import Diagnostic, Rejected
+    from avow.cli.workspace import require_systems, workspace
     from avow.pipeline.run_info import EXPLAIN, FRESH
 
     place = workspace()
-    known = [p.name for p in place.systems()]
-    for name in systems:
-        if name not in known:
-            raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=f"known: {', '.join(known)}"))
+    require_systems(place, systems)
     if fresh:
         os.environ[FRESH] = "1"
     if explain:

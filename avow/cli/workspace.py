@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from avow.diagnostics import Diagnostic, Rejected
@@ -42,3 +43,11 @@ def system_folder(name: str) -> Path:
             "CLI002", f"there is no system '{name}'", hint=f"known here: {known}" if known else "give its folder"
         )
     )
+
+
+def require_systems(place: Workspace, names: Iterable[str]) -> None:
+    """Raises Rejected for a name that no system of the workspace has."""
+    known = [p.name for p in place.systems()]
+    for name in names:
+        if name not in known:
+            raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=f"known: {', '.join(known)}"))

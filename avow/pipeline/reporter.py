@@ -35,6 +35,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         self._start = time.monotonic()
         self._done = 0
         self._selected: list[str] = []
+        self._seen: set[str] = set()
         self._run_lock: IO[str] | None = None
 
     def initialize(self, tasks: dict[str, Any], selected_tasks: list[str]) -> None:
@@ -49,6 +50,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
 
     def add_success(self, task: Any) -> None:
         with self._lock:
+            self._seen.add(task.name)
             start = self._running.pop(task.name, None)
             if start is None:
                 return
@@ -62,6 +64,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
 
     def add_failure(self, task: Any, fail: Any) -> None:
         with self._lock:
+            self._seen.add(task.name)
             self._running.pop(task.name, None)
             if not getattr(fail, "report", True):
                 return
@@ -73,7 +76,10 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             self._status()
 
     def skip_uptodate(self, task: Any) -> None:
-        pass
+        self._seen.add(task.name)
+
+    def skip_ignore(self, task: Any) -> None:
+        self._seen.add(task.name)
 
     def runtime_error(self, msg: str) -> None:
         self.runtime_errors.append(msg)
@@ -92,13 +98,17 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             - {g.system for g in finished()}
         )
         print_summary(finished(), broken, self._done, time.monotonic() - self._start, self.outstream)
+        if sys.exc_info()[0] is None and not self._seen.issuperset(self._selected):
+            self.runtime_errors.append("not all of it was run: is the number after -n below 0?")
         for message in self.runtime_errors:
             self.outstream.write(message + "\n")
         self._keep()
         if self._run_lock is not None:
             self._run_lock.close()
+        if self.runtime_errors:
+            raise SystemExit(2)
         # A failing gate is no failing task: doit would call its group an error (2), and it knows no code 3.
-        if not self.failures and not self.runtime_errors and exit_code():
+        if not self.failures and exit_code():
             raise SystemExit(exit_code())
 
     def _write_index(self) -> None:
