@@ -20,6 +20,8 @@ from avow.logic.formula import free_variables
 from avow.system.graph import components, cycle_in
 from avow.verdict import Verdict
 
+NARROW_MS = 4_000
+
 Hypotheses = dict[str, Term]
 
 
@@ -81,10 +83,16 @@ class _Solver:
         allowed = self.selected if allowed is None else allowed
         direct = [p for p in condition.providers if p in allowed]
         last: Settled | None = None
-        for number, (same, before) in enumerate(self.attempts(condition, direct, allowed)):
+        attempts = list(self.attempts(condition, direct, allowed))
+        for number, (same, before) in enumerate(attempts):
+            # Only the widest question is worth the whole time: what a narrower one cannot settle, that may.
+            patience = self.bounds.milliseconds
+            if number < len(attempts) - 1:
+                patience = min(patience, NARROW_MS)
+
             split = bool(before) or condition.delayed
             phases = (Phase.INITIAL, Phase.LATER) if split else (Phase.SAME_STEP,)
-            cases = tuple(self.case(condition, phase, same, before, wide=number > 0) for phase in phases)
+            cases = tuple(self.case(condition, phase, same, before, number > 0, patience) for phase in phases)
             answer = _settled(condition, cases)
             if answer.verdict is Verdict.PROVED:
                 return answer
@@ -132,7 +140,13 @@ class _Solver:
         return tuple(found)
 
     def case(
-        self, condition: SideCondition, phase: Phase, same: tuple[str, ...], before: tuple[str, ...], *, wide: bool
+        self,
+        condition: SideCondition,
+        phase: Phase,
+        same: tuple[str, ...],
+        before: tuple[str, ...],
+        wide: bool,
+        patience: int,
     ) -> Case:
         goal = self.frame.clause(condition.consumer, condition.clause)
         hypotheses = self.contracts(same, 0)
@@ -143,7 +157,7 @@ class _Solver:
         elif phase is Phase.INITIAL:
             around |= self.frame.initials(self.selected)
         hypotheses |= _about(around, [goal, *hypotheses.values()], direct=not wide)
-        answer = implied(hypotheses, goal, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed)
+        answer = implied(hypotheses, goal, timeout_ms=patience, seed=self.bounds.seed)
         return Case(
             phase,
             answer.verdict,

@@ -67,7 +67,7 @@ class FormulaQuestion:
     def by_induction(self, composition: Composition, everything: tuple[str, ...], goal: Term, bounds: Bounds) -> Answer:
         frame = composition.frame
         now = contracts(frame, everything) | frame.environment()
-        first = self.ask(now | frame.initials(frozenset(frame.graph.nodes)), goal, bounds)
+        first = self.ask(now | frame.initials(frame.graph.nodes), goal, bounds)
         if first.verdict is not Verdict.PROVED:
             return self.not_proved(first, genuine=True, when="at the first step")
         itself = {f"{self.name} one step before": system_term(frame, self.formula, 1)}

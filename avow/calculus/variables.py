@@ -6,7 +6,7 @@ earlier (what a delayed edge delivers); an input that no node provides is ``in.w
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from avow.language.contract import Node
@@ -14,7 +14,7 @@ from avow.language.sorts import Sort
 from avow.language.terms import Role, Term, Variable
 from avow.logic.formula import substitute
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition
-from avow.system.graph import Graph, dataflow
+from avow.system.graph import Edge, Graph, dataflow
 from avow.system.plan import Endpoint, System
 
 SUFFIXES = ("", "@before", "@before@before")
@@ -36,6 +36,8 @@ class Frame:
     _nodes: dict[str, Node] = field(default_factory=dict)
     _mappings: dict[tuple[str, int], Mapping[Variable, Term]] = field(default_factory=dict)
     _terms: dict[tuple[str, str, int], Term] = field(default_factory=dict)
+    _environment: dict[int, dict[str, Term]] = field(default_factory=dict)
+    _initials: dict[str, tuple[tuple[str, Term], ...]] | None = None
 
     def node(self, name: str) -> Node:
         return self._nodes[name]
@@ -79,27 +81,34 @@ class Frame:
 
     def environment(self, earlier: int = 0) -> dict[str, Term]:
         """What the plan assumes of the environment, labelled ``environment in.wayP``."""
-        return {
-            f"environment {assumed.port}" + (" one step before" if earlier else ""): substitute(
-                assumed.formula, self.mapping(assumed.node, earlier)
-            )
-            for assumed in self.assumed
-        }
+        if earlier not in self._environment:
+            suffix = " one step before" if earlier else ""
+            self._environment[earlier] = {
+                f"environment {assumed.port}{suffix}": substitute(assumed.formula, self.mapping(assumed.node, earlier))
+                for assumed in self.assumed
+            }
+        return dict(self._environment[earlier])
 
-    def initials(self, nodes: frozenset[str]) -> dict[str, Term]:
+    def initials(self, nodes: Iterable[str]) -> dict[str, Term]:
         """What holds before the first step of the outputs of `nodes` that feed delayed edges."""
-        found: dict[str, Term] = {}
-        for edge in self.graph.edges:
-            if edge.delayed and edge.source.node in nodes:
-                condition = initial_condition(self.system, edge)
-                if condition is not None:
-                    source = self.node(edge.source.node).output(edge.source.port).variable
-                    before = self.output(edge.source.node, edge.source.port, 1)
-                    found[f"initial {edge.source}"] = substitute(
-                        condition, {**self.mapping(edge.source.node), source: before}
-                    )
+        if self._initials is None:
+            found: dict[str, dict[str, Term]] = {}
+            for edge in self.graph.edges:
+                label = f"initial {edge.source}"
+                if edge.delayed and label not in found.get(edge.source.node, {}):
+                    condition = self._initially(edge)
+                    if condition is not None:
+                        found.setdefault(edge.source.node, {})[label] = condition
+            self._initials = {node: tuple(conditions.items()) for node, conditions in found.items()}
+        return dict(item for node in nodes for item in self._initials.get(node, ()))
 
-        return found
+    def _initially(self, edge: Edge) -> Term | None:
+        condition = initial_condition(self.system, edge)
+        if condition is None:
+            return None
+        node, port = edge.source.node, edge.source.port
+        source = self.node(node).output(port).variable
+        return substitute(condition, {**self.mapping(node), source: self.output(node, port, 1)})
 
 
 def frame(system: System) -> Frame:

@@ -76,7 +76,9 @@ def command(
         goal = chosen[-1] if goals else composition.whole
         click.echo(to_rcl(derived_contract(composition, goal)), nl=False)
         return 0
-    obligations = [o for o in composition_obligations(system) if not goals or o.name.split(".")[0] in goals]
+    prefixes = tuple(f"{name}." for name in goals) or ("",)
+    obligations = [o for o in composition_obligations(system) if o.name.startswith(prefixes)]
+
     limits = _Limits(seconds, seed)
     outcomes = settle_all(composition, obligations, limits)
     if as_json:

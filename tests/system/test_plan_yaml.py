@@ -61,6 +61,8 @@ def test_scalars_are_never_guessed(text: str, value: object) -> None:
         ("connections:\n  - {to: b.x}\n", 2, 5, "'from' is missing"),
         ("connections:\n  - {from: a.x, to: b.x, initial: 3}\n", 2, 35, "needs a delayed edge"),
         ("compose: {D1: {rule: R7}}\n", 1, 22, "not one of R1, R2, R3, R4"),
+        ("compose: {start: {}}\n", 1, 11, "cannot be used here"),
+        ("compose: {D.1: {}}\n", 1, 11, "cannot be used here"),
         ("nodes: {a: {criticality: hihg}}\n", 1, 26, "not one of low, medium, high"),
         ("contract: ../x.rcl\n", 1, 11, "out of the system's folder"),
         ("contract: /etc/passwd\n", 1, 11, "out of the system's folder"),
