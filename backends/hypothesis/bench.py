@@ -25,7 +25,7 @@ from avow.backends.hypothesis.generate import BYTES, Failing, Generator, Impossi
 from avow.backends.hypothesis.judging import Trigger, blamed, guarantee, judged
 from avow.backends.hypothesis.pools import parse_cell, pools
 from avow.backends.hypothesis.process import PATIENCE, Subject, SubjectFailed
-from avow.language.sorts import FunctionSort, Sort
+from avow.language.sorts import BoolSort, FunctionSort, Sort
 from avow.logic.values import Value, show
 
 SHRINKING = 4.0
@@ -301,10 +301,9 @@ class Bench:
         for name, table in self.data["scenario"].items():
             sort = self.inputs_sorts.get(name)
             if isinstance(sort, FunctionSort):
-                read = [
-                    tuple(parse_cell(cell, s) for cell, s in zip(row, sort.parameters, strict=False)) for row in table
-                ]
-                fitting = [row for row in read if len(row) == len(sort.parameters) and None not in row]
+                columns = sort.parameters if isinstance(sort.result, BoolSort) else (*sort.parameters, sort.result)
+                read = [tuple(parse_cell(cell, s) for cell, s in zip(row, columns, strict=False)) for row in table]
+                fitting = [row for row in read if len(row) == len(columns) and None not in row]
                 found[name] = tuple(tuple(v for v in row if v is not None) for row in fitting)
         return found
 

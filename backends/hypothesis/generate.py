@@ -94,6 +94,9 @@ class Generator:
     pools: Pools
     shared: Mapping[tuple[Sort, ...], tuple[tuple[Value, ...], ...]] = field(init=False)
     _threes: dict[tuple[Sort, ...], tuple[tuple[tuple[Value, ...], ...], ...]] = field(default_factory=dict)
+    _tables: dict[str, FunctionValue] = field(default_factory=dict)
+    _inside: bool = False
+    """Whether the case that is being made is one of the scenario: its tables belong together."""
 
     def __post_init__(self) -> None:
         self.shared = scenario_runs(self.pools.rows, self.ports)
@@ -101,6 +104,7 @@ class Generator:
     def case(self, source: Source, failing: Failing, aims: tuple[Failing, ...] = ()) -> Inputs:
         """One case's inputs; the assumptions may fail of them. Most cases aim at one guarantee's trigger."""
         near: dict[tuple[Sort, ...], list[tuple[Value, ...]]] = {}
+        self._inside = bool(self.pools.rows) and source.coin()
         inputs = {name: self._port(source, name, sort, near) for name, sort in self.ports.items()}
         if aims:
             aim = source.of((None, *aims))
@@ -130,8 +134,10 @@ class Generator:
 
     def _port(self, source: Source, name: str, sort: Sort, near: dict[Any, Any]) -> Value:
         rows = self.pools.rows.get(name)
-        if rows and isinstance(sort, FunctionSort) and source.coin():
-            return FunctionValue(dict.fromkeys(rows, True), False)
+        if rows and isinstance(sort, FunctionSort) and (self._inside or source.coin()):
+            if name not in self._tables:
+                self._tables[name] = table(rows, sort)
+            return self._tables[name]
         return self._value(source, sort, near, 0, True)
 
     def _value(self, source: Source, sort: Sort, near: dict[Any, Any], depth: int, alone: bool) -> Value:
@@ -164,6 +170,9 @@ class Generator:
     def _number(self, source: Source, sort: Sort, alone: bool) -> Value:
         if not alone:
             return source.of(self.pools.near[sort])
+        known = self.shared.get((sort,)) if self._inside else None
+        if known and source.coin():
+            return source.of(known)[0]
         if source.below(3) < 2:
             return source.of(self.pools.scalars[sort])
         match sort:
@@ -246,3 +255,19 @@ class Generator:
         default = self._value(source, sort.result, near, depth + 1, True)
         table = {p: self._value(source, sort.result, near, depth + 1, True) for p in points}
         return FunctionValue({p: v for p, v in table.items() if v != default}, default)
+
+
+def table(rows: Sized[tuple[Value, ...]], sort: FunctionSort) -> FunctionValue:
+    """A scenario's rows as a relation that holds at these; or as a function, each row ending in its result. Beside its
+    rows a function's value is one that they do not have, where that is easily found."""
+    if isinstance(sort.result, BoolSort):
+        return FunctionValue(dict.fromkeys(rows, True), False)
+    results = [row[-1] for row in rows]
+    other = results[0]
+    match sort.result:
+        case RealSort() | IntegerSort() | NaturalSort():
+            top = max(value for value in results if isinstance(value, int | Fraction))
+            other = Fraction(top + 2) if isinstance(sort.result, RealSort) else int(top) + 2
+        case EnumSort(members=members):
+            other = next((Element(m) for m in members if Element(m) not in results), other)
+    return FunctionValue({row[:-1]: row[-1] for row in rows}, other)
