@@ -10,15 +10,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from random import Random
-from typing import Any
 
+from avow.calculus.choices import MAX_FOUND, Values, by_variable, definition, search
 from avow.calculus.scenario import CannotRun, Point, World, key
-from avow.language.contract import Clause, Node, Port
+from avow.language.contract import Node, Port
 from avow.language.sorts import FunctionSort
-from avow.language.terms import Apply, Iff, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import Role, Term, Variable
 from avow.logic.evaluate import NotEvaluable, compile_term
 from avow.logic.formula import free_variables, substitute
-from avow.logic.models import Model
 from avow.logic.solver import z3
 from avow.logic.translation import Translator, Unsupported
 from avow.logic.values import FunctionValue, Value, show
@@ -29,12 +28,8 @@ from avow.system.plan import Endpoint
 MAX_ANSWERS = 4_000
 """Answers of one node to one input; with more, a search is not exhaustive."""
 
-MAX_FOUND = 300
-"""Answers that the solver is asked for, where they cannot be enumerated."""
-
 MAX_SHAPES = MAX_FOUND
 
-Values = dict[str, Value]
 Holds = Callable[[Mapping[str, Value]], bool]
 
 
@@ -135,7 +130,7 @@ class Machine:
         plain = tuple((p, self.world.candidates(node.name, p)) for p in node.outputs if p not in functions)
         mentioned = {v.name for clause in node.guarantees for v in ports_of(clause.formula) if v.role is Role.INPUT}
         assumed = {v.name for clause in node.assumptions for v in ports_of(clause.formula)}
-        searched = [(p, points) for p, points in relations if _definition(node.guarantees, p) is None]
+        searched = [(p, points) for p, points in relations if definition(node.guarantees, p) is None]
 
         return _Solver(
             node,
@@ -155,7 +150,7 @@ class Machine:
         about = [clause.formula for clause in node.guarantees if set(ports_of(clause.formula)) <= own]
         if not relations or not about:
             return None
-        found, complete = _search(relations, (), about, {}, self.seed)
+        found, complete = search(relations, (), about, {}, self.seed)
         return tuple(found) if complete and len(found) <= MAX_SHAPES else None
 
     def judge(self, formula: Term, *, finite: bool = False) -> Holds:
@@ -240,8 +235,8 @@ class Machine:
         if isinstance(port.sort, FunctionSort):
             points = self.world.points(endpoint.node, port)
             constraints = [] if condition is None else [condition]
-            known = _by_variable(self.frame.node(endpoint.node), given)
-            answers, complete = _search(((port, points),), (), constraints, known, self.seed)
+            known = by_variable(self.frame.node(endpoint.node), given)
+            answers, complete = search(((port, points),), (), constraints, known, self.seed)
             if not complete:
                 self.incomplete.add(f"too many initial values of {endpoint}")
             found = tuple(answer[port.name] for answer in answers)
@@ -344,8 +339,8 @@ class Machine:
         if searched and (free or solver.shapes is None):
             constraints = [] if free else [clause.formula for clause in solver.node.guarantees]
             known = inputs | {f"out.{name}": value for name, value in defined.items()}
-            given = _by_variable(solver.node, known)
-            answers, complete = _search(searched, solver.plain, constraints, given, self.seed)
+            given = by_variable(solver.node, known)
+            answers, complete = search(searched, solver.plain, constraints, given, self.seed)
             if not complete:
                 self.incomplete.add(f"{solver.node.name} has more than {MAX_ANSWERS} answers to one input")
             return tuple({**defined, **answer} for answer in answers)
@@ -369,11 +364,11 @@ class Machine:
         defined: Values = {}
         searched: list[tuple[Port, tuple[Point, ...]]] = []
         for port, points in solver.relations:
-            definition = _definition(solver.node.guarantees, port)
-            if definition is None:
+            found = definition(solver.node.guarantees, port)
+            if found is None:
                 searched.append((port, points))
                 continue
-            variables, body = definition
+            variables, body = found
             holds = self.judge(body)
             table = {
                 point: True
@@ -387,7 +382,7 @@ class Machine:
         """Is there really no output, or only none in the scenario? Z3 knows the contract without the scenario."""
         node = solver.node
         shown = tuple((name, show(value)) for name, value in inputs.items() if name[3:] in solver.read)
-        constants = _by_variable(node, inputs)
+        constants = by_variable(node, inputs)
         translator = Translator()
         z3_solver = z3.Solver(ctx=translator.context)
         z3_solver.set("timeout", 5_000)
@@ -407,83 +402,3 @@ class Machine:
         except (Unsupported, z3.Z3Exception):
             pass
         return Stuck(node.name, shown, names, False)
-
-
-def _by_variable(node: Node, values: Values) -> dict[Variable, Value]:
-    ports = {p.variable.qualified: p.variable for p in (*node.inputs, *node.outputs)}
-    return {ports[name]: value for name, value in values.items() if name in ports}
-
-
-def _definition(guarantees: Sequence[Clause], port: Port) -> tuple[tuple[Variable, ...], Term] | None:
-    """``forall(x | out.p(x) <=> body)`` gives x and body, if body does not speak of outputs."""
-    for clause in guarantees:
-        formula = clause.formula
-        if not (isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL):
-            continue
-        if not isinstance(formula.body, Iff):
-            continue
-        for head, body in ((formula.body.left, formula.body.right), (formula.body.right, formula.body.left)):
-            applied = isinstance(head, Apply) and head.function == port.variable and head.arguments == formula.variables
-            if applied and all(v.role is not Role.OUTPUT for v in free_variables(body)):
-                return formula.variables, body
-    return None
-
-
-def _search(
-    relations: Sequence[tuple[Port, tuple[Point, ...]]],
-    plain: Sequence[tuple[Port, tuple[Value, ...]]],
-    constraints: Sequence[Term],
-    known: Mapping[Variable, Value],
-    seed: int,
-) -> tuple[list[Values], bool]:
-    """Every choice of outputs that meets the constraints: a bit for each point of a relation, found by Z3.
-
-    Says too whether these are all. Raises CannotRun where Z3 cannot decide.
-    """
-    translator = Translator()
-    solver = z3.Solver(ctx=translator.context)
-    solver.set("timeout", 10_000)
-    solver.set("random_seed", seed)
-    try:
-        meanings: dict[Variable, Any] = {v: translator.value(value, v.sort) for v, value in known.items()}
-        bits: list[tuple[Port, Point, Any]] = []
-        for port, points in relations:
-            assert isinstance(port.sort, FunctionSort)
-            rows = []
-            for k, point in enumerate(points):
-                bit = z3.Bool(f"{port.name}#{k}", translator.context)
-                bits.append((port, point, bit))
-                rows.append(([translator.value(x, s) for x, s in zip(point, port.sort.parameters, strict=True)], bit))
-            meanings[port.variable] = translator.table(rows, z3.BoolVal(False, translator.context))
-        chosen = []
-        for port, values in plain:
-            constant = translator.variable(port.variable)
-            solver.add(z3.Or([constant == translator.value(value, port.sort) for value in values]))
-            chosen.append((port, constant))
-        solver.add(*(translator.term(constraint, meanings) for constraint in constraints))
-        found: list[Values] = []
-        while True:
-            status = solver.check()
-            if status == z3.unsat:
-                return found, True
-            if status != z3.sat:
-                raise CannotRun(f"the solver cannot decide which outputs are allowed: {solver.reason_unknown()}")
-            if len(found) >= MAX_FOUND:
-                return found, False
-            model = solver.model()
-            reader = Model(translator, model)
-            answer: Values = {port.name: reader.read(constant, port.sort) for port, constant in chosen}
-            literals = [constant != model.eval(constant, model_completion=True) for _, constant in chosen]
-            tables: dict[str, dict[tuple[Value, ...], Value]] = {port.name: {} for port, _ in relations}
-            for port, point, bit in bits:
-                truth = z3.is_true(model.eval(bit, model_completion=True))
-                literals.append(z3.Not(bit) if truth else bit)
-                if truth:
-                    tables[port.name][point] = True
-            answer.update({name: FunctionValue(table, False) for name, table in tables.items()})
-            found.append(answer)
-            solver.add(z3.Or(literals) if literals else z3.BoolVal(False, translator.context))
-    except Unsupported as what:
-        raise CannotRun(f"Avow cannot express {what.what} for the solver") from None
-    except z3.Z3Exception as error:
-        raise CannotRun(f"Z3: {error}") from None

@@ -1,7 +1,7 @@
 """One set of variables for a whole system: linking equations are solved by giving both ends of an edge one name.
 
 The output `at` of `navigation` is ``navigation.at`` wherever it flows; ``navigation.at@before`` is its value one step
-earlier (what a delayed edge delivers); an input that no node provides is ``in.wayP``, one for all nodes that read it.
+earlier (what a delayed edge delivers); an input that no node provides is ``in.map``, one for all nodes that read it.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Frame:
     graph: Graph
     assumed: tuple[Assumed, ...]
     own_inputs: frozenset[str]
-    """Inputs of one node (``agent.wayP``) that the plan sets apart from the inputs of that name that others read."""
+    """Inputs of one node (``planner.map``) that the plan sets apart from the inputs of that name that others read."""
     constants: frozenset[str]
-    """Environment inputs (``in.wayP``, ``agent.wayP``) that keep their value."""
+    """Environment inputs (``in.map``, ``planner.map``) that keep their value."""
 
     _nodes: dict[str, Node] = field(default_factory=dict)
     _mappings: dict[tuple[str, int], Mapping[Variable, Term]] = field(default_factory=dict)
@@ -80,7 +80,7 @@ class Frame:
         return self.output(edge.source.node, edge.source.port, earlier + (1 if edge.delayed else 0))
 
     def environment(self, earlier: int = 0) -> dict[str, Term]:
-        """What the plan assumes of the environment, labelled ``environment in.wayP``."""
+        """What the plan assumes of the environment, labelled ``environment in.map``."""
         if earlier not in self._environment:
             suffix = " one step before" if earlier else ""
             self._environment[earlier] = {
