@@ -146,6 +146,16 @@ def _counterexample(case: Case, condition: SideCondition) -> Counterexample | No
     return Counterexample(found.values, f"{condition.about} is false{when}", found.trace, found.loop)
 
 
+@dataclass(frozen=True, slots=True)
+class RuleQuestion:
+    """A rule that the plan names and that does not fit: nothing is left to ask."""
+
+    message: str
+
+    def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
+        return Answer(Verdict.REFUTED, self.message, Counterexample(explanation=self.message))
+
+
 # -- loops and start-up ------------------------------------------------------------------------------------------------
 
 

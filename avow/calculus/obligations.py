@@ -94,6 +94,19 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
     selected = frozenset(goal.nodes)
     plan = next((g for g in frame.system.plan.compose if g.name == goal.name), None)
     span = plan.span if plan else None
+    for finding in goal.findings:
+        yield Task(
+            _obligation(
+                frame.system,
+                f"{goal.name}.rule",
+                f"{goal.name}: the rule that the plan names fits the selected nodes",
+                "",
+                sha256(f"rule\n{finding.message}"),
+                (),
+                finding.span,
+            ),
+            answers.RuleQuestion(finding.message),
+        )
     for condition in goal.conditions:
         clause = frame.node(condition.consumer).clause(condition.clause)
         givers = [f"{name}.{g.name}" for name in condition.providers for g in frame.node(name).guarantees]

@@ -201,7 +201,10 @@ environment: {in.home: {because: it does not move, constant: %s}}
 def test_a_rule_that_does_not_fit_is_said(tmp_path: Path, rule: str) -> None:
     text = node("a", "", "x : REAL") + node("b", "", "y : REAL") + node("c", "x : REAL, y : REAL", "")
     plan = f"compose: {{D: {{select: [a, b, c], rule: {rule}}}}}"
-    goal = compose(make(tmp_path, text, plan)).goal("D")
+    system = make(tmp_path, text, plan)
+    assert outcomes(system)["D.rule"].verdict is Verdict.REFUTED
+    goal = compose(system).goal("D")
+
     assert [finding.code for finding in goal.findings] == ["PLAN125"]
     assert goal.root.rule is Rule.R3, "what fits is derived all the same"
 
