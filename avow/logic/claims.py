@@ -117,7 +117,7 @@ def claims(node: Node) -> tuple[Claim, ...]:
 
 def node_key(node: Node) -> str:
     """SHA-256 of all that the answers depend on: clauses by name and meaning, ports by name and sort."""
-    clauses = [[str(c.kind), c.name, digest(c.formula)] for c in node.clauses]
+    clauses = sorted([str(c.kind), c.name, digest(c.formula)] for c in node.clauses)  # their order means nothing
     ports = [[p.variable.qualified, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs)]
     return text_digest(json.dumps([clauses, ports]))
 

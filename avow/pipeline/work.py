@@ -22,6 +22,7 @@ from avow.files import digest, digest_file
 from avow.language.contract import Contract, Node
 from avow.language.printer import show_term
 from avow.logic.formula import node_digest, sort_digest
+from avow.pipeline.keys import surroundings
 from avow.registry import backend
 from avow.system.plan import Method, System
 
@@ -117,13 +118,14 @@ def method_work(system: System, node: Node, method: Method) -> Work:
     tool = method_backend(system, method)
     job = method_job(system, node, method)
     options = method.options.data if isinstance(method.options.data, Mapping) else {}
+    told = json.dumps({k: v for k, v in options.items() if k not in {"id", "guarantees"}}, sort_keys=True, default=str)
     parts = (
         tool.name,
         tool.version,
         json.dumps([(t.name, t.version) for t in tool.tools()]),
-        json.dumps({k: v for k, v in options.items() if k not in {"id", "guarantees"}}, sort_keys=True, default=str),
+        told,
         _files(tool, job),
-        _scenario(system),
+        surroundings(tool, job, told),
     )
     return _work(
         system, node.name, method.id, job.obligations, *parts, engine=tool.name, limits=_limits(method, options)
@@ -226,8 +228,8 @@ def _contract_digest(contract: Contract) -> str:
     parts: list[list[str]] = [[name, sort_digest(sort)] for name, sort in contract.types]
     for node in contract.nodes:
         parts.append([node.name, *(f"{p.role}.{p.name}:{sort_digest(p.sort)}" for p in node.inputs + node.outputs)])
-        parts += [[c.kind, c.name, node_digest(node, c)] for c in node.clauses]
-    return digest(json.dumps(parts))
+        parts += [[node.name, c.kind, c.name, node_digest(node, c)] for c in node.clauses]
+    return digest(json.dumps(sorted(parts)))  # the order of declarations means nothing
 
 
 def _digest(path: Path) -> str:

@@ -24,6 +24,7 @@ class AjpfBackend:
     title = "agent programs (Gwendolen), model-checked against properties instantiated from the contract"
     version = "1"
     strength = Verdict.CHECKED
+    uses_wiring = False
     link = Link.MAPPED
     options_schema: Mapping[str, Any] = SCHEMA
     codes = CODES

@@ -45,6 +45,8 @@ class DafnyBackend:
     title = "a Dafny implementation, verified against the contract"
     version = "1"
     strength = Verdict.PROVED
+    uses_scenario = False
+    uses_wiring = False
     link = Link.GENERATED
     options_schema: Mapping[str, Any] = SCHEMA
     codes = CODES

@@ -26,6 +26,8 @@ class ExperimentBackend:
     title = "measured runs, judged by exact binomial statistics"
     version = "1"
     strength = Verdict.TESTED
+    uses_scenario = False
+    uses_wiring = False
     link = Link.GUIDED
     options_schema: Mapping[str, Any] = SCHEMA
     codes = CODES

@@ -28,6 +28,8 @@ class Hoare:
     title = "Hoare triples from the guarantee, proved of an imperative program by weakest preconditions"
     version = "1"
     strength = Verdict.PROVED
+    uses_scenario = False
+    uses_wiring = False
     link = Link.GENERATED
     options_schema: Mapping[str, Any] = {
         "type": "object",

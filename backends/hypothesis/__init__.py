@@ -27,6 +27,7 @@ class HypothesisBackend:
     title = "Property-based tests of a Python function, generated from the contract"
     version = "1"
     strength = Verdict.TESTED
+    uses_wiring = False
     link = Link.GENERATED
     options_schema: Mapping[str, Any] = {
         "type": "object",

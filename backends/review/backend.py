@@ -39,6 +39,8 @@ class ReviewBackend:
     title = "a person's recorded review, stale as soon as what was read changes"
     version = "1"
     strength = Verdict.REVIEWED
+    uses_scenario = False
+    uses_wiring = False
     link = Link.GUIDED
     options_schema: Mapping[str, Any] = SCHEMA
     codes = CODES
