@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -64,12 +65,12 @@ def test_a_right_subject_is_tested_and_no_more(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "broken", "reading"),
     [
-        ("r < 120", "r < 130", {"medium"}, ("120", "130")),
+        pytest.param("r < 120", "r < 130", {"medium"}, ("120", "130"), marks=pytest.mark.slow),
         ("r < 120", "r <= 120", {"medium"}, ("120", "120")),
         ("r < 250", "r <= 250", {"high"}, ("250", "250")),
-        ('"green" if', '"orange" if', {"low"}, ("0", "120")),
+        pytest.param('"green" if', '"orange" if', {"low"}, ("0", "120"), marks=pytest.mark.slow),
         ('"orange" if r < 250 else "red"', '"red" if r < 250 else "orange"', {"medium", "high"}, None),
-        ("done.add(command[1])", "done.add(command[1] + 1)", {"marks"}, None),
+        pytest.param("done.add(command[1])", "done.add(command[1] + 1)", {"marks"}, None, marks=pytest.mark.slow),
         ("done.add(command[1])", "done = {command[1]}", {"marks"}, None),
         ('== "inspect"', '!= "halt"', {"marks"}, None),
     ],
@@ -143,14 +144,30 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("name", sorted(HOSTILE))
+QUICK = (
+    "answers by itself",
+    "kills",
+    "leaves hard",
+    "lies about types",
+    "patches the judge",
+    "raises",
+    "recurses",
+    "returns a cycle",
+    "writes a result",
+)
+"""One of each kind; every subject costs a process or two."""
+
+
+@pytest.mark.parametrize(
+    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in sorted(HOSTILE)]
+)
 def test_nothing_that_a_subject_does_is_green(tmp_path: Path, name: str) -> None:
     found = settle(job(tmp_path, HOSTILE[name], cases=60), seconds=20)
     assert not any(o.verdict.supports for o in found.values()), name
 
 
 def test_an_endless_subject_is_stopped(tmp_path: Path) -> None:
-    found = settle(job(tmp_path, "def step(**inputs):\n    while True: pass"), seconds=10)
+    found = settle(job(tmp_path, "import time\ndef step(**inputs):\n    while True: time.sleep(0.01)"), seconds=10)
     assert {o.verdict for o in found.values()} == {Verdict.ERROR}
     assert all("does not answer" in o.summary for o in found.values())
 
@@ -350,22 +367,32 @@ context {{ S : {{a, b}}; }}
 node n {{
   inputs( x' : STRING, class : S ) outputs( import : S ) topics( a/B c matches(in.class) )
   assume( TRUE )
-  guarantee os' "\\"\\"\\" + __import__('os') {{}} " ( in.x' == "{text}" -> out.import == in.class )
-  guarantee os ( out.import in {{a, b}} )
+  {guarantees}
 }}
 """
+GUARANTEE = """guarantee {name} "\\"\\"\\" + __import__('os') {{}} " ( in.x' == "{text}" -> out.import == in.class )
+"""
+NAMES = ("os", "os'", "exec", "exec'", "import_os", "_")
+TEXTS = ("'''", "{}{0}%s", "*/ -->", "); import os #", "ünïcode \U0001f916", "$(x) `y`")
 
 
-@pytest.mark.parametrize("text", ["'''", "{}{0}%s", "*/ -->", "); import os #", "ünïcode \U0001f916", "$(x) `y`"])
-def test_the_contracts_text_never_becomes_code(tmp_path: Path, text: str) -> None:
+def named(texts: Sequence[str]) -> str:
+    """A contract with each of the texts in a condition of its own."""
+    return HOSTILE_NAME.format(
+        guarantees="".join(GUARANTEE.format(name=name, text=text) for name, text in zip(NAMES, texts, strict=True))
+    )
+
+
+def test_the_contracts_text_never_becomes_code(tmp_path: Path) -> None:
     subject = "def step(**inputs):\n    return inputs['class']"
-    wanted = job(tmp_path, subject, HOSTILE_NAME.format(text=text), "n", cases=60)
+    wanted = job(tmp_path, subject, named(TEXTS), "n", cases=120)
     made = BACKEND.export(wanted)
-    tree = ast.parse(made["test_n.py"])
-    plain = ast.parse(BACKEND.export(job(tmp_path / "plain", subject, HOSTILE_NAME.format(text="x"), "n"))["test_n.py"])
-    assert ast.dump(tree) == ast.dump(plain)
-    assert text not in made["test_n.py"]
-    assert {o.verdict for o in settle(wanted).values()} == {Verdict.TESTED}
+    plain = BACKEND.export(job(tmp_path / "plain", subject, named(["x"] * len(TEXTS)), "n", cases=120))
+    assert ast.dump(ast.parse(made["test_n.py"])) == ast.dump(ast.parse(plain["test_n.py"]))
+    assert not any(text in made["test_n.py"] for text in TEXTS)
+    found = settle(wanted)
+    assert len(found) == len(TEXTS)
+    assert {o.verdict for o in found.values()} == {Verdict.TESTED}, found
     assert json.loads(made["contract.json"])["node"] == "n"
 
 

@@ -45,12 +45,12 @@ def test_the_repaired_nodes_pass(tmp_path: Path, root: Path, node: str, file: st
     ("old", "new", "broken"),
     [
         ("here + 1", "here + 2", {"next_waypoint", "end_of_mission"}),
-        ('("move", *following)', '("move", *place(wayP, EXIT))', {"next_waypoint"}),
-        ('("inspect", here)', '("inspect", here + 1)', {"inspect_here"}),
+        pytest.param('("move", *following)', '("move", *place(wayP, EXIT))', {"next_waypoint"}, marks=pytest.mark.slow),
+        pytest.param('("inspect", here)', '("inspect", here + 1)', {"inspect_here"}, marks=pytest.mark.slow),
         ('("red", "orange")', '("red",)', {"exit_on_danger", "abandon"}),
-        ('or phase == "leaving"', "", {"exit_on_danger", "abandon"}),
+        pytest.param('or phase == "leaving"', "", {"exit_on_danger", "abandon"}, marks=pytest.mark.slow),
         ("not inspected(here)", "inspected(here)", {"next_waypoint", "inspect_here"}),
-        ("EXIT = 0", "EXIT = 1", {"exit_on_danger"}),
+        pytest.param("EXIT = 0", "EXIT = 1", {"exit_on_danger"}, marks=pytest.mark.slow),
     ],
 )
 def test_agents_with_a_fault_are_refuted(tmp_path: Path, root: Path, old: str, new: str, broken: set[str]) -> None:
