@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
+    from avow.language.contract import Node
     from avow.logic.sanity import SanityResult
     from avow.verdict import Counterexample
 
@@ -39,12 +42,14 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     if seconds <= 0:
         raise Rejected(Diagnostic("CLI004", f"--seconds {seconds}: a time above 0 is wanted"))
     bounds = Bounds(max(1, int(seconds * 1000)), seed)
-    results: list[SanityResult] = []
-    for node in system.contract.nodes:
-        if nodes and node.name not in nodes:
-            continue
+
+    def settle(node: Node) -> tuple[SanityResult, ...]:
         scenario = interpretation(node, system.plan.scenario)
-        results.extend(analyse(node, system.contract, scenario=scenario, bounds=bounds))
+        return analyse(node, system.contract, scenario=scenario, bounds=bounds)
+
+    chosen = [node for node in system.contract.nodes if not nodes or node.name in nodes]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # Z3 lets other threads run while it searches
+        results = [result for found in pool.map(settle, chosen) for result in found]
     if as_json:
         click.echo(json.dumps({"results": [to_json(result) for result in results]}, indent=1, ensure_ascii=False))
     else:
