@@ -1,0 +1,359 @@
+"""Staleness by meaning: an edit that changes no meaning re-runs nothing, any other re-runs exactly its cone.
+
+Keys are pure, so no tool runs here: a folder is surveyed before and after an edit, and the keys are compared.
+"""
+
+from __future__ import annotations
+
+import random
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from avow.diagnostics import Rejected
+from avow.pipeline.survey import survey
+
+ROOT = Path(__file__).parents[2]
+FERRY = ROOT / "tests" / "pipeline" / "fixtures" / "ferry"
+SHIPPED = ROOT / "contracts" / "remote_inspection"
+
+Keys = dict[tuple[str, str], str]
+
+
+def keys(folder: Path) -> Keys:
+    found = survey(folder)
+    assert not isinstance(found, Rejected), [str(d) for d in found.diagnostics]
+    return {(name.partition("/")[2], method): key for (name, method), key in found.keys.items()}
+
+
+def copied(source: Path, place: Path) -> Path:
+    target = place / "contracts" / source.name
+    shutil.copytree(source, target)
+    return target
+
+
+def edit(path: Path, *pairs: tuple[str, str]) -> None:
+    text = path.read_text(encoding="utf-8")
+    for old, new in pairs:
+        assert old in text, old
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+
+
+def changed(before: Keys, after: Keys) -> set[tuple[str, str]]:
+    return {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
+
+
+# -- edits that change no meaning ---------------------------------------------------------------------------------------
+
+
+def comment(text: str, rng: random.Random) -> str:
+    lines = text.split("\n")
+    lines.insert(rng.randrange(len(lines)), f"   // {rng.choice(['note', 'node x (', '⊕ ∀'])} {rng.random()}")
+    return "\n".join(lines)
+
+
+def blank(text: str, rng: random.Random) -> str:
+    lines = text.split("\n")
+    lines.insert(rng.randrange(len(lines)), " " * rng.randrange(5))
+    return "\n".join(lines)
+
+
+def spaces(text: str, rng: random.Random) -> str:
+    places = [m.start() for m in re.finditer(r" (?=[(|]| *->|and )", text)]
+    at = rng.choice(places)
+    return text[:at] + " " * rng.randrange(1, 4) + ("\n" if rng.random() < 0.3 else "") + text[at:]
+
+
+_CLAUSES = re.compile(r"(?:^  (?:assume|guarantee) .*\n(?:^    .*\n)*)+", re.MULTILINE)
+_CLAUSE = re.compile(r"^  (?:assume|guarantee) .*\n(?:^    .*\n)*", re.MULTILINE)
+
+
+def reorder_clauses(text: str, rng: random.Random) -> str:
+    block = rng.choice(list(_CLAUSES.finditer(text)))
+    clauses = _CLAUSE.findall(block.group())
+    ordered = sorted(clauses, key=lambda c: (c.lstrip().startswith("guarantee"), rng.random()))
+    return text[: block.start()] + "".join(ordered) + text[block.end() :]
+
+
+def reorder_conjuncts(text: str, rng: random.Random) -> str:
+    pairs = [
+        ("in.free(b) and in.level == ok", "in.level == ok and in.free(b)"),
+        ("in.free(a) and in.free(b)", "in.free(b) and in.free(a)"),
+    ]
+    old, new = rng.choice(pairs)
+    return text.replace(old, new) if old in text else text.replace(new, old)
+
+
+def rename_bound(text: str, rng: random.Random) -> str:
+    name = rng.choice(["k", "left'", "z2"])
+    found = re.search(r"forall\((\S+), (\S+) in NATURAL \| \(in\.free\(", text)
+    if found is None:
+        return text
+    head, tail = text[: found.start()], text[found.start() :]
+    end = tail.index("\n")
+    formula = re.sub(rf"(?<![\w.]){re.escape(found.group(1))}(?![\w'])", name, tail[:end])
+    return head + formula + tail[end:]
+
+
+def rename_sentence(text: str, rng: random.Random) -> str:
+    return text.replace('"Else it waits"', f'"Otherwise it waits {rng.random()}"')
+
+
+def equal_number(text: str, rng: random.Random) -> str:
+    return re.sub(r"Minimum = [\d.]+;", f"Minimum = {rng.choice(['2.5', '2.50', '2.5000'])};", text)
+
+
+CONTRACT_EDITS = (
+    comment,
+    blank,
+    spaces,
+    reorder_clauses,
+    reorder_conjuncts,
+    rename_bound,
+    rename_sentence,
+    equal_number,
+)
+
+
+def plan_comment(text: str, rng: random.Random) -> str:
+    lines = text.split("\n")
+    lines.insert(rng.randrange(len(lines)), f"{' ' * rng.randrange(4)}# {rng.choice(['why', 'a: b', '{}'])}")
+    return "\n".join(lines)
+
+
+def plan_blank(text: str, rng: random.Random) -> str:
+    lines = text.split("\n")
+    lines.insert(rng.randrange(len(lines)), "")
+    return "\n".join(lines)
+
+
+def plan_sections(text: str, rng: random.Random) -> str:
+    parts = re.split(r"^(?=[a-z]+:)", text, flags=re.MULTILINE)
+    head, sections = parts[0], [p if p.endswith("\n") else p + "\n" for p in parts[1:]]
+    rng.shuffle(sections)
+    return head + "".join(sections)
+
+
+def plan_title(text: str, rng: random.Random) -> str:
+    return re.sub(r"^title: .*$", f"title: A ferry {rng.randrange(99)}", text, flags=re.MULTILINE)
+
+
+def plan_quotes(text: str, rng: random.Random) -> str:
+    return re.sub(r"cases: +200", f"cases:{' ' * rng.randrange(1, 6)}200", text, count=1)
+
+
+def plan_policy(text: str, rng: random.Random) -> str:
+    return re.sub(r"policy: \w+", f"policy: {rng.choice(['default', 'sil1', 'sil2'])}", text)
+
+
+def plan_criticality(text: str, rng: random.Random) -> str:
+    return text.replace("criticality: high", f"criticality: {rng.choice(['low', 'medium', 'high'])}", 1)
+
+
+PLAN_EDITS = (plan_comment, plan_blank, plan_sections, plan_title, plan_quotes, plan_policy, plan_criticality)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_edits_without_a_change_of_meaning_rerun_nothing(tmp_path: Path, seed: int) -> None:
+    folder = copied(FERRY, tmp_path)
+    before = keys(folder)
+    rng = random.Random(seed)
+    contract, plan = next(folder.glob("*.rcl")), folder / "plan.yaml"
+    for _ in range(6):
+        done: list[str] = []
+        for _ in range(rng.randrange(1, 4)):
+            path, edits = rng.choice([(contract, CONTRACT_EDITS), (plan, PLAN_EDITS)])
+            change: Callable[[str, random.Random], str] = rng.choice(edits)  # type: ignore[assignment]
+            path.write_text(change(path.read_text(encoding="utf-8"), rng), encoding="utf-8")
+            done.append(change.__name__)
+        assert changed(before, keys(folder)) == set(), (done, contract.read_text(), plan.read_text())
+
+
+def test_the_generator_does_edit(tmp_path: Path) -> None:
+    """A test that cannot fail is none: every edit changes the text that it is given, for some seed."""
+    texts = {True: next(FERRY.glob("*.rcl")).read_text(), False: (FERRY / "plan.yaml").read_text()}
+    for change in (*CONTRACT_EDITS, *PLAN_EDITS):
+        text = texts[change in CONTRACT_EDITS]
+        assert any(change(text, random.Random(seed)) != text for seed in range(9)), change.__name__
+
+
+# -- edits that change a meaning ----------------------------------------------------------------------------------------
+
+WHOLE = {("system/well-formed/contract", "language")}
+CHAIN = {("system/composition/chain.pilot.one_berth", "compose")}
+SAFE = {("system/requirement/SAFE", "compose")}
+
+
+def guarantees(node: str, names: str, methods: str) -> set[tuple[str, str]]:
+    return {(f"{node}/guarantee/{name}", method) for name in names.split() for method in methods.split()}
+
+
+def sanity(before: Keys, node: str) -> set[tuple[str, str]]:
+    return {name for name in before if name[0].startswith(f"{node}/sanity/")}
+
+
+FERRY_EDITS: dict[str, tuple[str, tuple[str, str], Callable[[Keys], set[tuple[str, str]]], set[tuple[str, str]]]] = {
+    # name: (file, edit, what must change, what may change too: derivations over the changed node)
+    "a threshold": (
+        "*.rcl",
+        ("Minimum = 2.5;", "Minimum = 2.6;"),
+        lambda k: guarantees("gauge", "shallow good", "hoare hypothesis") | sanity(k, "gauge") | WHOLE | SAFE,
+        CHAIN,
+    ),
+    "a flipped operator": (
+        "*.rcl",
+        ("in.depth > Maximum", "in.depth >= Maximum"),
+        lambda k: guarantees("gauge", "deep", "hoare hypothesis") | sanity(k, "gauge") | WHOLE | SAFE,
+        CHAIN,
+    ),
+    "an assumption": (
+        "*.rcl",
+        ("assume wet ( in.depth >= 0 )", "assume wet ( in.depth >= 1 )"),
+        lambda k: (
+            guarantees("gauge", "shallow good deep", "hoare hypothesis")
+            | sanity(k, "gauge")
+            | WHOLE
+            | SAFE
+            | {("system/composition/environment.gauge.wet", "compose")}
+        ),
+        CHAIN,
+    ),
+    "a guarantee of the last node": (
+        "*.rcl",
+        ("in.level != ok -> out.order == wait", "in.level == low -> out.order == wait"),
+        lambda k: guarantees("pilot", "waits", "ajpf hypothesis") | sanity(k, "pilot") | WHOLE | SAFE,
+        CHAIN,
+    ),
+    "an option": (
+        "plan.yaml",
+        ('"models/harbour.py:gauge", cases: 200', '"models/harbour.py:gauge", cases: 201'),
+        lambda k: guarantees("gauge", "shallow good deep", "hypothesis"),
+        set(),
+    ),
+    "a mapping": (
+        "plan.yaml",
+        ('"out.order == wait": "D(skipper, hold)"', '"out.order == wait": "D(skipper, stay)"'),
+        lambda k: guarantees("pilot", "docks waits", "ajpf"),
+        set(),
+    ),
+    "a program": (
+        "models/gauge.imp",
+        ("\n", "\n\n"),  # the bytes count: whether a program's comment matters is for its own tool to say
+        lambda k: guarantees("gauge", "shallow good deep", "hoare"),
+        set(),
+    ),
+    "a function under test": (
+        "models/harbour.py",
+        ("\n", "\n\n"),
+        lambda k: (
+            guarantees("gauge", "shallow good deep", "hypothesis") | guarantees("pilot", "docks waits", "hypothesis")
+        ),
+        set(),
+    ),
+    "an environment assumption": (
+        "plan.yaml",
+        ('assume: "in.depth >= 0"', 'assume: "in.depth >= 0 and in.depth < 100"'),
+        lambda k: SAFE | {("system/composition/environment.gauge.depth", "compose")},
+        CHAIN | {(f"system/composition/environment.{n}", "compose") for n in ("gauge.wet", "pilot.free")},
+    ),
+    "a reason": (
+        "plan.yaml",
+        ("because: water has no negative depth", "because: the tank is a closed vessel"),
+        lambda k: {("system/composition/environment.gauge.depth", "compose")},
+        {(f"system/composition/environment.{n}", "compose") for n in ("gauge.wet",)},
+    ),
+    "a requirement": (
+        "plan.yaml",
+        ("gauge.depth < 2.5 ->", "gauge.depth < 2.4 ->"),
+        lambda k: SAFE,
+        set(),
+    ),
+    "a wire's topic, which no method here looks at": (
+        "*.rcl",
+        ("harbour_msgs/Depth depth", "harbour_msgs/Depth metres"),
+        lambda k: set(),
+        set(),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FERRY_EDITS)
+def test_an_edit_of_a_meaning_reruns_exactly_its_cone(tmp_path: Path, name: str) -> None:
+    pattern, pair, must, may = FERRY_EDITS[name]
+    folder = copied(FERRY, tmp_path)
+    before = keys(folder)
+    edit(next(folder.glob(pattern)), pair)
+    moved = changed(before, keys(folder))
+    assert moved >= must(before), sorted(must(before) - moved)
+    assert moved <= must(before) | may, sorted(moved - must(before) - may)
+
+
+def test_a_type_that_only_another_input_has_reruns_the_methods(tmp_path: Path) -> None:
+    """A program runs on all its inputs: evidence for a clause that does not mention one of them depends on it too."""
+    folder = copied(FERRY, tmp_path)
+    contract = next(folder.glob("*.rcl"))
+    edit(contract, ("  inputs( depth : REAL )", "  inputs( depth : REAL, spare : Level )"))
+    before = keys(folder)
+    edit(contract, ("spare : Level", "spare : REAL"))
+    assert changed(before, keys(folder)) >= guarantees("gauge", "shallow good deep", "hoare hypothesis")
+
+
+def test_a_constant_that_only_an_option_or_a_program_names_reruns_it(tmp_path: Path) -> None:
+    folder = copied(FERRY, tmp_path)
+    contract, program = next(folder.glob("*.rcl")), folder / "models" / "gauge.imp"
+    edit(contract, ("  Maximum = 7;", "  Maximum = 7;\n  Spare = 1;"))
+    unnamed = keys(folder)
+    edit(contract, ("Spare = 1;", "Spare = 2;"))
+    assert changed(unnamed, keys(folder)) == set()
+    program.write_text(program.read_text() + "\n// Spare\n")
+    named = keys(folder)
+    edit(contract, ("Spare = 2;", "Spare = 3;"))
+    assert changed(named, keys(folder)) == guarantees("gauge", "shallow good deep", "hoare")
+
+
+def test_a_row_of_the_scenario_reruns_what_looks_at_it(tmp_path: Path) -> None:
+    folder = copied(SHIPPED, tmp_path)
+    before = keys(folder)
+    table = folder / "models" / "waypoints.csv"
+    rows = table.read_text().splitlines()
+    rows[2] = re.sub(r"-?\d+\.\d+", "1.25", rows[2], count=1)
+    table.write_text("\n".join(rows) + "\n")
+    moved = changed(before, keys(folder))
+    methods = {method for name, method in moved if "/guarantee/" in name}
+    assert methods == {"ajpf", "hypothesis", "rosmonitoring"}
+    assert all((name, method) in moved for name, method in before if method in methods)
+    assert {name for name, method in moved if name.startswith("system/requirement/")}, (
+        "temporal requirements look at it"
+    )
+
+
+def test_wiring_reruns_the_monitors_and_only_them(tmp_path: Path) -> None:
+    folder = copied(SHIPPED, tmp_path)
+    before = keys(folder)
+    edit(folder / "system.rcl", ("gazebo_radiation_plugins/Snapshot position", "gazebo_radiation_plugins/Snapshot pos"))
+    moved = changed(before, keys(folder))
+    assert moved, "monitors listen to topics"
+    assert {method for _, method in moved} == {"rosmonitoring"}
+    assert {name.split("/")[0] for name, _ in moved} <= {"localisation", "navigation"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("Orange = 120;", "Orange = 121;"), ("out.radiationStatus == red", "out.radiationStatus == orange")],
+)
+def test_a_change_in_one_node_of_the_case_study_leaves_the_others(tmp_path: Path, old: str, new: str) -> None:
+    folder = copied(SHIPPED, tmp_path)
+    before = keys(folder)
+    edit(folder / "system.rcl", (old, new))
+    moved = changed(before, keys(folder))
+    assert {name.split("/")[0] for name, _ in moved} <= {"radiationSensor", "system"}
+    kept = {name for name, _ in before if name.startswith("radiationSensor/guarantee/")} - {name for name, _ in moved}
+    assert "radiationSensor/guarantee/marks_inspected" in kept or "Orange" in old
+
+
+def test_keys_do_not_depend_on_where_the_workspace_is(tmp_path: Path) -> None:
+    assert keys(copied(FERRY, tmp_path / "a")) == keys(copied(FERRY, tmp_path / "b"))
