@@ -92,7 +92,10 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+QUICK = ("a plan dropped", "a wrong next location", "leaving too early", "the inspection not noted")
+
+
+@pytest.mark.parametrize("fault", [f if f in QUICK else pytest.param(f, marks=pytest.mark.slow) for f in FAULTS])
 def test_seeded_faults_are_caught(rover, tmp_path, fault):
     change, caught = FAULTS[fault]
     outcomes = settle(rover(*REPAIRED, {"states": 6_000}, program=change), tmp_path)

@@ -269,7 +269,7 @@ SHAPES = [
 ]
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 @given(repetitive_graphs())
 def test_reduction_changes_nothing(graph):
     small = reduce(graph)

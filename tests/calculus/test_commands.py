@@ -93,7 +93,10 @@ def test_refines(tmp_path: Path) -> None:
 
 
 @pytest.mark.needs_dafny
-@pytest.mark.parametrize("name", ["calculus", "r4", "relational", "steps"])
+@pytest.mark.parametrize(
+    "name",
+    ["relational", "steps", *(pytest.param(n, marks=pytest.mark.slow) for n in ("calculus", "r4"))],
+)
 def test_the_rules_are_proved(tmp_path: Path, name: str) -> None:
     completed = run(["dafny", "/compile:0", str(PROOFS / f"{name}.dfy")], seconds=120)
     assert " verified, 0 errors" in completed.stdout

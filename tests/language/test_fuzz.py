@@ -18,7 +18,7 @@ from avow.rendering import render, to_json, to_sarif
 from .generate import CONTRACT, damaged
 from .test_printer import LOADED, NODE
 
-ROUNDS = int(os.environ.get("AVOW_FUZZ", "500"))
+ROUNDS = int(os.environ.get("AVOW_FUZZ", "250"))
 
 
 def test_damaged_contracts(root: Path) -> None:

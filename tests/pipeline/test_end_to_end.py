@@ -132,6 +132,7 @@ def test_a_wrong_program_is_refuted(robot: Path) -> None:
     assert dict(verdicts["rests", "hoare"]["counterexample"]["values"])["in.temperature"] == "18"
 
 
+@pytest.mark.slow
 def test_deleted_outputs_come_back(robot: Path) -> None:
     import shutil
 
@@ -166,6 +167,7 @@ def test_a_killed_run_is_taken_up(made: Path, tmp_path: Path) -> None:
     assert len(every) == len(set(every)), "an answer that the killed run had recorded was made again"
 
 
+@pytest.mark.slow
 def test_two_runs_at_once_do_the_work_once(made: Path, tmp_path: Path) -> None:
     import shutil
 
@@ -181,6 +183,7 @@ def test_two_runs_at_once_do_the_work_once(made: Path, tmp_path: Path) -> None:
     assert len(every) == len(set(every))
 
 
+@pytest.mark.slow
 def test_fresh_settles_everything_anew(robot: Path) -> None:
     before = len(ledger(robot))
     done = run(robot, "avow", "verify", "--fresh")

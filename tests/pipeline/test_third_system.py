@@ -46,6 +46,7 @@ def test_it_verifies(harbour: Path) -> None:
     assert found["system/requirement/SAFE", "compose"]["verdict"] == "proved"
 
 
+@pytest.mark.slow
 def test_a_careless_pilot_is_caught_by_both_of_its_methods(harbour: Path) -> None:
     models = harbour / "contracts" / "ferry" / "models"
     program, function = models / "skipper.gwen", models / "harbour.py"
@@ -59,6 +60,7 @@ def test_a_careless_pilot_is_caught_by_both_of_its_methods(harbour: Path) -> Non
     assert ["in.level", "high"] in found["pilot/guarantee/waits", "hypothesis"]["counterexample"]["values"]
 
 
+@pytest.mark.slow
 def test_a_requirement_that_does_not_follow_is_refuted(harbour: Path) -> None:
     plan = harbour / "contracts" / "ferry" / "plan.yaml"
     plan.write_text(plan.read_text().replace("gauge.depth < 2.5 ->", "gauge.depth < 2.6 ->"))
