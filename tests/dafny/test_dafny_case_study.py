@@ -31,6 +31,7 @@ def test_it_is_a_backend() -> None:
 
 
 @pytest.mark.needs_dafny
+@pytest.mark.slow
 def test_the_radiation_sensor_is_proved(make_job: MakeJob) -> None:
     job = job_for(make_job, "remote_inspection", "radiationSensor", "models/radiation_sensor_impl.dfy")
     assert BACKEND.check(job) == ()
@@ -41,6 +42,7 @@ def test_the_radiation_sensor_is_proved(make_job: MakeJob) -> None:
 
 
 @pytest.mark.needs_dafny
+@pytest.mark.slow
 def test_the_agent_is_proved_for_its_map(make_job: MakeJob) -> None:
     job = job_for(make_job, "remote_inspection", "agent", "models/agent_impl.dfy")
     assert BACKEND.check(job) == ()

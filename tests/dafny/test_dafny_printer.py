@@ -249,6 +249,7 @@ def crosscheck_node(tmp_path: Path) -> Contract:
 
 
 @pytest.mark.needs_dafny
+@pytest.mark.slow
 def test_dafny_and_z3_agree_on_meanings(tmp_path: Path) -> None:
     """One lemma a formula: what Z3 proves Dafny proves, what Z3 refutes it never does."""
     node = crosscheck_node(tmp_path).node("n")
