@@ -76,12 +76,16 @@ def _places(name: str, value: str, view: MapView, known: dict[str, Place]) -> It
 
 
 def _path(example: Counterexample, view: MapView, known: dict[str, Place]) -> Iterable[_Visit]:
+    """A place is entered in the step in which it is first spoken of again: beliefs and relations persist."""
+    before: set[Place] = set()
     last = None
     for at, step in enumerate(example.trace[:_MOST_STEPS]):
-        for place in dict.fromkeys(p for name, value in step for p in _places(name, value, view, known)):
-            if place != last:
+        now = dict.fromkeys(p for name, value in step for p in _places(name, value, view, known))
+        for place in now:
+            if place not in before and place != last:
                 last = place
                 yield _Visit(place, f"step {at}")
+        before = set(now)
 
 
 def _svg(view: MapView, known: dict[str, Place], marked: Sequence[_Visit], path: Sequence[_Visit]) -> Markup:

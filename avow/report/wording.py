@@ -126,7 +126,8 @@ def banner_tone(case: Case) -> str:
     return "open" if case.strict and not all(r.status.supports for r in case.requirements) else "good"
 
 
-_CONNECTIVE = re.compile(r" (?=[→↔⇒⇔∧∨] )")
+_CONNECTIVES = ("→↔⇒⇔", "∨", "∧")
+"""Weakest first."""
 _LONG_FORMULA = 88
 
 
@@ -138,35 +139,51 @@ def in_lines(formula: str) -> str:
     stack = [(0, formula)]
     while stack:
         margin, text = stack.pop()
-        if len(text) + margin <= _LONG_FORMULA or margin > 24:
+        parts = _split(text) if len(text) + margin > _LONG_FORMULA and margin <= 32 else []
+        if parts:
+            stack += [(margin + indent, part) for indent, part in reversed(parts)]
+        else:
             lines.append(" " * margin + text)
-            continue
-        head, *parts = _split(text)
-        rest = [(margin + (0 if part[0] in "→↔⇒⇔" else 2), part) for part in parts]
-        if not rest:
-            lines.append(" " * margin + head)
-            continue
-        lines.append(" " * margin + head)
-        stack += reversed(rest)
     return "\n".join(lines)
 
 
-def _split(text: str) -> list[str]:
-    """Cut before every connective outside parentheses, and after the first quantifier's dot."""
-    cuts, depth, dotted = [0], 0, False
+def _split(text: str) -> list[tuple[int, str]]:
+    """The parts with their indentation: cut before the weakest connectives outside parentheses, else after a
+    quantifier's dot; where there is neither, within the outermost parentheses that have one. Nothing where none has."""
+    for depth in range(4):
+        inner = 2 if depth or text[0] in "∧∨→↔⇒⇔" else 0
+        cuts, kind = _cuts(text, depth)
+        if not cuts:
+            continue
+        ends = [*cuts[1:], len(text)]
+        head, rest = text[: cuts[0]].rstrip(), [text[a:b].rstrip() for a, b in zip(cuts, ends, strict=True)]
+        if kind == "·":
+            return [(0, head), *((2, part) for part in rest)]
+        if kind == _CONNECTIVES[0] and not inner:
+            return [(2, head), *((0, part) for part in rest)]
+        return [(0, head), *((inner, part) for part in rest)]
+    return []
+
+
+def _cuts(text: str, wanted: int) -> tuple[list[int], str]:
+    """Where to cut at one depth of parentheses, and at what: what follows a dot is within its quantifier's scope."""
+    found: dict[str, list[int]] = {}
+    depth = 0
     for at, c in enumerate(text):
         if c in "([{":
             depth += 1
         elif c in ")]}":
             depth -= 1
-        elif depth == 0 and c == " ":
-            if _CONNECTIVE.match(text, at):
-                cuts.append(at + 1)
-            elif not dotted and text[at - 1] == "·":
-                dotted = True
-                cuts.append(at + 1)
-    parts = [text[a:b].rstrip() for a, b in zip(cuts, [*cuts[1:], len(text)], strict=True)]
-    return [part for part in parts if part]
+        elif depth == wanted and c == " " and at > 2:
+            if text[at - 1] == "·":
+                if not found:
+                    return [at + 1], "·"
+                break
+            kind = next((k for k in _CONNECTIVES if text[at + 1 : at + 2] in k and text[at + 2 : at + 3] == " "), None)
+            if kind:
+                found.setdefault(kind, []).append(at + 1)
+    weakest = next((kind for kind in _CONNECTIVES if kind in found), "")
+    return found.get(weakest, []), weakest
 
 
 def bound_text(bound: Mapping[str, Any]) -> str:

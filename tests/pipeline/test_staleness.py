@@ -47,7 +47,7 @@ def changed(before: Keys, after: Keys) -> set[tuple[str, str]]:
     return {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
 
 
-# -- edits that change no meaning ---------------------------------------------------------------------------------------
+# -- edits that change no meaning --------------------------------
 
 
 def comment(text: str, rng: random.Random) -> str:
@@ -181,7 +181,7 @@ def test_the_generator_does_edit(tmp_path: Path) -> None:
         assert any(change(text, random.Random(seed)) != text for seed in range(9)), change.__name__
 
 
-# -- edits that change a meaning ----------------------------------------------------------------------------------------
+# -- edits that change a meaning --------------------------------
 
 WHOLE = {("system/well-formed/contract", "language")}
 CHAIN = {("system/composition/chain.pilot.one_berth", "compose")}

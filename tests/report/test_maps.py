@@ -26,7 +26,8 @@ def kinds(example: Counterexample, view: MapView = MAP) -> list[str]:
 
 def test_places_are_found_by_their_coordinates_exactly() -> None:
     found = str(draw_map(MAP, Counterexample((("in.at", "{(5/2, -1)}"), ("out.command", "move(4, 3)")))))
-    assert found.count('class="hit"') == 2 and found.count('class="spot"') == 1
+    assert found.count('class="hit"') == 2
+    assert found.count('class="spot"') == 1
     assert "in.at: waypoint 1; out.command: waypoint 2" in found
 
 
@@ -51,7 +52,8 @@ def test_pairs_that_are_no_values_of_a_port_are_no_places() -> None:
 def test_a_trace_is_a_path() -> None:
     trace = tuple((("in.at", f"{{({x}, {y})}}"),) for x, y in ((0, 0), (0, 0), (4, 3)))
     text = str(draw_map(MAP, Counterexample((), trace=trace)))
-    assert "step 0: waypoint 0; step 2: waypoint 2" in text and text.count("polyline") == 1
+    assert "step 0: waypoint 0; step 2: waypoint 2" in text
+    assert text.count("polyline") == 1
 
 
 def test_one_place_or_rows_without_numbers_draw_without_fault() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 from html.parser import HTMLParser
 
@@ -249,3 +250,23 @@ def test_index_tells_every_system() -> None:
     assert "1 of 2 do not pass" in text
     assert 'href="rover/index.html"' in text
     assert short("requirement:REQ1") in text
+
+
+def test_a_long_formula_is_broken_where_its_structure_is() -> None:
+    text = (
+        "∀ x, y ∈ ℝ, i ∈ ℕ · in.at(x, y) ∧ in.wayP(x, y, i) ∧ (in.level ∉ {red, orange} ∨ in.known(i)) → "
+        "∃ k ∈ ℕ · in.wayP(x, y, k) ∧ out.command = move(x, y)"
+    )
+    assert wording.in_lines(text).splitlines() == [
+        "∀ x, y ∈ ℝ, i ∈ ℕ ·",
+        "    in.at(x, y) ∧ in.wayP(x, y, i) ∧ (in.level ∉ {red, orange} ∨ in.known(i))",
+        "  → ∃ k ∈ ℕ · in.wayP(x, y, k) ∧ out.command = move(x, y)",
+    ]
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_breaking_a_formula_changes_nothing_but_blanks(seed: int) -> None:
+    rng = random.Random(seed)
+    pieces = ["∀ x ∈ ℝ · ", "(", ")", " ∧ ", " ∨ ", " → ", "in.at(x, y)", "¬", "{red, orange}", "· ", '"a → b"', "]"]
+    text = "".join(rng.choice(pieces) for _ in range(rng.randrange(1, 80)))
+    assert wording.in_lines(text).split() == text.split()
