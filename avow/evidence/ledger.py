@@ -100,7 +100,7 @@ class Ledger:
         with self._lock, self._locked() as file:
             self._mend(file)
             self._refresh()
-            missing = self._cut_off()
+            cut = self._lines > 0 and bool(self._cut_off())
             added, lines, result = dict[str, Entry](), [], []
             previous, number = self._stated_head, self._lines
             for evidence in evidences:
@@ -120,7 +120,7 @@ class Ledger:
             if lines:
                 self._write(file, "".join(lines).encode())
                 self._refresh()
-            if lines and not missing:  # else a new head would make the cut unseen; it stays until both files are deleted
+            if lines and not cut:  # a new head would make the cut unseen; a ledger deleted as a whole begins anew
                 write(self._head_file, canonical({"hash": previous, "records": number}) + "\n")
             return tuple(result)
 

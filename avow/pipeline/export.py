@@ -60,12 +60,19 @@ def read_stamp(place: Path) -> dict[str, Any] | None:
         stamp = json.loads((place / STAMP).read_text())
     except (OSError, ValueError):
         return None
-    return stamp if isinstance(stamp, dict) and isinstance(stamp.get("files"), dict) else None
+    if not isinstance(stamp, dict) or not isinstance(stamp.get("files"), dict):
+        return None
+    # what is listed here is removed once it is generated no more: never what lies elsewhere
+    return stamp if all(_is_within(name) for name in stamp["files"]) else None
 
 
 def _inside(name: str, work: Work) -> None:
-    path = PurePosixPath(name)
-    if path.is_absolute() or ".." in path.parts:
+    if not _is_within(name):
         raise Rejected(
             Diagnostic("BACKEND004", f"the backend '{work.engine}' wants to write outside its folder: {name}")
         )
+
+
+def _is_within(name: str) -> bool:
+    path = PurePosixPath(name)
+    return not path.is_absolute() and ".." not in path.parts

@@ -60,7 +60,7 @@ def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False)
     text = json.dumps({"system": surveyed.system.name, "obligations": listed}, indent=1, ensure_ascii=False) + "\n"
     path = workspace.artifacts / surveyed.system.name / "obligations.json"
     if dry:
-        return path.is_file() and path.read_text() == text
+        return path.is_file() and path.read_bytes() == text.encode()
     return write(path, text)
 
 
