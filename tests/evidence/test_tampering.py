@@ -1,0 +1,232 @@
+"""Poisoned ledgers and swapped files: a hundred random tamperings of each kind, and every one is found."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from assurance.sample import case, evidence, guarantee, key_of, system
+
+from avow.evidence.audit import audit
+from avow.evidence.encoding import canonical
+from avow.evidence.ledger import Ledger
+from avow.evidence.record import Evidence
+from avow.files import digest
+from avow.verdict import Verdict
+
+TIMES = 100
+NAMES = [f"c{n}" for n in range(12)]
+CLAIMS = {name: guarantee("node", name) for name in NAMES}
+METHODS = ("hoare", "dafny", "hypothesis")
+
+
+def records(root: Path) -> list[Evidence]:
+    found = []
+    for at, (name, claim) in enumerate(CLAIMS.items()):
+        method = METHODS[at % 3]
+        log = root / f"logs/{name}.log"
+        log.parent.mkdir(exist_ok=True)
+        log.write_text(f"{name}: verified, {at} goals\n")
+        verdict = Verdict.REFUTED if at % 4 == 3 else Verdict.TESTED if method == "hypothesis" else Verdict.PROVED
+        found.append(evidence(claim, verdict, method, outputs={f"logs/{name}.log": digest(log.read_text())}))
+    return found
+
+
+class Place:
+    """A workspace that is tampered with and put right again."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.ledger = root / "artifacts/ledger/rover.jsonl"
+        Ledger(self.ledger).append_all(records(root))
+        self.files = {p: p.read_bytes() for p in root.rglob("*") if p.is_file()}
+
+    def restore(self) -> None:
+        for path in self.root.rglob("*"):
+            if path.is_file() and path not in self.files:
+                path.unlink()
+        for path, data in self.files.items():
+            if not path.is_file() or path.read_bytes() != data:
+                path.write_bytes(data)
+
+    def found(self) -> list[str]:
+        keys = {(c.id, METHODS[at % 3]): key_of(c, METHODS[at % 3]) for at, c in enumerate(CLAIMS.values())}
+        meanings = {c.id: c.digest for c in CLAIMS.values()}
+        told = audit(Ledger(self.ledger), self.root, system="rover", obligations=meanings, keys=keys)
+        return [d.text for d in told if d.serious]
+
+    def lines(self) -> list[bytes]:
+        return self.files[self.ledger].splitlines(keepends=True)
+
+    def write(self, lines: list[bytes]) -> None:
+        self.ledger.write_bytes(b"".join(lines))
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Place:
+    return Place(tmp_path_factory.mktemp("tamper"))
+
+
+def flip_a_byte(place: Place, rng: random.Random) -> None:
+    data = bytearray(place.files[place.ledger])
+    at = rng.randrange(len(data))
+    data[at] ^= 1 << rng.randrange(7)
+    place.ledger.write_bytes(bytes(data))
+
+
+def change_a_verdict(place: Place, rng: random.Random) -> None:
+    lines = place.lines()
+    at = rng.randrange(len(lines))
+    data = json.loads(lines[at])
+    old = data["evidence"]["verdict"]
+    data["evidence"]["verdict"] = rng.choice([v.value for v in Verdict if v.value != old])
+    lines[at] = canonical(data).encode() + b"\n"
+    place.write(lines)
+
+
+def change_a_record_and_its_hash(place: Place, rng: random.Random) -> None:
+    """Cleverer: the line's own hash is computed again; the chain tells."""
+    lines = place.lines()
+    at = rng.randrange(len(lines))
+    data = json.loads(lines[at])
+    data["evidence"]["summary"] += " (surely)"
+    body = {name: data[name] for name in ("evidence", "n", "prev")}
+    lines[at] = canonical({**body, "hash": digest(canonical(body))}).encode() + b"\n"
+    place.write(lines)
+
+
+def remove_a_line(place: Place, rng: random.Random) -> None:
+    lines = place.lines()
+    del lines[rng.randrange(len(lines))]
+    place.write(lines)
+
+
+def cut_the_end(place: Place, rng: random.Random) -> None:
+    place.ledger.write_bytes(place.files[place.ledger][: -rng.randrange(1, 4000)])
+
+
+def swap_lines(place: Place, rng: random.Random) -> None:
+    lines = place.lines()
+    a, b = rng.sample(range(len(lines)), 2)
+    lines[a], lines[b] = lines[b], lines[a]
+    place.write(lines)
+
+
+def repeat_a_line(place: Place, rng: random.Random) -> None:
+    lines = place.lines()
+    lines.insert(rng.randrange(len(lines) + 1), rng.choice(lines))
+    place.write(lines)
+
+
+def insert_a_forgery(place: Place, rng: random.Random) -> None:
+    lines = place.lines()
+    at = rng.randrange(len(lines))
+    data = json.loads(lines[at])
+    data["evidence"]["verdict"], data["evidence"]["run"] = "proved", "forged"
+    body = {"evidence": data["evidence"], "n": at, "prev": data["prev"]}
+    lines.insert(at, canonical({**body, "hash": digest(canonical(body))}).encode() + b"\n")
+    place.write(lines)
+
+
+def edit_a_log(place: Place, rng: random.Random) -> None:
+    log = place.root / f"logs/{rng.choice(NAMES)}.log"
+    data = bytearray(log.read_bytes())
+    data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+    log.write_bytes(bytes(data))
+
+
+def swap_logs(place: Place, rng: random.Random) -> None:
+    a, b = (place.root / f"logs/{name}.log" for name in rng.sample(NAMES, 2))
+    first, second = a.read_bytes(), b.read_bytes()
+    a.write_bytes(second)
+    b.write_bytes(first)
+
+
+def remove_or_empty_a_log(place: Place, rng: random.Random) -> None:
+    log = place.root / f"logs/{rng.choice(NAMES)}.log"
+    if rng.random() < 0.5:
+        log.unlink()
+    else:
+        log.write_bytes(b"")
+
+
+def poison_the_cache(place: Place, rng: random.Random) -> None:
+    """Through the front door: a whole record with today's key, for a claim with another meaning."""
+    at = rng.randrange(len(NAMES))
+    claim, method = CLAIMS[NAMES[at]], METHODS[at % 3]
+    Ledger(place.ledger).append(evidence(claim, method=method, obligation_digest=digest(str(rng.random()))))
+
+
+def point_at_another_claim(place: Place, rng: random.Random) -> None:
+    a, b = rng.sample(range(len(NAMES)), 2)
+    key = key_of(CLAIMS[NAMES[a]], METHODS[a % 3])
+    Ledger(place.ledger).append(evidence(CLAIMS[NAMES[b]], method=METHODS[b % 3], key=key, summary=str(rng.random())))
+
+
+def claim_too_much(place: Place, rng: random.Random) -> None:
+    claim = CLAIMS[rng.choice(NAMES)]
+    weak = rng.choice([Verdict.TESTED, Verdict.MONITORED, Verdict.REVIEWED, Verdict.CHECKED])
+    record = evidence(claim, Verdict.PROVED, "hypothesis", strength=weak, key=str(rng.random()))
+    Ledger(place.ledger).append(record)
+
+
+def speak_for_another_system(place: Place, rng: random.Random) -> None:
+    Ledger(place.ledger).append(evidence(guarantee("node", rng.choice(NAMES), of=f"other{rng.random()}")))
+
+
+KINDS: tuple[Callable[[Place, random.Random], None], ...] = (
+    flip_a_byte,
+    change_a_verdict,
+    change_a_record_and_its_hash,
+    remove_a_line,
+    cut_the_end,
+    swap_lines,
+    repeat_a_line,
+    insert_a_forgery,
+    edit_a_log,
+    swap_logs,
+    remove_or_empty_a_log,
+    poison_the_cache,
+    point_at_another_claim,
+    claim_too_much,
+    speak_for_another_system,
+)
+
+
+def test_nothing_is_found_where_nothing_was_done(place: Place) -> None:
+    place.restore()
+    assert place.found() == []
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_every_tampering_is_found(place: Place, kind: Callable[[Place, random.Random], None]) -> None:
+    for seed in range(TIMES):
+        place.restore()
+        kind(place, random.Random(seed))
+        assert place.found(), (kind.__name__, seed)
+    place.restore()
+    assert place.found() == []
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_the_gate_fails_for_it(place: Place, kind: Callable[[Place, random.Random], None]) -> None:
+    place.restore()
+    kind(place, random.Random(7))
+    told = audit(
+        Ledger(place.ledger),
+        place.root,
+        system="rover",
+        obligations={c.id: c.digest for c in CLAIMS.values()},
+        keys={(c.id, METHODS[at % 3]): key_of(c, METHODS[at % 3]) for at, c in enumerate(CLAIMS.values())},
+    )
+    subject = system({"node": NAMES})
+    found = case(
+        subject, tuple(CLAIMS.values()), [e.evidence for e in Ledger(place.ledger).records()], discrepancies=told
+    )
+    gate = next(g for g in found.gates if g.id == "integrity")
+    assert not gate.passed
+    assert found.exit_code == 1
+    place.restore()
