@@ -8,8 +8,9 @@ from typing import Protocol
 
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideCondition
-from avow.calculus.discharge import Bounds
+from avow.calculus.discharge import Bounds, would_hold
 from avow.calculus.entailment import implied
+from avow.calculus.repair import Offer
 from avow.calculus.variables import Frame
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.language.printer import show_term
@@ -69,12 +70,14 @@ class SideQuestion:
     condition: SideCondition
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
-        answers = composition.settled(composition.goal(self.goal), bounds)
-        return side_answer(composition.frame, answers.settled[self.condition])
+        goal = composition.goal(self.goal)
+        settled = composition.settled(goal, bounds).settled[self.condition]
+        repairs = would_hold(composition.frame, goal, settled) if settled.verdict is Verdict.REFUTED else ()
+        return side_answer(settled, repairs)
 
 
-def side_answer(frame: Frame, settled: Settled) -> Answer:
-    """A settled side condition in words."""
+def side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ...]]] = ()) -> Answer:
+    """A settled side condition in words; `repairs`: what would make its refuted cases hold."""
     condition = settled.condition
     details: dict[str, object] = {
         "consumer": condition.consumer,
@@ -108,8 +111,20 @@ def side_answer(frame: Frame, settled: Settled) -> Answer:
             vacuous=settled.vacuous,
         )
     if bad.verdict is Verdict.REFUTED:
-        return Answer(Verdict.REFUTED, _why_not(condition, bad), _counterexample(bad, condition), details=details)
+        summary = _why_not(condition, bad) + "".join(
+            would_hold_if(found, "" if phase is Phase.SAME_STEP else f"at {phase.value} ") for phase, found in repairs
+        )
+        listed = [
+            offer.data("" if phase is Phase.SAME_STEP else phase.value) for phase, found in repairs for offer in found
+        ]
+        details |= {"would_hold_if": listed} if listed else {}
+        return Answer(Verdict.REFUTED, summary, _counterexample(bad, condition), details=details)
     return Answer(Verdict.UNKNOWN, f"the solver gave up: {bad.reason or 'no reason given'}", details=details)
+
+
+def would_hold_if(found: Sequence[Offer], when: str = "") -> str:
+    """To be put after a refutation's words; nothing where nothing is offered."""
+    return f"; {when}it would hold if {', or if '.join(offer.text for offer in found)}" if found else ""
 
 
 def environment_claims(labels: Sequence[str]) -> tuple[str, ...]:

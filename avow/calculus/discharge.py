@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 from avow.calculus.derivation import Case, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
 from avow.calculus.entailment import implied
+from avow.calculus.repair import Offer, environment, initial_values, offers, providers
 from avow.calculus.variables import Frame
 from avow.language.terms import Term
 from avow.logic.formula import free_variables
@@ -67,6 +68,39 @@ def settle(frame: Frame, goal: Goal, bounds: Bounds | None = None) -> Answers:
     settled = _break_circles(solver, settled)
     loops = tuple(_loop(frame, goal, part, settled) for part in goal.root.walk() if part.rule is Rule.R4)
     return Answers(goal, settled, loops)
+
+
+def would_hold(frame: Frame, goal: Goal, settled: Settled) -> tuple[tuple[Phase, tuple[Offer, ...]], ...]:
+    """For each case of a side condition that is refuted: the clauses with any one of which it would be proved.
+
+    Nothing is offered where values run in a circle through the consumer within one step: what would be proved there
+    might be circular.
+    """
+    condition = settled.condition
+    solver = _Solver(frame, frozenset(goal.nodes), Bounds())
+    consumer = condition.consumer
+    attempts = tuple(solver.attempts(condition, [*condition.providers], solver.selected))
+    same, before = attempts[-1]
+    if settled.circle or any(consumer in solver.ancestors(name, solver.selected) for name in same):
+        return ()
+    found: list[tuple[Phase, tuple[Offer, ...]]] = []
+    for case in settled.cases:
+        if case.verdict is not Verdict.REFUTED:
+            continue
+        hypotheses, claim = solver.question(condition, case.phase, same, before, len(attempts) > 1)
+        near = [name for name in condition.providers if name in same]
+        places = [*providers(frame, dict.fromkeys((*near, *same)))]
+        if case.phase is Phase.INITIAL:
+            places = [*initial_values(frame, consumer), *places]
+        if case.phase is Phase.LATER:
+            direct = [name for name in condition.providers if solver.feeds(name, consumer, delayed=True)]
+            places = [*providers(frame, direct, 1), *places, *environment(frame, (*before, consumer), 1)]
+        places += environment(frame, (*same, consumer))
+        spoken = set().union(*map(free_variables, (claim, *hypotheses.values())))
+        found.append(
+            (case.phase, offers(frame, hypotheses, claim, (p for p in places if not spoken.isdisjoint(p.ports))))
+        )
+    return tuple(found)
 
 
 @dataclass(slots=True)
@@ -148,15 +182,7 @@ class _Solver:
         wide: bool,
         patience: int,
     ) -> Case:
-        goal = self.frame.clause(condition.consumer, condition.clause)
-        hypotheses = self.contracts(same, 0)
-        around = self.frame.environment(0)
-        if phase is Phase.LATER:
-            hypotheses |= self.contracts(before, 1)
-            around |= self.frame.environment(1)
-        elif phase is Phase.INITIAL:
-            around |= self.frame.initials(self.selected)
-        hypotheses |= _about(around, [goal, *hypotheses.values()], direct=not wide)
+        hypotheses, goal = self.question(condition, phase, same, before, wide)
         answer = implied(hypotheses, goal, timeout_ms=patience, seed=self.bounds.seed)
         return Case(
             phase,
@@ -167,6 +193,20 @@ class _Solver:
             answer.reason,
             answer.engine,
         )
+
+    def question(
+        self, condition: SideCondition, phase: Phase, same: tuple[str, ...], before: tuple[str, ...], wide: bool
+    ) -> tuple[Hypotheses, Term]:
+        goal = self.frame.clause(condition.consumer, condition.clause)
+        hypotheses = self.contracts(same, 0)
+        around = self.frame.environment(0)
+        if phase is Phase.LATER:
+            hypotheses |= self.contracts(before, 1)
+            around |= self.frame.environment(1)
+        elif phase is Phase.INITIAL:
+            around |= self.frame.initials(self.selected)
+        hypotheses |= _about(around, [goal, *hypotheses.values()], direct=not wide)
+        return hypotheses, goal
 
     def contracts(self, nodes: Iterable[str], earlier: int) -> Hypotheses:
         """Assumptions and guarantees of some nodes, labelled ``navigation.somewhere``."""

@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from avow.calculus.answers import Answer, contracts, environment_claims
+from avow.calculus.answers import Answer, contracts, environment_claims, would_hold_if
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Phase
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import QUICK_MS, implied
+from avow.calculus.repair import environment, offers, providers
 from avow.calculus.variables import Frame
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.files import digest as sha256
@@ -61,8 +62,23 @@ class FormulaQuestion:
                 return self.proved(composition, (last,), clauses, Phase.SAME_STEP)
         assert last is not None
         if not any(edge.delayed for edge in frame.graph.edges):
-            return self.not_proved(last, genuine=True)
+            return self.repaired(frame, goal, self.not_proved(last, genuine=True))
         return self.by_induction(composition, everything, goal, bounds)
+
+    def repaired(self, frame: Frame, goal: Term, answer: Answer) -> Answer:
+        """A refutation with what would make it hold; any other answer as it is."""
+        if answer.verdict is not Verdict.REFUTED:
+            return answer
+        nodes = frame.graph.nodes
+        everything = tuple(f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees)
+        hypotheses = contracts(frame, everything) | frame.environment()
+        spoken = free_variables(goal)
+        near = [place for place in providers(frame, nodes) if not spoken.isdisjoint(place.ports)]
+        found = offers(frame, hypotheses, goal, (*near, *environment(frame, nodes)))
+        if not found:
+            return answer
+        listed = {"would_hold_if": [offer.data() for offer in found]}
+        return replace(answer, summary=answer.summary + would_hold_if(found), details=answer.details | listed)
 
     def by_induction(self, composition: Composition, everything: tuple[str, ...], goal: Term, bounds: Bounds) -> Answer:
         frame = composition.frame

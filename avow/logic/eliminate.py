@@ -65,7 +65,7 @@ def remedy(
     """
     whole = Implies(conjunction(hypotheses.values()), goal)
     others = sorted(free_variables(whole) - frozenset(about), key=lambda v: (v.qualified, repr(v.sort)))
-    if any(not isinstance(v.sort, _ELIMINABLE) for v in free_variables(whole)):
+    if not eliminable(whole):
         return None
     renamed = {v: Variable(Role.BOUND, f"any {v.qualified}", v.sort) for v in others}
     body = substitute(whole, renamed)
@@ -89,6 +89,11 @@ def remedy(
 
 
 _ELIMINABLE = (BoolSort, RealSort, IntegerSort, NaturalSort, EnumSort)
+
+
+def eliminable(term: Term) -> bool:
+    """Whether all the term's free variables have sorts that `remedy` can do something with."""
+    return all(isinstance(v.sort, _ELIMINABLE) for v in free_variables(term))
 
 
 def _eliminate(formula: Term, timeout_ms: int) -> Term | None:

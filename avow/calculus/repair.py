@@ -1,0 +1,182 @@
+"""What would make it hold: where an entailment between contracts fails, a clause with which it would not.
+
+Looked for are a further guarantee of a provider (in its own ports), a further assumption about the environment's
+inputs, and, at the first step, a condition on an initial value: each the weakest there is, by quantifier elimination,
+where the formulas allow that (`avow.logic.eliminate`). Where they do not, a provider that delivers all that the goal
+speaks of is offered the goal itself. An offer is checked: with it the goal is proved; it does not contradict what else
+is known; and of a guarantee it is not known that the node could not keep it. The search is bounded in time: that
+nothing is offered says nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from avow.calculus.variables import Frame
+from avow.language.printer import show_term
+from avow.language.terms import TRUE, And, Compare, Implies, Not, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.logic.eliminate import eliminable, remedy
+from avow.logic.formula import conjunction, disjunction, free_variables, rename
+from avow.logic.smt import entails, solve
+from avow.system.plan import Endpoint
+from avow.verdict import Verdict
+
+SECONDS = 3.0
+"""For all the offers to one failed question together; an offer is a service, not part of the answer."""
+
+_STEP_MS = 500
+_MOST_HYPOTHESES = 40
+_MOST_PLACES = 8
+_LONGEST = 300
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a clause might be added. `ports`: variables of the question → how the clause there calls them."""
+
+    kind: str
+    """``guarantee`` of a node, ``environment`` assumption, or ``initial`` value of ``node.port``."""
+    of: str
+    ports: Mapping[Variable, Variable]
+    without: str = ""
+    """The label of a hypothesis that the clause would replace."""
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """A clause with which the goal would hold."""
+
+    kind: str
+    of: str
+    formula: Term
+    weakest: bool
+
+    @property
+    def clause(self) -> str:
+        """As RCL; of an initial value the formula alone, as the plan has it."""
+        word = {"guarantee": "guarantee ", "environment": "assume "}.get(self.kind, "")
+        shown = show_term(self.formula, "rcl")
+        return f"{word}( {shown} )" if word else shown
+
+    @property
+    def text(self) -> str:
+        """Continues "it would hold if …"."""
+        shown = show_term(self.formula, "rcl")
+        match self.kind:
+            case "guarantee":
+                return f"{self.of} also had guarantee ( {shown} )"
+            case "environment":
+                return f"of the environment it were also assumed that ( {shown} )"
+            case _:
+                return f"the first value of {self.of} met ( {shown} )"
+
+    def data(self, when: str = "") -> dict[str, object]:
+        """For an outcome's details."""
+        found: dict[str, object] = {"kind": self.kind, "of": self.of, "clause": self.clause, "weakest": self.weakest}
+        return found | ({"when": when} if when else {})
+
+
+def offers(
+    frame: Frame, hypotheses: Mapping[str, Term], goal: Term, places: Iterable[Place], seconds: float = SECONDS
+) -> tuple[Offer, ...]:
+    """What would make the hypotheses imply the goal, at most one offer for each place."""
+    end = time.monotonic() + seconds
+    found: dict[tuple[str, str], Offer] = {}
+    for number, place in enumerate(places):
+        if number >= _MOST_PLACES or time.monotonic() > end:
+            break
+        known = {label: term for label, term in hypotheses.items() if label != place.without}
+        offer = _offer(frame, known, goal, place)
+        if offer is not None and len(offer.clause) <= _LONGEST:
+            found.setdefault((offer.of, offer.clause), offer)
+    return tuple(found.values())
+
+
+def _offer(frame: Frame, known: Mapping[str, Term], goal: Term, place: Place) -> Offer | None:
+    usable = {label: term for label, term in known.items() if eliminable(term)}
+    assumption: Term | None = None
+    weakest = False
+    if eliminable(goal) and len(usable) <= _MOST_HYPOTHESES:
+        remedied = remedy(usable, goal, place.ports, timeout_ms=_STEP_MS)
+        if remedied is not None:
+            assumption, weakest = _tidy(remedied.assumption), remedied.weakest and len(usable) == len(known)
+    sufficient = assumption is None and free_variables(goal) <= frozenset(place.ports)
+    if sufficient and solve({**known, "the goal": goal}, timeout_ms=_STEP_MS).status == "sat":
+        assumption = goal
+    if assumption is None or not free_variables(assumption) <= frozenset(place.ports):
+        return None
+    if len(usable) < len(known) and solve({**known, "offer": assumption}, timeout_ms=_STEP_MS).status == "unsat":
+        return None
+    formula = rename(assumption, place.ports)
+    if place.kind == "guarantee" and not _may_be_kept(frame, place.of, formula):
+        return None
+    return Offer(place.kind, place.of, formula, weakest)
+
+
+_OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">"}
+
+
+def _tidy(term: Term) -> Term:
+    """``not x >= 1`` as ``x < 1``: elimination leaves the first. Only numbers are compared by these operators."""
+    match term:
+        case Not(body=Compare(operator=operator, left=left, right=right)) if operator in _OPPOSITE:
+            return Compare(_OPPOSITE[operator], left, right)
+        case And(items=items):
+            return conjunction(map(_tidy, items))
+        case Or(items=items):
+            return disjunction(map(_tidy, items))
+    return term
+
+
+def _may_be_kept(frame: Frame, name: str, further: Term) -> bool:
+    """False where, for some inputs that the node has to accept, no outputs meet its guarantees and the further one."""
+    node = frame.node(name)
+    meets = conjunction([*(clause.formula for clause in node.guarantees), further])
+    outputs = tuple(port.variable for port in node.outputs)
+    bound = {v: Variable(Role.BOUND, f"some {v.name}", v.sort) for v in outputs}
+    possible: Term = Quantified(Quantifier.EXISTS, tuple(bound.values()), rename(meets, bound)) if bound else meets
+    accepted = conjunction(clause.formula for clause in node.assumptions) if node.assumptions else TRUE
+    return entails({}, Implies(accepted, possible), timeout_ms=_STEP_MS).verdict is not Verdict.REFUTED
+
+
+# -- places ------------------------------------------------------------------------------------------------------------
+
+
+def providers(frame: Frame, nodes: Iterable[str], earlier: int = 0) -> Iterator[Place]:
+    """Each node's own guarantees, `earlier` steps ago."""
+    for name in nodes:
+        yield Place("guarantee", name, _called(frame, name, earlier))
+
+
+def environment(frame: Frame, nodes: Iterable[str], earlier: int = 0) -> Iterator[Place]:
+    """The inputs of some nodes that nothing provides: each alone, as the plan would have it."""
+    ports: dict[Variable, tuple[str, Variable]] = {}
+    for name in nodes:
+        for port in frame.node(name).inputs:
+            if Endpoint(name, port.name) not in frame.graph.by_target:
+                own = f"{name}.{port.name}"
+                entry = own if own in frame.own_inputs else f"in.{port.name}"
+                ports.setdefault(frame.input(name, port.name, earlier), (entry, port.variable))
+    for variable, (entry, called) in ports.items():
+        yield Place("environment", entry, {variable: called})
+
+
+def initial_values(frame: Frame, consumer: str) -> Iterator[Place]:
+    """What comes first over the delayed edges that feed a node."""
+    for edge in frame.graph.feeding(consumer):
+        if edge.delayed:
+            source = edge.source
+            called = frame.node(source.node).output(source.port).variable
+            variable = frame.output(source.node, source.port, 1)
+            yield Place("initial", str(source), {variable: called}, f"initial {source}")
+
+
+def _called(frame: Frame, name: str, earlier: int) -> dict[Variable, Variable]:
+    """System-level variables as the node's own ports. Of two inputs that read one value, one is enough."""
+    found: dict[Variable, Variable] = {}
+    for variable, meant in frame.mapping(name, earlier).items():
+        if isinstance(meant, Variable):
+            found.setdefault(meant, variable)
+    return found

@@ -1,0 +1,99 @@
+"""What would make it hold: each offer, put in its place, makes the refuted side condition hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.cli.compose import command
+from avow.verdict import Outcome, Verdict
+
+from .make import make, node, outcomes
+from .test_commands import invoke
+
+CONSUMER = node("b", "x : REAL", "", "A small: in.x < 1")
+
+
+def offered(outcome: Outcome) -> list[dict[str, object]]:
+    found = outcome.details.get("would_hold_if", [])
+    assert isinstance(found, list)
+    return found
+
+
+def test_a_provider_a_hair_too_weak_is_told_what_it_lacks(tmp_path: Path) -> None:
+    weak = node("a", "", "x : REAL", "G: out.x <= 1")
+    outcome = outcomes(make(tmp_path / "weak", weak + CONSUMER))["whole.b.small"]
+    assert outcome.verdict is Verdict.REFUTED
+    (offer,) = offered(outcome)
+    assert offer == {"kind": "guarantee", "of": "a", "clause": "guarantee ( out.x < 1 )", "weakest": True}
+    assert outcome.summary.endswith("; it would hold if a also had guarantee ( out.x < 1 )")
+    repaired = weak.rstrip().removesuffix("}") + f"  {offer['clause']}\n}}\n"
+    assert outcomes(make(tmp_path / "repaired", repaired + CONSUMER))["whole.b.small"].verdict is Verdict.PROVED
+    code, output = invoke(command, str(tmp_path / "weak"))
+    assert code == 1
+    assert "it would hold if a also had guarantee ( out.x < 1 )" in " ".join(output.split())
+
+
+def test_a_guarantee_that_the_node_could_not_keep_is_not_offered(tmp_path: Path) -> None:
+    """a copies its input: only the environment can help."""
+    text = node("a", "r : REAL", "x : REAL", "G: out.x == in.r + 1") + CONSUMER
+    outcome = outcomes(make(tmp_path / "one", text))["whole.b.small"]
+    (offer,) = offered(outcome)
+    assert offer == {"kind": "environment", "of": "in.r", "clause": "assume ( in.r < 0 )", "weakest": True}
+    plan = "environment: {in.r: {assume: 'in.r < 0', because: test}}"
+    assert outcomes(make(tmp_path / "two", text, plan))["whole.b.small"].verdict is Verdict.PROVED
+
+
+def test_values_of_the_step_before(tmp_path: Path) -> None:
+    text = node("a", "", "x : INTEGER", "G: out.x >= 0") + node("b", "x : INTEGER", "", "A high: in.x > 2")
+    plan = "connections: [{from: a.x, to: b.x, delayed: true, initial: %s}]"
+    outcome = outcomes(make(tmp_path / "later", text, plan % 5))["whole.b.high"]
+    (offer,) = offered(outcome)
+    assert (offer["kind"], offer["of"], offer["when"]) == ("guarantee", "a", "every later step")
+    repaired = text.replace("out.x >= 0", f"out.x >= 0 and {str(offer['clause']).removeprefix('guarantee ')}")
+    assert outcomes(make(tmp_path / "repaired", repaired, plan % 5))["whole.b.high"].verdict is Verdict.PROVED
+    both = outcomes(make(tmp_path / "both", text, plan % 1))["whole.b.high"]
+    first, later = offered(both)
+    assert (first["kind"], first["of"], first["when"]) == ("initial", "a.x", "first step")
+    assert later["kind"] == "guarantee"
+    plan_text = plan % f'"{first["clause"]}"'
+    assert outcomes(make(tmp_path / "all", repaired, plan_text))["whole.b.high"].verdict is Verdict.PROVED
+
+
+def test_what_cannot_be_eliminated_gets_the_assumption_itself(tmp_path: Path) -> None:
+    text = node("a", "", "at : REAL --> BOOL", "G: out.at(1)") + node(
+        "b", "at : REAL --> BOOL", "", "A two: in.at(1) and in.at(2)"
+    )
+    (offer,) = offered(outcomes(make(tmp_path, text))["whole.b.two"])
+    assert offer["of"] == "a"
+    assert offer["weakest"] is False
+    assert "out.at(2)" in str(offer["clause"])
+
+
+@pytest.mark.parametrize("claim", ["out.x == 3", "out.x == 3 and out.x > in.e"])
+def test_nothing_is_offered_where_nothing_helps(tmp_path: Path, claim: str) -> None:
+    text = node("a", "e : INTEGER", "x : INTEGER", f"G: {claim}") + node("b", "x : INTEGER", "", "A: in.x == 4")
+    outcome = outcomes(make(tmp_path, text))["whole.b.A1"]
+    assert outcome.verdict is Verdict.REFUTED
+    assert "would hold" not in outcome.summary
+    assert not offered(outcome)
+
+
+def test_no_offer_is_made_inside_a_circle(tmp_path: Path) -> None:
+    """With the offer the proofs would hold up one another."""
+    text = node("a", "y : INTEGER", "x : INTEGER", "A: in.y > 0", "G: out.x > 0") + node(
+        "b", "x : INTEGER", "y : INTEGER", "A: in.x > 0", "G: out.y >= 0"
+    )
+    found = outcomes(make(tmp_path, text))
+    assert not any(offered(outcome) for outcome in found.values())
+
+
+def test_a_requirement(tmp_path: Path) -> None:
+    text = node("a", "r : REAL", "x : REAL", "A: in.r >= 0", "G: out.x >= in.r") + node("b", "x : REAL", "")
+    plan = "requirements: {REQ: {text: t, formula: 'a.x >= 1'}}"
+    outcome = outcomes(make(tmp_path, text, plan))["REQ"]
+    assert outcome.verdict is Verdict.REFUTED
+    kinds = {str(offer["kind"]): offer for offer in offered(outcome)}
+    assert kinds["environment"]["clause"] == "assume ( in.r >= 1 )"
+    assert kinds["guarantee"]["of"] == "a"
