@@ -9,8 +9,8 @@ from typing import Any
 
 from doit.exceptions import TaskError
 
-from avow.diagnostics import Diagnostic, Rejected
-from avow.files import write
+from avow.diagnostics import Diagnostic, Rejected, Severity
+from avow.files import digest_file, write
 from avow.pipeline.survey import Survey
 from avow.pipeline.work import COMMON_OPTIONS, ENGINES, method_backend, method_job
 from avow.system.plan import Located, Method, System
@@ -31,21 +31,35 @@ def check(workspace: Workspace, surveyed: Survey) -> None:
     if errors:
         raise Rejected(*found)
     show(found)
+    warnings = [f"{d.span}: {d.message} [{d.code}]" for d in found if d.severity is Severity.WARNING]
     write(
         _stamp(workspace, surveyed),
-        json.dumps({"key": _key(surveyed), "warnings": [f"{d.span}: {d.message} [{d.code}]" for d in found]}, indent=1),
+        json.dumps({"key": _key(surveyed), "warnings": warnings}, indent=1),
     )
 
 
 def diagnostics(system: System) -> tuple[Diagnostic, ...]:
-    """Lints of the contract, and what each backend says of its options."""
+    """Lints of the contract, the plan's account of the ROS graph, and what each backend says of its options."""
     from avow.language.load import check_paths
 
     found = list(check_paths(system.plan.contract_files, off=frozenset(system.plan.lints_off))[1])
+    found += _model(system)
     for plan in system.plan.nodes:
         for method in plan.methods:
             found += _method(system, plan.node, method)
     return tuple(found)
+
+
+def _model(system: System) -> tuple[Diagnostic, ...]:
+    """The paper's step 1: does the system model account for all of the ROS graph?"""
+    from avow.system.graph import dataflow
+    from avow.system.rosgraph import account
+
+    try:
+        told = account(system, dataflow(system))
+    except Rejected as rejected:  # a graph that cannot be read: said with everything else that is wrong
+        return rejected.diagnostics
+    return told.findings if told is not None else ()
 
 
 def _method(system: System, node: str, method: Method) -> Iterable[Diagnostic]:
@@ -92,4 +106,8 @@ def _stamp(workspace: Workspace, surveyed: Survey) -> Any:
 
 
 def _key(surveyed: Survey) -> str:
-    return json.dumps([surveyed.digest, sorted(key for work in surveyed.catalogue.works for key in work.keys.values())])
+    keys = sorted(key for work in surveyed.catalogue.works for key in work.keys.values())
+    plan = surveyed.system.plan
+    graph = plan.model.data.get("graph") if isinstance(plan.model.data, dict) else None
+    # No obligation depends on the ROS graph: only this stage reads it.
+    return json.dumps([surveyed.digest, digest_file(plan.root / str(graph)) if graph else "", keys])
