@@ -140,7 +140,7 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         if view.obligation.kind is Kind.REQUIREMENT:
             return Suggestion("add what it rests on under `supported_by`, or state it as a formula", cost=20)
         if view.obligation.kind is Kind.COMPOSITION and _wants_a_reason(view):
-            return Suggestion("give a dated reason in the plan, where the evidence says", cost=5)
+            return Suggestion(_reason_wanted(view.obligation.name), cost=5)
         return Suggestion(
             "narrow the question (a scenario in the plan), raise the time limit, or accept it with a reason", cost=20
         )
@@ -150,6 +150,13 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
 def _wants_a_reason(view: ObligationView) -> bool:
     """A condition that no tool settles, only a person's reason; the evidence says where it belongs."""
     return not view.obligation.formula or view.obligation.name.startswith("environment.")
+
+
+def _reason_wanted(name: str) -> str:
+    goal, _, key = name.rpartition(".")
+    if name.startswith("environment."):
+        return "say in the plan's `environment:` what is assumed of the input (assume), and why it may be (because)"
+    return f"give a reason in the plan: `compose: {{{goal}: {{{key.replace('-', '_')}: {{because: …}}}}}}`"
 
 
 def _planned(view: ObligationView, facts: Facts) -> Mapping[str, str]:

@@ -14,6 +14,7 @@ from avow.diagnostics import Diagnostic, Rejected
 from avow.evidence.audit import Discrepancy, Fault, audit
 from avow.evidence.encoding import Unreadable
 from avow.evidence.ledger import Ledger
+from avow.registry import backend, names
 from avow.workspace import Workspace
 
 
@@ -30,7 +31,7 @@ def audit_system(place: Workspace, name: str, public_key: str | None = None) -> 
     """The discrepancies of one system's ledger, and how many records it has. Raises Rejected if it cannot be read."""
     ledger = Ledger(place.ledger(name))
     try:
-        found = audit(ledger, place.root, system=name)
+        found = audit(ledger, place.root, system=name, strengths={b: backend(b, ()).strength for b in names()})
         count = len(ledger.records())
     except OSError as error:
         raise Rejected(Diagnostic("LEDGER001", f"{place.ledger(name)} cannot be read: {error.strerror}")) from None

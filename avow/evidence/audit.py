@@ -13,8 +13,9 @@ from enum import StrEnum
 from pathlib import Path
 
 from avow.evidence.ledger import Entry, Ledger
-from avow.evidence.status import effective
+from avow.evidence.status import Status, effective
 from avow.files import digest_file
+from avow.verdict import Verdict
 
 
 class Fault(StrEnum):
@@ -54,13 +55,15 @@ def audit(
     system: str | None = None,
     obligations: Mapping[str, str] | None = None,
     keys: Mapping[tuple[str, str], str] | None = None,
+    strengths: Mapping[str, Verdict] | None = None,
 ) -> tuple[Discrepancy, ...]:
     """Every discrepancy, the ledger's own first. `root` is the workspace; `obligations` maps ids to digests as computed
-    now, and `keys` (obligation id, method) to the key as of now, where the caller knows them."""
+    now, `keys` (obligation id, method) to the key as of now, and `strengths` a backend's name to the most that it can
+    show, where the caller knows them."""
     entries = ledger.records()
     found = [Discrepancy(Fault.LEDGER, f"line {d.line}", f"ledger line {d.line} {d.reason}") for d in ledger.damage]
     found += _misplaced(entries, system, obligations or {}, keys or {})
-    found += _impossible(entries)
+    found += _impossible(entries, strengths or {})
     found += _files(entries, root, keys)
     return tuple(dict.fromkeys(found))
 
@@ -89,9 +92,16 @@ def _misplaced(
             yield Discrepancy(Fault.MISPLACED, record.obligation, text)
 
 
-def _impossible(entries: tuple[Entry, ...]) -> Iterable[Discrepancy]:
+def _impossible(entries: tuple[Entry, ...], strengths: Mapping[str, Verdict]) -> Iterable[Discrepancy]:
     for entry in entries:
         record = entry.evidence
+        most = strengths.get(record.backend)
+        if most is not None and record.strength.supports and Status(record.strength).rank > Status(most).rank:
+            text = (
+                f"record {entry.number + 1} says that {record.backend} can show '{record.strength}', but it can "
+                f"show no more than '{most}'"
+            )
+            yield Discrepancy(Fault.IMPOSSIBLE, record.obligation, text)
         counts_as = effective(record)
         if counts_as is not record.verdict:
             text = (

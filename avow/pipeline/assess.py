@@ -134,6 +134,7 @@ def build(assessment: Assessment) -> Case:
             system=system.name,
             obligations={o.id: o.digest for o in assessment.surveyed.catalogue.obligations},
             keys=assessment.surveyed.keys,
+            strengths={name: backend(name, system.plan.plugins).strength for name in names()},
         ),
         digests={workspace.relative(path): digest_file(path) for path in texts},
         ledger_head=ledger.head,
@@ -187,7 +188,7 @@ def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, st
     gates = []
     for g in case.gates:
         closes = [s.text for s in g.suggestions[:3]] if explain or not g.passed else []
-        gates.append((g.title, g.passed, "; ".join([g.reason, *closes])))
+        gates.append((g.title, g.passed, "; ".join([g.reason, *(f"next: {text}" for text in closes)])))
     index = assessment.workspace.relative(assessment.workspace.report(assessment.system) / "index.html")
     counts = Counter(view.status.value for view in case.obligations if not view.obligation.advisory)
     return Result(case.system, case.exit_code, dict(counts), case.grade.value, index, tuple(gates), left_out)

@@ -8,9 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from assurance.sample import METHODS as METHOD_INFOS
 from assurance.sample import case, evidence, guarantee, key_of, system
 
-from avow.evidence.audit import audit
+from avow.evidence.audit import Discrepancy, audit
 from avow.evidence.encoding import canonical
 from avow.evidence.ledger import Ledger
 from avow.evidence.record import Evidence
@@ -53,10 +54,17 @@ class Place:
                 path.write_bytes(data)
 
     def found(self) -> list[str]:
-        keys = {(c.id, METHODS[at % 3]): key_of(c, METHODS[at % 3]) for at, c in enumerate(CLAIMS.values())}
-        meanings = {c.id: c.digest for c in CLAIMS.values()}
-        told = audit(Ledger(self.ledger), self.root, system="rover", obligations=meanings, keys=keys)
-        return [d.text for d in told if d.serious]
+        return [d.text for d in self.audit() if d.serious]
+
+    def audit(self) -> tuple[Discrepancy, ...]:
+        return audit(
+            Ledger(self.ledger),
+            self.root,
+            system="rover",
+            obligations={c.id: c.digest for c in CLAIMS.values()},
+            keys={(c.id, METHODS[at % 3]): key_of(c, METHODS[at % 3]) for at, c in enumerate(CLAIMS.values())},
+            strengths={method.name: method.strength for method in METHOD_INFOS},
+        )
 
     def lines(self) -> list[bytes]:
         return self.files[self.ledger].splitlines(keepends=True)
@@ -173,6 +181,13 @@ def claim_too_much(place: Place, rng: random.Random) -> None:
     Ledger(place.ledger).append(record)
 
 
+def lend_a_method_strength(place: Place, rng: random.Random) -> None:
+    """Tests that say of themselves that they can prove."""
+    claim = CLAIMS[rng.choice(NAMES)]
+    record = evidence(claim, Verdict.PROVED, "hypothesis", strength=Verdict.PROVED, key=str(rng.random()))
+    Ledger(place.ledger).append(record)
+
+
 def speak_for_another_system(place: Place, rng: random.Random) -> None:
     Ledger(place.ledger).append(evidence(guarantee("node", rng.choice(NAMES), of=f"other{rng.random()}")))
 
@@ -192,6 +207,7 @@ KINDS: tuple[Callable[[Place, random.Random], None], ...] = (
     poison_the_cache,
     point_at_another_claim,
     claim_too_much,
+    lend_a_method_strength,
     speak_for_another_system,
 )
 
@@ -215,13 +231,7 @@ def test_every_tampering_is_found(place: Place, kind: Callable[[Place, random.Ra
 def test_the_gate_fails_for_it(place: Place, kind: Callable[[Place, random.Random], None]) -> None:
     place.restore()
     kind(place, random.Random(7))
-    told = audit(
-        Ledger(place.ledger),
-        place.root,
-        system="rover",
-        obligations={c.id: c.digest for c in CLAIMS.values()},
-        keys={(c.id, METHODS[at % 3]): key_of(c, METHODS[at % 3]) for at, c in enumerate(CLAIMS.values())},
-    )
+    told = place.audit()
     subject = system({"node": NAMES})
     found = case(
         subject, tuple(CLAIMS.values()), [e.evidence for e in Ledger(place.ledger).records()], discrepancies=told
