@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import os
 import shutil
 import sys
 import threading
@@ -116,8 +115,11 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             from avow.pipeline.assess import index_is_due, known
             from avow.pipeline.overview import write_overview
 
-            if index_is_due():
-                write_overview(known())
+            try:
+                if index_is_due():
+                    write_overview(known())
+            except OSError as error:
+                self.runtime_errors.append(f"the page over all systems cannot be written: {error}")
 
     def _keep(self) -> None:
         """Note that all is settled, for the next run, or that it is not."""
@@ -148,19 +150,19 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             self.outstream.write("\r" + " " * (shutil.get_terminal_size().columns - 1) + "\r")
 
 
-def _lock_run(out: IO[str]) -> IO[str]:
-    """One run at a time in a workspace: a second waits for the first and then finds its work done."""
-    path = Path("artifacts") / ".lock"
-    path.parent.mkdir(exist_ok=True)
-    file = path.open("w")
+def _lock_run(out: IO[str]) -> IO[str] | None:
+    """One run at a time in a workspace: a second waits for the first and then finds its work done. None where nothing
+    can be written: there, no two runs can be in each other's way."""
+    try:
+        file = (Path("artifacts") / ".lock").open("w")
+    except OSError:
+        return None
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
         out.write("another run is under way here; waiting for it\n")
         out.flush()
         fcntl.flock(file, fcntl.LOCK_EX)
-    file.write(str(os.getpid()))
-    file.flush()
     return file
 
 

@@ -8,6 +8,7 @@ appear; and the environment. While all that is the same, the next `doit verify` 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -24,9 +25,15 @@ from avow.workspace import Workspace
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH)
 _PACKAGE = Path(__file__).parent.parent
 
+_begun: dict[Path, str] = {}
+"""Workspace → what the sources were before this process read them."""
+
 
 def nothing_to_do(workspace: Workspace, wanted: Sequence[str]) -> tuple[Result, ...] | None:
-    """The results of the last run, if only verification is `wanted` and nothing has changed since; else None."""
+    """The results of the last run, if only verification is `wanted` and nothing has changed since; else None.
+    Called before anything is read."""
+    with contextlib.suppress(OSError):
+        _begun[workspace.root.resolve()] = _sources(workspace)
     if not wanted or any(name.split(":")[0] != "verify" for name in wanted) or os.environ.get(FRESH):
         return None
     try:
@@ -42,8 +49,11 @@ def nothing_to_do(workspace: Workspace, wanted: Sequence[str]) -> tuple[Result, 
 
 
 def keep(workspace: Workspace, results: Sequence[Result]) -> None:
-    """Note that everything is settled as things stand. Without effect where a link leads out of the workspace."""
+    """Note that everything is settled as things stand. Without effect where a link leads out of the workspace, or where
+    something was edited during the run: the results are not of what stands there now."""
     try:
+        if _begun.get(workspace.root.resolve()) != _sources(workspace):
+            return
         identity = _identity(workspace)
         write(_stamp(workspace), json.dumps({"identity": identity, "results": [r.json() for r in results]}))
     except OSError:
@@ -61,16 +71,27 @@ def _stamp(workspace: Workspace) -> Path:
 
 def _identity(workspace: Workspace) -> str:
     """Raises OSError for anything that cannot be looked at."""
+    digest = hashlib.sha256(_sources(workspace).encode())
+    _add_files(digest, workspace.artifacts, workspace.reports)
+    return digest.hexdigest()
+
+
+def _sources(workspace: Workspace) -> str:
+    """As `_identity`, of what no run writes: contracts, code, tools, environment."""
     digest = hashlib.sha256()
     environment = [(name, os.environ.get(name)) for name in _ENVIRONMENT]
     today = str(datetime.now().astimezone().date())
     digest.update(json.dumps([environment, today, sys.version, sys.executable, sys.path]).encode())
-    for folder in (workspace.contracts, workspace.artifacts, workspace.reports, _PACKAGE, _PACKAGE.parent / "backends"):
-        for line in _files(folder):
-            digest.update(line.encode("utf-8", "surrogateescape"))
+    _add_files(digest, workspace.contracts, _PACKAGE, _PACKAGE.parent / "backends")
     for name in dict.fromkeys([*os.environ.get("PATH", "").split(os.pathsep), *sys.path]):
         digest.update(f"{name} {_mark(name) if Path(name).is_dir() else ''}\n".encode("utf-8", "surrogateescape"))
     return digest.hexdigest()
+
+
+def _add_files(digest: hashlib._Hash, *folders: Path) -> None:
+    for folder in folders:
+        for line in _files(folder):
+            digest.update(line.encode("utf-8", "surrogateescape"))
 
 
 def _files(folder: Path) -> Iterator[str]:

@@ -18,13 +18,18 @@ Task = dict[str, Any]
 
 
 def config(root: Path) -> dict[str, Any]:
-    """DOIT_CONFIG for a workspace."""
-    (root / "artifacts").mkdir(exist_ok=True)
+    """DOIT_CONFIG for a workspace. Ends with code 2 where there can be no artifacts."""
+    try:
+        (root / "artifacts").mkdir(exist_ok=True)
+    except OSError as error:
+        print(f"error: there can be no artifacts here: {error}", file=sys.stderr)
+        raise SystemExit(2) from error
     return {
         "default_tasks": ["verify"],
         "reporter": PipelineReporter,
-        "dep_file": str(root / "artifacts" / ".doit.json"),
-        "backend": "json",
+        # doit's own memory is of no use here, and a run killed while writing it would keep the next one from starting
+        "dep_file": ":memory:",
+        "backend": "sqlite3",
         "continue": True,
         "num_process": 2,
         "par_type": "thread",
