@@ -1,0 +1,242 @@
+"""The NASA rover: what is derived of it, and that the published R1.4 does not keep it from running dry."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+from collections import deque
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from avow.calculus.composition import Composition, compose
+from avow.calculus.derivation import Phase, Rule
+from avow.calculus.obligations import composition_obligations, requirement_obligations, settle_all
+from avow.logic.evaluate import compile_term
+from avow.logic.values import FunctionValue
+from avow.system.load import load_system
+from avow.system.plan import System
+from avow.verdict import Outcome, Verdict
+
+from .nasa_rover_run import (
+    AWAY,
+    CHARGER,
+    FOLDER,
+    FREE,
+    FREE_TABLE,
+    STEP_TABLE,
+    STEPS,
+    USE,
+    WAYS,
+    as_value,
+    published,
+    rover,
+    run,
+)
+
+MISSION = (11, 11, 6, 13, 15, 8, 11)
+"""Heat points on which a rover with the published R1.4 runs dry."""
+
+SHIPPED_R1_4 = "( in.battery <= (in.lengthC + 2) * Use -> out.recharge )"
+PUBLISHED_R1_4 = "( 0.95 * in.battery <= in.lengthC * Use -> out.recharge )"
+
+
+@dataclass(frozen=True)
+class Limits:
+    seconds: float = 10.0
+    seed: int = 0
+
+
+@cache
+def system() -> System:
+    return load_system(FOLDER)
+
+
+@cache
+def composition() -> Composition:
+    return compose(system())
+
+
+def requirement(name: str, limits: Limits | None = None, of: System | None = None) -> Outcome:
+    of = of or system()
+    [obligation] = [o for o in requirement_obligations(of) if o.name == name]
+    [outcome] = settle_all(compose(of), [obligation], limits or Limits())
+    return outcome
+
+
+# -- the requirements ------------------------------------------------------------------------------------------------
+
+
+def test_every_published_requirement_stands_in_the_plan_with_its_sentence() -> None:
+    with (FOLDER / "data" / "nasa_rover_requirements.csv").open(encoding="utf-8") as file:
+        published_set = {row["id"].replace(".", "_"): row["statement"] for row in csv.DictReader(file)}
+    shown = {r.id: r.text.rstrip(".") for r in system().plan.requirements}
+    assert published_set.items() <= shown.items()
+    assert len(published_set) == 15
+
+
+@pytest.mark.parametrize(
+    "name", ["R1_kept", "R1_2", "R1_3", "R1_4", "R1_5", "R1_6", "R2", "R2_2_2", "R3_2", "R3_5", "PLANS", "RECHARGES"]
+)
+def test_requirements_are_proved_and_not_vacuously(name: str) -> None:
+    outcome = requirement(name)
+    assert outcome.verdict is Verdict.PROVED, outcome.summary
+    assert not outcome.vacuous
+    assert outcome.hypotheses, "it rests on guarantees"
+
+
+def test_the_battery_is_proved_by_induction_over_steps() -> None:
+    outcome = requirement("R1")
+    assert outcome.verdict is Verdict.PROVED, outcome.summary
+    assert outcome.details["phase"] == Phase.LATER.value
+    assert "Interface/guarantee/in_time" in outcome.hypotheses
+    assert "system/composition/environment.in.away" in outcome.hypotheses
+
+
+# -- the paper's derivations -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "rule", "consumers"),
+    [
+        ("ReasoningAgent", Rule.R2, {"ComputePlan2Charging", "ComputePlan2Destination"}),
+        ("BatteryInterface", Rule.R3, {"Interface"}),
+    ],
+)
+def test_the_papers_derivations_are_found_and_discharged(name: str, rule: Rule, consumers: set[str]) -> None:
+    goal = composition().goal(name)
+    assert goal.root.rule is rule
+    assert {condition.consumer for condition in goal.conditions} == consumers
+    wanted = [o for o in composition_obligations(system()) if o.name.startswith(f"{name}.")]
+    for outcome in settle_all(composition(), wanted, Limits()):
+        assert outcome.verdict in {Verdict.PROVED, Verdict.JUSTIFIED}, outcome.summary
+        assert not outcome.vacuous
+
+
+def test_the_interface_reads_exactly_what_the_papers_linking_equation_says() -> None:
+    frame = composition().frame
+    outputs = {
+        port.name
+        for node in ("ComputePlan2Charging", "ComputePlan2Destination", "BatteryMonitor")
+        for port in frame.node(node).outputs
+    }
+    assert {port.name for port in frame.node("Interface").inputs} == outputs
+
+
+def test_the_loop_the_paper_does_not_mention_has_a_first_element() -> None:
+    [start] = [o for o in composition_obligations(system()) if o.name.startswith("start.")]
+    [outcome] = settle_all(composition(), [start], Limits())
+    assert outcome.verdict is Verdict.PROVED
+    assert {"initial Interface.recharge", "initial Interface.atGoal"} <= set(outcome.details["initial"])  # type: ignore[call-overload]
+
+
+# -- the published R1.4 ------------------------------------------------------------------------------------------------
+
+
+def test_with_the_published_margin_the_battery_is_not_proved(tmp_path: Path) -> None:
+    for file in FOLDER.rglob("*"):
+        target = tmp_path / "nasa_rover" / file.relative_to(FOLDER)
+        if file.is_file() and file.suffix in {".rcl", ".yaml", ".csv"}:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            text = file.read_text(encoding="utf-8")
+            target.write_text(text.replace(SHIPPED_R1_4, PUBLISHED_R1_4), encoding="utf-8")
+    faulty = load_system(tmp_path / "nasa_rover")
+    assert PUBLISHED_R1_4 in (tmp_path / "nasa_rover" / "system.rcl").read_text(encoding="utf-8")
+    assert requirement("R1_kept", Limits(0.3), faulty).verdict is Verdict.UNKNOWN
+
+
+def test_the_counterexample_meets_every_contract_but_the_repaired_clause() -> None:
+    """A whole run: every clause is evaluated exactly at every step; only Interface.in_time is ever broken."""
+    steps = run(MISSION, published, 60)
+    assert steps[-1]["Hardware"]["charge"] == 0
+    assert steps[-1]["Hardware"]["position"] != CHARGER
+    assert len(steps) == 34
+    assert broken_clauses(steps) == {"Interface.in_time"}
+
+
+def test_on_the_same_mission_the_repaired_rover_gets_home() -> None:
+    steps = run(MISSION, rover().interface, 300)
+    assert len(steps) == 300
+    assert min(s["Hardware"]["charge"] for s in steps) > 0
+    assert steps[-1]["GRA"]["done"] == len(MISSION)
+    assert steps[-1]["Hardware"]["position"] == CHARGER
+    assert broken_clauses(steps[:40]) == set()
+
+
+def broken_clauses(steps: list[dict[str, dict[str, object]]]) -> set[str]:
+    away = FunctionValue(dict(AWAY), max(AWAY.values()) + 2)
+    way = FunctionValue(dict(WAYS), max(WAYS.values()) + 2)
+    given = {"free": FREE_TABLE, "step": STEP_TABLE, "away": away, "way": way}
+    judges = [
+        (node, clause.name, compile_term(clause.formula)) for node in system().contract.nodes for clause in node.clauses
+    ]
+    found: set[str] = set()
+    for step in steps:
+        for node, name, holds in judges:
+            values = given | {port: as_value(value) for port, value in step[node.name].items()}
+            valuation = {f"in.{p.name}": values[p.name] for p in node.inputs}
+            valuation |= {f"out.{p.name}": values[p.name] for p in node.outputs}
+            if not holds(valuation):
+                found.add(f"{node.name}.{name}")
+    return found
+
+
+@pytest.mark.parametrize(("margin", "safe"), [("repaired", True), ("published", False)])
+def test_every_walk_on_the_grid(margin: str, safe: bool) -> None:
+    """Explicit search over places and charges, whatever destination is chosen, at the greatest use that is allowed."""
+    waiting = deque([(CHARGER, Fraction(1))])
+    seen = set(waiting)
+    dry = False
+    while waiting:
+        place, charge = waiting.popleft()
+        battery, length = charge * Fraction(95, 100), AWAY[place, CHARGER]
+        if margin == "repaired":
+            recharge = battery <= (length + 2) * USE
+        else:
+            recharge = battery * Fraction(95, 100) <= length * USE
+        if place == CHARGER and battery < Fraction(95, 100):
+            recharge = True
+        following = [b for a, b in STEPS if a == place]
+        if recharge:
+            following = [b for b in following if AWAY[b, CHARGER] == length - 1] or [place]
+        else:
+            following.append(place)
+        for cell in following:
+            left = Fraction(1) if cell == CHARGER else charge - USE
+            dry = dry or left <= 0
+            if left > 0 and (cell, left) not in seen:
+                seen.add((cell, left))
+                waiting.append((cell, left))
+    assert dry is not safe
+    assert len(seen) > 100
+
+
+# -- the map -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_tables_are_what_breadth_first_search_finds() -> None:
+    assert set(STEPS) == {(a, b) for a in FREE for b in FREE if abs(a % 4 - b % 4) + abs(a // 4 - b // 4) == 1}
+    for goal in FREE:
+        found = {goal: 0}
+        waiting = deque([goal])
+        while waiting:
+            cell = waiting.popleft()
+            for a, b in STEPS:
+                if b == cell and a not in found:
+                    found[a] = found[cell] + 1
+                    waiting.append(a)
+        assert {a: AWAY[a, goal] for a in FREE} == found
+
+
+def test_the_environment_assumptions_hold_of_the_grid() -> None:
+    for a in FREE:
+        for g in FREE:
+            way = [WAYS[a, g, k] for k in range(AWAY[a, g] + 1)]
+            assert way[0] == a
+            assert way[-1] == g
+            assert all(pair in STEPS for pair in itertools.pairwise(way))
+            assert [AWAY[cell, g] for cell in way] == list(range(AWAY[a, g], -1, -1))
+    assert all(AWAY[b, g] <= AWAY[a, g] + 1 for a, b in STEPS for g in FREE)
