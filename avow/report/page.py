@@ -61,6 +61,7 @@ def environment() -> Environment:
         "derivation": _derivation,
         "draw_map": draw_map,
         "in_lines": wording.in_lines,
+        "math": _math,
         "count": wording.count,
         "mutation": wording.mutation,
         "details_text": wording.details_text,
@@ -115,7 +116,7 @@ def render_page(case: Case) -> str:
     )
 
 
-_SUBSCRIPT = re.compile(r"([𝒜𝒢io])_([A-Za-z0-9_]+)")
+_SUBSCRIPT = re.compile(r"(?<!\w)([𝒜𝒢io])_([A-Za-z0-9_]+)")
 _RULE = re.compile(r"^[─—-]{5,}$")
 
 
@@ -134,9 +135,24 @@ def _derivation(text: str, title: str) -> Markup:
         prose = line.lstrip().startswith("provided")
         kind = ("said" if prose else "line") + (" under" if below else "")
         below = False
-        shown = shown if prose else _SUBSCRIPT.sub(r"\1<sub>\2</sub>", shown)
+        shown = shown if prose else _subscripts(shown)
         rows.append(f'<div class="{kind}">{shown}{note}</div>')
     return Markup("\n".join(rows))  # escaped line by line above
+
+
+def _subscripts(escaped: str) -> str:
+    """``𝒢_agent`` with a subscript; the streams i and o with the paper's line above."""
+
+    def typeset(found: re.Match[str]) -> str:
+        symbol, node = found.groups()
+        written = f"{symbol}<sub>{node}</sub>"
+        return f'<span class="stream">{written}</span>' if symbol in "io" else written
+
+    return _SUBSCRIPT.sub(typeset, escaped)
+
+
+def _math(text: str) -> Markup:
+    return Markup(_subscripts(str(escape(text))))  # escaped first
 
 
 def _ticks(text: str) -> Markup:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
@@ -270,3 +271,34 @@ def test_breaking_a_formula_changes_nothing_but_blanks(seed: int) -> None:
     pieces = ["∀ x ∈ ℝ · ", "(", ")", " ∧ ", " ∨ ", " → ", "in.at(x, y)", "¬", "{red, orange}", "· ", '"a → b"', "]"]
     text = "".join(rng.choice(pieces) for _ in range(rng.randrange(1, 80)))
     assert wording.in_lines(text).split() == text.split()
+
+
+def test_a_derivation_is_set_as_in_the_paper_and_stays_text() -> None:
+    from avow.report.page import _derivation
+
+    above = "R3 (D1)\n∀ i_a, o_a · 𝒜_a(i_a) ⇒ ◇𝒢_a(o_a)    [<b>up to</b> x]\n"
+    text = above + "──────────\n⊢ <script>\n  provided that o_a persists"
+    shown = str(_derivation(text, "R3 (D1)"))
+    assert "R3 (D1)" not in shown
+    assert '<span class="stream">i<sub>a</sub></span>' in shown
+    assert "𝒢<sub>a</sub>" in shown
+    assert "&lt;b&gt;up to" in shown
+    assert '<div class="line under">⊢ &lt;script&gt;</div>' in shown
+    assert "provided that o_a persists" in shown
+
+
+def test_gates_that_ask_nothing_do_not_look_passed() -> None:
+    found = rover_case()
+    idle = replace(found, gates=tuple(replace(gate, idle=True, passed=True) for gate in found.gates))
+    text = render_page(idle)
+    assert text.count('<li class="idle">') == len(found.gates)
+    assert '<li class="pass">' not in text
+
+
+def test_the_plans_reason_comes_first() -> None:
+    found = rover_case()
+    item = next(i for i in found.open_items if not i.advice)
+    told = replace(found, open_items=(replace(item, reason="because of <the> wind", title="It flies"),))
+    text = render_page(told)
+    assert "<b>because of &lt;the&gt; wind</b>" in text
+    assert "<p>It flies</p>" in text
