@@ -27,7 +27,8 @@ Given = Mapping[Variable, Value]
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Limits on the whole analysis of a node: milliseconds for one question, and the solver's seed."""
+    """Limits on the analysis of a node: milliseconds for one question whose answer makes a contract good or bad (a
+    third of it for warnings and notes), and the solver's seed."""
 
     milliseconds: int = 5_000
     seed: int = 0
@@ -165,6 +166,8 @@ class _Analysis:
     def __init__(self, node: Node, scenario: Given, bounds: Bounds) -> None:
         self.node = node
         self.scenario = scenario
+        # What is merely worth knowing is not worth waiting for.
+        self.limits = {True: bounds, False: replace(bounds, milliseconds=max(1, bounds.milliseconds // 3))}
         self.bounds = bounds
         self.inputs = tuple(port.variable for port in node.inputs)
         self.outputs = tuple(port.variable for port in node.outputs)
@@ -176,7 +179,12 @@ class _Analysis:
 
     def settle(self, claim: Claim) -> _Finding:
         if claim.name not in self.known:
-            self.known[claim.name] = self._settle(claim)
+            asked = self.bounds
+            self.bounds = self.limits[claim.severity is Severity.ERROR]
+            try:
+                self.known[claim.name] = self._settle(claim)
+            finally:
+                self.bounds = asked
         return self.known[claim.name]
 
     def _settle(self, claim: Claim) -> _Finding:
