@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.assurance.model import Case
-from avow.files import write
+from avow.files import digest, write
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +64,9 @@ def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
         return f"index.html#{wording.anchor(element.claim)}" if element.claim else None
 
     rows = trace(case)
-    yield "report.json", exchange.render_json(case)
-    yield "index.html", page.render_page(case)
+    as_json = exchange.render_json(case)
+    yield "report.json", as_json
+    yield "index.html", page.render_page(case, digest(as_json))
     yield "report.md", markdown.render_markdown(case)
     yield "report.sarif", exchange.render_sarif(case)
     yield "findings.sarif", exchange.render_sarif(case, findings_only=True)

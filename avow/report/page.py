@@ -75,8 +75,9 @@ def environment() -> Environment:
     return found
 
 
-def render_page(case: Case) -> str:
-    """The whole page. Deterministic: same case, same bytes."""
+def render_page(case: Case, json_digest: str = "") -> str:
+    """The whole page. Deterministic: same case, same bytes. `json_digest` is of the report.json that stands beside it:
+    with it no part of that file can be edited unseen, not even what no other format shows."""
     argument = build_argument(case)
     known, single = {view.id for view in case.obligations}, set(case.single_method)
     matrix = _matrix(case)
@@ -110,6 +111,7 @@ def render_page(case: Case) -> str:
             levels=techniques() if case.policy.name.startswith("sil") else (),
             full=_in_full(views),
             brief=_brief,
+            json_digest=json_digest,
             kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in views)],
             open_at_once=_OPEN_AT_ONCE,
         )

@@ -127,3 +127,12 @@ def test_a_report_without_a_ledger_or_without_json_does_not_agree(place: Path) -
 def test_changed_sources_are_told(place: Path) -> None:
     told = check(place / "report", Ledger(place / "rover.jsonl"), place)
     assert any("contracts/rover/plan.yaml" in line for line in told)
+
+
+def test_a_fact_that_no_other_format_shows_cannot_be_edited_either(place: Path) -> None:
+    """A node's guarantees stand in report.json alone; the page holds the digest of that file."""
+    path = place / "report/report.json"
+    text = path.read_text()
+    path.write_text(text.replace('["low", "TRUE"]', '["low", "FALSE"]', 1))
+    assert path.read_text() != text
+    assert any("index.html" in line for line in found(place))
