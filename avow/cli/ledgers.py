@@ -66,15 +66,25 @@ def read_case(path: Path) -> Case:
     except OSError as error:
         raise Rejected(Diagnostic("REPORT001", f"{file} cannot be read: {error.strerror}")) from None
     except (ValueError, RecursionError, Unreadable) as error:
-        raise Rejected(Diagnostic("REPORT002", f"{file} is no report of this version of Avow: {error}")) from None
+        message = f"{file} is no report of this version of Avow: {error}"
+        raise Rejected(Diagnostic("REPORT002", message, hint="`doit report` renders it again")) from None
 
 
 def reported_cases(place: Workspace) -> tuple[Case, ...]:
-    """Every report that stands in the workspace. Raises Rejected where there is none."""
+    """Every report in the workspace that can be read. Raises Rejected where there is none."""
     files = sorted(place.reports.glob("*/report.json")) if place.reports.is_dir() else []
     if not files:
         raise Rejected(Diagnostic("REPORT001", f"no report under {place.reports}", hint="run `avow verify` first"))
-    return tuple(read_case(file) for file in files)
+    found: list[Case] = []
+    faults: list[Diagnostic] = []
+    for file in files:
+        try:
+            found.append(read_case(file))
+        except Rejected as rejected:  # of an older version: no reason not to speak of the others
+            faults += rejected.diagnostics
+    if not found:
+        raise Rejected(*faults)
+    return tuple(found)
 
 
 def find_claim(cases: Sequence[Case], wanted: str) -> tuple[tuple[Case, ObligationView], ...]:
