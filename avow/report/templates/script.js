@@ -98,7 +98,7 @@
   // Paper has no folds.
   let folded = [];
   addEventListener("beforeprint", () => {
-    folded = all("details:not([open])").filter((d) => !d.parentElement.closest(".ob"));  // logs stay on the screen
+    folded = all("details:not([open])").filter((d) => !d.parentElement.closest(".ob") && !d.querySelector(".tree"));  // logs stay on the screen
     if (folded.length < 3000) folded.forEach((d) => { d.open = true; });
   });
   addEventListener("afterprint", () => { folded.forEach((d) => { d.open = false; }); folded = []; });
