@@ -4,9 +4,9 @@
 
 A chain of 20 nodes, and synthetic systems (chains, fans and joins: node k reads the outputs of k - 1 and of k // 2)
 are composed as `avow compose` does it: graph, derivation, obligations, every side condition with the hypotheses that
-carry it. The naive question says only whether *all* assumptions follow, from all contracts at once: neither which fails, nor
-what carries which, and it would accept a circle. CPU seconds of this process; imports, the reading of the contract and
-Z3's own start are not counted. Memory is the process' peak, everything included.
+carry it. The naive question says only whether *all* assumptions follow, from all contracts at once: neither which
+fails, nor what carries which, and it would accept a circle. CPU seconds of this process; imports, the reading of the
+contract and Z3's own start are not counted. Memory is the process' peak, everything included.
 """
 
 from __future__ import annotations

@@ -169,11 +169,14 @@ def test_a_chain_of_twenty_is_quick(tmp_path: Path) -> None:
             f"n{k}", f"x{k - 1} : INTEGER", f"x{k} : INTEGER", f"A: in.x{k - 1} >= 0", f"G: out.x{k} >= in.x{k - 1}"
         )
     system = make(tmp_path, text_)
-    start = time.process_time()
-    obligations = composition_obligations(system)
-    found = discharge(system, obligations, Limits())
-    assert all(outcome.verdict is Verdict.PROVED for outcome in found)
-    assert time.process_time() - start < 2.5
+    taken = []
+    for _ in range(4):  # the first round starts Z3; a busy machine makes CPU time dearer, too
+        start = time.process_time()
+        obligations = composition_obligations(system)
+        found = discharge(system, obligations, Limits())
+        assert all(outcome.verdict is Verdict.PROVED for outcome in found)
+        taken.append(time.process_time() - start)
+    assert min(taken) < 0.5, taken
 
 
 @pytest.mark.slow
