@@ -15,13 +15,20 @@ from avow.workspace import Workspace
 RESULT = Result("crane", 0, {"proved": 3}, "CHECKED", "reports/crane/index.html", (("all", True, "fine"),))
 
 
+def run(workspace: Workspace) -> None:
+    """As a whole run does: look first, and note at the end that everything is settled."""
+    assert shortcut.nothing_to_do(workspace, ("verify",)) is None
+    shortcut.keep(workspace, [RESULT])
+
+
 @pytest.fixture
 def settled(tmp_path: Path) -> Workspace:
     workspace = Workspace(tmp_path)
     for name in ("contracts/crane/plan.yaml", "artifacts/ledger/crane.jsonl", "reports/index.html"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("text")
-    shortcut.keep(workspace, [RESULT])
+    run(workspace)
+    assert shortcut.nothing_to_do(workspace, ("verify",)) == (RESULT,)
     return workspace
 
 
@@ -54,13 +61,22 @@ def test_new_and_deleted_files_are_seen(settled: Workspace) -> None:
     assert shortcut.nothing_to_do(settled, ("verify",)) is None
 
 
+def test_what_was_edited_during_the_run_is_not_settled(settled: Workspace) -> None:
+    plan = settled.contracts / "crane" / "plan.yaml"
+    plan.write_text("changed before")
+    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    plan.write_text("changed under way")
+    shortcut.keep(settled, [RESULT])
+    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+
+
 def test_a_tool_that_appears_on_the_path_is_seen(
     tmp_path: Path, settled: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tools = tmp_path.parent / f"{tmp_path.name}-tools"
     tools.mkdir()
     monkeypatch.setenv("PATH", f"{tools}:{os.environ['PATH']}")
-    shortcut.keep(settled, [RESULT])
+    run(settled)
     assert shortcut.nothing_to_do(settled, ("verify",)) == (RESULT,)
     (tools / "dafny").write_text("#!/bin/sh\n")
     assert shortcut.nothing_to_do(settled, ("verify",)) is None
@@ -70,7 +86,7 @@ def test_a_link_that_leads_elsewhere_is_never_short(tmp_path: Path, settled: Wor
     elsewhere = tmp_path.parent / f"{tmp_path.name}-elsewhere"
     elsewhere.mkdir()
     (settled.contracts / "crane" / "models").symlink_to(elsewhere)
-    shortcut.keep(settled, [RESULT])
+    run(settled)
     assert shortcut.nothing_to_do(settled, ("verify",)) is None
 
 

@@ -136,6 +136,7 @@ def test_the_loop_the_paper_does_not_mention_has_a_first_element() -> None:
 # -- the published R1.4 ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_with_the_published_margin_the_battery_is_not_proved(tmp_path: Path) -> None:
     for file in FOLDER.rglob("*"):
         target = tmp_path / "nasa_rover" / file.relative_to(FOLDER)
