@@ -274,7 +274,7 @@ def _requirements(composition: Composition) -> Iterator[Task]:
                 sha256(
                     "\n".join(
                         [
-                            "requirement",
+                            "requirement, with the assumptions behind it",
                             question.digest,
                             composition.meanings.all(everything),
                             scenario.digest if scenario and requirement.temporal else "",

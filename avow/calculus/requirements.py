@@ -59,7 +59,7 @@ class FormulaQuestion:
                 continue
             last = self.ask(contracts(frame, clauses) | frame.environment(), goal, bounds)
             if last.verdict is Verdict.PROVED:
-                return self.proved(composition, (last,), clauses, Phase.SAME_STEP)
+                return self.proved(composition, (last,), Phase.SAME_STEP, bounds)
         assert last is not None
         if not any(edge.delayed for edge in frame.graph.edges):
             return self.repaired(frame, goal, self.not_proved(last, genuine=True))
@@ -95,15 +95,13 @@ class FormulaQuestion:
         ):  # mostly it keeps itself, and the contracts of a step less make it quick
             later = self.ask(now | earlier, goal, bounds)
             if later.verdict is Verdict.PROVED:
-                return self.proved(composition, (first, later), everything, Phase.LATER)
+                return self.proved(composition, (first, later), Phase.LATER, bounds)
         return self.not_proved(later, genuine=False, when="at a later step (perhaps never reached)")
 
     def ask(self, hypotheses: Mapping[str, Term], goal: Term, bounds: Bounds) -> Entailment:
         return implied(hypotheses, goal, timeout_ms=bounds.milliseconds, seed=bounds.seed)
 
-    def proved(
-        self, composition: Composition, answers: tuple[Entailment, ...], clauses: tuple[str, ...], phase: Phase
-    ) -> Answer:
+    def proved(self, composition: Composition, answers: tuple[Entailment, ...], phase: Phase, bounds: Bounds) -> Answer:
         needed = tuple(dict.fromkeys(label for answer in answers for label in answer.needed))
         beyond = [n for n in _guarantees(composition.frame, needed) if n not in self.support and self.support]
         how = "at the first step, and from one step to the next" if phase is Phase.LATER else "at every step"
@@ -113,7 +111,7 @@ class FormulaQuestion:
         return Answer(
             Verdict.PROVED,
             summary,
-            hypotheses=rests_on(composition, needed),
+            hypotheses=rests_on(composition, needed, bounds),
             details={"needed": list(needed), "phase": phase.value},
             vacuous=any(answer.vacuous for answer in answers),
         )
@@ -150,7 +148,13 @@ class TemporalQuestion:
             machine = composition.machine(bounds.seed)
         except CannotRun:
             machine = None  # the judge meets the same obstacle, and says what it means for the property
-        return judge(composition.frame, self.name, self.formula, bounds, machine)
+        answer = judge(composition.frame, self.name, self.formula, bounds, machine)
+        if not answer.verdict.supports:
+            return answer
+        # every node was taken at its word, which it keeps only where its assumptions are met
+        nodes = composition.frame.system.contract.nodes
+        behind = rests_on(composition, tuple(f"{n.name}.{g.name}" for n in nodes for g in n.guarantees), bounds)
+        return replace(answer, hypotheses=tuple(dict.fromkeys((*answer.hypotheses, *behind))))
 
 
 def requirement_question(frame: Frame, requirement: Requirement) -> FormulaQuestion | TemporalQuestion | None:
@@ -177,23 +181,36 @@ def system_term(frame: Frame, formula: Term, earlier: int = 0) -> Term:
     return substitute(formula, mapping)
 
 
-def rests_on(composition: Composition, labels: tuple[str, ...]) -> tuple[str, ...]:
-    """The claims behind the labels of a proof: guarantees, discharged assumptions, environment assumptions."""
-    frame = composition.frame
-    discharged = {str(c.about): f"{composition.whole.name}.{c.about}" for c in composition.whole.conditions}
+def rests_on(composition: Composition, labels: tuple[str, ...], bounds: Bounds) -> tuple[str, ...]:
+    """The claims behind the labels of a proof: guarantees, discharged assumptions, environment assumptions.
+
+    A guarantee holds only where its node's assumptions do. What these were proved from are guarantees of other nodes,
+    which hold only where *their* assumptions do, and so on: all of it stands behind the proof.
+    """
+    frame, whole = composition.frame, composition.whole
+    settled = {str(about.about): answer for about, answer in composition.settled(whole, bounds).settled.items()}
+    discharged = {str(condition.about) for condition in whole.conditions}
     found: dict[str, None] = {}
-    for label in labels:
-        name = label.removesuffix(" one step before")
+    seen: set[str] = set()
+    todo = list(reversed(labels))
+    while todo:
+        name = todo.pop().removesuffix(" one step before")
+        if name in seen:
+            continue
+        seen.add(name)
+        found |= dict.fromkeys(environment_claims((name,)))
         node, dot, clause = name.partition(".")
         if not dot or " " in node or node not in frame.graph.nodes:
             continue
         if frame.node(node).clause(clause).kind is ClauseKind.GUARANTEE:
             found[f"{node}/{Kind.GUARANTEE}/{clause}"] = None
-        elif name in discharged:
-            found[f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/{discharged[name]}"] = None
-        else:
-            found[f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/environment.{name}"] = None
-    return (*found, *environment_claims(labels))
+            todo += [f"{node}.{assumption.name}" for assumption in reversed(frame.node(node).assumptions)]
+            continue
+        goal = whole.name if name in discharged else "environment"
+        found[f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/{goal}.{name}"] = None
+        if name in settled:
+            todo += reversed(settled[name].needed)
+    return tuple(found)
 
 
 def _guarantees(frame: Frame, labels: tuple[str, ...]) -> list[str]:
