@@ -39,6 +39,7 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+from avow.logic.clock import watchdog
 from avow.logic.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.logic.normal import push_negations
 from avow.logic.smt import entails, solve
@@ -72,7 +73,7 @@ def remedy(
     exact: Term = Quantified(Quantifier.FORALL, tuple(renamed.values()), body) if renamed else body
     try:
         raw = _eliminate(exact, timeout_ms)
-    except (Unsupported, z3.Z3Exception):
+    except (Unsupported, z3.Z3Exception, RecursionError):  # what is too deep to be read back is no use to anyone
         return None
     if raw is None:
         return None
@@ -106,7 +107,8 @@ def _eliminate(formula: Term, timeout_ms: int) -> Term | None:
         z3.Tactic("ctx-simplify", ctx=translator.context),
         ctx=translator.context,
     )
-    result = z3.TryFor(chain, timeout_ms)(goal)
+    with watchdog(timeout_ms, translator.context.interrupt):  # Z3's own limit is sometimes missed
+        result = z3.TryFor(chain, timeout_ms)(goal)
     free = {v.qualified: v for v in free_variables(formula)}
     reader = _Reader(translator, free)
     options = [conjunction(reader.formula(expr) for expr in subgoal) for subgoal in result]

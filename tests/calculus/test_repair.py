@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import pytest
@@ -97,3 +98,48 @@ def test_a_requirement(tmp_path: Path) -> None:
     kinds = {str(offer["kind"]): offer for offer in offered(outcome)}
     assert kinds["environment"]["clause"] == "assume ( in.r >= 1 )"
     assert kinds["guarantee"]["of"] == "a"
+
+
+def test_deep_formulas_do_no_harm(tmp_path: Path) -> None:
+    deep = "in.x == 0"
+    for k in range(1, 35):
+        deep = f"(in.x == {k} or not ({deep}))"
+    text = node("a", "", "x : INTEGER", "G: out.x > 50") + node("b", "x : INTEGER", "", f"A: {deep} and in.x < 90")
+    assert outcomes(make(tmp_path, text))["whole.b.A1"].verdict in (Verdict.REFUTED, Verdict.UNKNOWN)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_whatever_is_offered_does_it(tmp_path: Path, seed: int) -> None:
+    """Random diamonds of linear contracts: each offer, taken up, makes the refuted side condition hold."""
+    rng = random.Random(seed)
+
+    def bound(term: str) -> str:
+        return f"{term} {rng.choice(['<', '<=', '>', '>=', '!='])} {rng.randint(-3, 3)}"
+
+    def system(extra: dict[str, str]) -> str:
+        def one(name: str, inputs: str, outputs: str, *clauses: str) -> str:
+            return node(name, inputs, outputs, *clauses).rstrip().removesuffix("}") + extra.get(name, "") + "\n}\n"
+
+        return (
+            one("a", "e : INTEGER", "x : INTEGER", f"G: {relation} and {limits[0]}")
+            + one(
+                "b", "x : INTEGER, f : INTEGER", "y : INTEGER", f"A: {limits[1]}", f"G: out.y == in.x + {shift} * in.f"
+            )
+            + one("c", "x : INTEGER, y : INTEGER", "", f"A: {limits[2]}")
+        )
+
+    relation = rng.choice(["out.x >= in.e", "out.x == in.e", "out.x <= in.e + 1"])
+    limits = bound("out.x"), bound("in.x"), bound("in.x + in.y")
+    shift = rng.randint(-1, 1)
+    found = outcomes(make(tmp_path / "first", system({})))
+    assert seed not in (4, 9) or any(map(offered, found.values())), "this test asks something"
+    for name, outcome in found.items():
+        for number, offer in enumerate(offered(outcome)):
+            clause = str(offer["clause"])
+            if offer["kind"] == "guarantee":
+                again = make(tmp_path / f"{name}{number}", system({str(offer["of"]): f"  {clause}"}))
+            else:
+                assume = clause.removeprefix("assume ")
+                plan = f'environment: {{{offer["of"]}: {{assume: "{assume}", because: offered}}}}'
+                again = make(tmp_path / f"{name}{number}", system({}), plan)
+            assert outcomes(again)[name].verdict is Verdict.PROVED, (name, offer, system({}))
