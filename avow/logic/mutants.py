@@ -100,7 +100,10 @@ def _here(term: Term) -> Iterator[tuple[str, Term]]:
         case Or(items=items) if len(items) > 1:
             for place in range(len(items)):
                 rest = (*items[:place], *items[place + 1 :])
-                yield f"part {place + 1} of a disjunction is dropped", rest[0] if len(rest) == 1 else Or(rest, term.span)
+                yield (
+                    f"part {place + 1} of a disjunction is dropped",
+                    rest[0] if len(rest) == 1 else Or(rest, term.span),
+                )
         case Not(body=body):
             yield "a negation is dropped", body
         case _:
