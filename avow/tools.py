@@ -25,7 +25,7 @@ def find_tool(
     pattern: str = r"\d+(\.\d+)+",
     optional: bool = True,
 ) -> Tool:
-    """The program `name` on the PATH, with the version that it says it is ("unknown" where it says none). Never raises."""
+    """The program `name` on the PATH, with its version ("unknown" where it says none). Never raises."""
     path = shutil.which(name)
     if path is None:
         return Tool(name, None, None, install, optional)
