@@ -84,7 +84,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         self.runtime_errors.append(msg)
 
     def complete_run(self) -> None:
-        from avow.pipeline.summary import print_obligations, print_summary
+        from avow.pipeline.summary import append_job_summary, print_obligations, print_summary
 
         process.kill_all()  # nothing of ours may outlive the run, also when it was interrupted
         with self._lock:
@@ -97,6 +97,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             - {g.system for g in finished()}
         )
         print_summary(finished(), broken, self._done, time.monotonic() - self._start, self.outstream)
+        append_job_summary(finished(), broken)
         if sys.exc_info()[0] is None and not self._seen.issuperset(self._selected):
             self.runtime_errors.append("not all of it was run: is the number after -n below 0?")
         for message in self.runtime_errors:

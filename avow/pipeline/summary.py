@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
@@ -44,6 +45,38 @@ def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, s
         index = str(Path(results[0].report).parent.parent / "index.html")
         console.print(f"{index if len(results) > 1 else results[0].report}   ", markup=False, end="")
     console.print(f"({done} stages run, {seconds:.1f} s)" if done else f"(nothing to do, {seconds:.1f} s)")
+
+
+def append_job_summary(results: Sequence[Result], broken: Sequence[str]) -> None:
+    """The same as Markdown at the end of the file that GITHUB_STEP_SUMMARY names, as CI services show it."""
+    path = os.environ.get("GITHUB_STEP_SUMMARY")
+    if path and (results or broken):
+        with Path(path).open("a", encoding="utf-8") as file:
+            file.write(job_summary(results, broken))
+
+
+def job_summary(results: Sequence[Result], broken: Sequence[str]) -> str:
+    """A table over all systems, and what fails, in GitHub's Markdown."""
+    shown = [word for word in (*GOOD, *BAD) if any(r.counts.get(word) for r in results)]
+    lines = [
+        "## Assurance",
+        "",
+        f"| system | {' | '.join([*shown, 'verdict'])} |",
+        "|---|" + "--:|" * len(shown) + "---|",
+    ]
+    for r in sorted(results, key=lambda r: r.system):
+        verdict = "✅ every gate passes" if r.exit_code == 0 else "❌ a gate fails"
+        lines.append(f"| {r.system} | {' | '.join([*(str(r.counts.get(w, '')) for w in shown), verdict])} |")
+    lines += [f"| {name} | {'| ' * len(shown)}❌ not read |" for name in broken]
+    failing = [(r.system, title, reason) for r in results for title, passed, reason in r.gates if not passed]
+    lines += ["", *(f"- **{_inline(system)}**: {_inline(title)}: {_inline(why)}" for system, title, why in failing)]
+    return "\n".join(lines) + "\n"
+
+
+def _inline(text: str) -> str:
+    """Text as it stands, on one line, without meaning to Markdown or HTML."""
+    escaped = "".join(f"\\{c}" if c in "\\`*_[]<>|#" else c for c in " ".join(text.split()))
+    return escaped.replace("&", "&amp;")
 
 
 def print_obligations(selected: Sequence[str], out: IO[str]) -> None:
