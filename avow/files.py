@@ -19,6 +19,14 @@ def digest_file(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def is_intact(path: Path, sha: str) -> bool:
+    """Whether the file is there and has this SHA-256."""
+    try:
+        return digest_file(path) == sha
+    except OSError:
+        return False
+
+
 def write(path: Path, content: str | bytes) -> bool:
     """Put `content` in place of the file in one step; says whether that changed anything."""
     data = content.encode() if isinstance(content, str) else content

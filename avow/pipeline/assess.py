@@ -16,7 +16,7 @@ from doit.exceptions import TaskError
 from avow import __version__
 from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
 from avow.diagnostics import Rejected
-from avow.files import digest, digest_file, write
+from avow.files import digest, digest_file, is_intact, write
 from avow.pipeline import check as checking
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.results import Result, finished, note, read_result
@@ -67,7 +67,8 @@ def render(assessment: Assessment) -> Result:
     """Build the case and write every format, unless what stands in reports/ already says the same."""
     key = _key(assessment)
     known = _read(assessment)
-    if known is not None and known["key"] == key and _is_intact(assessment, known["files"]):
+    root = assessment.workspace.root
+    if known is not None and known["key"] == key and all(is_intact(root / p, sha) for p, sha in known["files"].items()):
         result = read_result(known)
     else:
         from avow.report import render_all
@@ -201,10 +202,3 @@ def _read(assessment: Assessment) -> dict[str, Any] | None:
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return data if isinstance(data, dict) and isinstance(data.get("files"), dict) else None
-
-
-def _is_intact(assessment: Assessment, files: dict[str, str]) -> bool:
-    try:
-        return all(digest_file(assessment.workspace.root / name) == sha for name, sha in files.items())
-    except OSError:
-        return False

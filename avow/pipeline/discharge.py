@@ -12,11 +12,11 @@ from avow.backend import Report
 from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import Evidence
-from avow.files import digest, digest_file, write
+from avow.files import digest, digest_file, is_intact, write
 from avow.pipeline import worker
 from avow.pipeline.export import folder
 from avow.pipeline.run_info import Run
-from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job
+from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
 from avow.verdict import Link, Outcome, Verdict
 from avow.workspace import Workspace
 
@@ -43,14 +43,7 @@ def _is_settled(workspace: Workspace, ledger: Ledger, work: Work, obligation: Ob
     last = records[-1]
     if last.details.get(RETRY) and last.run != run.id:
         return False
-    return all(_is_intact(workspace.root / path, sha) for path, sha in last.outputs.items())
-
-
-def _is_intact(path: Path, sha: str) -> bool:
-    try:
-        return digest_file(path) == sha
-    except OSError:
-        return False
+    return all(is_intact(workspace.root / path, sha) for path, sha in last.outputs.items())
 
 
 def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]:
@@ -109,7 +102,7 @@ def _language(obligations: tuple[Obligation, ...]) -> Report:
 def _promise(work: Work) -> tuple[Verdict, Link]:
     if work.is_engine:
         return Verdict.PROVED, Link.GENERATED
-    method = next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
+    method = planned_method(work)
     tool = method_backend(work.system, method)
     return tool.strength, tool.link
 
@@ -119,7 +112,7 @@ def _inputs(workspace: Workspace, work: Work) -> dict[str, str]:
     if work.is_engine:
         return {}
     system = work.system
-    method = next(m for m in system.plan.node(work.node).methods if m.id == work.method)
+    method = planned_method(work)
     files = method_backend(system, method).files(method_job(system, system.contract.node(work.node), method))
     return {workspace.relative(path): digest_file(path) for path in files if path.is_file()}
 

@@ -7,8 +7,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from avow.diagnostics import Diagnostic, Rejected
-from avow.files import digest, digest_file, write
-from avow.pipeline.work import Work, method_backend, method_job
+from avow.files import digest, is_intact, write
+from avow.pipeline.work import Work, method_backend, method_job, planned_method
 from avow.workspace import Workspace
 
 STAMP = ".export.json"
@@ -24,10 +24,7 @@ def is_current(workspace: Workspace, work: Work, key: str) -> bool:
     stamp = read_stamp(place)
     if stamp is None or stamp.get("key") != key:
         return False
-    try:
-        return all(digest_file(place / name) == sha for name, sha in stamp["files"].items())
-    except OSError:
-        return False
+    return all(is_intact(place / name, sha) for name, sha in stamp["files"].items())
 
 
 def key(work: Work, contract: str) -> str:
@@ -37,7 +34,7 @@ def key(work: Work, contract: str) -> str:
 
 def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:
     """Write what the backend generates and remove what it generated before and no more; the files' names."""
-    method = next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
+    method = planned_method(work)
     files = method_backend(work.system, method).export(
         method_job(work.system, work.system.contract.node(work.node), method)
     )

@@ -21,7 +21,7 @@ from avow.pipeline import worker
 from avow.pipeline.altered import Altered, chosen
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.run_info import Run
-from avow.pipeline.work import Work, method_backend
+from avow.pipeline.work import Work, method_backend, planned_method
 from avow.verdict import Link
 from avow.workspace import Workspace
 
@@ -57,7 +57,7 @@ def hunt(workspace: Workspace, works: tuple[Work, ...], run: Run, limit: int, jo
 def _reads_formulas(work: Work) -> bool:
     if work.is_engine:
         return False
-    method = next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
+    method = planned_method(work)
     return method_backend(work.system, method).link is not Link.GUIDED
 
 

@@ -60,11 +60,6 @@ def keep(workspace: Workspace, results: Sequence[Result]) -> None:
         return
 
 
-def drop(workspace: Workspace) -> None:
-    """A run begins, or some of it failed."""
-    _stamp(workspace).unlink(missing_ok=True)
-
-
 def _stamp(workspace: Workspace) -> Path:
     return workspace.artifacts / ".settled.json"
 

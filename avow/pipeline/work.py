@@ -152,6 +152,11 @@ def _limits(method: Method, options: Mapping[str, Any]) -> Limits:
     return replace(Limits(), **given)
 
 
+def planned_method(work: Work) -> Method:
+    """The plan's method that a work is of; not for the core's own engines."""
+    return next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
+
+
 def method_backend(system: System, method: Method) -> Backend:
     return backend(method.backend, system.plan.plugins)
 

@@ -21,7 +21,7 @@ from avow.evidence.obligation import Obligation
 from avow.files import write
 from avow.pipeline.altered import Altered, alter
 from avow.pipeline.wire import report_from_json, report_to_json
-from avow.pipeline.work import Work, compose_work, method_backend, method_job, method_work, sanity_work
+from avow.pipeline.work import Work, compose_work, method_backend, method_job, method_work, planned_method, sanity_work
 from avow.system.load import load_system
 from avow.system.plan import System
 from avow.verdict import Outcome, Verdict
@@ -170,7 +170,7 @@ def _execute(request: dict[str, Any], system: System, work: Work) -> Report:
 def _discharge(request: dict[str, Any], system: System, work: Work, limits: Limits) -> Report:
     folder = Path(request["folder"])
     node = system.contract.node(work.node)
-    method = next(m for m in system.plan.node(node.name).methods if m.id == work.method)
+    method = planned_method(work)
     tool = method_backend(system, method)
     if request["altered"]:
         system = alter(system, node, Altered(**request["altered"]))
