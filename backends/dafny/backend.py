@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -159,7 +160,7 @@ def _implementation(job: Job) -> tuple[Path, str]:
     if path is None:
         raise Rejected(Diagnostic("DFY101", f"'{name}' is not a file in the system's folder", place))
     if not path.is_file():
-        hint = "a skeleton is among the exported files"
+        hint = f"for a skeleton to start from: python -m avow.backends.dafny {_shown(job.root)} {job.node.name}"
         raise Rejected(Diagnostic("DFY102", f"there is no file '{name}' in {job.root.name}/", place, hint=hint))
     try:
         data = path.read_bytes()
@@ -168,6 +169,14 @@ def _implementation(job: Job) -> tuple[Path, str]:
         return path, data.decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise Rejected(Diagnostic("DFY102", f"'{name}' cannot be read: {error}", place)) from None
+
+
+def _shown(folder: Path) -> str:
+    """The folder as one would type it here."""
+    try:
+        return shlex.quote(str(folder.resolve().relative_to(Path.cwd())) or ".")
+    except (OSError, ValueError):
+        return shlex.quote(str(folder))
 
 
 def _generate(job: Job) -> Generated:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from avow.backends.hoare.names import Names, assignments, expect, spread, vocabulary
+from avow.backends.hoare.names import UNKNOWN, Names, assignments, expect, spread, vocabulary
 from avow.backends.hoare.parser import parse_expression
 from avow.backends.hoare.program import (
     Assign,
@@ -39,7 +39,7 @@ from avow.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Contract, Node, Port
 from avow.language.printer import show_sort as show
 from avow.language.printer import show_term
-from avow.language.sorts import BOOL, INTEGER, NATURAL, FunctionSort, Sort
+from avow.language.sorts import BOOL, INTEGER, NATURAL, FunctionSort, SequenceSort, Sort, components
 from avow.language.terms import Apply, Role, Term, Variable
 from avow.logic.formula import free_variables, substitute
 
@@ -345,6 +345,9 @@ class _Checker:
                 )
                 raise rejected("HOARE200", f"nothing says which map `{name.name}` is", name.span, hint)
             raise rejected("HOARE300", f"the sort of `{name.name}` is unclear ({show(value.sort)}?)", name.span)
+        if UNKNOWN in components(sort):
+            hint = f"declare it: VAR {name.name} : T; with a type T of the contract"
+            raise rejected("HOARE300", f"nothing says of what the sequence `{name.name}` is", name.span, hint)
         target = variable(name.name, sort)
         if not statement.arguments:
             value = fit(term(statement.value, scope), sort, statement.value.span)
@@ -352,7 +355,8 @@ class _Checker:
                 raise rejected("HOARE300", "only a whole map can be assigned to a map", statement.value.span)
             return Assign(target, value, statement.span)
         if not isinstance(sort, FunctionSort):
-            raise rejected("HOARE300", f"`{name.name}` is {show(sort)}, no map", name.span)
+            hint = "a sequence is assigned as a whole: s := [a, b]" if isinstance(sort, SequenceSort) else None
+            raise rejected("HOARE300", f"`{name.name}` is {show(sort)}, no map", name.span, hint)
         if len(statement.arguments) != len(sort.parameters):
             message = f"`{name.name}` takes {len(sort.parameters)} argument(s), not {len(statement.arguments)}"
             raise rejected("HOARE300", message, statement.span)

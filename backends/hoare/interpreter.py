@@ -13,6 +13,8 @@ from avow.language.terms import Term
 from avow.logic.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.logic.values import Data, FunctionValue, Value
 
+_UNDEFINED = "a division by zero, an element that the sequence does not have, or a negative number for a natural one,"
+
 STEPS = 5_000
 """Statements after which a run is given up."""
 
@@ -104,7 +106,7 @@ class Machine:
     def _compute(self, term: Term, state: State, at: Span) -> Value:
         safe = defined(term)
         if self.value(safe, state) is not True:
-            raise Fault("a division by zero, or a negative number where a natural one is wanted,", at)
+            raise Fault(_UNDEFINED, at)
         return self.value(term, state)
 
     def _stored(self, term: Term, sort: Sort, state: State, at: Span) -> Value:

@@ -15,14 +15,17 @@ from avow.backends.hoare.syntax import (
     Chain,
     Expression,
     IfStatement,
+    Inside,
     MatchStatement,
     Member,
     Name,
     Number,
     Quantification,
+    Sequence,
     Statement,
     Text,
     Truth,
+    Tuple,
     Unary,
     WhileStatement,
 )
@@ -37,13 +40,18 @@ from avow.language.sorts import (
     DataSort,
     EnumSort,
     FunctionSort,
+    OpaqueSort,
+    SequenceSort,
     Sort,
+    TupleSort,
     components,
 )
 from avow.language.terms import EnumValue, Term
 
 _NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
 _ARITHMETIC = frozenset("+-*/")
+UNKNOWN = OpaqueSort("?")
+"""Of what an empty sequence is: whatever its place says. No contract can declare a type of this name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +93,13 @@ def join(one: Sort | None, other: Sort | None) -> Sort | None:
     """The narrowest sort that holds both: numbers widen; anything else stays what it was first."""
     if one is None or other is None:
         return one or other
+    if one == UNKNOWN:
+        return other
+    match one, other:
+        case TupleSort(items=ones), TupleSort(items=others) if len(ones) == len(others):
+            return TupleSort(tuple(join(a, b) or a for a, b in zip(ones, others, strict=True)))
+        case SequenceSort(item=a), SequenceSort(item=b):
+            return SequenceSort(join(a, b) or a)
     if one in _NUMBERS and other in _NUMBERS:
         return _NUMBERS[max(_NUMBERS.index(one), _NUMBERS.index(other))]
     return one
@@ -95,8 +110,18 @@ def estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) ->
     match expression:
         case Number(whole=whole):
             return NATURAL if whole else REAL
-        case Truth() | Member() | Chain() | Quantification():
+        case Truth() | Member() | Inside() | Chain() | Quantification():
             return BOOL
+        case Tuple(items=items):
+            sorts = [estimate(item, names, local) for item in items]
+            return TupleSort(tuple(s for s in sorts if s is not None)) if None not in sorts else None
+        case Sequence(items=items):
+            item: Sort | None = UNKNOWN
+            for each in items:
+                item = join(item, estimate(each, names, local))
+            return SequenceSort(item or UNKNOWN)
+        case Call(function=Name(name="length", prefix=None)) if "length" not in names.sorts:
+            return NATURAL
         case Text():
             return STRING
         case Name(name=name, prefix=None):
@@ -114,6 +139,8 @@ def estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) ->
             if function.prefix is None and function.name in names.vocabulary.constructors:
                 return names.vocabulary.constructors[function.name][0]
             sort = names.sorts.get(function.name) if function.prefix is None else None
+            if isinstance(sort, SequenceSort):
+                return sort.item
             return sort.result if isinstance(sort, FunctionSort) else None
         case Unary(operator="-", operand=operand):
             return join(INTEGER, estimate(operand, names, local))
@@ -136,7 +163,7 @@ def expect(expression: Expression, sort: Sort, names: Names) -> None:
                 parameters = names.vocabulary.constructors[name][1].parameters
                 for argument, parameter in zip(arguments, parameters, strict=False):
                     expect(argument, parameter, names)
-            elif name not in names.sorts:
+            elif name not in names.sorts and name != "length":
                 known = [estimate(argument, names, {}) for argument in arguments]
                 if all(k is not None for k in known):
                     names.sorts[name] = FunctionSort(tuple(k for k in known if k is not None), sort)

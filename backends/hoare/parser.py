@@ -22,15 +22,18 @@ from avow.backends.hoare.syntax import (
     Declaration,
     Expression,
     IfStatement,
+    Inside,
     MatchStatement,
     Member,
     Name,
     Number,
     Quantification,
+    Sequence,
     SkipStatement,
     Source,
     Text,
     Truth,
+    Tuple,
     Unary,
     WhileStatement,
 )
@@ -216,6 +219,15 @@ class _Build(Transformer_NonRecursive):  # type: ignore[misc]
 
     def member(self, meta: Any, items: list[Any]) -> Member:
         return Member(items[0], items[2], items[1].type == "NOT_IN", self._span(meta))
+
+    def inside(self, meta: Any, items: list[Any]) -> Inside:
+        return Inside(items[0], items[2], items[1].type == "NOT_IN", self._span(meta))
+
+    def tuple(self, meta: Any, items: list[Any]) -> Tuple:
+        return Tuple(tuple(items), self._span(meta))
+
+    def sequence(self, meta: Any, items: list[Any]) -> Sequence:
+        return Sequence(items[0] or (), self._span(meta))
 
     def _binary(self, operator: str, meta: Any, items: list[Any]) -> Binary:
         return Binary(operator, items[0], items[-1], self._span(meta))

@@ -91,6 +91,32 @@ class Member:
 
 
 @dataclass(frozen=True, slots=True)
+class Inside:
+    """``e in s`` or ``e !in s``: s is a sequence, or a set that the contract names."""
+
+    item: Expression
+    collection: Expression
+    negated: bool
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Tuple:
+    """``(a, b)``."""
+
+    items: tuple[Expression, ...]
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """``[a, b]`` and ``[]``."""
+
+    items: tuple[Expression, ...]
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Quantification:
     """``forall(x, y in REAL | e)``; in assertions only."""
 
@@ -100,7 +126,9 @@ class Quantification:
     span: Span = field(compare=False, repr=False)
 
 
-Expression = Number | Truth | Text | Name | Call | Unary | Binary | Chain | Member | Quantification
+Expression = (
+    Number | Truth | Text | Name | Call | Unary | Binary | Chain | Member | Inside | Tuple | Sequence | Quantification
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,19 +7,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from avow.backends.hoare.names import Names, join
+from avow.backends.hoare.names import UNKNOWN, Names, join
 from avow.backends.hoare.program import variable
 from avow.backends.hoare.syntax import (
     Binary,
     Call,
     Chain,
     Expression,
+    Inside,
     Member,
     Name,
     Number,
     Quantification,
+    Sequence,
     Text,
     Truth,
+    Tuple,
     Unary,
 )
 from avow.diagnostics import Diagnostic, Rejected, Span
@@ -31,8 +34,11 @@ from avow.language.sorts import (
     REAL,
     STRING,
     FunctionSort,
+    SequenceSort,
     SetSort,
     Sort,
+    TupleSort,
+    components,
 )
 from avow.language.terms import (
     And,
@@ -43,14 +49,18 @@ from avow.language.terms import (
     Iff,
     Implies,
     In,
+    Index,
+    Length,
     Literal,
     Negative,
     Not,
     Or,
     Quantified,
     Quantifier,
+    SequenceTerm,
     SetTerm,
     Term,
+    TupleTerm,
     Variable,
     Widen,
 )
@@ -97,6 +107,14 @@ def term(expression: Expression, scope: Scope) -> Term:
             others = tuple(fit(term(choice, scope), one.sort, choice.span) for choice in choices)
             inside = In(one, SetTerm(others, SetSort(one.sort)), span)
             return Not(inside, span) if negated else inside
+        case Inside(item=item, collection=collection, negated=negated, span=span):
+            among = _inside(term(item, scope), term(collection, scope), span)
+            return Not(among, span) if negated else among
+        case Tuple(items=items, span=span):
+            values = tuple(term(item, scope) for item in items)
+            return TupleTerm(values, TupleSort(tuple(v.sort for v in values)), span)
+        case Sequence(items=items, span=span):
+            return _sequence(tuple(term(item, scope) for item in items), span)
         case Quantification():
             return _quantified(expression, scope)
 
@@ -112,6 +130,11 @@ def fit(given: Term, sort: Sort, span: Span | None) -> Term:
         return given
     if sort == REAL and given.sort in (INTEGER, NATURAL):
         return real(given)
+    match given, sort:  # what is written out widens part by part
+        case TupleTerm(items=items), TupleSort(items=sorts) if len(items) == len(sorts):
+            return TupleTerm(tuple(fit(i, s, i.span or span) for i, s in zip(items, sorts, strict=True)), sort, span)
+        case SequenceTerm(items=items), SequenceSort(item=item):
+            return SequenceTerm(tuple(fit(i, item, i.span or span) for i in items), sort, span)
     raise rejected("HOARE300", f"this is {show(given.sort)}, but {show(sort)} is wanted here", span)
 
 
@@ -126,6 +149,8 @@ def compare(operator: str, left: Term, right: Term, span: Span | None) -> Term:
     """A comparison of terms of one sort, up to widening. Raises Rejected."""
     sort = join(left.sort, right.sort)
     assert sort is not None
+    if UNKNOWN in components(sort):
+        raise rejected("HOARE300", "nothing says of what these sequences are", span)
     left, right = fit(left, sort, left.span or span), fit(right, sort, right.span or span)
     if operator in {"<", "<=", ">", ">="} and sort not in _NUMERIC:
         raise rejected("HOARE300", f"{operator} compares numbers; these are {show(sort)}", span)
@@ -134,6 +159,24 @@ def compare(operator: str, left: Term, right: Term, span: Span | None) -> Term:
     if sort == BOOL:
         return Iff(left, right, span) if operator == "==" else Not(Iff(left, right, span), span)
     return Compare(operator, left, right, span)
+
+
+def _sequence(items: tuple[Term, ...], span: Span | None) -> Term:
+    sort: Sort = UNKNOWN
+    for item in items:
+        sort = join(sort, item.sort) or sort
+    return SequenceTerm(tuple(fit(item, sort, item.span or span) for item in items), SequenceSort(sort), span)
+
+
+def _inside(item: Term, collection: Term, span: Span | None) -> Term:
+    """In a sequence, or in a set that the contract names."""
+    if not isinstance(collection.sort, SequenceSort | SetSort):
+        raise rejected("HOARE300", f"`in` wants a set or a sequence; this is {show(collection.sort)}", span)
+    wanted = collection.sort.item
+    if isinstance(collection, SequenceTerm):
+        wanted = join(item.sort, wanted) or wanted
+        collection = fit(collection, SequenceSort(wanted), span)
+    return In(fit(item, wanted, span), collection, span)
 
 
 def rejected(code: str, message: str, span: Span | None, hint: str | None = None) -> Rejected:
@@ -185,15 +228,27 @@ def _call(call: Call, scope: Scope) -> Term:
     words = scope.names.vocabulary
     name = call.function
     arguments = [term(argument, scope) for argument in call.arguments]
+    if str(name) == "length" and name.name not in scope.names.sorts and name.name not in scope.local:
+        return _length(call, arguments)
     if name.prefix is None and name.name not in scope.local and name.name in words.constructors:
         data, constructor = words.constructors[name.name]
         return Construct(name.name, _fitted(call, arguments, constructor.parameters), data, call.span)
     function = _name(name, scope)
+    if isinstance(function.sort, SequenceSort):
+        return Index(function, _fitted(call, arguments, (NATURAL,))[0], function.sort.item, call.span)
     if not isinstance(function.sort, FunctionSort):
         raise rejected("HOARE300", f"`{name}` is {show(function.sort)}, not a function", call.span)
     if not isinstance(function, Variable):
         raise rejected("HOARE300", f"`{name}` cannot be applied here: it is not one function of the program", call.span)
     return Apply(function, _fitted(call, arguments, function.sort.parameters), function.sort.result, call.span)
+
+
+def _length(call: Call, arguments: list[Term]) -> Term:
+    if len(arguments) != 1 or not isinstance(arguments[0].sort, SequenceSort):
+        raise rejected("HOARE300", "length(…) takes one sequence", call.span)
+    if arguments[0].sort.item == UNKNOWN:
+        return Literal(0, NATURAL, call.span)
+    return Length(arguments[0], NATURAL, call.span)
 
 
 def _fitted(call: Call, arguments: list[Term], parameters: tuple[Sort, ...]) -> tuple[Term, ...]:

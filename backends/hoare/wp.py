@@ -13,7 +13,7 @@ from fractions import Fraction
 from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statement, Update, While, variable
 from avow.backends.hoare.triples import Triple, rename_bound
 from avow.diagnostics import Span
-from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, Sort
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SequenceSort, Sort, TupleSort
 from avow.language.terms import (
     TRUE,
     And,
@@ -23,12 +23,16 @@ from avow.language.terms import (
     Construct,
     Iff,
     Implies,
+    Index,
+    Length,
     Literal,
     Not,
     Or,
     Quantified,
     Quantifier,
+    SequenceTerm,
     Term,
+    TupleTerm,
     Variable,
     children,
 )
@@ -226,8 +230,9 @@ def in_range(value: Term, sort: Sort) -> list[Term]:
 
 
 def defined(term: Term) -> Term:
-    """That evaluation from left to right, with `and`, `or` and `->` cut short, divides by nothing that is zero and
-    gives no function a negative natural number."""
+    """That evaluation from left to right, with `and`, `or` and `->` cut short, divides by nothing that is zero, asks
+    for no element before the first or after the last of a sequence, and puts no negative number in the place of a
+    natural one."""
     match term:
         case And(items=items) | Or(items=items):
             conditions: list[Term] = []
@@ -246,6 +251,13 @@ def defined(term: Term) -> Term:
         case Construct(constructor=name, arguments=arguments, sort=data):
             sorts = data.constructor(name).parameters
             parts.extend(r for a, s in zip(arguments, sorts, strict=True) for r in in_range(a, s))
+        case Index(sequence=sequence, index=index):
+            parts.extend(in_range(index, NATURAL))
+            parts.append(Compare("<", index, Length(sequence, NATURAL)))
+        case SequenceTerm(items=items, sort=SequenceSort(item=sort)):
+            parts.extend(r for i in items for r in in_range(i, sort))
+        case TupleTerm(items=items, sort=TupleSort(items=sorts)):
+            parts.extend(r for i, s in zip(items, sorts, strict=True) for r in in_range(i, s))
         case _:
             pass
     return conjunction(parts)

@@ -1,0 +1,71 @@
+"""``python -m avow.backends.dafny FOLDER NODE``: a skeleton of the implementation, where the plan wants it.
+
+A plan that names a file that is not there yet is refused, and then nothing is exported: without this, nobody would come
+by the first skeleton.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from avow.backend import Job
+from avow.backends.dafny.modules import generate
+from avow.backends.dafny.printer import NotExpressible
+from avow.diagnostics import Diagnostic, Rejected
+from avow.files import write
+from avow.system.load import load_system
+from avow.system.paths import inside
+
+
+def write_skeleton(folder: Path, node: str, *, method: str | None = None) -> Path:
+    """Write the skeleton to the method's `implementation`, and say where. Raises Rejected, above all where a file is."""
+    system = load_system(folder)
+    if node not in [n.name for n in system.contract.nodes]:
+        known = ", ".join(n.name for n in system.contract.nodes)
+        raise Rejected(Diagnostic("DFY101", f"system '{system.name}' has no node '{node}'", hint=f"known: {known}"))
+    methods = [m for m in system.plan.node(node).methods if m.backend == "dafny" and method in (None, m.id)]
+    if len(methods) != 1:
+        what = "no dafny" if not methods else f"{len(methods)} of dafny ({', '.join(m.id for m in methods)})"
+        hint = "say which one: --method ID" if methods else "add one: dafny: {implementation: models/….dfy}"
+        raise Rejected(Diagnostic("DFY101", f"the plan has {what} among the methods of node '{node}'", hint=hint))
+    job = Job(system, system.contract.node(node), methods[0], ())
+    name, place = job.options.get("implementation"), methods[0].options.at("implementation")
+    path = inside(job.root, name) if isinstance(name, str) and name else None
+    if path is None:
+        raise Rejected(Diagnostic("DFY101", "dafny needs 'implementation': a file of the system's folder", place))
+    if path.exists():
+        raise Rejected(Diagnostic("DFY102", f"'{name}' is there already; nothing is ever written over it", place))
+    try:
+        write(path, generate(job.node, methods[0].guarantees).skeleton)
+    except NotExpressible as problem:
+        message = f"node '{node}' cannot be put into Dafny: {problem.what}"
+        raise Rejected(Diagnostic("DFY104", message, problem.span or job.node.span)) from None
+    except OSError as error:
+        raise Rejected(Diagnostic("DFY102", f"'{name}' cannot be written: {error}", place)) from None
+    return path
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """0: written; 2: refused, with the reasons."""
+    parser = argparse.ArgumentParser(
+        prog="python -m avow.backends.dafny", description="Write a skeleton where the plan wants the implementation."
+    )
+    parser.add_argument("folder", type=Path, help="the system's folder, with plan.yaml")
+    parser.add_argument("node")
+    parser.add_argument("--method", help="the method's id, where the node has several of dafny")
+    given = parser.parse_args(arguments)
+    try:
+        path = write_skeleton(given.folder, given.node, method=given.method)
+    except Rejected as error:
+        for d in error.diagnostics:
+            hint = f" ({d.hint})" if d.hint else ""
+            sys.stderr.write(f"{d.span or given.folder}: {d.message}{hint} [{d.code}]\n")
+        return 2
+    sys.stdout.write(f"{path}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
