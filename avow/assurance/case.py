@@ -19,6 +19,7 @@ The pipeline calls, once a system:
         digests={"contracts/x/plan.yaml": sha256, …},
         ledger_head=ledger.head,
         graph_svg="<svg…>",
+        sources={"contracts/x/system.rcl": "the text…"},  # what `digests` are the digests of
     )
     render_all(case, workspace.report(system.name))
     exit code: case.exit_code
@@ -86,8 +87,10 @@ def build_case(
     digests: Mapping[str, str] | None = None,
     ledger_head: str = GENESIS,
     graph_svg: str = "",
+    sources: Mapping[str, str] | None = None,
 ) -> Case:
-    """The case. Pure: same arguments, same case. Raises Rejected for an unusable policy."""
+    """The case. Pure: same arguments, same case. `sources` are the texts behind `digests`, by the same names.
+    Raises Rejected for an unusable policy."""
     return conclude(
         facts_of_system(
             system,
@@ -103,6 +106,7 @@ def build_case(
             digests or {},
             ledger_head,
             graph_svg,
+            sources or {},
         )
     )
 
@@ -172,6 +176,7 @@ def conclude(facts: Facts) -> Case:
         orphans=orphans,
         graph_svg=facts.graph_svg,
         maps=facts.maps,
+        sources=facts.sources,
     )
 
 

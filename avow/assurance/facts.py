@@ -10,7 +10,17 @@ from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
-from avow.assurance.model import Case, Derivation, EnvironmentView, MapView, MethodInfo, NodeView, RunInfo, ToolInfo
+from avow.assurance.model import (
+    Case,
+    Derivation,
+    EnvironmentView,
+    MapView,
+    MethodInfo,
+    NodeView,
+    RunInfo,
+    SourceView,
+    ToolInfo,
+)
 from avow.assurance.policy import Policy, read_policy
 from avow.diagnostics import Span
 from avow.evidence.audit import Discrepancy
@@ -44,6 +54,7 @@ class Facts:
     discrepancies: tuple[Discrepancy, ...] | None
     graph_svg: str
     maps: tuple[MapView, ...] = ()
+    sources: tuple[SourceView, ...] = ()
 
 
 def facts_of_system(
@@ -60,6 +71,7 @@ def facts_of_system(
     digests: Mapping[str, str],
     ledger_head: str,
     graph_svg: str,
+    sources: Mapping[str, str],
 ) -> Facts:
     """Raises Rejected for an unusable policy."""
     plan = system.plan
@@ -98,6 +110,11 @@ def facts_of_system(
         discrepancies=None if discrepancies is None else tuple(discrepancies),
         graph_svg=graph_svg,
         maps=_maps(plan),
+        sources=tuple(
+            sorted(
+                (SourceView(path, text) for path, text in sources.items()), key=lambda s: (not s.is_contract, s.path)
+            )
+        ),
     )
 
 
@@ -157,6 +174,7 @@ def facts_of_case(case: Case) -> Facts:
         discrepancies=case.discrepancies if case.audited else None,
         graph_svg=case.graph_svg,
         maps=case.maps,
+        sources=case.sources,
     )
 
 

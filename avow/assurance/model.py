@@ -245,6 +245,19 @@ class EnvironmentView:
 
 
 @dataclass(frozen=True, slots=True)
+class SourceView:
+    """A text that the case was made of, exactly as it stood: a contract with its comments, or the plan."""
+
+    path: str
+    """Relative to the workspace; `Case.digests` has the text's SHA-256 under the same name."""
+    text: str
+
+    @property
+    def is_contract(self) -> bool:
+        return self.path.endswith(".rcl")
+
+
+@dataclass(frozen=True, slots=True)
 class MapView:
     """Places that counterexamples may speak of: (x, y, label) as exact text, from a table of the plan's scenario."""
 
@@ -338,6 +351,8 @@ class Case:
     graph_svg: str = ""
     """The dataflow picture; shown as an image, never as markup."""
     maps: tuple[MapView, ...] = ()
+    sources: tuple[SourceView, ...] = ()
+    """Contracts first, then the plan. What is shown of them is text: nothing is concluded from it."""
 
     def obligation(self, name: str) -> ObligationView:
         """The obligation of that id. Raises KeyError."""

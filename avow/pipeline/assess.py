@@ -16,9 +16,12 @@ from doit.exceptions import TaskError
 from avow import __version__
 from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
 from avow.diagnostics import Rejected
+from avow.evidence.continuity import continuity
+from avow.evidence.heads import index_path, read_index
 from avow.files import digest, digest_file, is_intact, write
 from avow.pipeline import check as checking
-from avow.pipeline.discharge import ledger_of
+from avow.pipeline.discharge import RETRY, ledger_of
+from avow.pipeline.integrity import acknowledge, confirm, discrepancies
 from avow.pipeline.results import Result, finished, note, read_result
 from avow.pipeline.run_info import EXPLAIN, Run, seconds_so_far
 from avow.pipeline.survey import Survey
@@ -58,6 +61,17 @@ def known() -> tuple[Assessment, ...]:
     return tuple(_known)
 
 
+def is_settled() -> bool:
+    """Whether a later run would ask nothing again: no answer is one that it must not be content with."""
+    return not any(
+        records[-1].evidence.details.get(RETRY)
+        for a in _known
+        for work in a.surveyed.catalogue.works
+        for o in work.obligations
+        if (records := ledger_of(a.workspace.ledger(a.system)).current(o.id, work.keys[o.id]))
+    )
+
+
 def index_is_due() -> bool:
     """Whether the page over all systems no longer shows what its systems' reports show."""
     return bool(_changed) or any(not (a.workspace.reports / "index.html").is_file() for a in _known if finished())
@@ -65,6 +79,8 @@ def index_is_due() -> bool:
 
 def render(assessment: Assessment) -> Result:
     """Build the case and write every format, unless what stands in reports/ already says the same."""
+    ledger = ledger_of(assessment.workspace.ledger(assessment.system))
+    acknowledge(assessment.workspace, ledger)
     key = _key(assessment)
     known = _read(assessment)
     root = assessment.workspace.root
@@ -79,6 +95,7 @@ def render(assessment: Assessment) -> Result:
         files = {assessment.workspace.relative(p): digest_file(p) for p in rendered.written}
         write(assessment.stamp, json.dumps({"key": key, "files": files, **result.json()}, indent=1))
         _changed.append(assessment.system)
+    confirm(assessment.workspace, ledger)
     return result
 
 
@@ -100,13 +117,13 @@ def gate(assessment: Assessment) -> TaskError | bool:
 def build(assessment: Assessment) -> Case:
     """The case, from contract, plan and ledger. Raises Rejected for a policy that cannot be used."""
     from avow.assurance.case import build_case
-    from avow.evidence.audit import audit
     from avow.pipeline.derivations import derivation_views, graph_svg
 
     system, workspace = assessment.surveyed.system, assessment.workspace
     ledger = ledger_of(workspace.ledger(system.name))
     plan = system.plan
-    texts = (plan.path, *plan.contract_files)
+    # read once, so that the texts that the report shows are those whose digests it names
+    texts = {workspace.relative(path): path.read_bytes() for path in (*plan.contract_files, plan.path)}
     return build_case(
         system,
         assessment.surveyed.catalogue.obligations,
@@ -129,17 +146,11 @@ def build(assessment: Assessment) -> Case:
         derivations=derivation_views(system),
         methods=_methods(assessment),
         tools=_tools(assessment),
-        discrepancies=audit(
-            ledger,
-            workspace.root,
-            system=system.name,
-            obligations={o.id: o.digest for o in assessment.surveyed.catalogue.obligations},
-            keys=assessment.surveyed.keys,
-            strengths={name: backend(name, system.plan.plugins).strength for name in names()},
-        ),
-        digests={workspace.relative(path): digest_file(path) for path in texts},
+        discrepancies=discrepancies(workspace, ledger, assessment.surveyed),
+        digests={path: digest(data) for path, data in texts.items()},
         ledger_head=ledger.head,
         graph_svg=graph_svg(system),
+        sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
     )
 
 
@@ -179,7 +190,7 @@ def _key(assessment: Assessment) -> str:
     """The report depends on the texts, the plan, all evidence, and the day (reviews and accepted risks expire)."""
     surveyed, ledger = assessment.surveyed, ledger_of(assessment.workspace.ledger(assessment.system))
     keys = sorted((*pair, key) for pair, key in surveyed.keys.items())
-    damage = [str(d) for d in ledger.damage]
+    damage = [str(d) for d in (*ledger.damage, *continuity(ledger, read_index(index_path(ledger.path.parent))))]
     explain = os.environ.get(EXPLAIN, "")
     return digest(json.dumps([surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]))
 

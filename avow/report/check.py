@@ -1,10 +1,10 @@
 """Does a report on disk say what the ledger says?
 
-Three steps, none of which trusts the one before: every record that the report quotes is in the ledger, unchanged, and
+Four steps, none of which trusts the one before: every record that the report quotes is in the ledger, unchanged, and
 the ledger has no other for its claims; every conclusion follows again from those records (statuses, gates, exit code);
-every other format is, byte for byte, what that case renders to. What the report was made *of* (contract, plan) is
-compared by digest where the files are here. One thing it cannot know: whether the obligations are still those of
-today's contract; that is what `avow verify` is for.
+the contracts' texts that it shows have the digests that it names; every other format is, byte for byte, what that case
+renders to. What the report was made *of* (contract, plan) is compared by digest where the files are here. One thing it
+cannot know: whether the obligations are still those of today's contract; that is what `avow verify` is for.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from avow.assurance.codec import from_json, to_json
 from avow.assurance.model import Case
 from avow.evidence.encoding import Unreadable
 from avow.evidence.ledger import Ledger
-from avow.files import digest_file
+from avow.files import digest, digest_file
 from avow.report import LeftOut, formats
 
 
@@ -34,7 +34,7 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
         return (f"report.json cannot be read: {error}",)
     except Unreadable as error:
         return (f"report.json is no case: {error}",)
-    found = [*_conclusions(case), *_formats(case, folder)]
+    found = [*_conclusions(case), *_texts(case), *_formats(case, folder)]
     found += ["there is no ledger to compare with"] if ledger is None else _ledger(case, ledger)
     if root is not None:
         found += _sources(case, root)
@@ -51,6 +51,16 @@ def _conclusions(case: Case) -> Iterable[str]:
     for name, value in stated.items():
         if again[name] != value:
             yield f"report.json: '{name}' does not follow from the evidence in it{_where(value, again[name])}"
+
+
+def _texts(case: Case) -> Iterable[str]:
+    """Contracts and plan as the report shows them, against the digests that it names."""
+    named = dict(case.digests)
+    for source in case.sources:
+        if source.path not in named:
+            yield f"report.json: the text of {source.path} is shown, but no digest of it is named"
+        elif named[source.path] != digest(source.text.encode("utf-8", "surrogatepass")):
+            yield f"report.json: the text of {source.path} is not the one whose digest is named"
 
 
 def _where(stated: object, again: object) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from avow.assurance.model import Case, DerivationView, ObligationView
+from avow.assurance.model import Case, DerivationView, ObligationView, SourceView
 from avow.assurance.naming import short
 from avow.report.exchange import headline
+from avow.report.source import plain_lines
 from avow.report.wording import clean, verdict_line
 
 
@@ -35,6 +36,10 @@ _DANGEROUS = re.compile(
     r"|verbatiminput|lstinputlisting)(?![A-Za-z])|\^\^"
 )
 """Commands that do more than print: a derivation's LaTeX that holds one is shown as plain text instead."""
+
+
+_LINES = 1200
+"""Lines of a contract in the appendix, which then says so."""
 
 
 def latex(text: str) -> str:
@@ -87,8 +92,26 @@ def render_latex(case: Case) -> str:
                 lines += _latex_obligation(view)
     lines += [r"\section{What is not shown}", r"\begin{itemize}"]
     lines += [rf"\item {latex(line)}" for line in case.not_shown]
-    lines += [r"\end{itemize}", r"\end{document}"]
+    lines.append(r"\end{itemize}")
+    for source in case.sources:
+        if source.is_contract:
+            lines += _latex_source(source)
+    lines.append(r"\end{document}")
     return "\n".join(lines) + "\n"
+
+
+def _latex_source(source: SourceView) -> Iterable[str]:
+    """A contract as written, line by line: no verbatim, which its own text could end."""
+    lines = list(plain_lines(source))
+    yield rf"\section{{{latex(source.path)}, as written}}"
+    yield r"{\footnotesize\ttfamily\raggedright\setlength{\parskip}{0pt}"
+    for line in lines[:_LINES]:
+        shown = line.expandtabs(2)
+        margin = len(shown) - len(shown.lstrip(" "))
+        yield rf"\hangindent={margin / 2 + 2:g}em {'~' * margin}{latex(shown[margin:])}\strut\par"
+    if len(lines) > _LINES:
+        yield rf"\normalfont and {len(lines) - _LINES} more lines: see report.json\par"
+    yield "}"
 
 
 def _latex_derivation(view: DerivationView) -> Iterable[str]:

@@ -8,11 +8,14 @@ from collections.abc import Iterable, Sequence
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.evidence.obligation import Kind
+from avow.report.source import plain_lines
 from avow.report.wording import clean, verdict_line, where
 
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
 _LONG = 200
 """Rows of a table in the summary; all of them are in report.json."""
+_MOST_SOURCE = 40_000
+"""Characters of contracts in the summary: code hosts cut a comment at some 65,000."""
 
 
 def render_markdown(case: Case) -> str:
@@ -54,8 +57,25 @@ def render_markdown(case: Case) -> str:
         ),
         "## What is not shown",
         "\n".join(f"- {_md(line)}" for line in case.not_shown),
+        *_contracts(case),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _contracts(case: Case) -> Iterable[str]:
+    """The contracts' texts between fences that are longer than any within."""
+    room = _MOST_SOURCE
+    for source in case.sources:
+        if not source.is_contract:
+            continue
+        text = "\n".join(plain_lines(source)).rstrip("\n")
+        yield f"## {_md(source.path)}, as written"
+        room -= len(text)
+        if room < 0:
+            yield "Too long for a summary: see index.html or report.json."
+            continue
+        fence = "`" * max(3, 1 + max((len(run) for run in re.findall("`+", text)), default=0))
+        yield f"{fence}rcl\n{text}\n{fence}"
 
 
 def _origin(case: Case) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -21,7 +21,7 @@ from avow.assurance.traceability import COLUMNS, Row
 from avow.assurance.trend import trend
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
-from avow.report import picture, wording
+from avow.report import picture, source, wording
 from avow.report.maps import draw_map
 from avow.report.wording import history
 
@@ -61,6 +61,8 @@ def environment() -> Environment:
         "derivation": _derivation,
         "draw_map": draw_map,
         "in_lines": wording.in_lines,
+        "location": source.location,
+        "source_lines": source.lines_of,
         "math": _math,
         "count": wording.count,
         "mutation": wording.mutation,
@@ -80,7 +82,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
     with it no part of that file can be edited unseen, not even what no other format shows."""
     argument = build_argument(case)
     known, single = {view.id for view in case.obligations}, set(case.single_method)
-    matrix = _matrix(case)
+    matrix, places = _matrix(case), source.places(case)
     rows = sum(len(found) for _, _, found in matrix)
     views = sorted(case.obligations, key=_reading_order(case))
     return (
@@ -100,6 +102,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
             pictures=_pictures(case, argument),
             outline_of=_outlines(argument),
             graph=_graph(case),
+            places=places,
             failed=[gate for gate in case.gates if not gate.passed],
             open_items=[item for item in case.open_items if not item.advice],
             advice=[item for item in case.open_items if item.advice],
@@ -110,7 +113,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
             statuses=[s for s in Status if any(view.standing is s for view in views)],
             levels=techniques() if case.policy.name.startswith("sil") else (),
             full=_in_full(views),
-            brief=_brief,
+            brief=lambda view: _brief(view, places),
             json_digest=json_digest,
             kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in views)],
             open_at_once=_OPEN_AT_ONCE,
@@ -206,7 +209,7 @@ def _in_full(views: Sequence[ObligationView]) -> set[str]:
     return set(telling[:_IN_FULL])
 
 
-def _brief(view: ObligationView) -> Markup:
+def _brief(view: ObligationView, places: Mapping[str, tuple[int, int]]) -> Markup:
     """An obligation in a few lines; built by hand, as there may be ten thousand of them."""
     o = view.obligation
     status = view.standing
@@ -222,7 +225,8 @@ def _brief(view: ObligationView) -> Markup:
     return Markup(
         f'<details class="ob" id="{wording.anchor(o.id)}" {marks}><summary>{chip} <b>{escape(short(o.id))}</b> '
         f'<span class="claim">{escape(o.claim)}</span></summary><div class="body">{formula}<ul>{said}</ul>'
-        f'<p class="quiet">{escape(wording.where(view))} <code>avow explain {escape(o.id)}</code></p></div></details>\n'
+        f'<p class="quiet">{source.location(o.span, places)} <code>avow explain {escape(o.id)}</code></p>'
+        "</div></details>\n"
     )
 
 

@@ -7,15 +7,19 @@ from importlib import resources
 from typing import Any
 
 from avow.assurance.argument import build_argument
-from avow.assurance.model import Case, ObligationView
+from avow.assurance.model import Case, ObligationView, SourceView
 from avow.assurance.naming import short
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report import picture
+from avow.report.source import plain_lines
 from avow.report.wording import MARKS, banner_tone, bound_text, clean, in_lines, tone, verdict_line
 
 _MOST = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
+
+_LINES = 1200
+"""Lines of a contract in the PDF, which then says so."""
 
 _MOST_IN_A_PICTURE = 90
 _GATE = {
@@ -111,9 +115,16 @@ def _data(case: Case) -> dict[str, Any]:
         "single": [short(name) for name in case.single_method],
         "limits": [*case.limits[:400]],
         "not_shown": [*more, *case.not_shown],
+        "sources": [_source(source) for source in case.sources if source.is_contract],
     }
     plain: dict[str, Any] = _clean(found)
     return plain
+
+
+def _source(source: SourceView) -> dict[str, Any]:
+    lines = list(plain_lines(source))
+    more = f"and {len(lines) - _LINES} more lines: see report.json" if len(lines) > _LINES else ""
+    return {"path": source.path, "lines": [[str(at), line] for at, line in enumerate(lines[:_LINES], 1)], "more": more}
 
 
 def _pictures(case: Case) -> list[dict[str, str]]:

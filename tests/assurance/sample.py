@@ -23,6 +23,8 @@ from avow.verdict import Counterexample, Link, Verdict
 
 TODAY = date(2026, 11, 21)
 SPAN = Span("contracts/rover/plan.yaml", 1, 1, 1, 1)
+PLAN_TEXT = "system: rover\n"
+RCL_TEXT = "".join(f"// line {n} of the rover's contract\n" for n in range(1, 41))
 RUN = RunInfo(
     "20261121T100000-1",
     "2026-11-21T10:00:00+00:00",
@@ -504,7 +506,8 @@ def rover_parts() -> tuple[System, list[Obligation], list[Evidence], dict[tuple[
                 ("in.wayP is provided by the environment",),
             ),
         ),
-        "digests": {"contracts/rover/plan.yaml": digest("plan"), "contracts/rover/system.rcl": digest("contract")},
+        "digests": {"contracts/rover/plan.yaml": digest(PLAN_TEXT), "contracts/rover/system.rcl": digest(RCL_TEXT)},
+        "sources": {"contracts/rover/plan.yaml": PLAN_TEXT, "contracts/rover/system.rcl": RCL_TEXT},
     }
     return rover_system(), obligations, records, keys, extras
 

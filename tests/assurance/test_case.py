@@ -332,7 +332,7 @@ def test_a_case_survives_json_and_meets_its_schema() -> None:
         from_json(data)
 
 
-@pytest.mark.parametrize("bad", [None, [], {}, {"schema": "other"}, {"schema": "https://avow.invalid/schemas/case-1"}])
+@pytest.mark.parametrize("bad", [None, [], {}, {"schema": "other"}, {"schema": "https://avow.invalid/schemas/case-2"}])
 def test_other_json_is_no_case(bad: object) -> None:
     with pytest.raises(Unreadable):
         from_json(bad)

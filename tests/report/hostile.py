@@ -8,6 +8,7 @@ from assurance.sample import RUN, case, evidence, guarantee, node_plan, obligati
 
 from avow.assurance.model import Case, Derivation, SideCondition
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
+from avow.files import digest
 from avow.system.plan import EnvironmentInput, Finding, Requirement
 from avow.verdict import Counterexample, Verdict
 
@@ -19,6 +20,12 @@ NAME = (
 """What a name, a sentence or a formula of contract and plan may hold."""
 EVIL = NAME + "\ud800"
 """What a tool may say: half a character, too."""
+SOURCE_PATH = "contracts/rover/system.rcl"
+SOURCE = (
+    f'// {NAME}\r\n/* {NAME} */ node n{{ guarantee("{NAME}" TRUE) }}\n'
+    "// ``` fence ``````\n// \u202e code that looks like a comment \u2066\n" + "x" * 30_000 + "\n\n</pre></div>\ta\rb\n"
+) * 3
+"""A contract whose comments try the same."""
 
 
 def hostile_case() -> Case:
@@ -54,6 +61,7 @@ def hostile_case() -> Case:
         [record, evidence(side, method="compose")],
         run=replace(RUN, command=NAME, limits={NAME: NAME}),
         derivations=[derivation],
-        digests={NAME: "0" * 64},
+        digests={NAME: "0" * 64, SOURCE_PATH: digest(SOURCE)},
+        sources={SOURCE_PATH: SOURCE, "plan\"'><b>.yaml": NAME},
         graph_svg="<svg xmlns='http://www.w3.org/2000/svg'><script>alert(4)</script></svg>",
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from assurance.sample import case, evidence, rover_parts
+from assurance.sample import PLAN_TEXT, RCL_TEXT, case, evidence, rover_parts
 from click.testing import CliRunner, Result
 
 from avow.assurance.compare import compare, of_case, of_ledger
@@ -28,8 +28,8 @@ def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("workspace")
     (root / "contracts/rover").mkdir(parents=True)
     (root / "dodo.py").touch()
-    (root / "contracts/rover/plan.yaml").write_text("plan")
-    (root / "contracts/rover/system.rcl").write_text("contract")
+    (root / "contracts/rover/plan.yaml").write_text(PLAN_TEXT)
+    (root / "contracts/rover/system.rcl").write_text(RCL_TEXT)
     (root / "a.log").write_text("log")
     subject, obligations, records, keys, extras = rover_parts()
     logged = evidence("radiationSensor.low", outputs={"a.log": digest("log")}, run="later")

@@ -1,0 +1,143 @@
+"""Contracts and plan as written, for the HTML page: numbered lines, coloured by Pygments, with what came of each.
+
+A comment may hold anything, so every piece of text is escaped here, and characters that a reader would not see but
+that change what is read (controls of writing direction, invisible blanks) are shown by their numbers.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+
+from markupsafe import Markup, escape
+from pygments.lexer import Lexer
+from pygments.lexers.data import YamlLexer
+from pygments.token import Comment, Keyword, Name, Number, Operator, String, _TokenType
+
+from avow.assurance.model import Case, ObligationView, SourceView
+from avow.diagnostics import Span
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
+from avow.language.pygments_lexer import RclLexer
+from avow.report.wording import MARKS, anchor, clean, tone
+
+_PLAIN_BEYOND = 400_000
+"""Characters of a file that are still coloured: colours triple a page, and nobody reads that much of it."""
+_ANCHORED = 4_000
+"""So many lines have an anchor each; of longer files only those that something in the report points at."""
+
+_COLOURS: tuple[tuple[_TokenType, str], ...] = (
+    (Comment, "c"),
+    (Keyword.Type, "t"),
+    (Keyword, "k"),
+    (Operator.Word, "k"),
+    (String, "s"),
+    (Number, "m"),
+    (Name.Label, "l"),
+    (Name.Tag, "l"),
+    (Name.Class, "l"),
+    (Name.Variable, "v"),
+)
+"""Pygments' token types → the style sheet's classes (``.src .c``…); what is not here has the text's colour."""
+
+_HIDDEN = re.compile("[\r\u00ad\u061c\u180e\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff\u2028\u2029\u0085]")
+"""Characters that show nothing, or turn the order of what follows: a comment could make code look like a comment."""
+
+
+def line_anchor(number: int, line: int) -> str:
+    """The fragment of a line of the `number`-th text, from 1."""
+    return f"s{number}-{line}"
+
+
+def places(case: Case) -> Mapping[str, tuple[int, int]]:
+    """Path → (number of the text, its lines), for links to lines."""
+    return {s.path: (at, len(visible_lines(s.text))) for at, s in enumerate(case.sources, 1)}
+
+
+def location(span: Span | None, known: Mapping[str, tuple[int, int]]) -> Markup:
+    """``contracts/x/system.rcl:12``, as a link to the line where the text is on the page; empty without a place."""
+    if span is None:
+        return Markup()
+    shown = escape(f"{span.file}:{span.line}")
+    number, lines = known.get(span.file, (0, 0))
+    if not 1 <= span.line <= lines:
+        return shown
+    return Markup(f'<a href="#{line_anchor(number, span.line)}">{shown}</a>')  # escaped above
+
+
+def lines_of(case: Case, number: int) -> Markup:
+    """The `number`-th text, line by line; beside a guarantee's or a requirement's line stands what came of it."""
+    source = case.sources[number - 1]
+    notes: dict[int, list[str]] = {}
+    needed: set[int] = set()
+    for span, note in _pointing(case):
+        if span.file == source.path:
+            needed.add(span.line)
+            notes.setdefault(span.line, []).extend([note] if note else [])
+    lines = _coloured(source)
+    rows = []
+    for at, shown in enumerate(lines, 1):
+        name = f' id="{line_anchor(number, at)}"' if len(lines) <= _ANCHORED or at in needed else ""
+        rows.append(f"<div{name}>{''.join(notes.get(at, ()))}{shown or ' '}</div>")
+    return Markup("".join(rows))  # every piece is escaped
+
+
+def _pointing(case: Case) -> Iterator[tuple[Span, str]]:
+    """Everything in the report that has a place: the place, and a mark to put there for what a person wrote."""
+    for view in case.obligations:
+        if view.obligation.span is not None:
+            yield view.obligation.span, _mark(view) if view.obligation.kind is Kind.GUARANTEE else ""
+    for r in case.requirements:
+        if r.span is not None:
+            yield r.span, _note(f"requirement:{r.id}", r.status, r.id)
+
+
+def _mark(view: ObligationView) -> str:
+    return _note(view.id, view.standing, view.obligation.name)
+
+
+def _note(claim: str, status: Status, name: str) -> str:
+    return (
+        f'<a class="came {tone(status)}" href="#{anchor(claim)}"><span aria-hidden="true">{MARKS[status]}</span> '
+        f"{escape(clean(name))} {status}</a>"
+    )
+
+
+@cache
+def _lexer(is_contract: bool) -> Lexer:
+    return RclLexer(stripnl=False, ensurenl=False) if is_contract else YamlLexer(stripnl=False, ensurenl=False)
+
+
+def _coloured(source: SourceView) -> list[str]:
+    """The text's lines as HTML."""
+    if len(source.text) > _PLAIN_BEYOND:
+        return [_shown(line) for line in visible_lines(source.text)]
+    text = "\n".join(visible_lines(source.text))
+    lines = [""]
+    for _, kind, value in _lexer(source.is_contract).get_tokens_unprocessed(text):
+        colour = next((name for found, name in _COLOURS if kind in found), "")
+        for at, piece in enumerate(value.split("\n")):
+            if at:
+                lines.append("")
+            if piece:
+                shown = _shown(piece)
+                lines[-1] += f'<span class="{colour}">{shown}</span>' if colour else shown
+    return lines
+
+
+def _shown(piece: str) -> str:
+    escaped = str(escape(clean(piece)))
+    return _HIDDEN.sub(lambda m: f'<span class="odd" title="not visible">U+{ord(m.group()):04X}</span>', escaped)
+
+
+def visible_lines(text: str) -> list[str]:
+    """The lines as the compiler counts them: a line ends with a line feed, and with nothing else."""
+    lines = [line.removesuffix("\r") for line in text.split("\n")]
+    return lines[:-1] if len(lines) > 1 and not lines[-1] else lines
+
+
+def plain_lines(source: SourceView) -> Iterable[str]:
+    """The lines for formats without markup of their own; what is not visible is told by its number."""
+    for line in visible_lines(source.text):
+        yield _HIDDEN.sub(lambda m: f"<U+{ord(m.group()):04X}>", clean(line))
