@@ -20,7 +20,7 @@ from avow.system.paths import inside
 
 
 def write_skeleton(folder: Path, node: str, *, method: str | None = None) -> Path:
-    """Write the skeleton to the method's `implementation`, and say where. Raises Rejected, above all where a file is."""
+    """Write the skeleton to the method's `implementation`, and say where. Raises Rejected, also where a file is."""
     system = load_system(folder)
     if node not in [n.name for n in system.contract.nodes]:
         known = ", ".join(n.name for n in system.contract.nodes)

@@ -13,12 +13,12 @@ from avow.backends.hoare.checker import Checked, check
 from avow.backends.hoare.outline import outline, show
 from avow.backends.hoare.parser import parse_program
 from avow.backends.hoare.program import While, statements
-from avow.backends.hoare.triples import Triple, triples
+from avow.backends.hoare.triples import Triple, every_run, triples
 from avow.backends.hoare.witness import Breach, breach
 from avow.backends.hoare.wp import Condition, TooLarge, conditions
 from avow.diagnostics import Diagnostic, Rejected, Span
 from avow.evidence.obligation import Obligation
-from avow.language.terms import FALSE, Not, Role, Variable
+from avow.language.terms import FALSE, TRUE, Not, Role, Variable
 from avow.logic.evaluate import NotEvaluable, evaluate
 from avow.logic.formula import conjunction, free_variables
 from avow.logic.smt import Entailment, entails, z3_version
@@ -45,6 +45,15 @@ class Work:
         except RecursionError:
             message = "a clause of this node is nested too deeply for this method"
             raise Rejected(Diagnostic("HOARE100", message, self.job.node.span)) from None
+
+    @cached_property
+    def every_run(self) -> Triple:
+        """What any guarantee needs besides its own triples: that the program runs, whatever the input."""
+        return every_run(self.job.node, self.checked)
+
+    def run_conditions(self) -> tuple[Condition, ...]:
+        """Its conditions, without those that say nothing. Raises TooLarge."""
+        return tuple(c for c in conditions(self.every_run, self.checked.program.body) if c.goal != TRUE)
 
 
 def load(job: Job) -> Work:
@@ -117,6 +126,11 @@ def files(job: Job) -> Mapping[str, str]:
                     made[f"{_stem(triple)}.{condition.name}.smt2"] = _script(triple, condition)
             except (TooLarge, RecursionError) as error:
                 made[f"{_stem(triple)}.outline.txt"] = f"no outline: {error}\n"
+    try:
+        for condition in work.run_conditions():
+            made[f"every-run.{condition.name}.smt2"] = _script(work.every_run, condition)
+    except (TooLarge, RecursionError):
+        pass  # each triple's outline says so
     return made
 
 
@@ -155,6 +169,11 @@ def settle(job: Job, limits: Limits) -> Report:
         return Report(failed, "weakest preconditions", version)
     logs: dict[str, str] = {}
     outcomes = tuple(_obligation(o, found[o.id], work, limits, logs) for o in job.obligations)
+    if any(o.verdict is Verdict.PROVED for o in outcomes):
+        running = _every_run(work, limits)
+        logs["every-run.log"] = f"{running.verdict} - {running.why}\n"
+        if running.verdict is not Verdict.PROVED:
+            outcomes = tuple(_stopped(o, running, work) if o.verdict is Verdict.PROVED else o for o in outcomes)
     return Report(outcomes, "weakest preconditions", version, logs=logs)
 
 
@@ -211,6 +230,38 @@ def _obligation(
         details=details,
         link=link,
         vacuous=vacuous,
+    )
+
+
+def _every_run(work: Work, limits: Limits) -> Settled:
+    """Whether the program runs to its end (or on, in loops without a variant) on every input that is allowed."""
+    triple, deadline = work.every_run, time.monotonic() + limits.seconds
+    try:
+        wanted = work.run_conditions()
+        failed = [c for c in wanted if not _holds(c, deadline, limits)]
+        shown = breach(triple, work.checked.program, failed, max(1000, _left(deadline))) if failed else None
+    except TooLarge as error:
+        return Settled(triple, Verdict.UNKNOWN, str(error))
+    except RecursionError:
+        return Settled(triple, Verdict.UNKNOWN, "its formulas are nested too deeply for this method")
+    if shown is not None:
+        return Settled(triple, Verdict.REFUTED, f"{shown.why}: on this input there is no output", shown)
+    if failed:
+        why = "not shown that the program has an output for every input that the assumptions allow"
+        return Settled(triple, Verdict.UNKNOWN, f"{why}: {failed[0].what}")
+    return Settled(triple, Verdict.PROVED, "proved", conditions=len(wanted))
+
+
+def _holds(condition: Condition, deadline: float, limits: Limits) -> bool:
+    answer = entails(condition.hypotheses, condition.goal, timeout_ms=_left(deadline), seed=limits.seed)
+    return answer.verdict is Verdict.PROVED
+
+
+def _stopped(outcome: Outcome, running: Settled, work: Work) -> Outcome:
+    """In place of a proof of the guarantee's own triples, where some run has no output."""
+    shown = _counterexample(running, work) if running.breach is not None else None
+    return replace(
+        outcome, verdict=running.verdict, summary=running.why, counterexample=shown, hypotheses=(), vacuous=False
     )
 
 

@@ -346,8 +346,8 @@ class _Checker:
                 raise rejected("HOARE200", f"nothing says which map `{name.name}` is", name.span, hint)
             raise rejected("HOARE300", f"the sort of `{name.name}` is unclear ({show(value.sort)}?)", name.span)
         if UNKNOWN in components(sort):
-            hint = f"declare it: VAR {name.name} : T; with a type T of the contract"
-            raise rejected("HOARE300", f"nothing says of what the sequence `{name.name}` is", name.span, hint)
+            wanted = f"declare it: VAR {name.name} : T; with a type T of the contract"
+            raise rejected("HOARE300", f"nothing says of what the sequence `{name.name}` is", name.span, wanted)
         target = variable(name.name, sort)
         if not statement.arguments:
             value = fit(term(statement.value, scope), sort, statement.value.span)
@@ -355,8 +355,8 @@ class _Checker:
                 raise rejected("HOARE300", "only a whole map can be assigned to a map", statement.value.span)
             return Assign(target, value, statement.span)
         if not isinstance(sort, FunctionSort):
-            hint = "a sequence is assigned as a whole: s := [a, b]" if isinstance(sort, SequenceSort) else None
-            raise rejected("HOARE300", f"`{name.name}` is {show(sort)}, no map", name.span, hint)
+            whole = "a sequence is assigned as a whole: s := [a, b]" if isinstance(sort, SequenceSort) else None
+            raise rejected("HOARE300", f"`{name.name}` is {show(sort)}, no map", name.span, whole)
         if len(statement.arguments) != len(sort.parameters):
             message = f"`{name.name}` takes {len(sort.parameters)} argument(s), not {len(statement.arguments)}"
             raise rejected("HOARE300", message, statement.span)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statement, Update, While
 from avow.backends.hoare.simplify import simplify
 from avow.backends.hoare.triples import Triple
-from avow.backends.hoare.wp import Conditions, fits, misfits, weakest
+from avow.backends.hoare.wp import Conditions, fits, misfits, side_conditions, weakest
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, Term
 from avow.logic.formula import conjunction, negation
@@ -35,7 +35,7 @@ def show(term: Term) -> str:
 
 def outline(triple: Triple, body: Block) -> str:
     """The whole outline; its entailments ("strengthening") are the verification conditions. Raises TooLarge."""
-    writer = _Writer(Conditions(triple.pre))
+    writer = _Writer(side_conditions(triple, body))
     pre = triple.full_pre
     writer.assertion(0, pre)
     first = _weakest(body, triple.post, writer)

@@ -223,7 +223,7 @@ class _Build(Transformer_NonRecursive):  # type: ignore[misc]
     def inside(self, meta: Any, items: list[Any]) -> Inside:
         return Inside(items[0], items[2], items[1].type == "NOT_IN", self._span(meta))
 
-    def tuple(self, meta: Any, items: list[Any]) -> Tuple:
+    def several(self, meta: Any, items: list[Any]) -> Tuple:
         return Tuple(tuple(items), self._span(meta))
 
     def sequence(self, meta: Any, items: list[Any]) -> Sequence:

@@ -18,6 +18,7 @@ from avow.evidence.obligation import Obligation
 from avow.language.contract import Clause, Node
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort
 from avow.language.terms import (
+    TRUE,
     And,
     Apply,
     Compare,
@@ -78,6 +79,16 @@ def triples(obligation: Obligation, clause: Clause, node: Node, checked: Checked
         Triple(clause.name if count == 1 else f"{clause.name}.{k}", obligation.id, pre, post, ghosts)
         for k, (pre, post) in enumerate(found, start=1)
     )
+
+
+def every_run(node: Node, checked: Checked) -> Triple:
+    """{assumptions} program {TRUE}: on every input that the assumptions allow, the program asks for nothing undefined,
+    keeps its invariants and gets on towards its end. The node promises an output for each of them, also where a
+    guarantee asks nothing of it."""
+    names = set(checked.program.names)
+    assumed = [translate(a, checked.reading, names) for a in node.assumptions]
+    ghosts = tuple(sorted(checked.program.ghosts.items(), key=lambda pair: pair[0].name))
+    return Triple("every-run", "", simplify(conjunction(assumed)), TRUE, ghosts)
 
 
 # -- the guarantee, taken apart ----------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statement, Update, While, variable
+from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statement, Update, While, statements, variable
 from avow.backends.hoare.triples import Triple, rename_bound
 from avow.diagnostics import Span
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SequenceSort, Sort, TupleSort
@@ -72,11 +72,27 @@ class Conditions:
 
     known: Term
     found: list[Condition] = field(default_factory=list)
+    assigned: frozenset[str] | None = None
+    """The names that the whole program assigns. None: not known, so that no test is taken to go on holding."""
+
+    def under(self, test: Term) -> Conditions:
+        """The same within a branch: what its test says of variables that are never assigned goes on holding there."""
+        if self.assigned is None:
+            return self
+        parts = test.items if isinstance(test, And) else (test,)
+        lasting = [p for p in parts if not any(v.name in self.assigned for v in free_variables(p))]
+        return Conditions(conjunction((self.known, *lasting)), self.found, self.assigned) if lasting else self
+
+
+def side_conditions(triple: Triple, body: Block) -> Conditions:
+    """None met yet."""
+    targets = frozenset(s.target.name for s in statements(body) if isinstance(s, Assign | Update))
+    return Conditions(triple.pre, assigned=targets)
 
 
 def conditions(triple: Triple, body: Block) -> tuple[Condition, ...]:
     """The triple holds if all of these do. Raises TooLarge."""
-    side = Conditions(triple.pre)
+    side = side_conditions(triple, body)
     goal = weakest(body, triple.post, side)
     whole = Condition("pre", (triple.full_pre,), goal, "the precondition implies the program's weakest precondition")
     return (whole, *side.found)
@@ -106,7 +122,8 @@ def _statement(statement: Statement, post: Term, side: Conditions) -> Term:
             safe.extend(in_range(value, target.sort.result))
             return conjunction((*safe, updated(post, target, arguments, value)))
         case If(condition=condition, then=then, otherwise=otherwise):
-            yes, no = weakest(then, post, side), weakest(otherwise, post, side)
+            yes = weakest(then, post, side.under(condition))
+            no = weakest(otherwise, post, side.under(negation(condition)))
             if yes == no:
                 return conjunction((defined(condition), yes))
             cases = (Implies(condition, yes), Implies(negation(condition), no))
@@ -141,7 +158,8 @@ _BELOW = "₁₂₃₄₅₆₇₈₉₀"
 
 def _match(statement: Match, post: Term, side: Conditions) -> Term:
     assert not free_variables(post) & frozenset(statement.variables), "bound names of triples are apart from these"
-    then, otherwise = weakest(statement.then, post, side), weakest(statement.otherwise, post, side)
+    then = weakest(statement.then, post, side.under(fits(statement, statement.variables)))
+    otherwise = weakest(statement.otherwise, post, side.under(misfits(statement)))
     if then == otherwise:
         return conjunction((defined(statement.subject), then))
     yes: Term = Implies(fits(statement, statement.variables), then)
