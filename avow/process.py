@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-_KEEP = 4_000_000
+KEEP = 4_000_000
 """Characters of output kept: a tool that prints without end must not fill the memory."""
 
 _running: set[int] = set()
@@ -71,19 +71,29 @@ def run(
             )
         except (FileNotFoundError, PermissionError, NotADirectoryError) as error:
             raise ToolMissing(f"{command[0]}: {error.strerror or error}") from error
-        with _lock:
-            _running.add(process.pid)
+        watch(process.pid)
         code: int | None
         try:
             code = process.wait(timeout=seconds)
         except subprocess.TimeoutExpired:
             code = None
         finally:
-            _kill_tree(process.pid)
+            kill_tree(process.pid)
             process.wait()
-            with _lock:
-                _running.discard(process.pid)
+            unwatch(process.pid)
         return Completed(tuple(command), code, _read(out), _read(err), time.monotonic() - start)
+
+
+def watch(pid: int) -> None:
+    """`kill_all` is to kill this process too, with its descendants."""
+    with _lock:
+        _running.add(pid)
+
+
+def unwatch(pid: int) -> None:
+    """It has ended and was waited for: its number may be another's now."""
+    with _lock:
+        _running.discard(pid)
 
 
 def kill_all() -> None:
@@ -91,11 +101,11 @@ def kill_all() -> None:
     with _lock:
         pids = tuple(_running)
     for pid in pids:
-        _kill_tree(pid)
+        kill_tree(pid)
 
 
-def _kill_tree(pid: int) -> None:
-    """Kill the process group, and descendants that moved to a group of their own (a tool run by a worker of ours)."""
+def kill_tree(pid: int) -> None:
+    """Kill a process, its group, and descendants that moved to a group of their own (a tool that a worker runs)."""
     family = _descendants(pid)
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(pid, signal.SIGKILL)
@@ -150,5 +160,5 @@ def _stdin(text: str | None) -> Iterator[int]:
 
 def _read(file: object) -> str:
     file.seek(0)  # type: ignore[attr-defined]
-    data: bytes = file.read(_KEEP)  # type: ignore[attr-defined]
+    data: bytes = file.read(KEEP)  # type: ignore[attr-defined]
     return data.decode("utf-8", errors="replace")

@@ -1,4 +1,5 @@
-"""One unit of work in a process of its own: ``python -m avow.pipeline.worker REQUEST RESPONSE``.
+"""One unit of work in a process of its own: ``python -m avow.pipeline.worker REQUEST RESPONSE``, or a fork that does
+the same (`avow.pipeline.forks`).
 
 A solver that crashes, eats the memory or never returns takes this process with it and nothing else: the pipeline turns
 that into a verdict. Two workers use two cores, whatever Python's lock says.
@@ -9,16 +10,18 @@ from __future__ import annotations
 import json
 import sys
 import traceback
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from avow import __version__, process
+from avow import __version__
 from avow.backend import Limits, Report
 from avow.diagnostics import Rejected
 from avow.evidence.encoding import Unreadable
 from avow.evidence.obligation import Obligation
 from avow.files import write
+from avow.pipeline import forks
 from avow.pipeline.altered import Altered, alter
 from avow.pipeline.wire import report_from_json, report_to_json
 from avow.pipeline.work import Work, compose_work, method_backend, method_job, method_work, planned_method, sanity_work
@@ -26,9 +29,6 @@ from avow.system.load import load_system
 from avow.system.plan import System
 from avow.verdict import Outcome, Verdict
 from avow.workspace import Workspace
-
-_KEEP_BYTE_CODE = {"PYTHONDONTWRITEBYTECODE": ""}
-"""A run starts dozens of workers: each would compile the same modules again."""
 
 GRACE = 90.0
 """Seconds above the tool's own limits that a worker gets to load, translate and write."""
@@ -59,12 +59,7 @@ def run(
         ),
     )
     limit = work.limits.seconds * max(2, len(obligations)) + GRACE
-    done = process.run(
-        [sys.executable, "-m", "avow.pipeline.worker", str(request), str(response)],
-        cwd=workspace.root,
-        seconds=limit,
-        env=_KEEP_BYTE_CODE,
-    )
+    done = forks.run([str(request), str(response)], cwd=workspace.root, seconds=limit)
     log = {"worker.log": done.stderr} if done.stderr.strip() else {}
     try:
         if done.timed_out:
@@ -114,13 +109,24 @@ class Changed(Exception):  # noqa: N818 - it names what happened
     """The files are no longer those that the keys are of."""
 
 
-def main(arguments: list[str]) -> int:
+def entry(arguments: Sequence[str]) -> int:
+    """The whole work of the process; its exit code."""
+    try:
+        _main(arguments)
+    except Changed:
+        return CHANGED
+    except Exception:
+        traceback.print_exc()
+        return 1
+    return 0
+
+
+def _main(arguments: Sequence[str]) -> None:
     request = json.loads(Path(arguments[0]).read_text())
     system, work = _asked(request)
     report = _execute(request, system, work)
     _asked(request)  # tools read the plan's files by themselves, at any time until now
     write(Path(arguments[1]), json.dumps(report_to_json(report), default=str))
-    return 0
 
 
 def _asked(request: dict[str, Any]) -> tuple[System, Work]:
@@ -183,11 +189,4 @@ def _discharge(request: dict[str, Any], system: System, work: Work, limits: Limi
 
 
 if __name__ == "__main__":
-    try:
-        code = main(sys.argv[1:])
-    except Changed:
-        code = CHANGED
-    except Exception:
-        traceback.print_exc()
-        code = 1
-    sys.exit(code)
+    sys.exit(entry(sys.argv[1:]))

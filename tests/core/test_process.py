@@ -68,7 +68,7 @@ def test_memory_is_bounded() -> None:
 
 def test_endless_output_is_cut() -> None:
     done = process.run(["bash", "-c", "yes | head -c 9000000"], seconds=20)
-    assert len(done.stdout) == process._KEEP
+    assert len(done.stdout) == process.KEEP
 
 
 def test_standard_input_is_closed_unless_given() -> None:

@@ -1,0 +1,140 @@
+"""The far end of `avow.pipeline.forks`: imports everything once, then forks for each work that it is told of.
+
+One loop, one thread: it waits for the next message, for a fork to end, and for its user to hang up. What is imported
+here is Avow's core only. A backend may do as it likes at import (start a thread, ask the environment), so each fork
+imports its own.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import ctypes
+import gc
+import importlib
+import json
+import os
+import selectors
+import signal
+import socket
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+from avow.pipeline import worker
+from avow.process import kill_tree
+
+PRELOADED = (
+    "avow.calculus.interpretation",
+    "avow.calculus.obligations",
+    "avow.language.load",
+    "avow.logic.claims",
+    "avow.logic.sanity",
+    "avow.logic.smt",
+    "avow.pipeline.engines",
+    "avow.system.formulas",
+)
+"""What nearly every work needs, directly or not."""
+
+_MESSAGE = 1 << 20
+_PR_SET_PDEATHSIG = 1
+
+
+@dataclass(frozen=True, slots=True)
+class _Fork:
+    pid: int
+    handle: int
+    """A descriptor that becomes readable as the process ends."""
+    user: socket.socket
+
+
+def serve(control: socket.socket) -> int:
+    """Until `control` is closed and every fork has ended; the exit code."""
+    for name in PRELOADED:
+        importlib.import_module(name)
+    if len(list(Path("/proc/self/task").iterdir())) != 1:
+        return 1  # a lock that another thread holds would stay locked in every fork
+    gc.collect()
+    gc.freeze()  # what is shared with the forks stays shared: the collector does not write to it
+    control.send(b"ready")
+    forks: set[_Fork] = set()
+    with selectors.DefaultSelector() as events:
+        events.register(control, selectors.EVENT_READ)
+        listening = True
+        while listening or forks:
+            for event, _ in events.select():
+                fork: _Fork | None = event.data
+                if fork is None:
+                    begun = _next(control, events)
+                    if begun is None:
+                        events.unregister(control)
+                        listening = False
+                    else:
+                        forks.add(begun)
+                        events.register(begun.handle, selectors.EVENT_READ, begun)
+                        events.register(begun.user, selectors.EVENT_READ, begun)
+                elif fork in forks:  # it ended, or its user hung up; both may come at once
+                    forks.remove(fork)
+                    events.unregister(fork.handle)
+                    events.unregister(fork.user)
+                    _end(fork)
+    return 0
+
+
+def _next(control: socket.socket, events: selectors.BaseSelector) -> _Fork | None:
+    """Start what the next message asks for; None at the end of all messages."""
+    try:
+        message, descriptors, _, _ = socket.recv_fds(control, _MESSAGE, 2)
+    except OSError:
+        message, descriptors = b"", []
+    if not message:
+        return None
+    user, errors = descriptors
+    server = os.getpid()
+    pid = os.fork()
+    if pid == 0:
+        open_here = [control.fileno(), user, *_descriptors(events)]
+        _work(json.loads(message), server, errors, open_here)
+    os.close(errors)
+    return _Fork(pid, os.pidfd_open(pid), socket.socket(fileno=user))
+
+
+def _descriptors(events: selectors.BaseSelector) -> list[int]:
+    own = [events.fileno()] if isinstance(events, selectors.EpollSelector) else []
+    return [*own, *(key.fd for key in events.get_map().values())]
+
+
+def _work(arguments: Sequence[str], server: int, errors: int, open_here: Sequence[int]) -> NoReturn:
+    """In the fork, from here to its end."""
+    code = 1
+    try:
+        os.setsid()
+        # as a tool (`avow.process`), it must not outlive what started it, however that dies
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != server:
+            os._exit(1)
+        os.dup2(errors, 2)
+        for descriptor in {*open_here, errors}:
+            with contextlib.suppress(OSError):
+                os.close(descriptor)  # a connection that stays open here would never close for its user
+        sys.argv = [worker.__file__, *arguments]
+        code = worker.entry(arguments)
+        atexit._run_exitfuncs()
+    finally:
+        with contextlib.suppress(Exception):
+            sys.stderr.flush()
+        os._exit(code)
+
+
+def _end(fork: _Fork) -> None:
+    kill_tree(fork.pid)  # before it is waited for: until then, its number cannot be another's
+    _, status = os.waitpid(fork.pid, 0)
+    os.close(fork.handle)
+    with fork.user, contextlib.suppress(OSError):
+        fork.user.send(str(os.waitstatus_to_exitcode(status)).encode())
+
+
+if __name__ == "__main__":
+    sys.exit(serve(socket.socket(fileno=int(sys.argv[1]))))

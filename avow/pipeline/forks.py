@@ -1,0 +1,181 @@
+"""Where a work's process comes from: a fork of one that has imported everything, or else a new Python.
+
+To start Python, import Avow and Z3 and build the grammar's tables costs more than many an obligation does. So a run
+starts one server (``python -m avow.pipeline.fork_server``) that does this once, and forks itself for each work. A fork
+is a process of its own in a session of its own: it is bounded, crashes and is killed with its descendants like a new
+Python. The server runs nothing but imports, has one thread, and ends with the process that started it.
+
+It is of one process, folder and environment: where any of them is another, another server is started. Systems other
+than Linux, and machines on which the server does not start, use a new Python for each work.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from avow import process
+from avow.process import Completed
+
+WORKER = "avow.pipeline.worker"
+PLAIN = "AVOW_PLAIN_WORKERS"
+"""Environment: when set, every work gets a new Python."""
+
+_KEEP_BYTE_CODE = {"PYTHONDONTWRITEBYTECODE": ""}
+"""A run may start dozens of Pythons: each would compile the same modules again."""
+
+_START = 60.0
+"""Seconds that the server gets for its imports."""
+
+_STOP = 15.0
+"""Seconds that it gets to kill a fork."""
+
+_lock = threading.Lock()
+_servers: list[_Server] = []
+"""The one in use; none before the first work."""
+
+
+def run(arguments: Sequence[str], *, cwd: Path, seconds: float) -> Completed:
+    """Run the worker on these arguments, in a process of its own; what it prints on standard output is not kept."""
+    server = _server(cwd)
+    done = server.run(arguments, seconds) if server else None
+    if done is not None:
+        return done
+    return process.run([sys.executable, "-m", WORKER, *arguments], cwd=cwd, seconds=seconds, env=_KEEP_BYTE_CODE)
+
+
+def _server(cwd: Path) -> _Server | None:
+    """The server for this folder and environment; None where there can be none."""
+    if os.environ.get(PLAIN) or sys.platform != "linux" or not hasattr(os, "pidfd_open"):
+        return None
+    place = (os.getpid(), str(cwd.resolve()), tuple(sorted(os.environ.items())))
+    with _lock:
+        if _servers and (_servers[0].place != place or not _servers[0].alive):
+            _servers.pop().close()
+        if not _servers:
+            server = _start(place, cwd)
+            if server is None:
+                return None
+            _servers.append(server)
+        return _servers[0]
+
+
+_Place = tuple[int, str, tuple[tuple[str, str], ...]]
+
+
+_refused: set[_Place] = set()
+"""Where a server did not start: waited for once, not for each work."""
+
+
+def _start(place: _Place, cwd: Path) -> _Server | None:
+    if place in _refused:
+        return None
+    try:
+        server = _Server(place, cwd)
+        if server.ready():
+            return server
+        server.close()
+    except OSError:
+        pass
+    _refused.add(place)
+    return None
+
+
+class _Server:
+    """The near end. One message on `control` starts a fork, and hands over a socket of that fork's own: on it comes
+    the exit code, and closing it kills the fork."""
+
+    def __init__(self, place: _Place, cwd: Path) -> None:
+        """Raises OSError."""
+        self.place = place
+        self._sending = threading.Lock()
+        self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            # Not bound to our life by a signal, as that is bound to the starting *thread*: it ends as `control` closes.
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "avow.pipeline.fork_server", str(theirs.fileno())],
+                cwd=cwd,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                env={**os.environ, **_KEEP_BYTE_CODE},
+                start_new_session=True,
+                pass_fds=[theirs.fileno()],
+            )
+        process.watch(self._process.pid)
+
+    @property
+    def alive(self) -> bool:
+        return self._process.poll() is None
+
+    def ready(self) -> bool:
+        """Wait until it has imported everything."""
+        try:
+            self._control.settimeout(_START)
+            ready = self._control.recv(16) == b"ready"
+            self._control.settimeout(None)
+        except OSError:
+            return False
+        return ready
+
+    def run(self, arguments: Sequence[str], seconds: float) -> Completed | None:
+        """None where the server did not take it on."""
+        start = time.monotonic()
+        mine, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with tempfile.TemporaryFile() as errors, mine:
+            with theirs, self._sending:
+                try:
+                    message = json.dumps(list(arguments)).encode()
+                    socket.send_fds(self._control, [message], [theirs.fileno(), errors.fileno()])
+                except OSError:
+                    return None
+            code: int | None = None
+            ended = False
+            try:
+                mine.settimeout(seconds)
+                code = _code(mine)
+                ended = True
+            except TimeoutError:
+                pass
+            finally:
+                if not ended:
+                    _end(mine)
+            errors.seek(0)
+            text = errors.read(process.KEEP).decode("utf-8", errors="replace")
+            return Completed((WORKER, *arguments), code, "", text, time.monotonic() - start)
+
+    def close(self) -> None:
+        """Let it end, once nothing that it forked is running. Never waits long."""
+        self._control.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(1)
+        if self._process.poll() is not None:
+            process.unwatch(self._process.pid)
+
+
+def _code(connection: socket.socket) -> int:
+    """The fork's exit code. Raises TimeoutError."""
+    try:
+        said = connection.recv(32)
+    except ConnectionError:
+        said = b""
+    # without a word: the server, and with it the fork, was killed from outside
+    return int(said) if said else -signal.SIGKILL
+
+
+def _end(connection: socket.socket) -> None:
+    """Have the fork killed, and wait until it is."""
+    with contextlib.suppress(OSError):
+        connection.shutdown(socket.SHUT_WR)
+        connection.settimeout(_STOP)
+        connection.recv(32)

@@ -1,0 +1,223 @@
+"""A work's process, forked or started anew: bounded, killed with all that it started, its end turned into a verdict."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from avow import process
+from avow.backend import Limits, Report
+from avow.pipeline import forks, worker
+from avow.pipeline.survey import Survey, survey
+from avow.verdict import Outcome, Verdict
+from avow.workspace import Workspace
+
+BACKEND = """
+import os, signal, subprocess, sys, time
+from pathlib import Path
+from avow import process
+from avow.backend import Report
+from avow.verdict import Link, Outcome, Verdict
+
+class Odd:
+    name, title, version, green_means = "odd", "does as it is told", "1", ""
+    strength, link = Verdict.TESTED, Link.GUIDED
+    options_schema = {"type": "object"}
+    def tools(self): return ()
+    def check(self, job): return ()
+    def files(self, job): return ()
+    def export(self, job): return {}
+    def discharge(self, job, folder, limits):
+        match job.options["does"]:
+            case "answers":
+                print("never mind")
+            case "exits":
+                os._exit(3)
+            case "aborts":
+                os.abort()
+            case "raises":
+                raise ValueError("of its own")
+            case "hangs":
+                pids = [os.getpid()]
+                for own_session in (False, True):
+                    pids.append(subprocess.Popen(["sleep", "300"], start_new_session=own_session).pid)
+                Path("pids.tmp").write_text(" ".join(map(str, pids)))
+                os.replace("pids.tmp", "pids")
+                process.run(["sleep", "300"], seconds=300)
+        text = f"{os.getcwd()} {os.environ.get('SAID')} {os.getpgid(0) == os.getsid(0) == os.getpid()} {sys.path[0]}"
+        return Report(tuple(Outcome(o.id, Verdict.TESTED, text) for o in job.obligations), "odd", "1")
+
+BACKEND = Odd()
+"""
+
+
+@pytest.fixture(scope="module")
+def odd(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A workspace with a system for each thing that the backend may do."""
+    root = tmp_path_factory.mktemp("odd")
+    (root / "odd_backend_of_test_forks.py").write_text(BACKEND)
+    for does in ("answers", "exits", "aborts", "raises", "hangs"):
+        folder = root / "contracts" / does
+        folder.mkdir(parents=True)
+        (folder / "system.rcl").write_text("node n { inputs() outputs(b : BOOL) topics() guarantee g (out.b) }")
+        methods = f"methods: [{{odd: {{does: {does}}}}}]"
+        (folder / "plan.yaml").write_text(
+            f"plugins: [odd_backend_of_test_forks]\nnodes: {{n: {{criticality: low, {methods}}}}}\n"
+        )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(root))
+        yield root
+
+
+@pytest.fixture(params=["forked", "anew"])
+def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    way: str = request.param
+    if way == "anew":
+        monkeypatch.setenv(forks.PLAIN, "1")
+    elif sys.platform != "linux":
+        pytest.skip("only Linux forks")
+    return way
+
+
+def settle(root: Path, does: str) -> tuple[Outcome, Report]:
+    os.environ.pop("PYTEST_CURRENT_TEST", None)  # with another environment it is another server
+    found = survey(root / "contracts" / does)
+    assert isinstance(found, Survey)
+    work = found.work("odd")
+    folder = root / "artifacts" / does
+    folder.mkdir(parents=True, exist_ok=True)
+    report = worker.run(Workspace(root), work, work.obligations, folder)
+    (outcome,) = report.outcomes
+    return outcome, report
+
+
+def pids(root: Path) -> list[int]:
+    """Of the hanging work and of what it started, once it hangs."""
+    path = root / "pids"
+    until(path.is_file)
+    return [int(word) for word in path.read_text().split()]
+
+
+def until(happens: object) -> None:
+    deadline = time.monotonic() + 60
+    while not happens():  # type: ignore[operator]
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def server() -> int:
+    return forks._servers[0]._process.pid
+
+
+def test_it_answers_from_a_session_of_its_own(odd: Path, way: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for said in ("this", "that"):  # a fork has the environment of now, not of the server's start
+        monkeypatch.setenv("SAID", said)
+        outcome, _ = settle(odd, "answers")
+        assert (outcome.verdict, outcome.summary) == (Verdict.TESTED, f"{odd} {said} True {odd}")
+    if way == "forked":
+        first = server()
+        settle(odd, "answers")
+        assert server() == first
+
+
+@pytest.mark.parametrize(
+    ("does", "why"),
+    [("exits", "ended with code 3"), ("aborts", f"ended with code -{int(signal.SIGABRT)}"), ("raises", "of its own")],
+)
+def test_a_crash_is_a_verdict_and_takes_nothing_with_it(odd: Path, way: str, does: str, why: str) -> None:
+    outcome, report = settle(odd, does)
+    assert outcome.verdict is Verdict.ERROR
+    assert why in outcome.summary
+    assert ("Traceback" in report.logs.get("worker.log", "")) == (does == "raises")
+    assert settle(odd, "answers")[0].verdict is Verdict.TESTED
+
+
+def test_a_work_that_hangs_is_killed_with_all_that_it_started(
+    odd: Path, way: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (odd / "pids").unlink(missing_ok=True)
+    settle(odd, "answers")  # from here on, a server is there
+    for limit in (1.0, 4.0, 16.0):  # until the work gets far enough to hang, on a busy machine
+        monkeypatch.setattr(worker, "GRACE", limit - 2 * Limits().seconds)
+        outcome, _ = settle(odd, "hangs")
+        assert outcome.verdict is Verdict.UNKNOWN
+        assert "no answer within" in outcome.summary
+        if (odd / "pids").exists():
+            break
+    started = pids(odd)
+    until(lambda: not any(map(alive, started)))
+
+
+def test_an_interrupt_ends_all_works(odd: Path, way: str) -> None:
+    (odd / "pids").unlink(missing_ok=True)
+    found: list[Outcome] = []
+    thread = threading.Thread(target=lambda: found.append(settle(odd, "hangs")[0]))
+    thread.start()
+    started = pids(odd)
+    process.kill_all()
+    thread.join(30)
+    assert found[0].verdict is Verdict.ERROR
+    until(lambda: not any(map(alive, started)))
+    assert settle(odd, "answers")[0].verdict is Verdict.TESTED, "what was killed is started again for the next run"
+
+
+def test_works_at_once_do_not_hold_each_other(odd: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fork that kept another's connection open would keep it from being killed, or from being heard to end."""
+    (odd / "pids").unlink(missing_ok=True)
+    monkeypatch.delenv(forks.PLAIN, raising=False)
+    thread = threading.Thread(target=settle, args=(odd, "hangs"))
+    thread.start()
+    started = pids(odd)
+    for _ in range(3):
+        assert settle(odd, "answers")[0].verdict is Verdict.TESTED
+    assert all(map(alive, started))
+    process.kill_all()
+    thread.join(30)
+
+
+def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
+    (odd / "pids").unlink(missing_ok=True)
+    script = f"""
+        from pathlib import Path
+        from avow.pipeline import worker
+        from avow.pipeline.survey import survey
+        from avow.workspace import Workspace
+        root = Path({str(odd)!r})
+        work = survey(root / "contracts" / "hangs").work("odd")
+        worker.run(Workspace(root), work, work.obligations, root)
+    """
+    run = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)], cwd=odd)
+    started = pids(odd)
+    family = process._descendants(run.pid)
+    assert started[0] in family
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    # what the work started by itself, without `process.run`, is its own business where nobody is left to look for it
+    bound = set(family) - set(started[1:])
+    until(lambda: not any(map(alive, bound)))
+    for pid in filter(alive, started[1:]):
+        os.kill(pid, signal.SIGKILL)
+
+
+def test_without_a_server_there_is_a_new_python(odd: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SAID", "without")
+    monkeypatch.setattr(forks, "_START", 0.0)
+    assert settle(odd, "answers")[0].verdict is Verdict.TESTED
+    monkeypatch.setattr(forks, "_Server", None)  # it is not tried again
+    assert settle(odd, "answers")[0].verdict is Verdict.TESTED
