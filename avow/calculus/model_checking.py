@@ -7,18 +7,20 @@ stays as it is for ever, and the report says which node has no answer.
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from random import Random
 
+from avow.calculus.answering import Stuck
 from avow.calculus.answers import Answer
 from avow.calculus.discharge import Bounds
 from avow.calculus.ltl import Lasso, demands_progress, violation
+from avow.calculus.narrowing import Holds
 from avow.calculus.scenario import CannotRun, world
-from avow.calculus.transition import Holds, Machine, Step, Stuck, Walk
+from avow.calculus.transition import Machine, Step, Walk
 from avow.calculus.variables import Frame
+from avow.logic.clock import now
 from avow.logic.formula import free_variables
 from avow.logic.values import Value
 from avow.system.temporal import Property, State, states_of
@@ -54,7 +56,7 @@ class Explored:
         """The steps from a memory, each once."""
         if memory not in self.following:
             found: dict[int, None] = {}
-            for step in self.machine.steps(memory):
+            for step in self.machine.judged(memory, tuple(self.judges.values())):
                 truth = {state: judge(step.values) for state, judge in self.judges.items()}
                 index = (tuple(truth.values()), step.memory)
                 if index not in self.index:
@@ -74,8 +76,9 @@ class Explored:
         """A run of these kinds of steps, each step really taken from the memory that the one before it leaves."""
         found: list[Step] = []
         memories = self.machine.initial()
+        judges = tuple(self.judges.values())
         for kind in run:
-            step = next((s for m in memories for s in self.machine.steps(m) if self.kind(s) == kind), None)
+            step = next((s for m in memories for s in self.machine.judged(m, judges) if self.kind(s) == kind), None)
             if step is None:  # it stays as it is: there is no further step
                 break
             found.append(step)
@@ -114,14 +117,14 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
         told = f"the system cannot take a first step: {explored.cannot_start.text()}"
         verdict = Verdict.REFUTED if explored.cannot_start.genuine else Verdict.UNKNOWN
         return Answer(verdict, told, Counterexample(explanation=told), bound=_bound(explored))
-    if done and not machine.incomplete:
+    if done and not machine.short:
         return Answer(
             Verdict.CHECKED,
             f"every run within the scenario has it: {len(explored.steps)} kinds of steps, all looked at",
             bound=_bound(explored),
             details={"exhaustive": True},
         )
-    why = "; ".join(sorted(machine.incomplete)) or "time or steps ran out"
+    why = "; ".join(machine.short) or "time or steps ran out"
     return Answer(
         Verdict.TESTED,
         f"no run of the first {explored.depth} steps was found to break it; not exhaustive: {why}",
@@ -133,16 +136,16 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
 def _tried(machine: Machine, frame: Frame, name: str, formula: Property, bounds: Bounds) -> Answer | None:
     """Some runs at random: most systems that break a property do so soon, and a search need not even begin."""
     random = Random(bounds.seed)
-    deadline = time.monotonic() + bounds.milliseconds / 4000
+    deadline = now() + bounds.milliseconds / 4000
     judges = _judges(machine, frame, formula)
     best: tuple[Walk, int] | None = None  # a run that gets stuck tells more than one that goes round
     for _ in range(RUNS):
-        walk = machine.walk(random, RUN_LENGTH, until_repeat=True)
+        walk = machine.walk(random, RUN_LENGTH, until_repeat=True, judges=tuple(judges.values()))
         if walk.steps and (walk.back is not None or (walk.stuck is not None and walk.stuck.genuine)):
             back = len(walk.steps) - 1 if walk.back is None else walk.back
             if (best is None or walk.stuck is not None) and _breaks(walk.steps, back, formula, judges):
                 best = (walk, back)
-        if time.monotonic() > deadline or (best is not None and best[0].stuck is not None):
+        if now() > deadline or (best is not None and best[0].stuck is not None):
             break
     if best is None:
         return None
@@ -160,7 +163,7 @@ def _breaks(steps: Sequence[Step], back: int, formula: Property, judges: dict[St
 def _judges(machine: Machine, frame: Frame, formula: Property) -> dict[State, Holds]:
     from avow.calculus.requirements import system_term
 
-    return {state: machine.judge(system_term(frame, state.term), finite=True) for state in states_of(formula)}
+    return {state: machine.judge(system_term(frame, state.term)) for state in states_of(formula)}
 
 
 def _begin(machine: Machine, frame: Frame, formula: Property) -> Explored:
@@ -181,7 +184,7 @@ def _begin(machine: Machine, frame: Frame, formula: Property) -> Explored:
 
 def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | bool:
     """Breadth first; looks for a violation now and then. True: nothing is left to look at."""
-    deadline = time.monotonic() + bounds.milliseconds / 1000
+    deadline = now() + bounds.milliseconds / 1000
     scenario = explored.machine.world.scenario
     deepest = scenario.steps
     next_look, stuck_seen, cut = 64, 0, False
@@ -193,7 +196,7 @@ def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | b
         if (deepest is not None and depth >= deepest) or len(explored.steps) > MAX_STATES:
             cut = True
             continue
-        if time.monotonic() > deadline:
+        if now() > deadline:
             cut = True
             break
         following = explored.open(memory)
@@ -241,8 +244,14 @@ def _shown_run(
     if broken:
         told += f"; on the way an assumption does not hold: {', '.join(broken)}"
     shown = Counterexample(trace[-1] if trace else (), told, trace, back)
+    doubt = ""
     if stuck is not None and not stuck.genuine:
-        summary = f"{told}: perhaps only because the scenario lacks the value"
+        doubt = "perhaps only because the scenario lacks the value"
+    else:
+        inexact = sorted({name for step in steps for name in machine.unconfirmed(step)})
+        doubt = f"but over the scenario's values only is it sure that {', '.join(inexact)} holds" if inexact else ""
+    if doubt:
+        summary = f"{told}: {doubt}"
         return Answer(Verdict.UNKNOWN, summary, shown, bound=bound, details={"exhaustive": False})
     return Answer(Verdict.REFUTED, f"a run of the composed contracts breaks {name}: {told}", shown, bound=bound)
 

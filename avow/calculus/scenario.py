@@ -65,18 +65,34 @@ class World:
         """The values that are tried for an output that is not a function. Raises CannotRun."""
         return self.values(f"{node}.{port.name}", ("out", node), port)
 
+    def domain(self, owners: Sequence[str], port: Port) -> tuple[str, ...] | None:
+        """What the scenario says of a port by its name."""
+        found = (self.scenario.domains.get(f"{owner}.{port.name}") for owner in owners)
+        return next((texts for texts in found if texts is not None), None)
+
+    def results(self, node: str, port: Port) -> tuple[Value, ...]:
+        """The values that a function may have at each point. Raises CannotRun."""
+        sort = port.sort
+        assert isinstance(sort, FunctionSort)
+        texts = self.domain(("out", node), port)
+        if texts is not None:
+            return tuple(dict.fromkeys(self.parse(text, sort.result) for text in texts))
+        found = self.plain_values(sort.result)
+        if found is None or len(found) > MAX_CANDIDATES:
+            raise CannotRun(
+                f"what values {node}.{port.name} has is not said; give scenario.domains: {{out.{port.name}: …}}"
+            )
+        return found
+
     def points(self, node: str, port: Port) -> tuple[Point, ...]:
         """The points at which a relation may hold. Raises CannotRun."""
         sort = port.sort
         assert isinstance(sort, FunctionSort)
-        if sort.result != BOOL:
-            raise CannotRun(f"{node}.{port.name} is a function; only relations (… --> BOOL) can be searched for")
-        for owner in ("out", "in", node):
-            texts = self.scenario.domains.get(f"{owner}.{port.name}")
-            if texts is not None:
-                wanted = sort.parameters[0] if len(sort.parameters) == 1 else TupleSort(sort.parameters)
-                found = [self.parse(text, wanted) for text in texts]
-                return tuple(v if isinstance(v, tuple) else (v,) for v in found)
+        texts = self.domain(("out", "in", node), port)
+        if texts is not None:
+            wanted = sort.parameters[0] if len(sort.parameters) == 1 else TupleSort(sort.parameters)
+            found = [self.parse(text, wanted) for text in texts]
+            return tuple(v if isinstance(v, tuple) else (v,) for v in found)
         found_points = self.tuples(sort.parameters)
         if found_points is None:
             raise CannotRun(
@@ -131,10 +147,9 @@ class World:
         return finite_values(sort, self.domains) or (tuple(p[0] for p in self.tuples((sort,)) or ()) or None)
 
     def values(self, name: str, owners: Sequence[str], port: Port) -> tuple[Value, ...]:
-        for owner in owners:
-            texts = self.scenario.domains.get(f"{owner}.{port.name}")
-            if texts is not None and not isinstance(port.sort, FunctionSort):
-                return tuple(self.parse(text, port.sort) for text in texts)
+        texts = self.domain(owners, port)
+        if texts is not None and not isinstance(port.sort, FunctionSort):
+            return tuple(self.parse(text, port.sort) for text in texts)
         if isinstance(port.sort, OpaqueSort):
             return (Opaque(port.sort.name, 0),)
         if isinstance(port.sort, FunctionSort):
@@ -205,8 +220,24 @@ def world(frame: Frame) -> World:
     return found
 
 
+_LARGE = 3
+_KEYS: dict[int, tuple[FunctionValue, object]] = {}
+
+
 def key(value: Value) -> object:
     """Equal for equal values, and quick to look up (functions hash poorly)."""
-    if isinstance(value, FunctionValue):
-        return (frozenset((p, v) for p, v in value.table.items() if v != value.default), value.default)
-    return value
+    if not isinstance(value, FunctionValue):
+        return value
+    if len(value.table) <= _LARGE:
+        return _function_key(value)
+    # Maps and plans are met again and again, and stay the same objects: a key is made once.
+    known = _KEYS.get(id(value))
+    if known is None or known[0] is not value:
+        if len(_KEYS) > 10_000:
+            _KEYS.clear()
+        known = _KEYS[id(value)] = (value, _function_key(value))
+    return known[1]
+
+
+def _function_key(value: FunctionValue) -> object:
+    return (frozenset((p, v) for p, v in value.table.items() if v != value.default), value.default)

@@ -1,0 +1,392 @@
+"""What a node may put out, found by asking: a function's or a sequence's values are chosen where something looks.
+
+A guarantee that is evaluated over a function of which nothing is decided yet says which point it has to know: the
+search goes on with each value that there may be, and what no clause looks at stays open, for whoever reads it later to
+decide. So one open function stands for all functions that complete it, and a search that ends has looked at them all
+(lazy narrowing: Lindblad 2007; Runciman, Naylor and Lindblad 2008).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from avow.language.contract import Clause
+from avow.language.sorts import FunctionSort, SequenceSort
+from avow.language.terms import And, Apply, Compare, Implies, Role, Term, Variable
+from avow.logic import values as values_
+from avow.logic.evaluate import Evaluator, NotEvaluable, compile_term
+from avow.logic.formula import free_variables
+from avow.logic.values import Data, FunctionValue, Opaque, Value
+
+Values = dict[str, Value]
+Point = tuple[Value, ...]
+Holds = Callable[[Mapping[str, Value]], bool]
+
+
+class _Any(Opaque):
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        return "any"
+
+
+ANY = _Any("any", -1)
+"""Stands where nothing is decided yet: a function's default, or an element of a sequence."""
+
+MAX_TRIED = 100_000
+"""Partial answers looked at for one question; beyond it, the search is not exhaustive."""
+
+
+class Undecided(Exception):  # noqa: N818 - it names a state
+    """A clause cannot be judged before these points are decided: (variable, arguments), in the order met."""
+
+    def __init__(self, wanted: Sequence[tuple[str, Point]]) -> None:
+        super().__init__(wanted)
+        self.wanted = tuple(wanted)
+
+    def __str__(self) -> str:
+        return f"{self.wanted[0][0]} is open"
+
+
+# -- open values -------------------------------------------------------------------------------------------------------
+
+
+def is_open(value: Value) -> bool:
+    """Whether a function or a sequence has undecided values."""
+    match value:
+        case FunctionValue(default=default):
+            return default is ANY
+        case values_.Sequence(items=items):
+            return any(item is ANY for item in items)
+        case _:
+            return False
+
+
+def lazy_names(formula: Term) -> tuple[str, ...]:
+    """The free variables of a formula whose values may be open."""
+    return tuple(v.qualified for v in free_variables(formula) if isinstance(v.sort, FunctionSort | SequenceSort))
+
+
+def decided(value: Value, point: Point, result: Value) -> Value:
+    """The open value with one more point decided."""
+    match value:
+        case FunctionValue(table=table, default=default):
+            return FunctionValue(dict(sorted({**table, point: result}.items(), key=_order)), default)
+        case values_.Sequence(items=items):
+            [at] = point
+            assert isinstance(at, int)
+            return values_.Sequence((*items[:at], result, *items[at + 1 :]))
+    raise AssertionError("only functions and sequences are open")
+
+
+def _order(entry: tuple[Point, Value]) -> tuple[object, ...]:
+    return tuple((0, a, "") if isinstance(a, int | Fraction) else (1, 0, str(a)) for a in entry[0])
+
+
+def opened(found: Mapping[str, Value], names: Sequence[str]) -> tuple[Mapping[str, Value], list[tuple[str, Point]]]:
+    """The valuation with its open values ready to be asked, and where the questions to them will be noted."""
+    wanted: list[tuple[str, Point]] = []
+    asking: Values = {}
+    for name in names:
+        value = found.get(name)
+        if value is None or not is_open(value):
+            continue
+        match value:
+            case FunctionValue(table=table, default=default):
+                asking[name] = FunctionValue(_OpenTable(name, table, wanted), default)
+            case values_.Sequence(items=items):
+                asks: Any = _OpenItems(name, items, wanted)
+                asking[name] = values_.Sequence(asks)
+    return ({**found, **asking} if asking else found), wanted
+
+
+class _Asked(NotEvaluable):
+    """Evaluation met an open point. Where another part decides the whole, it does no harm."""
+
+
+class _OpenTable(Mapping[Point, Value]):
+    """A table that says which point it was asked for. Asked for all of them at once, it has no answer."""
+
+    def __init__(self, name: str, table: Mapping[Point, Value], wanted: list[tuple[str, Point]]) -> None:
+        self._name, self._table, self._wanted = name, table, wanted
+
+    def get(self, point: Point, default: Any = None) -> Value:
+        found = self._table.get(point)
+        if found is None:
+            self._wanted.append((self._name, point))
+            raise _Asked(f"{self._name} is open")
+        return found
+
+    def __getitem__(self, point: Point) -> Value:
+        return self.get(point)
+
+    def _all(self) -> Any:
+        raise NotEvaluable(f"{self._name} is not known at all its points")
+
+    def __iter__(self) -> Iterator[Point]:
+        raise NotEvaluable(f"{self._name} is not known at all its points")
+
+    def __len__(self) -> int:
+        raise NotEvaluable(f"{self._name} is not known at all its points")
+
+    def items(self) -> Any:
+        return self._all()
+
+    def keys(self) -> Any:
+        return self._all()
+
+    def values(self) -> Any:
+        return self._all()
+
+    def __eq__(self, other: object) -> bool:
+        return bool(self._all())
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class _OpenItems(Sequence[Value]):
+    """The elements of a sequence of known length, some of them open."""
+
+    def __init__(self, name: str, items: tuple[Value, ...], wanted: list[tuple[str, Point]]) -> None:
+        self._name, self._items, self._wanted = name, items, wanted
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __getitem__(self, at: Any) -> Any:
+        found = self._items[at]
+        if found is ANY:
+            self._wanted.append((self._name, (at,)))
+            raise _Asked(f"{self._name} is open")
+        return found
+
+    def __contains__(self, item: object) -> bool:
+        if item in [known for known in self._items if known is not ANY]:
+            return True
+        return ANY in self._items and bool(self[self._items.index(ANY)])
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, tuple | _OpenItems):
+            return NotImplemented
+        theirs = other._items if isinstance(other, _OpenItems) else other
+        if len(theirs) != len(self._items):
+            return False
+        doubt: _Asked | None = None
+        for at in range(len(theirs)):
+            try:
+                if self[at] != other[at]:
+                    return False
+            except _Asked as asked:
+                doubt = doubt or asked
+        if doubt is not None:
+            raise doubt
+        return True
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+
+def _asking(value: Value) -> bool:
+    match value:
+        case values_.Sequence(items=items):
+            return isinstance(items, _OpenItems) or any(map(_asking, items))
+        case Data(arguments=items) | tuple(items):
+            return any(map(_asking, items))
+        case _:
+            return False
+
+
+# -- equations ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Forcing:
+    """``when -> out.name == value`` or, with arguments, ``when -> out.name(arguments) == value``: no other will do."""
+
+    name: str
+    arguments: tuple[Evaluator, ...] | None
+    when: tuple[Evaluator, ...]
+    value: Evaluator
+    lazy: tuple[str, ...]
+
+    def forced(self, found: Mapping[str, Value], point: Point | None) -> tuple[Value, ...] | None:
+        """The only value that is possible, if this equation says so of this port (at this point)."""
+        if (point is None) is not (self.arguments is None):
+            return None
+        values, _ = opened(found, self.lazy)
+        try:
+            if self.arguments is not None and tuple(a(values) for a in self.arguments) != point:
+                return None
+            if not all(when(values) for when in self.when):
+                return None
+            value = self.value(values)
+        except NotEvaluable:
+            return None
+        # An open sequence is not copied: what is decided of the copy later would not be decided of it.
+        return None if _asking(value) else (value,)
+
+
+def forcings(guarantees: Sequence[Clause]) -> tuple[Forcing, ...]:
+    """The equations among the guarantees that give an output, or a function's value at a point."""
+    found: list[Forcing] = []
+    for clause in guarantees:
+        stack: list[tuple[Term, tuple[Term, ...]]] = [(clause.formula, ())]
+        while stack:
+            term, when = stack.pop()
+            match term:
+                case And(items=items):
+                    stack += [(item, when) for item in reversed(items)]
+                case Implies(left=left, right=right):
+                    stack.append((right, (*when, left)))
+                case Compare(operator="==", left=left, right=right):
+                    for head, value in ((left, right), (right, left)):
+                        forcing = _forcing(head, value, when)
+                        if forcing is not None:
+                            found.append(forcing)
+    return tuple(found)
+
+
+def _forcing(head: Term, value: Term, when: tuple[Term, ...]) -> Forcing | None:
+    port, arguments = (head.function, head.arguments) if isinstance(head, Apply) else (head, None)
+    if not isinstance(port, Variable) or port.role is not Role.OUTPUT:
+        return None
+    if arguments is None and isinstance(port.sort, FunctionSort):
+        return None
+    parts = (*(arguments or ()), *when, value)
+    if port in {v for part in ((value, *when) if arguments is None else parts) for v in free_variables(part)}:
+        return None
+    try:
+        return Forcing(
+            port.qualified,
+            None if arguments is None else tuple(map(compile_term, arguments)),
+            tuple(map(compile_term, when)),
+            compile_term(value),
+            tuple(dict.fromkeys(name for part in parts for name in lazy_names(part))),
+        )
+    except NotEvaluable:
+        return None
+
+
+# -- the search --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Choices:
+    """What an output may be. `values`: of a plain one the values tried, None where they are not known; of a function or
+    a sequence the values that it may have at a point. `why` says what would help where they are not known."""
+
+    values: tuple[Value, ...] | None
+    why: str = ""
+    shells: tuple[Value, ...] | None = None
+    """What is tried of an open output to begin with: the open function; open sequences of every length tried."""
+
+    short: str = ""
+    """In what way `shells` are not all there are."""
+
+    def begin(self) -> tuple[Value, ...] | None:
+        return self.shells if self.shells is not None else self.values
+
+
+class Unknown(Exception):  # noqa: N818 - it names a state
+    """An output whose values are not known, and that no equation gives."""
+
+
+@dataclass(slots=True)
+class Narrowing:
+    """The search for the outputs of one node."""
+
+    choices: Mapping[str, Choices]
+    """By ``out.port``."""
+    guarantees: tuple[tuple[frozenset[str], Holds], ...]
+    """With the outputs that each mentions. They raise `Undecided`."""
+    forcings: tuple[Forcing, ...]
+    incomplete: set[str] = field(default_factory=set)
+    """Why a search that came to its end still is not exhaustive."""
+
+    def answers(self, inputs: Mapping[str, Value], limit: int, *, free: bool = False) -> tuple[list[Values], bool]:
+        """Every output that meets the guarantees (with `free`, every output at all), each open where that does not
+        matter; and whether these are all. Raises Undecided where an open input has to be known first, and Unknown."""
+        pending = () if free else self.guarantees
+        stack: list[tuple[Values, tuple[tuple[frozenset[str], Holds], ...]]] = [({}, pending)]
+        found: list[Values] = []
+        tried = 0
+        while stack:
+            outputs, pending = stack.pop()
+            tried += 1
+            if tried > MAX_TRIED or len(found) > limit:
+                return found[:limit], False
+            judged = self._judge({**inputs, **outputs}, outputs, pending)
+            if judged is None:
+                continue
+            pending, wanted = judged
+            missing = [name for name in self.choices if name not in outputs]
+            if missing:
+                name, values = self._next(missing, {**inputs, **outputs}, free)
+                stack += [({**outputs, name: value}, pending) for value in reversed(values)]
+            elif wanted:
+                own = next(((name, point) for name, point in wanted if name in self.choices), None)
+                if own is None:
+                    raise Undecided(wanted)
+                name, point = own
+                possible = self._possible(name, point, {**inputs, **outputs}, free)
+                further = [decided(outputs[name], point, value) for value in reversed(possible)]
+                stack += [({**outputs, name: value}, pending) for value in further]
+            else:
+                found.append(outputs)
+        return found, True
+
+    def _judge(
+        self, valuation: Values, outputs: Values, pending: tuple[tuple[frozenset[str], Holds], ...]
+    ) -> tuple[tuple[tuple[frozenset[str], Holds], ...], list[tuple[str, Point]]] | None:
+        """The guarantees that are not judged yet, with the points that they ask for; None if one is broken."""
+        left: list[tuple[frozenset[str], Holds]] = []
+        wanted: list[tuple[str, Point]] = []
+        for guarantee in pending:
+            mentioned, holds = guarantee
+            if not mentioned <= outputs.keys():
+                left.append(guarantee)
+                continue
+            try:
+                if not holds(valuation):
+                    return None
+            except Undecided as undecided:
+                left.append(guarantee)
+                wanted += undecided.wanted
+        return tuple(left), wanted
+
+    def _next(self, missing: Sequence[str], valuation: Values, free: bool) -> tuple[str, tuple[Value, ...]]:
+        """The output to choose next, and what it may be: one that an equation gives, else the one with least choice."""
+        best: tuple[str, tuple[Value, ...]] | None = None
+        for name in missing:
+            begin = self.choices[name].begin()
+            forced = None if free else self._forced(name, None, valuation)
+            if forced is not None:
+                allowed = self.choices[name].values if self.choices[name].shells is None else None
+                return name, tuple(value for value in forced if allowed is None or value in allowed)
+            if begin is not None and (best is None or len(begin) < len(best[1])):
+                best = name, begin
+        if best is None:
+            raise Unknown(self.choices[missing[0]].why)
+        if self.choices[best[0]].short:
+            self.incomplete.add(self.choices[best[0]].short)
+        return best
+
+    def _possible(self, name: str, point: Point, valuation: Values, free: bool) -> tuple[Value, ...]:
+        values = self.choices[name].values
+        forced = None if free else self._forced(name, point, valuation)
+        if forced is not None:
+            return tuple(value for value in forced if values is None or value in values)
+        if values is None:
+            raise Unknown(self.choices[name].why)
+        return values
+
+    def _forced(self, name: str, point: Point | None, valuation: Values) -> tuple[Value, ...] | None:
+        for forcing in self.forcings:
+            if forcing.name == name:
+                found = forcing.forced(valuation, point)
+                if found is not None:
+                    return found
+        return None
