@@ -67,7 +67,8 @@ class Counterexample:
     """Why a claim is false, in the contract's own words.
 
     `values` are (name, value) pairs such as ``("in.r", "125")``; `trace` is a run, one tuple of pairs a step, and
-    `loop` the index of the step to which its last step returns (a lasso), if it does.
+    `loop` the index of the step to which its last step returns (a lasso), if it does. A name in parentheses, such as
+    ``(believes)``, is the tool's, not the contract's: reports print it small, and `text` leaves it out.
     """
 
     values: tuple[tuple[str, str], ...] = ()
@@ -77,7 +78,7 @@ class Counterexample:
 
     def text(self) -> str:
         """One line for people: ``in.r = 125, out.status = green: guarantee 1 demands orange``."""
-        values = ", ".join(f"{name} = {value}" for name, value in self.values)
+        values = ", ".join(f"{name} = {value}" for name, value in self.values if not name.startswith("("))
         return ": ".join(part for part in (values, self.explanation) if part)
 
 

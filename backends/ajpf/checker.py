@@ -1,18 +1,17 @@
-"""Model checking of properties on an explored state graph; vacuity; counterexamples in words."""
+"""Model checking of properties on an explored state graph; vacuity; runs that refute."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from avow.backends.ajpf.automaton import Automaton, build, compiled
 from avow.backends.ajpf.explore import Graph
-from avow.backends.ajpf.interpreter import NONE, Frame, State
+from avow.backends.ajpf.interpreter import NONE, Agent, Frame, State
 from avow.backends.ajpf.psl import Atom, Formula, Modality, Not, atoms, conjunction
 from avow.backends.ajpf.structure import Fair, Kripke, Lasso, find_lasso, reduce
-from avow.backends.ajpf.syntax import DeedKind, Sign, Struct, Term, Var, show, unify
-from avow.verdict import Counterexample
+from avow.backends.ajpf.syntax import DeedKind, Sign, Struct, Term, Var, unify
 
 
 class OutOfTime(Exception):  # noqa: N818 - it names a state, not a fault
@@ -59,7 +58,7 @@ class Checker:
         found = {atom: None for p in self.properties for f in (p.formula, p.trigger, p.goal) if f for atom in atoms(f)}
         self.atoms = tuple(found)
         self.places = {atom: at for at, atom in enumerate(self.atoms)}
-        self.labels = _labels(self.graph, self.atoms)
+        self.labels = label_states(self.graph.agent, self.graph.states, self.atoms)
         self.reduced = reduce(self.whole(self.labels))
         while len(smaller := reduce(self.reduced)) < 0.95 * len(self.reduced):
             self.reduced = smaller
@@ -111,8 +110,8 @@ class Checker:
         return automaton, fair, [new[label] for label in labels]
 
 
-def _labels(graph: Graph, wanted: Sequence[Atom]) -> list[int]:
-    agent = graph.agent
+def label_states(agent: Agent, states: Iterable[State], wanted: Sequence[Atom]) -> list[int]:
+    """For each state the bits of the atoms that hold in it, above them two bits for each fairness assumption."""
     by_beliefs: dict[int, int] = {}
     by_last: dict[int, int] = {NONE: 0}
     by_choice: dict[int, int] = {}
@@ -142,7 +141,7 @@ def _labels(graph: Graph, wanted: Sequence[Atom]) -> list[int]:
 
     by_draw: dict[int, int] = {}
     result = []
-    for state in graph.states:
+    for state in states:
         bits = _memo(by_beliefs, state.beliefs, of_beliefs)
         if done:
             bits |= _memo(by_last, state.last, of_last)
@@ -192,35 +191,3 @@ def needs_fine_steps(properties: Iterable[Property]) -> bool:
     """Whether a property looks at intentions, which change between a plan's choice and its first deed."""
     fine = (Modality.INTENDS, Modality.INTENDS_TO_DO)
     return any(atom.modality in fine for p in properties for atom in atoms(p.formula))
-
-
-def explain(graph: Graph, lasso: Lasso, values: Mapping[str, str], explanation: str) -> Counterexample:
-    """The run in words: what the agent did last, what it believes beyond its first beliefs, what is new to perceive."""
-    always = frozenset(graph.agent.program.beliefs)
-    trace: list[tuple[tuple[str, str], ...]] = []
-    loop: int | None = None
-    for at, number in enumerate(lasso.path):
-        shown = _words(graph, graph.states[number], always)
-        if at == lasso.loop:
-            loop = len(trace)
-        elif trace and trace[-1] == shown and (loop is None or loop < len(trace)):
-            continue
-        trace.append(shown)
-    return Counterexample(tuple(values.items()), explanation, tuple(trace), loop)
-
-
-def _words(graph: Graph, state: State, always: frozenset[Struct]) -> tuple[tuple[str, str], ...]:
-    agent = graph.agent
-    beliefs = agent.beliefs.items[state.beliefs]
-    believed = sorted(show(b) for b in (beliefs.own | beliefs.perceived) - always)
-    words = [
-        ("last action", "none" if state.last == NONE else show(agent.actions.items[state.last])),
-        ("believes", ", ".join(believed) or "nothing new"),
-    ]
-    missing = sorted(show(b) for b in always if b not in beliefs)
-    if missing:
-        words.append(("no longer believes", ", ".join(missing)))
-    if state.drawn:
-        offered = agent.environment.percepts(agent.choices.items[state.choice])
-        words.append(("is about to perceive", ", ".join(map(show, offered)) or "nothing"))
-    return tuple(words)

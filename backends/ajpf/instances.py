@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 from avow.backend import Job
@@ -50,6 +50,8 @@ class Instantiation:
     extras: tuple[tuple[Extra, tuple[Property, ...]], ...]
     unused: tuple[str, ...]
     """Rows of the table that covered nothing."""
+    words: Mapping[Formula, str] = field(default_factory=dict)
+    """What each formula that came of a row stands for in the contract."""
 
     @property
     def properties(self) -> tuple[Property, ...]:
@@ -65,7 +67,7 @@ def instances(job: Job, setup: Setup) -> Instantiation:
     claims = tuple(_claim(job.clause(o), mapper, setup, keys) for o in job.obligations)
     extras = tuple((extra, _extra(extra, keys)) for extra in setup.extras)
     unused = tuple(row.text for row in setup.rows if row.text not in mapper.used)
-    return Instantiation(claims, extras, unused)
+    return Instantiation(claims, extras, unused, dict(mapper.words))
 
 
 def diagnose(setup: Setup, made: Instantiation) -> Iterator[Diagnostic]:

@@ -41,6 +41,11 @@ class Row:
     formula: Formula
     span: Span | None = None
 
+    def say(self, values: Mapping[str, int]) -> str:
+        """The pattern with numbers for its index variables, for people."""
+        known = {t for t in subterms(self.pattern) if isinstance(t, Variable) and t.name in values}
+        return show_term(substituted(self.pattern, {v: values[v.name] for v in known if v.role is Role.BOUND}))
+
 
 @dataclass(frozen=True, slots=True)
 class Unit:
@@ -79,6 +84,8 @@ class Mapper:
     """The texts of the rows that covered something."""
     expanded: dict[str, tuple[int, ...]] = field(default_factory=dict)
     """Index variables quantified within formulas, and the finite ranges that they were given."""
+    words: dict[Formula, str] = field(default_factory=dict)
+    """Formula of the agent → what it stands for, as covered in the contract: for counterexamples."""
 
     def map(self, term: Term) -> Mapped:
         """A formula in normal form. Raises NotCovered."""
@@ -202,6 +209,9 @@ class Mapper:
             raise NotCovered(f"the row “{row.text}” cannot be used here: {error.reason}", row.span) from None
         if isinstance(formula, psl.Truth):
             return YES if formula.value else NO
+        said = row.say(values)
+        if self.words.setdefault(formula, said) != said:  # the row forgets an index: one formula for several
+            self.words[formula] = row.say({})
         return Unit(formula, any(_has_output(c) for c in covered))
 
 

@@ -8,17 +8,18 @@ from dataclasses import replace
 from pathlib import Path
 
 from avow.backend import Job, Limits, Report
-from avow.backends.ajpf import ajpf_tool, psl, spin
+from avow.backends.ajpf import ajpf_tool, spin
 from avow.backends.ajpf.ajpf_tool import Answer, Said
 from avow.backends.ajpf.automaton import TooLarge
 from avow.backends.ajpf.beliefs import TooDeep
-from avow.backends.ajpf.checker import Checker, OutOfTime, Property, explain, needs_fine_steps
+from avow.backends.ajpf.checker import Checker, OutOfTime, Property, needs_fine_steps
 from avow.backends.ajpf.explore import explore
 from avow.backends.ajpf.files import ail_file, jpf_file
 from avow.backends.ajpf.instances import Instantiation, instances
 from avow.backends.ajpf.interpreter import Agent
 from avow.backends.ajpf.options import Setup, read
 from avow.backends.ajpf.settle import Frame, Settled, outcome
+from avow.backends.ajpf.words import Wording, explain
 from avow.diagnostics import Rejected
 from avow.files import write
 from avow.verdict import Counterexample, Link, Outcome, Verdict
@@ -127,6 +128,7 @@ class _Run:
 
     def explain(self, checker: Checker) -> None:
         """A run for the first refuted property of each guarantee, and of each further property."""
+        wording = Wording(self.setup.rows, self.made.words, self.setup.instances)
         groups = [claim.properties for claim in self.made.claims] + [ps for _, ps in self.made.extras]
         for group in groups:
             refuted = next((p for p in group if self.results[p.key].verdict is Verdict.REFUTED), None)
@@ -136,10 +138,7 @@ class _Run:
             if lasso is None:  # the reduced and the whole graph disagree: never to happen, never to be passed over
                 self.results[refuted.key] = Settled(Verdict.ERROR, "the checker contradicts itself")
                 continue
-            name, equals, value = refuted.about.partition(" = ")
-            values = {name: value} if equals else {}
-            values["property"] = psl.show(refuted.formula)
-            found = explain(checker.graph, lasso, values, _because(refuted))
+            found = explain(checker.graph, lasso, refuted, wording)
             self.counterexamples[refuted.key] = found
             self.logs[f"{refuted.key}.trace.txt"] = _trace(found)
 
@@ -203,14 +202,6 @@ class _Run:
                     self.results[p.key] = replace(self.results[p.key], opinions={ENGINE: str(own.verdict)})
             else:
                 self.second(p.key, "AJPF", answer.said)
-
-
-def _because(p: Property) -> str:
-    if p.goal is not None and p.trigger is not None:
-        return f"{psl.show(p.trigger)} comes about on this run, and afterwards {psl.show(p.goal)} never does"
-    if p.trigger is not None:
-        return f"{psl.show(p.trigger)} comes about on this run, and what must follow does not"
-    return "the property fails on this run"
 
 
 def _trace(found: Counterexample) -> str:

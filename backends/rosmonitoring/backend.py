@@ -203,7 +203,9 @@ def _outcome(obligation: str, name: str, runs: list[_Run]) -> Outcome:
     for run in runs:
         broken = run.first.get(f"{Fault.GUARANTEE.name}/{name}")
         if broken is not None:
-            shown = Counterexample((*broken.bindings, *broken.values), broken.text())
+            when = f" (t = {broken.time})" if broken.time else ""
+            told = f"event {broken.index}{when} of {run.name}: {broken.explanation}"
+            shown = Counterexample((*broken.bindings, *broken.values), told)
             summary = f"broken at event {broken.index} of {run.name}: {broken.explanation}"
             return Outcome(obligation, Verdict.REFUTED, summary, shown, bound=bound)
 

@@ -1,0 +1,223 @@
+"""A run of the agent in the contract's own words, through the plan's table read backwards.
+
+Each row of the table says which agent formula stands for which contract formula. So a step of a run can be told by the
+rows that hold in it: a column for each row, with the indices for which it holds. What the agent believes stays beside
+it, under names in parentheses: reports print those small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+from avow.backends.ajpf import psl
+from avow.backends.ajpf.automaton import compiled
+from avow.backends.ajpf.checker import Property, label_states
+from avow.backends.ajpf.explore import Graph
+from avow.backends.ajpf.interpreter import NONE, State
+from avow.backends.ajpf.mapping import Row
+from avow.backends.ajpf.psl import Formula
+from avow.backends.ajpf.psl_parser import Malformed, index_names, instantiate
+from avow.backends.ajpf.structure import Lasso
+from avow.backends.ajpf.syntax import Struct, Term, show
+from avow.verdict import Counterexample
+
+MAX_INDICES = 400
+"""Combinations of index values that a row is tried with in each step."""
+
+Step = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Wording:
+    """`rows` is the plan's table; `told` what each formula that came of it stands for, as it was met in the contract;
+    `indices` the values that the plan gives to index variables."""
+
+    rows: Sequence[Row]
+    told: Mapping[Formula, str]
+    indices: Mapping[str, Sequence[int]] = field(default_factory=dict)
+
+    def say(self, formula: Formula) -> str:
+        """A formula without temporal operators in the contract's words; what no row covers stays in the agent's."""
+        known = self.told.get(formula)
+        if known is not None:
+            return known
+        match formula:
+            case psl.Truth(value=value):
+                return "always" if value else "never"
+            case psl.Not(body=body):
+                return f"¬({self.say(body)})"
+            case psl.And(items=items):
+                return " ∧ ".join(self._junction(items, psl.And))
+            case psl.Or(items=items):
+                return " ∨ ".join(f"({part})" if " ∧ " in part else part for part in self._junction(items, psl.Or))
+            case _:
+                return self._part_of(formula)
+
+    def _junction(self, items: Sequence[Formula], kind: type[psl.And] | type[psl.Or]) -> Iterator[str]:
+        """Several items may be what one row stands for: the rows that cover most come first."""
+        rest = list(items)
+        whole = [f for f in self.told if isinstance(f, kind) and set(f.items) <= set(rest)]
+        for formula in sorted(whole, key=lambda f: -len(f.items)):
+            if set(formula.items) <= set(rest):
+                yield self.told[formula]
+                rest = [item for item in rest if item not in formula.items]
+        for item in rest:
+            said = self.say(item)
+            yield f"({said})" if kind is psl.And and " ∨ " in said else said
+
+    def _part_of(self, formula: Formula) -> str:
+        """One of the alternatives that a row stands for: the row, and which of them it is."""
+        row = next((f for f in self.told if isinstance(f, psl.Or) and formula in f.items), None)
+        shown = psl.show(formula)
+        return shown if row is None else f"{self.told[row]} (here {shown})"
+
+
+def explain(graph: Graph, lasso: Lasso, refuted: Property, wording: Wording) -> Counterexample:
+    """The run on which a property fails: step by step what the contract speaks of, then what the agent believes."""
+    visited = [graph.states[number] for number in lasso.path]
+    rows = _contract_cells(graph, visited, wording)
+    always = frozenset(graph.agent.program.beliefs)
+    trace: list[Step] = []
+    places: list[int] = []
+    loop: int | None = None
+    for at, state in enumerate(visited):
+        shown = (*rows[at], *_agent_cells(graph, state, always))
+        if at == lasso.loop:
+            loop = len(trace)
+        elif trace and trace[-1] == shown and (loop is None or loop < len(trace)):
+            places.append(len(trace) - 1)
+            continue
+        places.append(len(trace))
+        trace.append(shown)
+    name, equals, value = refuted.about.partition(" = ")
+    values = ({name: value} if equals else {}) | {"(property)": psl.show(refuted.formula)}
+    return Counterexample(tuple(values.items()), _because(graph, visited, places, refuted, wording), tuple(trace), loop)
+
+
+def _because(graph: Graph, visited: Sequence[State], places: Sequence[int], refuted: Property, wording: Wording) -> str:
+    trigger, goal = refuted.trigger, refuted.goal
+    if trigger is None:
+        return "the property fails on this run"
+    if goal is None:
+        return f"in step {_first(graph, visited, places, trigger, None)}: {wording.say(trigger)}; this must never be"
+    if trigger == psl.TRUE:
+        return f"demanded whatever happens, and never so on this run: {wording.say(goal)}"
+    step = _first(graph, visited, places, trigger, goal)
+    return f"in step {step}: {wording.say(trigger)}; what must follow never does: {wording.say(goal)}"
+
+
+def _first(
+    graph: Graph, visited: Sequence[State], places: Sequence[int], trigger: Formula, goal: Formula | None
+) -> str:
+    """The first step in which the trigger holds and after which the goal never does."""
+    atoms = tuple(dict.fromkeys(a for f in (trigger, goal) if f is not None for a in psl.atoms(f)))
+    numbers = {atom: at for at, atom in enumerate(atoms)}
+    labels = label_states(graph.agent, visited, atoms)
+    meant = compiled(trigger, numbers)
+    reached = compiled(goal, numbers) if goal is not None else None
+    last = max((at for at, label in enumerate(labels) if reached is not None and reached(label)), default=-1)
+    found = next((at for at, label in enumerate(labels) if at > last and meant(label)), None)
+    return "?" if found is None else str(places[found])
+
+
+def _contract_cells(graph: Graph, visited: Sequence[State], wording: Wording) -> list[Step]:
+    """For each state and each row that ever holds: ``i = 1, 2``, or ``yes`` where the row has no index.
+    Of two rows that say the opposite of each other all along, the first is enough."""
+    numbers = _numbers(graph, visited)
+    tried: list[tuple[Row, dict[str, int], Formula]] = []
+    for row in wording.rows:
+        tried += [(row, values, made) for values, made in _instances(row, wording.indices, numbers)]
+    atoms = tuple(dict.fromkeys(a for _, _, formula in tried for a in psl.atoms(formula)))
+    places = {atom: at for at, atom in enumerate(atoms)}
+    tests = [(row, values, compiled(formula, places)) for row, values, formula in tried]
+    cells: dict[str, list[str]] = {}
+    opposites: set[tuple[str, ...]] = set()
+    labels = label_states(graph.agent, visited, atoms)
+    for row in wording.rows:
+        mine = [(values, test) for of, values, test in tests if of is row]
+        column = [_cell([values for values, test in mine if test(label)]) for label in labels]
+        if set(column) - {"no"} and tuple(column) not in opposites:
+            cells[row.say({})] = column
+            opposites.add(tuple(_OPPOSITE.get(cell, "") for cell in column))
+    return [tuple((name, column[at]) for name, column in cells.items()) for at in range(len(visited))]
+
+
+_OPPOSITE = {"yes": "no", "no": "yes"}
+
+
+def _cell(holds_for: Sequence[Mapping[str, int]]) -> str:
+    if not holds_for:
+        return "no"
+    names = list(holds_for[0])
+    if len(names) == 1:
+        return f"{names[0]} = {_runs([values[names[0]] for values in holds_for])}"
+    return "; ".join(", ".join(f"{n} = {v}" for n, v in values.items()) for values in holds_for) or "yes"
+
+
+def _runs(numbers: Sequence[int]) -> str:
+    """``1, 2, 5…9``"""
+    groups: list[list[int]] = []
+    for n in sorted(numbers):
+        if groups and groups[-1][-1] == n - 1:
+            groups[-1].append(n)
+        else:
+            groups.append([n])
+    return ", ".join(f"{g[0]}…{g[-1]}" if len(g) > 2 else ", ".join(map(str, g)) for g in groups)
+
+
+def _instances(
+    row: Row, ranges: Mapping[str, Sequence[int]], numbers: Sequence[int]
+) -> Iterator[tuple[dict[str, int], Formula]]:
+    """The row's formula with numbers for its indices, and these; nothing for what no state decides."""
+    names = sorted(index_names(row.formula) & row.variables)
+    domains = [sorted({*ranges.get(name, ()), *numbers}) for name in names]
+    total = 1
+    for domain in domains:
+        total *= len(domain)
+    if psl.is_temporal(row.formula) or total > MAX_INDICES:
+        return
+    for choice in product(*domains):
+        values = dict(zip(names, choice, strict=True))
+        try:
+            yield values, instantiate(row.formula, values)
+        except Malformed:
+            continue
+
+
+def _numbers(graph: Graph, visited: Sequence[State]) -> list[int]:
+    """The whole numbers of which the agent speaks on its way."""
+    agent = graph.agent
+    found: set[int] = set()
+    stack: list[Term] = []
+    for state in visited:
+        stack += agent.beliefs.items[state.beliefs].own | agent.beliefs.items[state.beliefs].perceived
+        stack += [] if state.last == NONE else [agent.actions.items[state.last]]
+    seen: set[Term] = set()
+    while stack:
+        term = stack.pop()
+        if isinstance(term, Struct) and term not in seen:
+            seen.add(term)
+            stack += term.args
+            if not term.args and term.functor.isascii() and term.functor.isdigit() and len(term.functor) < 10:
+                found.add(int(term.functor))
+    return sorted(found) if len(found) <= MAX_INDICES else []
+
+
+def _agent_cells(graph: Graph, state: State, always: frozenset[Struct]) -> Step:
+    """What the agent did last, what it believes beyond its first beliefs, what is new to perceive."""
+    agent = graph.agent
+    beliefs = agent.beliefs.items[state.beliefs]
+    believed = sorted(show(b) for b in (beliefs.own | beliefs.perceived) - always)
+    words = [
+        ("(last action)", "none" if state.last == NONE else show(agent.actions.items[state.last])),
+        ("(believes)", ", ".join(believed) or "nothing new"),
+    ]
+    missing = sorted(show(b) for b in always if b not in beliefs)
+    if missing:
+        words.append(("(no longer believes)", ", ".join(missing)))
+    if state.drawn:
+        offered = agent.environment.percepts(agent.choices.items[state.choice])
+        words.append(("(is about to perceive)", ", ".join(map(show, offered)) or "nothing"))
+    return tuple(words)
