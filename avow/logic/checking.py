@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal as OneOf
 
@@ -71,7 +72,7 @@ def _ask(
     engine: Engine,
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
     if engine == "qsat":
-        with watchdog(timeout_ms, translator.context.interrupt):
+        with _limited(translator, timeout_ms):
             return _ask_qsat(translator, assertions, tracked, timeout_ms)
     solver = z3.Solver(ctx=translator.context)
     solver.set("timeout", _wall(timeout_ms))
@@ -84,13 +85,22 @@ def _ask(
         switch = z3.Bool(f"track!{number}", translator.context)
         solver.add(z3.Implies(switch, expr))
         switches[switch.get_id()] = (switch, label)
-    with watchdog(timeout_ms, translator.context.interrupt):
+    with _limited(translator, timeout_ms):
         result = solver.check(*(switch for switch, _ in switches.values()))
     if result == z3.sat:
         return "sat", solver.model(), (), ""
     if result == z3.unsat:
         return "unsat", None, tuple(switches[s.get_id()][1] for s in solver.unsat_core()), ""
     return "unknown", None, (), str(solver.reason_unknown())
+
+
+@contextlib.contextmanager
+def _limited(translator: Translator, timeout_ms: int) -> Iterator[None]:
+    with watchdog(timeout_ms, translator.context.interrupt) as interrupted:
+        yield
+    if interrupted.is_set():
+        # An interrupt that came too late to end the search would end what is asked of this context next.
+        z3.Solver(ctx=translator.context).check()
 
 
 def _wall(timeout_ms: int) -> int:

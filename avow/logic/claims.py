@@ -14,7 +14,7 @@ always bad: `vacuous-G1` claims that guarantee G1 is *not* vacuous. Nothing here
 | redundant                | the guarantee (assumption) does not follow from the others               | warning  |
 | unconstrained            | the guarantees exclude some value of the output                          | warning  |
 | undetermined             | the inputs determine the output                                          | note     |
-| unneeded                 | without the assumption the guarantees could not always be met            | note     |
+| unneeded                 | the assumption rules out inputs for which no output meets the guarantees | note     |
 """
 
 from __future__ import annotations
@@ -196,7 +196,7 @@ def _of_assumption(node: Node, clause: Clause) -> list[Claim]:
     if len(node.assumptions) > 1:
         sentence = f"Assumption {clause.name} of {node.name} does not follow from the others."
         found.append(_claim(Property.REDUNDANT, clause, sentence, *common))
-    sentence = f"Without assumption {clause.name} the guarantees of {node.name} could not always be met."
+    sentence = f"Assumption {clause.name} of {node.name} rules out inputs for which no output meets the guarantees."
     found.append(_claim(Property.UNNEEDED, clause, sentence, *common))
     return found
 

@@ -29,12 +29,13 @@ def _clock() -> Callable[[], float]:
 
 
 @contextlib.contextmanager
-def watchdog(milliseconds: int, interrupt: Callable[[], None]) -> Iterator[None]:
-    """Call `interrupt`, again and again, while the block goes on beyond its limit.
+def watchdog(milliseconds: int, interrupt: Callable[[], None]) -> Iterator[threading.Event]:
+    """Call `interrupt`, again and again, while the block goes on beyond its limit; what is yielded is set once it was.
 
     Z3's own limit is in wall-clock time, and sometimes it misses it altogether (seen: 84 s for 16 ms).
     """
     done = threading.Event()
+    interrupted = threading.Event()
     used = _clock()
     limit = milliseconds / 1000
     cpu_end = used() + limit
@@ -45,13 +46,14 @@ def watchdog(milliseconds: int, interrupt: Callable[[], None]) -> Iterator[None]
         while not done.wait(wait):
             left = min(cpu_end - used(), wall_end - time.monotonic())
             if left <= 0:
+                interrupted.set()
                 interrupt()
             wait = max(left, 0.02)
 
     dog = threading.Thread(target=bark, daemon=True)
     dog.start()
     try:
-        yield
+        yield interrupted
     finally:
         done.set()
         dog.join()

@@ -6,6 +6,8 @@ that cannot be done exactly the value is a best reading of it: whoever shows a m
 
 from __future__ import annotations
 
+import itertools
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -33,6 +35,10 @@ from avow.logic.translation import Expr, Translator, Unsupported
 from avow.logic.values import Data, Element, FunctionValue, Opaque, Sequence, Value
 
 _ESCAPE = re.compile(r"\\u\{([0-9a-fA-F]+)\}|\\u([0-9a-fA-F]{4})|\\x([0-9a-fA-F]{2})")
+
+
+_SAMPLES = 128
+"""Tables read off a function that is given by comparisons have no more points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +124,7 @@ class Model:
         while rest is not None and z3.is_app_of(rest, z3.Z3_OP_ITE):
             point = self._point(rest.arg(0), sort)
             if point is None:
-                break
+                return self._sampled(rest, sort, table)
             table.setdefault(point, self._value(self._eval(rest.arg(1)), sort.result))
             rest = rest.arg(2)
         if rest is None:
@@ -126,6 +132,23 @@ class Model:
         simple = self._eval(rest)
         try:
             return self._value(simple, sort.result)
+        except Unsupported:
+            return default_value(sort.result)
+
+    def _sampled(self, rest: Expr, sort: FunctionSort, table: dict[tuple[Value, ...], Value]) -> Value:
+        """The rest tells arguments apart by comparing them (``2 <= x``): its values at the points that are named there
+        are added to the table, and what its last branch yields is taken for the default."""
+        places = _compared(rest, len(sort.parameters))
+        if math.prod(map(len, places)) > _SAMPLES:
+            return default_value(sort.result)
+        try:
+            for place in itertools.product(*places):
+                point = tuple(self._value(self._eval(a), p) for a, p in zip(place, sort.parameters, strict=True))
+                value = self._eval(z3.substitute_vars(rest, *place))
+                table.setdefault(point, self._value(value, sort.result))
+            while z3.is_app_of(rest, z3.Z3_OP_ITE):
+                rest = rest.arg(2)
+            return self._value(self._eval(rest), sort.result)
         except Unsupported:
             return default_value(sort.result)
 
@@ -146,6 +169,23 @@ class Model:
             return tuple(self._value(self._eval(fixed[k]), p) for k, p in enumerate(sort.parameters))
         except Unsupported:
             return None
+
+
+def _compared(expr: Expr, count: int) -> list[list[Expr]]:
+    """For each of a function's `count` arguments, the constants that an expression compares it with."""
+    found: list[dict[int, Expr]] = [{} for _ in range(count)]
+    stack, seen = [expr], set()
+    while stack:
+        part = stack.pop()
+        if part.get_id() in seen or not z3.is_app(part):
+            continue
+        seen.add(part.get_id())
+        stack.extend(part.children())
+        if part.num_args() == 2 and z3.is_bool(part):
+            for one, other in (part.children(), reversed(part.children())):
+                if z3.is_var(one) and not z3.is_var(other) and z3.is_const(other):
+                    found[z3.get_var_index(one)][other.get_id()] = other
+    return [list(values.values()) for values in found]
 
 
 def default_value(sort: Sort) -> Value:

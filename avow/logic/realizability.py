@@ -81,13 +81,15 @@ def realizable(
     given: Given | None = None,
     timeout_ms: int = 10_000,
     seed: int = 0,
+    doubtful: bool = False,
 ) -> Realizability:
-    """Decide it. `given` fixes some inputs (a scenario): the answer is then about these only."""
+    """Decide it. `given` fixes some inputs (a scenario): the answer is then about these only. `doubtful`: it is likely
+    not to be, and inputs without an output are looked for first."""
     needed: set[str] = set()
     engines: list[str] = []
     open_question: Realizability | None = None
     for group in groups(guarantees, outputs):
-        answer = Search(inputs, group, assumptions, given or {}, timeout_ms, seed).decide()
+        answer = Search(inputs, group, assumptions, given or {}, timeout_ms, seed).decide(doubtful)
         if answer.verdict is Verdict.REFUTED:
             return answer
         if answer.verdict is not Verdict.PROVED:
@@ -98,27 +100,6 @@ def realizable(
         return open_question
     ordered = tuple(label for label in assumptions if label in needed)
     return Realizability(Verdict.PROVED, needed=ordered, engine=", ".join(dict.fromkeys(engines)) or "z3")
-
-
-def unrealizable(
-    inputs: Sequence[Variable],
-    outputs: Sequence[Variable],
-    assumptions: Formulas,
-    guarantees: Formulas,
-    *,
-    timeout_ms: int = 2_000,
-    seed: int = 0,
-) -> Realizability | None:
-    """Only look for inputs without an output; None if none are found in time."""
-    for group in groups(guarantees, outputs):
-        search = Search(inputs, group, assumptions, {}, timeout_ms, seed)
-        try:
-            answer = search.refute((), timeout_ms) if group.outputs else search.decide()
-        except (Unsupported, z3.Z3Exception):
-            continue
-        if answer is not None and answer.verdict is Verdict.REFUTED:
-            return answer
-    return None
 
 
 class Search:
@@ -135,30 +116,28 @@ class Search:
         self.seed = seed
         self.found = candidates(group.outputs, assumptions.values(), group.guarantees.values())
         self.witnesses: list[Witness] = witnesses(self.found)
+        self.read = len(self.witnesses)
+        """So many were read off the contract; what follows these are outputs found for single inputs."""
         self.reason = ""
 
     def left(self) -> int:
         return int((self.deadline - now()) * 1000)
 
-    def decide(self) -> Realizability:
+    def decide(self, doubtful: bool = False) -> Realizability:
         try:
-            return self._decide()
+            return self._decide(doubtful)
         except Unsupported as error:
             return Realizability(Verdict.UNKNOWN, reason=f"Avow cannot express {error.what} for the solver")
         except z3.Z3Exception as error:
             return Realizability(Verdict.UNKNOWN, reason=f"Z3: {error}")
 
-    def _decide(self) -> Realizability:
+    def _decide(self, doubtful: bool) -> Realizability:
         if not self.group.outputs:
             return self._without_outputs()
-        rounds: list[Callable[[int], Realizability | None]] = [
-            self._direct,
-            self._witnessed,
-            self._strengthened,
-            self._refute,
-        ]
-        for limit in (300, 1_000, 4_000, 10_000):
-            for method in rounds:
+        methods: list[Callable[[int], Realizability | None]] = [self._direct, self._strengthened, self._witnessed]
+        methods.insert(1 if doubtful else 3, self._refute)
+        for limit in (1_000, 4_000) if doubtful else (300, 1_000, 4_000, 10_000):
+            for method in methods:
                 answer = method(max(50, min(limit, self.left())))
                 if answer is not None:
                     return answer
@@ -232,14 +211,26 @@ class Search:
         meanings: Mapping[Variable, Meaning],
         few: int | None = None,
     ) -> list[Expr]:
-        """That the constants are as chosen, and no witness meets the guarantees."""
+        """That the constants are as chosen, and no witness meets the guarantees (of those read off the contract, only
+        the first `few` are asked)."""
         guarantees = list(guarantees)
-        facts = [translator.term(axiom, meanings) for axiom in self.found.axioms]
-        for witness in self.witnesses[:few]:
+        asked = [*self.witnesses[: self.read][:few], *self.witnesses[self.read :]]
+        facts = [translator.term(axiom, meanings) for axiom in self._axioms(asked, guarantees)]
+        for witness in asked:
             whole = {**meanings, **meanings_of(translator, witness, meanings)}
             met = [*translator.background(witness, whole), *(translator.term(g, whole) for g in guarantees)]
             facts.append(z3.Not(z3.And(met)))
         return [*facts, *translator.opaque_facts()]
+
+    def _axioms(self, asked: Iterable[Witness], guarantees: Iterable[Term]) -> list[Term]:
+        """What is known of the constants that these mention, and of those that this mentions in its turn."""
+        wanted = frozenset[Variable]().union(*map(free_variables, guarantees), *map(_mentioned, asked))
+        left, found = dict.fromkeys(self.found.axioms), dict[Term, None]()
+        while fresh := [axiom for axiom in left if free_variables(axiom) & wanted & set(self.found.constants)]:
+            for axiom in fresh:
+                wanted |= free_variables(axiom)
+                found[axiom] = left.pop(axiom)
+        return list(found)
 
     def _fixed(self, translator: Translator) -> dict[Variable, Meaning]:
         return {variable: translator.value(value, variable.sort) for variable, value in self.given.items()}
@@ -247,14 +238,15 @@ class Search:
     # -- refutation ----------------------------------------------------------------------------------------------------
 
     def _refute(self, limit: int) -> Realizability | None:
-        return self.refute((), limit)
+        # The first candidate is the likeliest: inputs that defeat it mostly defeat all, and are much easier to find.
+        return self.refute((), limit, 1) or self.refute((), limit)
 
-    def refute(self, possible: Sequence[Formulas], limit: int) -> Realizability | None:
+    def refute(self, possible: Sequence[Formulas], limit: int, few: int | None = None) -> Realizability | None:
         """Inputs without an output, at which each of the `possible` sets of guarantees could be met by itself; None
-        if none are found in `limit` ms."""
+        if none are found in `limit` ms. `few`: only so many witnesses are to be defeated from the start."""
         end = now() + limit / 1000
         while now() < end:
-            inputs = self._defeat(self.group.guarantees, possible, int((end - now()) * 1000))
+            inputs = self._defeat(self.group.guarantees, possible, int((end - now()) * 1000), few)
             if inputs is None:
                 return None
             before = len(self.witnesses)
@@ -263,7 +255,9 @@ class Search:
                 return answer
         return None
 
-    def _defeat(self, guarantees: Formulas, possible: Sequence[Formulas], limit: int) -> dict[Variable, Value] | None:
+    def _defeat(
+        self, guarantees: Formulas, possible: Sequence[Formulas], limit: int, few: int | None
+    ) -> dict[Variable, Value] | None:
         """Allowed inputs at which no known witness meets the guarantees, though each of the `possible` sets of
         guarantees can be met; not judged yet."""
         translator = Translator()
@@ -281,7 +275,7 @@ class Search:
             facts = [translator.term(formula, whole) for formula in self.assumptions.values()]
             for copy, formulas in zip(copies, possible, strict=True):
                 facts += [translator.term(substitute(formula, copy), whole) for formula in formulas.values()]
-            return facts + self._defeated(translator, guarantees.values(), whole)
+            return facts + self._defeated(translator, guarantees.values(), whole, few)
 
         values = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=self.seed)
         if values is None:
@@ -342,6 +336,21 @@ def _function(
         return result
 
     return function
+
+
+def _mentioned(witness: Witness) -> frozenset[Variable]:
+    found: frozenset[Variable] = frozenset()
+    for value in witness.values():
+        match value:
+            case Cases(body=body, cases=cases):
+                found = found.union(free_variables(body), *(free_variables(t) for case in cases for t in case))
+            case Definition(body=body):
+                found |= free_variables(body)
+            case Fixed():
+                pass
+            case _:
+                found |= free_variables(value)
+    return found
 
 
 def _unused(label: str, taken: Mapping[str, object]) -> str:

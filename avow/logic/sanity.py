@@ -320,19 +320,32 @@ class _Analysis:
         return replace(finding, because=self._if_refuted(whole) or self._if_refuted(f"tautology-{name}"))
 
     def _unneeded(self, name: str) -> _Finding:
-        from avow.logic.realizability import unrealizable
+        from avow.logic.realizability import realizable
 
-        if self._other("realizable").verdict is not Verdict.PROVED:
-            return _Finding(Verdict.UNKNOWN, "only a realizable contract shows what it needs")
-        unused = "every guarantee can be met without it"
-        if name not in self.needed:
-            return _Finding(Verdict.REFUTED, unused, (name,), because=self._if_refuted(f"tautology-{name}"))
-        rest = {other: formula for other, formula in self.assumptions.items() if other != name}
-        limit = self.bounds.milliseconds // 3
-        answer = unrealizable(self.inputs, self.outputs, rest, self.guarantees, timeout_ms=limit, seed=self.bounds.seed)
-        if answer is not None:
-            return _Finding(Verdict.PROVED, engine=answer.engine)
-        return _Finding(Verdict.UNKNOWN, "the proof of realizability uses it; whether one could do without is open")
+        if weaker := self._if_refuted(f"tautology-{name}") or self._if_refuted(f"redundant-{name}"):
+            return _Finding(Verdict.REFUTED, "it rules out nothing that the others do not", (name,), because=weaker)
+        because = self._if_refuted("assumptions-satisfiable")
+        unused = _Finding(Verdict.REFUTED, "every guarantee can be met without it", (name,), because=because)
+        if self._other("realizable").verdict is Verdict.PROVED and name not in self.needed:
+            return unused
+        # What it rules out is all that there is to ask about: an output for each of these inputs makes it idle.
+        outside = {label: negation(f) if label == name else f for label, f in self.assumptions.items()}
+        answer = realizable(
+            self.inputs,
+            self.outputs,
+            outside,
+            self.guarantees,
+            timeout_ms=self.bounds.milliseconds,
+            seed=self.bounds.seed,
+            doubtful=True,
+        )
+        match answer.verdict:
+            case Verdict.REFUTED:
+                return _Finding(Verdict.PROVED, engine=answer.engine)
+            case Verdict.PROVED:
+                return replace(unused, engine=answer.engine)
+            case _:
+                return _Finding(Verdict.UNKNOWN, "whether the guarantees could be met without it is open")
 
     # -- one output ----------------------------------------------------------------------------------------------------
 

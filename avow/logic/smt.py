@@ -218,6 +218,9 @@ _ROUNDS = ((0.025, 0.1), (0.1, 0.2), (0.275, 0.3))
 """Parts of the time allowed, for the solver's own methods and for functions as tables: short rounds of different
 methods before any gets long."""
 
+_GLANCE_MS = 30
+"""Where there are functions, the solver's own methods answer at once or mostly not at all; then tables are tried."""
+
 _PATIENT_MS = 5_000
 """From this much time on, another solver is worth its start."""
 
@@ -244,6 +247,8 @@ def _solve(
     reason = ""
     for plain, tables in _ROUNDS:
         limit = max(1, int(timeout_ms * plain))
+        if functions and plain == _ROUNDS[0][0]:
+            limit = min(limit, _GLANCE_MS)
         answer = check(translator, background, timeout_ms=limit, seed=seed, tracked=tracked)
         if answer.status == "unsat":
             return Solution("unsat", core=answer.core)
@@ -299,7 +304,7 @@ def search_tables(
         left = (deadline - now()) * 1000
         if left < 1:
             return None
-        limit = max(50, int(left / min(3, len(_TABLES) - tried)))
+        limit = max(min(120, max(50, timeout_ms)), int(left / min(3, len(_TABLES) - tried)))
         values = _with_tables(translator, build, ordinary, functions, size, sparse, limit, seed)
         if values is not None:
             return values

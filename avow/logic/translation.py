@@ -47,6 +47,7 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+from avow.logic.one_point import eliminate_points
 from avow.logic.solver import z3
 from avow.logic.traversal import Steps, run
 from avow.logic.z3_sorts import Expr, Meaning, Sorts, Unsupported
@@ -269,19 +270,32 @@ class Translator(Sorts):
         inner = {**bound, **dict(zip(term.variables, constants, strict=True))}
         body = yield self._term(term.body, inner, meanings)
         members = [self.member(v.sort, c) for v, c in zip(term.variables, constants, strict=True)]
-        allowed = self.all_of(members)
+        allowed = [member for member in members if member is not None]
         if term.quantifier is Quantifier.FORALL:
-            return z3.ForAll(constants, body if allowed is None else z3.Implies(allowed, body))
-        within = body if allowed is None else z3.And(allowed, body)
-        exists = z3.Exists(constants, within)
+            left, parts = eliminate_points(constants, [*allowed, z3.Not(body)])
+            return self._all(left, parts)
         if term.quantifier is Quantifier.EXISTS:
-            return exists
+            left, parts = eliminate_points(constants, [*allowed, body])
+            within = self._every(parts)
+            return z3.Exists(left, within) if left else within
+        within = self._every([*allowed, body])
         if any(isinstance(variable.sort, FunctionSort) for variable in term.variables):
             raise Unsupported("unique existence of a function", term.span)
         others = [self.fresh(variable.name, variable.sort) for variable in term.variables]
         again = z3.substitute(within, *zip(constants, others, strict=True))
         equal = z3.And([one == other for one, other in zip(constants, others, strict=True)])
+        exists = z3.Exists(constants, within)
         return z3.And(exists, z3.ForAll([*constants, *others], z3.Implies(z3.And(within, again), equal)))
+
+    def _all(self, constants: list[Expr], denied: list[Expr]) -> Expr:
+        """For all constants, not all that is `denied` holds: its last part as a consequence, which reads better."""
+        *conditions, last = denied or [self.true()]
+        consequence = last.arg(0) if z3.is_not(last) else z3.Not(last)
+        body = z3.Implies(self._every(conditions), consequence) if conditions else consequence
+        return z3.ForAll(constants, body) if constants else body
+
+    def _every(self, parts: list[Expr]) -> Expr:
+        return self.all_of(parts) if parts else self.true()
 
     def _range(self, low: Term, high: Term, sort: SequenceSort, span: Span | None) -> Expr:
         if not (isinstance(low, Literal) and isinstance(high, Literal)):

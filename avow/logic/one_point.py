@@ -1,0 +1,111 @@
+"""``exists(i | c == inspect(i) and P(i))`` without its quantifier: c is an `inspect`, and P holds of what is in it.
+
+The one-point rule, for constructors (and tuples) too: where a quantified variable can have one value only, that value
+stands for it. Solvers apply the rule to ``i == t`` by themselves, but not through a constructor, and what is left of a
+contract's formulas is then often free of quantifiers. The meaning stays the same, whatever the sorts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from avow.logic.solver import z3
+from avow.logic.z3_sorts import Expr
+
+_MANY = 64
+"""Conjunctions of more parts are left alone: each part may be looked at once for each variable."""
+
+
+def eliminate_points(constants: Sequence[Expr], conjuncts: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
+    """Of "there are `constants` such that all of the `conjuncts` hold": the constants that are still needed, and the
+    conjuncts then."""
+    left = list(constants)
+    parts = _flat(conjuncts)
+    while len(parts) <= _MANY:
+        step = _step(left, parts)
+        if step is None:
+            break
+        left, parts = step
+        parts = _flat(parts)
+    return left, parts
+
+
+def _flat(conjuncts: Sequence[Expr]) -> list[Expr]:
+    """The conjuncts of the conjuncts, negations pushed in as far as that takes."""
+    found: list[Expr] = []
+    stack = list(reversed(conjuncts))
+    while stack:
+        part = stack.pop()
+        if z3.is_and(part):
+            stack.extend(reversed(part.children()))
+        elif z3.is_not(part) and z3.is_not(part.arg(0)):
+            stack.append(part.arg(0).arg(0))
+        elif z3.is_not(part) and z3.is_or(part.arg(0)):
+            stack.extend(z3.Not(item) for item in reversed(part.arg(0).children()))
+        elif z3.is_not(part) and z3.is_implies(part.arg(0)):
+            stack.extend((z3.Not(part.arg(0).arg(1)), part.arg(0).arg(0)))
+        else:
+            found.append(part)
+    return found
+
+
+def _step(constants: list[Expr], parts: list[Expr]) -> tuple[list[Expr], list[Expr]] | None:
+    """One equation used up; None if there is none of use."""
+    for position, part in enumerate(parts):
+        if not z3.is_eq(part):
+            continue
+        for built, other in (part.children(), reversed(part.children())):
+            fields = _fields(built, other)
+            solved = [(field, value) for field, value in fields if _among(field, constants)]
+            if not solved or _mentions(other, constants):
+                continue
+            values: dict[int, tuple[Expr, Expr]] = {}
+            rest = []
+            for field, value in fields:
+                if _among(field, constants) and field.get_id() not in values:
+                    values[field.get_id()] = (field, value)
+                else:
+                    rest.append(field == value)
+            shape = [] if built.eq(fields[0][0]) else [_recognised(built, other)]
+            known = list(values.values())
+            replaced = [z3.substitute(p, *known) for k, p in enumerate(parts) if k != position]
+            kept = [c for c in constants if c.get_id() not in values]
+            return kept, [*shape, *(z3.substitute(p, *known) for p in rest), *replaced]
+    return None
+
+
+def _fields(built: Expr, other: Expr) -> list[tuple[Expr, Expr]]:
+    """(x, t) for ``x == t``; for ``C(a, b) == t``, each argument with what t has in its place."""
+    if z3.is_const(built):
+        return [(built, other)]
+    sort = built.sort()
+    if not (z3.is_app(built) and isinstance(sort, z3.DatatypeSortRef)):
+        return []
+    for index in range(sort.num_constructors()):
+        if built.decl().eq(sort.constructor(index)):
+            return [(a, sort.accessor(index, k)(other)) for k, a in enumerate(built.children())]
+    return []
+
+
+def _recognised(built: Expr, other: Expr) -> Expr:
+    sort = built.sort()
+    index = next(k for k in range(sort.num_constructors()) if built.decl().eq(sort.constructor(k)))
+    return sort.recognizer(index)(other)
+
+
+def _among(expr: Expr, constants: Sequence[Expr]) -> bool:
+    return any(expr.eq(constant) for constant in constants)
+
+
+def _mentions(expr: Expr, constants: Sequence[Expr]) -> bool:
+    wanted = {constant.get_id() for constant in constants}
+    seen: set[int] = set()
+    stack = [expr]
+    while stack:
+        part = stack.pop()
+        if part.get_id() in wanted:
+            return True
+        if part.get_id() not in seen:
+            seen.add(part.get_id())
+            stack.extend([part.body()] if z3.is_quantifier(part) else part.children())
+    return False
