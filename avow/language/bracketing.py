@@ -18,6 +18,10 @@ _SIGNS = {"and": "and", "or": "or", "implies": "->", "iff": "<=>"}
 _EXHAUSTIVE = 10
 """Up to this many letters every assignment is tried, else `_SAMPLES` of them."""
 _SAMPLES = 2000
+_EFFORT = 400_000
+"""Samples times operators, at most: a formula of thousands of parts gets fewer samples."""
+_SHOWN = 12
+"""So many parts of a formula are shown, and the rest is left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +81,7 @@ _LEVELS: dict[_Way, tuple[str, ...]] = {
 def _differ(operands: list[Tree], operators: list[str], text: str) -> bool:
     letters: dict[str, int] = {}
     atoms = [_literal(o, text, letters) for o in operands]
-    for values in _assignments(len(letters)):
+    for values in _assignments(len(letters), len(operators)):
         row = [constant if letter is None else values[letter] != negated for letter, negated, constant in atoms]
         if _value(row, operators, "ours") != _value(row, operators, "other"):
             return True
@@ -96,13 +100,13 @@ def _literal(tree: Tree, text: str, letters: dict[str, int]) -> tuple[int | None
     return letters.setdefault(key, len(letters)), negated, False
 
 
-def _assignments(count: int) -> Iterator[list[bool]]:
-    if count <= _EXHAUSTIVE:
+def _assignments(count: int, size: int) -> Iterator[list[bool]]:
+    if count <= _EXHAUSTIVE and size << count <= _EFFORT:
         for number in range(1 << count):
             yield [bool(number >> i & 1) for i in range(count)]
         return
     source = random.Random(count)
-    for _ in range(_SAMPLES):
+    for _ in range(max(20, min(_SAMPLES, _EFFORT // size))):
         weight = source.random()
         yield [source.random() < weight for _ in range(count)]
 
@@ -136,15 +140,25 @@ def _reduce(values: list[bool], signs: list[str], level: str) -> tuple[list[bool
     return (out[::-1], left[::-1]) if level == "->" else (out, left)
 
 
-def _bracketed(tree: Tree, text: str) -> str:
-    """The formula as it is read, with parentheses around what binds tighter."""
+def _bracketed(tree: Tree, text: str, among: int = 1) -> str:
+    """The formula as it is read, with parentheses around what binds tighter. `among`: so many others stand around."""
+    most = max(2, _SHOWN // among)
+    left_out = len(tree.parts) - most
     parts = []
-    for part in tree.parts:
+    for part in tree.parts if left_out <= 0 else (*tree.parts[: most - 1], tree.parts[-1]):
         if part.kind in _SIGNS:
-            parts.append(f"({_bracketed(part, text)})")
+            parts.append(f"({_bracketed(part, text, min(len(tree.parts), most) * among)})")
         else:
             parts.append(_shortened(text[part.start : part.end]))
-    return f" {_SIGNS[tree.kind]} ".join(parts)
+    if left_out > 0:
+        parts.insert(-1, "…")
+    sign = f" {_SIGNS[tree.kind]} "
+    if tree.kind != "implies":
+        return sign.join(parts)
+    shown = parts[-1]
+    for i, part in enumerate(reversed(parts[:-1])):
+        shown = f"{part}{sign}({shown})" if i else f"{part}{sign}{shown}"
+    return shown
 
 
 def _shortened(text: str) -> str:

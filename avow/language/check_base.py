@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from avow.diagnostics import Span
 from avow.language.conversions import convert
@@ -62,6 +62,10 @@ class Base:
 
     def span(self, tree: Tree | Token) -> Span:
         return self.reports.source.span(tree.start, tree.end)
+
+    def places(self, trees: Sequence[Tree]) -> Callable[[int, int], Span]:
+        """Of parts that stand one after another: the place from one of them to another."""
+        return lambda first, last: self.reports.source.span(trees[first].start, trees[last].end)
 
     def text(self, tree: Tree) -> str:
         text = " ".join(self.reports.source.text[tree.start : tree.end].split())

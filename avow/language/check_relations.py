@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from avow.language.chains import arithmetic
 from avow.language.check_applications import Applications
 from avow.language.check_base import count
-from avow.language.conversions import NUMERIC, alike, common, convert, joined, widen
+from avow.language.conversions import NUMERIC, alike, common, convert, joined
 from avow.language.lexer import Token
 from avow.language.printer import show_sort
 from avow.language.sorts import (
     BOOL,
     INTEGER,
-    NATURAL,
     REAL,
     EnumSort,
     FunctionSort,
@@ -23,7 +23,6 @@ from avow.language.sorts import (
 from avow.language.syntax import Tree
 from avow.language.terms import (
     And,
-    Arithmetic,
     Compare,
     In,
     Literal,
@@ -50,17 +49,24 @@ class Relations(Applications):
         return term
 
     def _arithmetic(self, tree: Tree, expected: Sort | None) -> Term | None:
-        left_tree, operator, right_tree = tree.parts
-        left, right = self.numeric(left_tree, operator), self.numeric(right_tree, operator)
-        if left is None or right is None:
+        trees = tree.parts[::2]
+        operators = [token.text for token in tree.parts[1::2]]
+        operands: list[Term] = []
+        for operand, operator in zip(trees, [operators[0], *operators], strict=True):
+            term = self.numeric(operand, operator)
+            if term is None:
+                continue
+            if operator == "/" and operand is not trees[0] and isinstance(term, Literal) and term.value == 0:
+                self.error("RCL309", "division by zero", operand)
+                continue
+            operands.append(term)
+        if len(operands) < len(trees):
             return None
-        if operator == "/" and isinstance(right, Literal) and right.value == 0:
-            self.error("RCL309", "division by zero", right_tree)
-            return None
-        if operator == "/" or REAL in (left.sort, right.sort):
-            return Arithmetic(operator, widen(left), widen(right), REAL, self.span(tree))
-        natural = left.sort == NATURAL and right.sort == NATURAL and operator != "-"
-        return Arithmetic(operator, left, right, NATURAL if natural else INTEGER, self.span(tree))
+        made = arithmetic(operators, operands, self.places(trees))
+        if made is None:
+            message = f"a chain of {len(operators)} operators, with a `/` between most of them, is too long"
+            self.error("RCL110", message, tree.parts[1], hint="put parentheses around its parts")
+        return made
 
     def _negative(self, tree: Tree, expected: Sort | None) -> Term | None:
         inner = tree.parts[0]

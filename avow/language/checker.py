@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from avow.diagnostics import Span
+from avow.language.chains import equivalence, implication
 from avow.language.check_names import BUILTINS
 from avow.language.check_relations import Relations
 from avow.language.environment import did_you_mean
@@ -25,7 +26,6 @@ from avow.language.sorts import (
 from avow.language.syntax import Tree
 from avow.language.terms import (
     And,
-    Iff,
     Implies,
     In,
     Not,
@@ -61,12 +61,12 @@ class Checker(Relations):
         return None if body is None else Not(body, self.span(tree))
 
     def _implies(self, tree: Tree, expected: Sort | None) -> Term | None:
-        both = self.formulas(tree.parts)
-        return None if both is None else Implies(both[0], both[1], self.span(tree))
+        items = self.formulas(tree.parts)
+        return None if items is None else implication(items, self.places(tree.parts))
 
     def _iff(self, tree: Tree, expected: Sort | None) -> Term | None:
-        both = self.formulas(tree.parts)
-        return None if both is None else Iff(both[0], both[1], self.span(tree))
+        items = self.formulas(tree.parts)
+        return None if items is None else equivalence(items, self.places(tree.parts))
 
     # --- quantifiers -------------------------------------------------------------------------------------------------
 

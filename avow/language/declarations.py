@@ -14,6 +14,8 @@ from avow.language.check_names import BUILTINS
 from avow.language.checker import Checker
 from avow.language.environment import Environment, did_you_mean
 from avow.language.lexer import Token
+from avow.language.limits import MAX_DECLARED, MAX_REFERENCES, sort_extent, term_extent
+from avow.language.parser import MAX_DEPTH
 from avow.language.scope import Scope
 from avow.language.sorts import (
     Constructor,
@@ -64,6 +66,8 @@ class Declarations:
     declared: dict[str, _Declared] = field(default_factory=dict)
     owners: dict[str, str] = field(default_factory=dict)
     """Which type declaration writes down an element or constructor: known before anything is elaborated."""
+    open: int = 0
+    """How many declarations wait for one that they refer to."""
 
     def add(self, trees: Sequence[Tree], reports: Reports) -> None:
         for tree in trees:
@@ -79,9 +83,11 @@ class Declarations:
                 name = new.name.text
                 notes = ((f"`{name}` is first declared here", old.place),)
                 message = f"`{name}` is declared twice"
+                hint = "remove one of the two" if _same_text(old, new) else "give one of them another name"
                 if old.reports is not reports:
                     message = f"`{name}` is declared differently in another file"
-                reports.error("RCL210", message, new.name.start, new.name.end, notes=notes)
+                    hint = "write the same in both, or give one of them another name"
+                reports.error("RCL210", message, new.name.start, new.name.end, hint=hint, notes=notes)
 
     def elaborate(self) -> None:
         for name, declared in self.declared.items():
@@ -99,19 +105,42 @@ class Declarations:
     def resolve(self, declared: _Declared) -> None:
         if declared.state != "new":
             return
-        declared.state = "open"
         environment, name = self.environment, declared.name.text
         environment.places[name] = declared.place
+        if self.open > MAX_REFERENCES:
+            message = f"`{name}` stands at the end of a row of {MAX_REFERENCES} declarations that refer to later ones"
+            hint = "declare a name before the declarations that use it"
+            declared.reports.error("RCL110", message, declared.name.start, declared.name.end, hint=hint)
+            environment.broken.add(name)
+            declared.state = "done"
+            return
+        declared.state = "open"
+        self.open += 1
         if declared.tree.kind == "type":
             sort = self.type_of(declared.tree.parts[1], declared.reports, name)
             if sort is None:
                 environment.broken.add(name)
                 environment.broken.update(_names(declared.tree.parts[1]))
-            else:
+            elif self.is_small(name, sort_extent(sort), declared.name, declared.reports):
                 environment.types[name] = sort
         else:
             self.constant(declared)
+        self.open -= 1
         declared.state = "done"
+
+    def is_small(self, name: str, extent: tuple[int, int], place: Token, reports: Reports) -> bool:
+        """Whether a sort or value is not too large or deep to be worked with; reports it if it is."""
+        size, depth = extent
+        if size <= MAX_DECLARED and depth <= MAX_DEPTH:
+            return True
+        what = f"{size:,} parts" if size > MAX_DECLARED else f"{depth} levels"
+        most = f"{MAX_DECLARED:,}" if size > MAX_DECLARED else str(MAX_DEPTH)
+        if size >= 10**15:
+            what = "astronomically many parts"
+        message = f"`{name}` has {what} once all the names in it are written out; {most} is the most"
+        reports.error("RCL110", message, place.start, place.end)
+        self.environment.broken.add(name)
+        return False
 
     # --- constants ---------------------------------------------------------------------------------------------------
 
@@ -132,6 +161,8 @@ class Declarations:
             environment.constants[name] = SetTerm(tuple(EnumValue(m, sort) for m in sort.members), SetSort(sort), span)
             return
         term = Checker(Scope(environment), declared.reports).term(value)
+        if term is not None and not self.is_small(name, term_extent(term), declared.name, declared.reports):
+            return
         if term is not None and _has_quantifier(term):
             message = "a constant is a value: no quantifier stands in it"
             declared.reports.error("RCL220", message, value.start, value.end, hint="write the formula where it is used")

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from avow.diagnostics import Diagnostic, Rejected
+from avow.language.flat import flat
 from avow.language.lexer import Token, tokens
 from avow.language.load import clean_text
 from avow.language.outline import FileSyntax, read
@@ -165,7 +166,7 @@ class _Layout:
         if tree is None:
             return [head + "()"]
         if keyword in ("inputs", "outputs", "topics"):
-            items = [_flat(part) for part in tree.parts]
+            items = [flat(part) for part in tree.parts]
             line = f"{head}( {', '.join(items)} )"
             if _STEP + len(line) <= WIDTH:
                 return [line]
@@ -173,7 +174,7 @@ class _Layout:
             return [f"{head}( {items[0]}," if len(items) > 1 else f"{head}( {items[0]} )"] + [
                 f"{pad}{item}{' )' if i == len(items) - 1 else ','}" for i, item in enumerate(items) if i
             ]
-        line = f"{head}( {_flat(tree)} )"
+        line = f"{head}( {flat(tree)} )"
         if own[at - 1].type != "STRING" and _STEP + len(line) <= WIDTH:
             return [line]
         lines = _lay(tree, 2 * _STEP + 2, WIDTH - 2)
@@ -188,9 +189,9 @@ class _Layout:
 
 def _lay(tree: Tree, indent: int, width: int) -> list[str]:
     """The lines of a formula or type that begins at column `indent`; all but the first carry their indentation."""
-    flat = _flat(tree)
-    if indent + len(flat) <= width:
-        return [flat]
+    line = flat(tree)
+    if indent + len(line) <= width:
+        return [line]
     match tree.kind:
         case "parenthesised":
             return _enclosed("(", _lay(tree.parts[0], indent + 1, width - 1), ")")
@@ -203,14 +204,18 @@ def _lay(tree: Tree, indent: int, width: int) -> list[str]:
             return lines
         case "implies" | "iff":
             sign = " ->" if tree.kind == "implies" else " <=>"
-            deeper = indent + (0 if tree.parts[1].kind == tree.kind else _STEP)
-            left, right = _lay(tree.parts[0], indent, width - len(sign)), _lay(tree.parts[1], deeper, width)
-            left[-1] += sign
-            return [*left, " " * deeper + right[0], *right[1:]]
+            lines = _lay(tree.parts[0], indent, width - len(sign))
+            for i, part in enumerate(tree.parts[1:], 2):
+                lines[-1] += sign
+                last = i == len(tree.parts)
+                deeper = indent + (_STEP if last else 0)
+                more = _lay(part, deeper, width - (0 if last else len(sign)))
+                lines += [" " * deeper + more[0], *more[1:]]
+            return lines
         case "not":
             return _enclosed("not ", _lay(tree.parts[0], indent + 4, width), "")
         case "quantified":
-            head = f"{tree.parts[0]}({_flat(tree.parts[1])} |"
+            head = f"{tree.parts[0]}({flat(tree.parts[1])} |"
             body = _lay(tree.parts[2], indent + _STEP, width - 1)
             return (
                 [head, " " * (indent + _STEP) + body[0], *body[1:-1], body[-1] + ")"]
@@ -220,7 +225,7 @@ def _lay(tree: Tree, indent: int, width: int) -> list[str]:
                     " " * (indent + _STEP) + body[0] + ")",
                 ]
             )
-    return [flat]
+    return [line]
 
 
 def _enclosed(before: str, lines: list[str], after: str) -> list[str]:
@@ -231,13 +236,12 @@ def _enclosed(before: str, lines: list[str], after: str) -> list[str]:
 
 def _broken_set(tree: Tree, indent: int, width: int) -> list[str] | None:
     """A long set over several lines, as many elements on each as fit; None where it is short or no set."""
-    flat = _flat(tree)
-    if tree.kind not in ("set_type", "set") or indent + len(flat) <= width:
+    if tree.kind not in ("set_type", "set") or indent + len(flat(tree)) <= width:
         return None
     lines = ["{"]
     pad = " " * (_STEP + _STEP)
     row = ""
-    items = [_flat(part) for part in tree.parts]
+    items = [flat(part) for part in tree.parts]
     for i, item in enumerate(items):
         piece = item + ("," if i < len(items) - 1 else "")
         if row and len(pad) + len(row) + 1 + len(piece) > width:
@@ -245,69 +249,3 @@ def _broken_set(tree: Tree, indent: int, width: int) -> list[str] | None:
             row = ""
         row = f"{row} {piece}".strip()
     return [*lines, pad + row, " " * _STEP + "}"]
-
-
-def _flat(tree: Tree) -> str:
-    """The tree on one line."""
-    p = tree.parts
-    match tree.kind:
-        case "and" | "or":
-            return f" {tree.kind} ".join(map(_flat, p))
-        case "implies":
-            return f"{_flat(p[0])} -> {_flat(p[1])}"
-        case "iff":
-            return f"{_flat(p[0])} <=> {_flat(p[1])}"
-        case "not":
-            return f"not {_flat(p[0])}"
-        case "comparison":
-            return "".join(_flat(x) if isinstance(x, Tree) else f" {_relation(x)} " for x in p)
-        case "arithmetic":
-            return f"{_flat(p[0])} {p[1]} {_flat(p[2])}"
-        case "negative":
-            inner = _flat(p[0])
-            return f"- {inner}" if inner.startswith("-") else f"-{inner}"
-        case "application":
-            return f"{_flat(p[0])}({', '.join(map(_flat, p[1:]))})"
-        case "parenthesised":
-            return f"({_flat(p[0])})"
-        case "tuple" | "tuple_type":
-            return f"({', '.join(map(_flat, p))})"
-        case "set" | "set_type" | "unspecified_type":
-            return f"{{{', '.join(map(_flat, p))}}}"
-        case "sequence":
-            return f"<{', '.join(map(_flat, p))}>"
-        case "sequence_type":
-            return f"<{_flat(p[0])}>"
-        case "range":
-            return f"<{_flat(p[0])} upto {_flat(p[1])}>"
-        case "quantified":
-            return f"{p[0]}({_flat(p[1])} | {_flat(p[2])})"
-        case "binders":
-            return ", ".join(map(_flat, p))
-        case "binder":
-            return f"{', '.join(n.text for n in p[:-1])} in {_flat(p[-1])}"
-        case "port_name":
-            return f"{p[0]}.{p[1]}"
-        case "node_port":
-            return ".".join(x for x in p if x is not None)
-        case "function_type":
-            return f"{_flat(p[0])} --> {_flat(p[1])}"
-        case "product_type":
-            return " ".join(_flat(x) if isinstance(x, Tree) else x.text for x in p)
-        case "element":
-            return str(p[0].text)
-        case "constructor":
-            return f"{p[0].text}({', '.join(map(_flat, p[1:]))})"
-        case "port":
-            return f"{p[0].text} : {_flat(p[1])}"
-        case "topic":
-            matched = ""
-            if p[3] is not None:
-                matched = f" matches({p[2]}.{p[3].text})" if p[2] is not None else f" matches({p[3].text})"
-            return f"{'/'.join(t.text for t in p[0].parts)} {p[1].text}{matched}"
-        case _:
-            return str(p[0])
-
-
-def _relation(token: Token) -> str:
-    return "!in" if token.type == "NOT_IN" else token.text

@@ -9,13 +9,16 @@ from avow.language.checker import Checker
 from avow.language.contract import Clause, ClauseKind, Node, Port, Topic
 from avow.language.declarations import Declarations
 from avow.language.environment import did_you_mean
+from avow.language.flat import flat
 from avow.language.lexer import Token, unquote
+from avow.language.limits import MAX_WRITTEN_OUT, sort_extent, term_extent
 from avow.language.outline import ClauseSyntax, NodeSyntax
+from avow.language.parser import MAX_DEPTH
 from avow.language.printer import show_type
 from avow.language.scope import Scope
 from avow.language.source import Reports
 from avow.language.syntax import Tree
-from avow.language.terms import Role
+from avow.language.terms import Role, Term
 
 ROS_BUILTINS = (
     *("bool", "byte", "char", "string", "wstring", "time", "duration", "float32", "float64"),
@@ -40,11 +43,10 @@ def check_ports(
                 reports.error("RCL214", message, name.start, name.end, notes=notes)
                 continue
             sort = declarations.type_of(type_tree, reports, name.text)
-            if sort is None:
+            if sort is None or not declarations.is_small(name.text, sort_extent(sort), name, reports):
                 node.broken.add(name.text)
                 continue
-            written = reports.source.text[type_tree.start : type_tree.end]
-            type_name = " ".join(written.split()) if type_tree.kind != "unspecified_type" else show_type(sort)
+            type_name = flat(type_tree) if type_tree.kind != "unspecified_type" else show_type(sort)
             ports[name.text] = Port(role, name.text, sort, type_name, reports.source.span(name.start, name.end))
         found.append(ports)
     return found[0], found[1]
@@ -97,12 +99,32 @@ def _clause(
     if syntax.formula is None:
         return None
     formula = Checker(scope, reports).formula(syntax.formula)
-    if formula is None:
+    if formula is None or not _is_small(formula, place, scope, reports):
         return None
     text = reports.source.text[slice(*syntax.inside)].strip()
     sentence = unquote(syntax.sentence.text) if syntax.sentence is not None else None
     whole = reports.source.span(syntax.start, syntax.end)
     return Clause(syntax.kind, name, position, formula, sentence, text, whole)
+
+
+def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bool:
+    """Whether the formula with its constants written out can still be worked with. Without constants it is as large and
+    as deep as it is written, which the parser has seen to."""
+    environment = scope.environment
+    if not environment.constants:
+        return True
+    size, depth = term_extent(formula)
+    before = environment.written_out
+    environment.written_out += size
+    hint = "use fewer or smaller constants"
+    if environment.written_out > MAX_WRITTEN_OUT >= before:
+        message = f"up to here, the formulas have more than {MAX_WRITTEN_OUT:,} parts once constants are written out"
+        reports.error("RCL110", message, place.start, place.end, hint=hint)
+    elif depth > 2 * MAX_DEPTH:
+        message = f"with its constants written out, this is nested {depth} levels deep; {2 * MAX_DEPTH} is the most"
+        reports.error("RCL110", message, place.start, place.end, hint=hint)
+        return False
+    return environment.written_out <= MAX_WRITTEN_OUT
 
 
 def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]:

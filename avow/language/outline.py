@@ -281,7 +281,7 @@ class _Reader:
             if section not in seen:
                 word = section.lower()
                 message = f"node `{node.name.text}` has no `{word}( … )`"
-                self.reports.error("RCL118", message, *where, hint=f"write `{word}()` where there are none")
+                self.reports.error("RCL118", message, *where, hint=_FORMS[section])
                 node.broken.add("*")
         if "GUARANTEE" not in seen:
             message = f"node `{node.name.text}` guarantees nothing"
@@ -416,6 +416,11 @@ class _Reader:
             self.at += 1
 
 
+_FORMS = {
+    "INPUTS": "write `inputs( name : TYPE, … )`, or `inputs()` where there are none",
+    "OUTPUTS": "write `outputs( name : TYPE, … )`, or `outputs()` where there are none",
+    "TOPICS": "write `topics( package/Type name matches(in.variable), … )`, or `topics()` where there are none",
+}
 _NEAR = {
     **dict.fromkeys(("input", "ins"), "inputs"),
     **dict.fromkeys(("output", "outs"), "outputs"),

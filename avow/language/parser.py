@@ -13,12 +13,14 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from avow.language.chains import LONG
 from avow.language.lexer import Token
 from avow.language.source import Reports
 from avow.language.syntax import Tree
 
 MAX_DEPTH = 150
-"""How deep a formula or type may be nested. Every later pass may recurse as deep as this."""
+"""How deep a formula or type may be nested. Every later pass may recurse as deep as this. A chain of operators is no
+nesting: its terms are made shallow by `avow.language.chains`."""
 
 QUANTIFIERS = {"FORALL": "forall", "EXISTS": "exists", "UNIQUE": "exists_unique"}
 STARTS = ("declaration", "ports", "topics", "formula")
@@ -161,6 +163,12 @@ def _cache_file() -> Path | None:
     return folder / f"rcl-{sys.version_info.major}{sys.version_info.minor}.lark"
 
 
+def _chain(kind: str, parts: list[Any], operators: int) -> Tree:
+    """A chain of operators counts as deep as its term becomes."""
+    tree = _make(kind, tuple(parts), parts[0], parts[-1])
+    return tree._replace(depth=tree.depth - 1 + min(operators, LONG))
+
+
 def _make(kind: str, parts: tuple[Any, ...], first: Any, last: Any) -> Tree:
     depth = 0
     for part in parts:
@@ -235,11 +243,11 @@ class _Build:
 
     # --- formulas and terms ------------------------------------------------------------------------------------------
 
-    def iff(self, c: list[Any]) -> Tree:  # (left, right)
-        return _make("iff", (c[0], c[2]), c[0], c[2])
+    def iff(self, c: list[Any]) -> Tree:  # (formula, …)
+        return _chain("iff", c[::2], len(c) // 2)
 
-    def implies(self, c: list[Any]) -> Tree:  # (left, right)
-        return _make("implies", (c[0], c[2]), c[0], c[2])
+    def implies(self, c: list[Any]) -> Tree:  # (formula, …)
+        return _chain("implies", c[::2], len(c) // 2)
 
     def disjunction(self, c: list[Any]) -> Tree:  # (formula, …)
         return _make("or", tuple(c[::2]), c[0], c[-1])
@@ -253,8 +261,8 @@ class _Build:
     def comparison(self, c: list[Any]) -> Tree:  # (term, relation token, term, …)
         return _make("comparison", tuple(c), c[0], c[-1])
 
-    def arithmetic(self, c: list[Any]) -> Tree:  # (left, operator, right)
-        return _make("arithmetic", (c[0], c[1].text, c[2]), c[0], c[2])
+    def arithmetic(self, c: list[Any]) -> Tree:  # (term, operator token, term, …)
+        return _chain("arithmetic", c, len(c) // 2)
 
     def negative(self, c: list[Any]) -> Tree:  # (term,)
         return _make("negative", (c[1],), c[0], c[1])

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
+from avow.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Clause, Contract, Node, Port, Topic
 from avow.language.format import format_text
 from avow.language.latex import to_latex
@@ -31,7 +32,10 @@ from avow.language.terms import Term
 
 
 def to_rcl(contract: Contract) -> str:
-    """The contract as an RCL file, which reads back as the equal contract. Constants are expanded in formulas."""
+    """The contract as an RCL file, which reads back as the equal contract. Constants are expanded in formulas.
+
+    Raises `Rejected` where a formula so written would be nested too deeply to be read.
+    """
     out: list[str] = []
     declarations = list(_declarations(contract))
     if declarations:
@@ -47,7 +51,14 @@ def to_rcl(contract: Contract) -> str:
             word = "assume" if clause in node.assumptions else "guarantee"
             out.append(f"  {word}{_head(clause)}( {show_term(clause.formula, 'rcl')} )")
         out += ["}", ""]
-    return format_text("\n".join(out), "contract.rcl")
+    try:
+        return format_text("\n".join(out), "contract.rcl")
+    except Rejected as rejected:
+        if any(d.code != "RCL110" for d in rejected.diagnostics):
+            raise
+        message = "with its constants and the sets of its quantifiers written out, the contract is nested too deeply"
+        place = contract.nodes[0].span if contract.nodes else None
+        raise Rejected(Diagnostic("RCL110", message, place, hint="split the deepest clause")) from rejected
 
 
 def _declarations(contract: Contract) -> Iterator[str]:

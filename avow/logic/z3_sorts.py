@@ -8,6 +8,7 @@ from typing import Any
 
 from avow.diagnostics import Span
 from avow.language.sorts import (
+    INTEGER,
     BoolSort,
     DataSort,
     EnumSort,
@@ -45,6 +46,19 @@ class Unsupported(Exception):  # noqa: N818 - it names what happened
         self.span = span
 
 
+def _whole(sort: Sort) -> Sort:
+    """The sort with INTEGER for NATURAL inside tuples and sequences: RCL compares ``(1, n)`` with ``(1, i)``, so that
+    both must be of one Z3 sort. Which of its values are naturals, `member` says."""
+    match sort:
+        case NaturalSort():
+            return INTEGER
+        case TupleSort(items=items):
+            return TupleSort(tuple(map(_whole, items)))
+        case SequenceSort(item=item):
+            return SequenceSort(_whole(item))
+    return sort
+
+
 class Sorts:
     """The Z3 sorts of one context, which of their values are members of RCL's sorts, and concrete values."""
 
@@ -59,6 +73,7 @@ class Sorts:
 
     def sort(self, sort: Sort) -> Any:
         """The Z3 sort of values of `sort`; of a function sort, an array sort. Raises Unsupported."""
+        sort = _whole(sort)
         if sort not in self._sorts:
             self._sorts[sort] = self._make_sort(sort)
         return self._sorts[sort]

@@ -185,8 +185,7 @@ node Agent {
         "(" * 10_000,
         FRAME % ("(" * 10_000 + "TRUE" + ")" * 10_000),
         FRAME % ("not " * 10_000 + "TRUE"),
-        FRAME % ("TRUE -> " * 10_000 + "TRUE"),
-        FRAME % ("r + " * 10_000 + "1 > 0"),
+        FRAME % ("r / k * " * 10_000 + "1 > 0"),
         FRAME % ("-(" * 10_000 + "1" + ")" * 10_000 + " > 0"),
         "context { A : " + "<" * 10_000 + "REAL" + ">" * 10_000 + "; }",
         "context {" * 10_000,
@@ -208,7 +207,7 @@ def test_hostile_texts_are_diagnosed(text: str) -> None:
 
 
 def test_nesting_up_to_the_limit_works() -> None:
-    for text in ("(" * 145 + "TRUE" + ")" * 145, "not " * 145 + "TRUE", "TRUE -> " * 145 + "TRUE"):
+    for text in ("(" * 145 + "TRUE" + ")" * 145, "not " * 145 + "TRUE"):
         assert errors(FRAME % text) == []
 
 

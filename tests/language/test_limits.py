@@ -1,0 +1,110 @@
+"""A few lines can stand for a term that no machine could finish with: refused where it is declared."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from avow.language.format import format_text
+from avow.language.limits import MAX_REFERENCES, sort_extent, term_extent
+from avow.language.load import check_text
+from avow.language.sorts import REAL, DataSort, SequenceSort, TupleSort
+from avow.language.translate import FORMATS
+from avow.logic.formula import node_digest
+
+NODE = "node n { inputs( i : %s ) outputs( o : BOOL ) topics() guarantee( %s ) }"
+
+
+def codes(text: str) -> list[str]:
+    began = time.process_time()
+    contract, found = check_text(text, "f")
+    assert time.process_time() - began < 3
+    assert (contract is None) == any(d.is_error for d in found)
+    assert all(d.span is not None for d in found)
+    return [d.code for d in found if d.is_error]
+
+
+def row(count: int, first: str, form: str, last: str = "") -> str:
+    """A context in which each declaration is made from its neighbour: `{0}` is its number, `{1}` the one before it."""
+    return "context { " + first + " ".join(form.format(i, i - 1) for i in range(1, count)) + last + " }\n"
+
+
+@pytest.mark.parametrize(
+    ("context", "sort", "formula"),
+    [
+        (row(40, "C0 = 1;", "C{0} = C{1} + C{1};"), "REAL", "o or C39 > 1"),
+        (row(40, "C0 = {1, 2};", "C{0} = (C{1}, C{1});"), "REAL", "o"),
+        (row(40, "T0 : {a};", "T{0} : (T{1}, T{1});"), "T39", "o"),
+        (row(40, "T0 : {a};", "T{0} : {{c{0}(T{1}, T{1})}};"), "T39", "o"),
+        (row(40, "T0 : {a};", "T{0} : T{1} x T{1} --> T{1};"), "T39", "o"),
+        (row(400, "T0 : {a};", "T{0} : <T{1}>;"), "T399", "o"),
+        (row(400, "C0 = 1;", "C{0} = -(C{1});"), "REAL", "o or C399 > 1"),
+        (row(4000, "", "C{1} = C{0} + 1;", "C3999 = 1;"), "REAL", "o or C0 > 1"),
+        (row(4000, "", "T{1} : T{0};", "T3999 : REAL;"), "T0", "o"),
+    ],
+)
+def test_what_is_too_large_is_refused(context: str, sort: str, formula: str) -> None:
+    found = codes(context + NODE % (sort, formula))
+    assert "RCL110" in found
+    assert set(found) <= {"RCL110", "RCL302", "RCL307"}
+
+
+def test_constants_in_formulas_count() -> None:
+    context = row(13, "C0 = 1;", "C{0} = C{1} + C{1};")
+    assert codes(context + NODE % ("REAL", "o or C12 > 1")) == []
+    many = " or ".join(["C12 > i"] * 600)
+    assert codes(context + NODE % ("REAL", many)) == ["RCL110"]
+    deep = row(150, "C0 = 1;", "C{0} = -(C{1});")
+    assert codes(deep + NODE % ("REAL", "o or C149 > 1")) == []
+    within = "(1 - " * 70 + "(1 / C149)" + ")" * 70
+    assert codes(deep + NODE % ("REAL", f"o or {within} > 1")) == []
+    assert codes(deep + NODE % ("REAL", f"o or {within.replace('(1 -', '(-(1 -').replace(')', '))')} > 1")) != []
+
+
+def test_declarations_in_a_moderate_row_are_accepted_whatever_their_order() -> None:
+    count = MAX_REFERENCES // 2
+    assert codes(row(count, "", "T{1} : T{0};", f"T{count - 1} : REAL;") + NODE % ("T0", "o and i > 0")) == []
+    assert codes(row(2000, "T0 : REAL;", "T{0} : T{1};") + NODE % ("T1999", "o and i > 0")) == []
+
+
+def _nested(before: str, after: str, count: int, core: str = "o") -> str:
+    return "".join(before.format(k) for k in range(count)) + core + after * count
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        _nested("forall(x{0} in <1 upto 3> | ", ")", 74),
+        _nested("exists_unique(x{0} in REAL | ", ")", 74),
+        _nested("(", ")", 148),
+        _nested("not ", "", 148),
+        _nested("<", ">", 140, "i") + " == " + _nested("<", ">", 140, "i"),
+        _nested("(", ", 1)", 140, "i") + " == " + _nested("(", ", 1)", 140, "i"),
+        _nested("(1 + ", ")", 72, "i") + " > 1",
+        _nested("(o and (o or ", "))", 36),
+        _nested("(i in {{1}} and ", ")", 48),
+        _nested("(", ") -> o", 72),
+    ],
+    ids=lambda text: text[:16],
+)
+def test_what_is_as_deep_as_may_be_breaks_nothing(formula: str) -> None:
+    """No pass may recurse more than Python allows on what the checker has accepted."""
+    text = NODE % ("INTEGER", formula)
+    contract, found = check_text(text, "f")
+    assert contract is not None, [d.message for d in found if d.is_error]
+    assert check_text(format_text(text, "f"), "f")[0] == contract
+    for style in ("text", "unicode", "latex", "json"):
+        assert FORMATS[style](contract)
+    assert node_digest(contract.nodes[0], contract.nodes[0].guarantees[0])
+    assert hash(contract.nodes[0].guarantees[0].formula)
+
+
+def test_extents() -> None:
+    pair = TupleSort((REAL, SequenceSort(REAL)))
+    assert sort_extent(pair) == (4, 3)
+    assert sort_extent(TupleSort((pair, pair))) == (9, 4)
+    assert sort_extent(DataSort("d", ())) == (1, 1)
+    contract = check_text(NODE % ("REAL", "i > 1 and o"), "f")[0]
+    assert contract is not None
+    assert term_extent(contract.nodes[0].guarantees[0].formula) == (5, 3)
