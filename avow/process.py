@@ -137,10 +137,13 @@ _libc = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
 
 def _before_exec(megabytes: int | None) -> Callable[[], None]:
     size = megabytes * 1024 * 1024 if megabytes else None
+    here = os.getpid()
 
     def apply() -> None:
         if _libc is not None:  # the tool must not outlive us, however we die
             _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+            if os.getppid() != here:  # we died before that was said
+                os._exit(1)
         if size is not None:
             resource.setrlimit(resource.RLIMIT_AS, (size, size))
 
