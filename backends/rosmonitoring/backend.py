@@ -29,7 +29,7 @@ class RosMonitoringBackend:
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "1"
+    version = "2"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     options_schema: Mapping[str, Any] = SCHEMA

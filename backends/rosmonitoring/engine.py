@@ -1,13 +1,14 @@
 """Our own monitor: the clauses of one node over events, judged exactly. The cost of an event does not grow with them.
 
-A snapshot maps each variable to its latest value. A clause is judged when an event brings a value of one of its outputs
-(the node has answered), a clause about inputs when it brings any of them, by the values then known; until every
-variable has a value it is not judged. A guarantee that fails while an assumption is broken is laid at the
+A snapshot maps each variable to its latest value. A clause is judged when events have brought a value of each of its
+outputs (the node has answered), a clause about inputs when one brings any of them, by the values then known; until
+every variable has a value it is not judged. A guarantee that fails while an assumption is broken is laid at the
 environment's door, not the node's.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -74,6 +75,15 @@ class _Watched:
     trigger: Callable[[Mapping[str, Value]], Value] | None
     witness: Callable[[Mapping[str, Value]], dict[str, Value] | None]
     tally: Tally
+    outputs: frozenset[str] = frozenset()
+    """Those that must all be published anew before it is judged: they are the parts of one answer."""
+    fresh: set[str] = field(default_factory=set)
+    """Those that have been, since it was last judged."""
+    held: tuple[tuple[str, str], ...] = ()
+    """(previous value, its source): of one of several outputs, it is the value that the answer before had, whichever
+    of the outputs comes first in this one."""
+    memory: dict[str, Value] = field(default_factory=dict)
+    """The held values."""
     key: tuple[int, ...] | None = None
     truth: bool | None = None
 
@@ -113,7 +123,11 @@ class Monitor:
         self._seen.clear()
         self._readers.clear()
         self._previous.clear()
+        for watched in itertools.chain.from_iterable(self._clauses.values()):
+            watched.fresh.clear()
         self._observe()
+        for watched in itertools.chain.from_iterable(self._clauses.values()):
+            self._hold(watched)
 
     def _observe(self) -> None:
         for name, rule in self.setup.rules.items():
@@ -156,14 +170,14 @@ class Monitor:
             if old is None or new != old:
                 self.values[name] = new
                 self._versions[name] += 1
-        done: set[int] = set()
         while self._constant:
             self._judge(self._constant.pop(), event, found)
-        for name in updated:
-            for watched in self._clauses.get(name, ()):
-                if id(watched) not in done:
-                    done.add(id(watched))
-                    self._judge(watched, event, found)
+        for watched in self._due(updated):
+            self._judge(watched, event, found)
+            for name, source in watched.held:
+                watched.memory.pop(name, None)
+                if source in self.values:
+                    watched.memory[name] = self.values[source]
         for name, source in self._previous:
             value = self.values.get(source)
             if value is None:
@@ -173,6 +187,18 @@ class Monitor:
                 self.values[name] = value
                 self._versions[name] += 1
         return found
+
+    def _due(self, updated: Iterable[str]) -> list[_Watched]:
+        """The clauses to be judged now that these variables have new values."""
+        due: dict[int, _Watched] = {}
+        for name in updated:
+            for watched in self._clauses.get(name, ()):
+                watched.fresh.add(name)
+                if watched.outputs <= watched.fresh:
+                    due[id(watched)] = watched
+        for watched in due.values():
+            watched.fresh.clear()
+        return list(due.values())
 
     def _forget(self, name: str) -> None:
         self._versions[name] += 1
@@ -204,6 +230,11 @@ class Monitor:
             return
         tally.triggered = trigger is None
         triggers = self._triggers(names)
+        if self.setup.when == "outputs" and any(n.startswith(f"{Role.OUTPUT}.") for n in triggers):
+            watched.outputs = frozenset(triggers)
+            if len(triggers) > 1:
+                watched.held = tuple((n, s) for n, s in self._previous if n in names and s in triggers)
+                self._hold(watched)
         for name in triggers:
             self._clauses.setdefault(name, []).append(watched)
         if not triggers:
@@ -211,25 +242,32 @@ class Monitor:
         if clause.kind is ClauseKind.ASSUMPTION:
             self._assumptions.append(watched)
 
+    def _hold(self, watched: _Watched) -> None:
+        """Before the first answer: the initial values."""
+        watched.memory = {n: self.values[n] for n, _ in watched.held if n in self.values}
+
     def _triggers(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """The variables whose publication makes a clause judged."""
         direct = tuple(n for n in names if isinstance(self.setup.rules[n], Fields | InOrder | Choice))
         outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
         sources = tuple(rule.source for n in names if isinstance(rule := self.setup.rules[n], Previous))
-        if outputs and not self.setup.judge_every:
+        if outputs and self.setup.when != "every":
             return outputs
         return direct or sources
 
     def _judge(self, watched: _Watched, event: Mapping[str, Any], found: list[Violation]) -> None:
         values, versions, tally = self.values, self._versions, watched.tally
+        if watched.held:
+            held = {n for n, _ in watched.held}
+            values = {**{n: v for n, v in values.items() if n not in held}, **watched.memory}
         for name in watched.names:
             if name not in values:
                 return
         key = tuple([versions[n] for n in watched.names])
-        if key != watched.key:
+        if key != watched.key or watched.held:
             watched.key = key
-            watched.truth = self._truth(watched)
-            self._note_trigger(watched)
+            watched.truth = self._truth(watched, values)
+            self._note_trigger(watched, values)
         tally.judged += 1
         if watched.truth:
             return
@@ -240,22 +278,22 @@ class Monitor:
         fault, why = self._blame(watched.clause)
         if fault is Fault.EXCUSED:
             tally.excused += 1
-        found.append(self._violation(fault, watched.clause.name, event, why, watched))
+        found.append(self._violation(fault, watched.clause.name, event, why, watched, values))
 
-    def _truth(self, watched: _Watched) -> bool | None:
+    def _truth(self, watched: _Watched, values: Mapping[str, Value]) -> bool | None:
         try:
-            return bool(watched.holds(self.values))
+            return bool(watched.holds(values))
         except NotEvaluable as error:
-            answer = judge(watched.clause.formula, self.values, timeout_ms=2_000) if self.solver else None
+            answer = judge(watched.clause.formula, values, timeout_ms=2_000) if self.solver else None
             if answer is None and not watched.tally.reason:
                 watched.tally.reason = error.reason
             return answer
 
-    def _note_trigger(self, watched: _Watched) -> None:
+    def _note_trigger(self, watched: _Watched, values: Mapping[str, Value]) -> None:
         if watched.tally.triggered or watched.trigger is None:
             return
         try:
-            watched.tally.triggered = bool(watched.trigger(self.values))
+            watched.tally.triggered = bool(watched.trigger(values))
         except NotEvaluable:
             watched.tally.triggered = True
 
@@ -264,21 +302,27 @@ class Monitor:
         if clause.kind is ClauseKind.ASSUMPTION:
             return Fault.ASSUMPTION, said
         for assumed in self._assumptions:
-            if all(n in self.values for n in assumed.names) and self._truth(assumed) is False:
+            if all(n in self.values for n in assumed.names) and self._truth(assumed, self.values) is False:
                 return Fault.EXCUSED, f"{said}; but the assumption {assumed.clause.name} does not hold"
         return Fault.GUARANTEE, said
 
     def _violation(
-        self, fault: Fault, clause: str, event: Mapping[str, Any], explanation: str, watched: _Watched | None = None
+        self,
+        fault: Fault,
+        clause: str,
+        event: Mapping[str, Any],
+        explanation: str,
+        watched: _Watched | None = None,
+        snapshot: Mapping[str, Value] | None = None,
     ) -> Violation:
         bindings: dict[str, Value] = {}
         values: list[tuple[str, str]] = []
-        if watched is not None:
+        if watched is not None and snapshot is not None:
             try:
-                bindings = watched.witness(self.values) or {}
+                bindings = watched.witness(snapshot) or {}
             except NotEvaluable:
                 bindings = {}
-            values = [(n, _shorten(show(self.values[n]))) for n in watched.names]
+            values = [(n, _shorten(show(snapshot[n]))) for n in watched.names]
         pairs = tuple((n, show(v)) for n, v in bindings.items())
         time = _time(event.get("time"))
         return Violation(fault, self.setup.node.name, clause, self.events, time, tuple(values), pairs, explanation)

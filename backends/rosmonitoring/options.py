@@ -22,7 +22,21 @@ from avow.backends.rosmonitoring.rules import (
 from avow.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Node, Port
 from avow.language.load import parse_term
-from avow.language.sorts import BOOL, DataSort, FunctionSort, OpaqueSort
+from avow.language.sorts import (
+    BOOL,
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    Sort,
+    StringSort,
+    TupleSort,
+    components,
+)
 from avow.language.terms import Apply, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.logic.evaluate import NotEvaluable, evaluate
 from avow.logic.values import FunctionValue, Value
@@ -40,7 +54,8 @@ class Setup:
     node: Node
     rules: Mapping[str, Rule]
     hidden: Mapping[str, str]
-    judge_every: bool = False
+    when: str = "outputs"
+    """When a clause is judged: the option of that name."""
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -55,8 +70,9 @@ def setup(system: System, node: Node, options: Located | None) -> tuple[Setup, t
     work.unknown_names()
     for port in (*node.inputs, *node.outputs):
         work.port(port)
+    work.shared_topics()
     data = options.data if options is not None and isinstance(options.data, Mapping) else {}
-    return Setup(node, work.rules, work.hidden, data.get("when") == "every"), tuple(work.faults)
+    return Setup(node, work.rules, work.hidden, str(data.get("when", "outputs"))), tuple(work.faults)
 
 
 def same_topic(name: str) -> str:
@@ -107,6 +123,24 @@ class _Work:
         else:
             self.rules[name] = found
 
+    def shared_topics(self) -> None:
+        """Hides a variable that would be read by the order of fields from a message that carries another like it: both
+        might be given one field's value, and nobody would notice."""
+        found = {n: r for n, r in self.rules.items() if isinstance(r, Fields | InOrder | Choice)}
+        for name, rule in found.items():
+            if not isinstance(rule, InOrder):
+                continue
+            for other_name, other in found.items():
+                if (
+                    other_name != name
+                    and other.variable.role is rule.variable.role
+                    and same_topic(other.topic) == same_topic(rule.topic)
+                    and _look_alike(other.variable.sort, rule.variable.sort)
+                ):
+                    why = f"the topic {rule.topic} carries {name} and {other_name}"
+                    self.hidden[name] = f"{why}, and the plan does not name the field of {name}"
+                    self.rules.pop(name, None)
+
     def rule(self, port: Port) -> Rule | str:
         """The rule, or why there is none."""
         name = port.variable.qualified
@@ -142,6 +176,8 @@ class _Work:
         elif isinstance(entry, list):
             entry = {"fields": entry}
         entry = entry or {}
+        if isinstance(entry, Mapping) and not (isinstance(sort, DataSort) and "constructor" in entry):
+            _keys(entry, sort)
         initial = self.literal(entry, "initial", variable)
         if isinstance(sort, DataSort) and "constructor" in entry:
             return self.choice(sort, variable, topic, entry, initial)
@@ -162,6 +198,8 @@ class _Work:
             wanted = 1
             if isinstance(sort, FunctionSort):
                 wanted = len(sort.parameters) + (sort.result != BOOL)
+            elif isinstance(sort, TupleSort) and len(paths) > 1:  # a field for each part; one field holds them all
+                wanted = len(sort.items)
             if len(paths) != wanted:
                 raise _Fault(f"{wanted} field{'s are' if wanted > 1 else ' is'} wanted, not {len(paths)}", "fields")
             each = path(entry["each"]) if "each" in entry else None
@@ -297,12 +335,57 @@ class _Work:
 
 
 _KEYS = frozenset(("topic", "type", "constructor", "arguments", "values", "initial"))
+_FIELD_KEYS = ("topic", "type", "field", "fields", "each", "hold", "values", "elsewhere", "initial")
+_FUNCTION_KEYS = ("each", "hold", "elsewhere")
+
+
+def _keys(entry: Mapping[str, Any], sort: Sort) -> None:
+    """Refuses what would be passed over in silence. Raises _Fault."""
+    for key in entry:
+        if key not in _FIELD_KEYS:
+            raise _Fault(f"there is no {key!r} here", key, hint=suggest(key, _FIELD_KEYS))
+        if key in _FUNCTION_KEYS and not isinstance(sort, FunctionSort):
+            raise _Fault(f"{key!r} is for functions and relations", key)
+    if "field" in entry and "fields" in entry:
+        raise _Fault("either 'field' or 'fields'", "fields")
+    parts = tuple(components(sort))
+    words = sorted({m for part in parts if isinstance(part, EnumSort) for m in part.members})
+    if words and not any(isinstance(part, StringSort | DataSort) for part in parts):
+        for name, word in entry.get("values", {}).items():
+            if word not in words:
+                raise _Fault(f"{word!r} is no element that could be meant", "values", name, hint=suggest(word, words))
 
 
 def _mapping(options: Located | None) -> Mapping[str, Any]:
     data = options.data if options is not None else None
     found = data.get("mapping") if isinstance(data, Mapping) else None
     return found if isinstance(found, Mapping) else {}
+
+
+def _look_alike(one: Sort, other: Sort) -> bool:
+    """Whether a field might be read as (part of) a value of either sort."""
+    return any(a == b or _ANYTHING in (a, b) for a in _contents(one) for b in _contents(other))
+
+
+_ANYTHING = "anything"
+
+
+def _contents(sort: Sort) -> frozenset[str]:
+    """What fields a value is read from: numbers, truth values, or words."""
+    match sort:
+        case FunctionSort(parameters=parameters, result=result):
+            parts = parameters if result == BOOL else (*parameters, result)
+            return frozenset(word for part in parts for word in _contents(part))
+        case TupleSort(items=items):
+            return frozenset(word for item in items for word in _contents(item))
+        case RealSort() | IntegerSort() | NaturalSort():
+            return frozenset(("a number",))
+        case BoolSort():
+            return frozenset(("a truth value",))
+        case EnumSort(members=members):
+            return frozenset(f"word {member}" for member in members)
+        case _:
+            return frozenset((_ANYTHING,))
 
 
 def _topic(node: Node, port: Port) -> str | None:

@@ -165,7 +165,10 @@ def _show(raw: Any) -> str:
 def _scalar(rule: Fields | InOrder, sort: Sort) -> Reader:
     names = rule.names
     if isinstance(rule, Fields):
-        path = rule.paths[0]
+        path, items = rule.paths[0], sort.items if isinstance(sort, TupleSort) else ()
+        if len(rule.paths) > 1:
+            pairs = tuple(zip(rule.paths, items, strict=True))
+            return lambda message, old: tuple([convert(at(message, p), s, names) for p, s in pairs])
         return lambda message, old: convert(at(message, path), sort, names)
     topic = rule.topic
 

@@ -102,6 +102,16 @@ def translate(setup: Setup, guarantees: Sequence[Clause]) -> Translation:
 
 
 @dataclass(frozen=True, slots=True)
+class _Mode:
+    """One way to take an event: what it has to satisfy, the numbers that it then sets besides those of its fields, and
+    whether it ends an answer."""
+
+    guard: Condition
+    sets: dict[str, Numeric]
+    judged: bool
+
+
+@dataclass(frozen=True, slots=True)
 class _Case:
     """One shape that a rule's message can have: fields with constants or variables, and the parts' new values."""
 
@@ -120,6 +130,8 @@ class _Machine:
     symbols: dict[str, Symbol] = field(default_factory=dict)
     flags: dict[str, str] = field(default_factory=dict)
     """Variable → name of the number that is 1 once it has a value."""
+    fresh: dict[str, str] = field(default_factory=dict)
+    """Of several outputs: each → name of the number that is 1 once it has been published since the last judgement."""
     events: list[EventType | Derived] = field(default_factory=list)
 
     @property
@@ -134,8 +146,11 @@ class _Machine:
         guard = Eliminator(self.symbols).condition(self.clause.formula)
         complete = every([compare("==", Name(self.flags[n]), Number(Fraction(1))) for n in names if n in self.flags])
         judged = some([*_negations(complete), guard])
-        state = self._state()
-        triggers = set(self._triggers(names))
+        triggers = self._triggers(names)
+        together = self.setup.when == "outputs" and any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)
+        if together and len(triggers) > 1:
+            self.fresh = {name: f"f{at}" for at, name in enumerate(triggers, start=1)}
+        state = [*self._state(), *self.fresh.values()]
         steps: list[Step] = []
         relevant: list[str] = []
         by_topic: dict[str, list[str]] = {}
@@ -148,8 +163,8 @@ class _Machine:
             filter_name = f"{self.prefix}_t{at}"
             self.events.append(EventType(filter_name, (), (f"{{topic: {string(self._written(topic))}}}",)))
             relevant.append(filter_name)
-            condition = judged if triggers & set(updated) else TRUE
-            steps += self._steps(f"{self.prefix}_t{at}", topic, updated, condition, state)
+            modes = self._modes(judged, updated, triggers)
+            steps += self._steps(f"{self.prefix}_t{at}", topic, updated, modes, state)
         everything = f"{self.prefix}_relevant"
         self.events.append(Derived(everything, tuple(relevant)))
         needed = self._needed(state, steps)
@@ -162,6 +177,19 @@ class _Machine:
             tuple(initial[k] for k in kept),
             everything,
         )
+
+    def _modes(self, judged: Condition, updated: Sequence[str], triggers: Sequence[str]) -> list[_Mode]:
+        """As `engine.Monitor` has it: judged once each of its outputs has been published anew, and not before."""
+        mine = [n for n in triggers if n in updated]
+        if not mine:
+            return [_Mode(TRUE, {}, judged=False)]
+        others = [self.fresh[n] for n in triggers if n not in updated and n in self.fresh]
+        ready = every([compare("==", Name(f), Number(Fraction(1))) for f in others])
+        now = _Mode(every([ready, judged]), dict.fromkeys(self.fresh.values(), Number(Fraction(0))), judged=True)
+        if not others:
+            return [now]
+        begun: dict[str, Numeric] = {self.fresh[n]: Number(Fraction(1)) for n in mine}
+        return [now, _Mode(opposite(ready), begun, judged=False)]
 
     def _needed(self, state: Sequence[str], steps: Sequence[Step]) -> set[str]:
         """The carried numbers on which some later answer depends."""
@@ -213,7 +241,7 @@ class _Machine:
         direct = tuple(n for n in names if isinstance(self.rules[n], Fields | Choice))
         outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
         sources = tuple(r.source for n in names if isinstance(r := self.rules[n], Previous))
-        return outputs if outputs and not self.setup.judge_every else direct or sources
+        return outputs if outputs and self.setup.when != "every" else direct or sources
 
     def _state(self) -> list[str]:
         found: list[str] = []
@@ -239,40 +267,43 @@ class _Machine:
         return [values[name] for name in state]
 
     def _steps(
-        self, prefix: str, topic: str, updated: Sequence[str], judged: Condition, state: Sequence[str]
+        self, prefix: str, topic: str, updated: Sequence[str], modes: Sequence[_Mode], state: Sequence[str]
     ) -> list[Step]:
         choices = [self._cases(name, at) for at, name in enumerate(updated, start=1)]
-        combinations = list(product(*choices))
+        combinations = list(product(product(*choices), modes))
         if len(combinations) > CASES:
             raise NotRml(f"a message of {topic} has {len(combinations)} shapes, more than {CASES}")
         steps = []
-        for at, cases in enumerate(combinations, start=1):
+        for at, (cases, mode) in enumerate(combinations, start=1):
             new: dict[str, Numeric] = {}
             for name, case in zip(updated, cases, strict=True):
                 new[self.flags[name]] = Number(Fraction(1))
                 new.update(zip(components(self.symbols[name]), case.values, strict=True))
-            guard = every([*(case.guard for case in cases), _substitute(judged, new)])
+            guard = every([*(case.guard for case in cases), _substitute(mode.guard, new)])
             binds = tuple(b for case in cases for b in case.binds)
             used = [n for n in state if n in names_in(guard)]
             fields = tuple(f for case in cases for f in case.fields)
             patterns = tuple(dict.fromkeys(_pattern(self._written(topic), fields, inside) for inside in (False, True)))
             event = EventType(f"{prefix}_{at}", (*binds, *used), patterns, guard)
             self.events.append(event)
-            after = dict(new)
+            after = {**new, **mode.sets}
             for name, rule in self.rules.items():
                 if isinstance(rule, Previous):
-                    after.update(self._follow(name, rule, updated, new))
+                    after.update(self._follow(name, rule, updated, new, mode))
             then = tuple(after.get(n, Name(n)) for n in state)
             steps.append(Step(event.name, event.parameters, binds, then))
         return steps
 
-    def _follow(self, name: str, rule: Previous, updated: Sequence[str], new: dict[str, Numeric]) -> dict[str, Numeric]:
-        """The previous value, for the next event: the source's value as it is after this one, once it has one."""
-        if rule.source not in updated:
+    def _follow(
+        self, name: str, rule: Previous, updated: Sequence[str], new: dict[str, Numeric], mode: _Mode
+    ) -> dict[str, Numeric]:
+        """The previous value, for the next event: the source's value as it is after this one, once it has one. Of one
+        of several outputs: the value that it had in the answer that has just been judged."""
+        if not (mode.judged if rule.source in self.fresh else rule.source in updated):
             return {}
         mine, theirs = components(self.symbols[name]), components(self.symbols[rule.source])
         found: dict[str, Numeric] = {self.flags[name]: Number(Fraction(1))}
-        found.update((m, new[t]) for m, t in zip(mine, theirs, strict=True))
+        found.update((m, new.get(t, Name(t))) for m, t in zip(mine, theirs, strict=True))
         return found
 
     def _cases(self, name: str, at: int) -> list[_Case]:

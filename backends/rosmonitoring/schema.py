@@ -39,9 +39,9 @@ SCHEMA: dict[str, Any] = {
             "description": "recorded runs, one by one: JSON lines (.jsonl), ROS 1 bags (.bag), ROS 2 bags (folders)",
         },
         "when": {
-            "enum": ["outputs", "every"],
-            "description": "judge a clause when one of its outputs is published (default), or at every event that "
-            "changes one of its variables",
+            "enum": ["outputs", "any", "every"],
+            "description": "judge a clause when each of its outputs has been published since it was last judged "
+            "(default), when any of them is, or at every event that changes one of its variables",
         },
         "ros_version": {"enum": ["ros1", "ros2"], "description": "for the generated configuration"},
         "silent": {"type": "boolean", "description": "whether the ROS monitor keeps its messages to itself"},

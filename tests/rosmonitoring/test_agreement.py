@@ -292,13 +292,16 @@ NATURALS = {Fraction(v) for v in range(5)}
 and one beyond each end."""
 
 
-def brute_force(system: System, events: list[dict[str, Any]]) -> int | None:
+def brute_force(system: System, events: list[dict[str, Any]], when: str = "outputs") -> int | None:
     """The index (from 1) of the first event that breaks the guarantee or cannot be read, by the definition."""
     clause = system.contract.node("n").guarantees[0]
     mentioned = names_of(clause.formula)
     needed = mentioned | ({"out.marks"} if "in.last" in mentioned else set())
     outputs = {n for n in mentioned if n.startswith("out.")}
-    triggers = outputs or (mentioned - {"in.last"}) or {"out.marks"}
+    triggers = mentioned - {"in.last"} if when == "every" else outputs or mentioned - {"in.last"}
+    triggers = triggers or {"out.marks"}
+    awaited = triggers if when == "outputs" and any(n.startswith("out.") for n in triggers) else set()
+    fresh: set[str] = set()
     snapshot: Snapshot = {"out.flag": True, "out.s": Fraction(-3, 2), "in.last": set()}
     snapshot["in.done"] = {(Fraction(2),)}
     for index, event in enumerate(events, start=1):
@@ -313,10 +316,17 @@ def brute_force(system: System, events: list[dict[str, Any]]) -> int | None:
                 snapshot.pop(name, None)
             continue
         snapshot[name] = snapshot[name] | content if name == "in.done" else content
-        judged = name in triggers and mentioned <= snapshot.keys()
+        fresh |= {name} & triggers
+        due = name in triggers and awaited <= fresh
+        if due:
+            fresh = set()
+        judged = due and mentioned <= snapshot.keys()
         if judged and not truth(clause.formula, snapshot, {}, REALS, NATURALS):
             return index
-        if name == "out.marks":
+        if "out.marks" in awaited and len(awaited) > 1:
+            if due:
+                snapshot["in.last"] = snapshot["out.marks"]  # of the answer that has just been judged
+        elif name == "out.marks":
             snapshot["in.last"] = content
     return None
 
@@ -359,7 +369,8 @@ def test_rml_engine_and_brute_force_agree(seed: int, make_system: Callable[..., 
     translated = broken = clean = 0
     for _ in range(10):
         text = formula(rng, rng.choice((1, 2, 2, 3)))
-        system = make_system(RCL.format(formula=text), MAPPING)
+        when = rng.choice(("outputs", "outputs", "any", "every"))
+        system = make_system(RCL.format(formula=text), MAPPING, when=when)
         node = system.contract.node("n")
         found, _ = setup(system, node, system.plan.node("n").methods[0].options)
         made = translate(found, node.guarantees)
@@ -367,7 +378,7 @@ def test_rml_engine_and_brute_force_agree(seed: int, make_system: Callable[..., 
         needed = mentioned | ({"out.marks"} if "in.last" in mentioned else set())
         for _ in range(4):
             events = trace(rng, 30)
-            expected = brute_force(system, events) if mentioned - {"in.last"} or mentioned else None
+            expected = brute_force(system, events, when) if mentioned - {"in.last"} or mentioned else None
             if mentioned:
                 assert first_reported(system, events, needed) == expected, (text, events)
             if not made.refused:
@@ -402,3 +413,44 @@ def test_the_interpreter_notices_a_changed_threshold(make_system: Callable[..., 
     assert first_rejected(text, events) == 2
     assert "2.5" in text
     assert first_rejected(text.replace("2.5", "2.3"), events) is None
+
+
+@pytest.mark.parametrize(
+    ("when", "first"),
+    [("outputs", 7), ("any", 4), ("every", 4)],
+)
+def test_several_outputs_are_judged_together(when: str, first: int, make_system: Callable[..., System]) -> None:
+    """A node that publishes the parts of an answer one after the other has not broken a guarantee in between."""
+    system = make_system(RCL.format(formula="out.flag <=> out.light == green"), MAPPING, when=when)
+    node = system.contract.node("n")
+    found, _ = setup(system, node, system.plan.node("n").methods[0].options)
+    events = [
+        {"topic": "flag", "on": True},
+        {"topic": "light", "light": "green"},
+        {"topic": "r", "data": 1},
+        {"topic": "flag", "on": False},  # the second answer begins
+        {"topic": "light", "light": "red"},
+        {"topic": "light", "light": "green"},  # the third: false
+        {"topic": "flag", "on": False},
+    ]
+    text = translate(found, node.guarantees).text
+    assert first_reported(system, events, set()) == brute_force(system, events, when) == first_rejected(text, events)
+    assert first_rejected(text, events) == first
+
+
+@pytest.mark.parametrize("order", [("marks", "flag"), ("flag", "marks")])
+def test_a_previous_value_is_that_of_the_answer_before_in_whichever_order_this_one_comes(
+    order: tuple[str, str], make_system: Callable[..., System]
+) -> None:
+    formula = "out.flag <=> exists(i in NATURAL | out.marks(i) and not in.last(i))"
+    system = make_system(RCL.format(formula=formula), MAPPING)
+    node = system.contract.node("n")
+    found, _ = setup(system, node, system.plan.node("n").methods[0].options)
+    text = translate(found, node.guarantees).text
+    answers = [(1, True), (1, False), (2, True), (2, True)]  # the last: nothing is new, and the flag says otherwise
+    events = [
+        {"topic": topic, **({"id": mark} if topic == "marks" else {"on": flag})}
+        for mark, flag in answers
+        for topic in order
+    ]
+    assert first_reported(system, events, set()) == brute_force(system, events) == first_rejected(text, events) == 8
