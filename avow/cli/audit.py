@@ -14,17 +14,30 @@ import click
     "--sign", type=click.Path(exists=True, dir_okay=False), help="Sign each ledger's head with this private key."
 )
 @click.option("--key", type=click.Path(exists=True, dir_okay=False), help="Check signatures against this public key.")
+@click.option(
+    "--against",
+    type=click.Path(exists=True),
+    help="A report, an attestation or a folder of reports, kept elsewhere: the ledgers must hold what it names.",
+)
 @click.option("--new-key", type=click.Path(dir_okay=False), help="Make a key pair: FILE, and FILE.pub.")
-def command(systems: tuple[str, ...], as_json: bool, sign: str | None, key: str | None, new_key: str | None) -> int:
+def command(
+    systems: tuple[str, ...],
+    as_json: bool,
+    sign: str | None,
+    key: str | None,
+    against: str | None,
+    new_key: str | None,
+) -> int:
     """Re-digest everything that the ledgers of SYSTEMS (all, if none is named) refer to; name each discrepancy.
 
-    Exit code 1 if the ledger or a file behind today's evidence was tampered with; changed inputs are told, but only
-    make evidence stale.
+    Exit code 1 if the ledger or a file behind today's evidence was tampered with, or a ledger is not the one that the
+    index of ledgers, the reports here or --against know; changed inputs are told, but only make evidence stale.
     """
     from pathlib import Path
 
-    from avow.cli.ledgers import audit_system, ledger_names
+    from avow.cli.ledgers import audit_index, audit_system, ledger_names, outside_heads, sign_all
     from avow.cli.workspace import workspace
+    from avow.pipeline.integrity import reported_heads
 
     if new_key:
         from avow.evidence.signing import new_key_pair
@@ -33,26 +46,28 @@ def command(systems: tuple[str, ...], as_json: bool, sign: str | None, key: str 
         click.echo(f"private key {new_key} (keep it), public key {public}")
         return 0
     place = workspace()
-    found = {name: audit_system(place, name, key) for name in ledger_names(place, systems)}
-    bad = any(d.serious for discrepancies, _ in found.values() for d in discrepancies)
+    anchors = (*reported_heads(place), *(outside_heads(Path(against)) if against else ()))
+    found = {name: audit_system(place, name, key, anchors) for name in ledger_names(place, systems, anchors)}
+    index = audit_index(place, key)
+    bad = any(d.serious for ds in (index, *(ds for ds, _ in found.values())) for d in ds)
     if sign and not bad:
-        from avow.cli.ledgers import sign_system
-
-        for name in found:
-            click.echo(f"signed: {sign_system(place, name, Path(sign))}", err=True)
+        for path in sign_all(place, tuple(found), Path(sign)):
+            click.echo(f"signed: {path}", err=True)
     if as_json:
         listed = {
             name: {"records": count, "discrepancies": [_json(d) for d in discrepancies]}
             for name, (discrepancies, count) in found.items()
         }
-        click.echo(json.dumps({"systems": listed}, indent=1))
+        click.echo(json.dumps({"systems": listed, "index": [_json(d) for d in index]}, indent=1))
     else:
         for name, (discrepancies, count) in found.items():
             serious = sum(d.serious for d in discrepancies)
             click.echo(f"{name}: {count} records, {serious} discrepanc{'y' if serious == 1 else 'ies'}")
             for d in discrepancies:
                 click.echo(f"  {'✘' if d.serious else '·'} {d.fault}: {d.text}")
-        if not found:
+        for d in index:
+            click.echo(f"index of ledgers: {d.fault}: {d.text}")
+        if not found and not bad:
             click.echo("no ledger yet: run `avow verify`")
         if sign and bad:
             click.echo("not signed: there are discrepancies", err=True)

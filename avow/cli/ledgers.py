@@ -11,51 +11,105 @@ from avow.assurance.codec import from_json
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.diagnostics import Diagnostic, Rejected
-from avow.evidence.audit import Discrepancy, Fault, audit
+from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.encoding import Unreadable
+from avow.evidence.heads import Anchor, Index, index_path, read_index, stated_heads
 from avow.evidence.ledger import Ledger
-from avow.registry import backend, names
+from avow.evidence.signing import Signed, sign, signature_path, verify_signature
+from avow.pipeline.integrity import confirm, discrepancies
+from avow.pipeline.survey import Survey, survey
 from avow.workspace import Workspace
 
 
-def ledger_names(place: Workspace, wanted: Sequence[str]) -> tuple[str, ...]:
-    """The systems named, or all that have a ledger. Raises Rejected for one that has none."""
-    known = sorted(path.stem for path in place.ledgers.glob("*.jsonl")) if place.ledgers.is_dir() else []
+def ledger_names(place: Workspace, wanted: Sequence[str], anchors: Sequence[Anchor] = ()) -> tuple[str, ...]:
+    """The systems named, or all that have a ledger, or had one by what the index of ledgers and `anchors` say. Raises
+    Rejected for one that never had any."""
+    there = [path.stem for path in place.ledgers.glob("*.jsonl")] if place.ledgers.is_dir() else []
+    known = sorted({*there, *_index(place).systems, *(anchor.system for anchor in anchors)})
     for name in wanted:
         if name not in known:
             raise Rejected(_unknown(f"there is no ledger of a system '{name}'", name, known))
     return tuple(wanted) or tuple(known)
 
 
-def audit_system(place: Workspace, name: str, public_key: str | None = None) -> tuple[tuple[Discrepancy, ...], int]:
+def outside_heads(path: Path) -> tuple[Anchor, ...]:
+    """The ledgers' heads that a report or attestation, kept elsewhere, names. Raises Rejected where it names none."""
+    try:
+        found = stated_heads(path, "")
+    except OSError as error:
+        raise Rejected(Diagnostic("REPORT001", f"{path} cannot be read: {error.strerror}")) from None
+    if not found:
+        raise Rejected(Diagnostic("REPORT002", f"{path} names no ledger: it is no report, and no attestation"))
+    return found
+
+
+def audit_system(
+    place: Workspace, name: str, public_key: str | None = None, anchors: Sequence[Anchor] = ()
+) -> tuple[tuple[Discrepancy, ...], int]:
     """The discrepancies of one system's ledger, and how many records it has. Raises Rejected if it cannot be read."""
     ledger = Ledger(place.ledger(name))
     try:
-        found = audit(ledger, place.root, system=name, strengths={b: backend(b, ()).strength for b in names()})
+        found = discrepancies(place, ledger, _surveyed(place, name), anchors, strict=True)
         count = len(ledger.records())
     except OSError as error:
         raise Rejected(Diagnostic("LEDGER001", f"{place.ledger(name)} cannot be read: {error.strerror}")) from None
-    return (*found, *_signature(place, name, ledger, public_key)), count
+    return (*found, *_signature(place.ledger(name), _head_of(ledger), public_key)), count
 
 
-def _signature(place: Workspace, name: str, ledger: Ledger, public_key: str | None) -> Iterable[Discrepancy]:
-    from avow.evidence.signing import signature_path, verify_signature
+def _surveyed(place: Workspace, name: str) -> Survey | None:
+    for folder in sorted(place.systems(), key=lambda folder: folder.name != name):
+        found = survey(folder)
+        if isinstance(found, Survey) and found.system.name == name:
+            return found
+    return None
 
-    path = signature_path(place.ledger(name))
+
+def audit_index(place: Workspace, public_key: str | None = None) -> tuple[Discrepancy, ...]:
+    """What is wrong with the index of ledgers as a whole. Raises Rejected if it cannot be read."""
+    path, index = index_path(place.ledgers), _index(place)
+    damage = tuple(Discrepancy(Fault.LEDGER, "index", text) for text in index.damage)
+    if not index.exists and not public_key:
+        return ()
+    return (*damage, *_signature(path, Signed("index of ledgers", index.marks), public_key, grows=True))
+
+
+def _index(place: Workspace) -> Index:
+    path = index_path(place.ledgers)
+    try:
+        return read_index(path)
+    except OSError as error:
+        raise Rejected(Diagnostic("LEDGER001", f"{path} cannot be read: {error.strerror}")) from None
+
+
+def _head_of(ledger: Ledger) -> Signed:
+    return Signed(ledger.path.stem, tuple(entry.hash for entry in ledger.records()))
+
+
+def _signature(file: Path, signed: Signed, public_key: str | None, grows: bool = False) -> Iterable[Discrepancy]:
+    """With a key of the auditor's own everything must be covered by a signature of it."""
+    path = signature_path(file)
     if not path.exists():
         if public_key:
-            yield Discrepancy(Fault.SIGNATURE, path.name, f"{path.name}: the ledger is not signed")
+            yield Discrepancy(Fault.SIGNATURE, path.name, f"{path.name}: it is not signed")
         return
-    problem = verify_signature(ledger, Path(public_key) if public_key else None)
+    problem, covered = verify_signature(path, signed, Path(public_key) if public_key else None)
     if problem:
         yield Discrepancy(Fault.SIGNATURE, path.name, problem)
+    elif covered < len(signed.marks) and not grows:
+        text = f"{len(signed.marks) - covered} of {len(signed.marks)} records are newer than the signature"
+        yield Discrepancy(Fault.SIGNATURE, path.name, text, serious=bool(public_key))
 
 
-def sign_system(place: Workspace, name: str, private_key: Path) -> Path:
-    """Sign the ledger's head. Raises Rejected."""
-    from avow.evidence.signing import sign
-
-    return sign(Ledger(place.ledger(name)), private_key)
+def sign_all(place: Workspace, systems: Sequence[str], private_key: Path) -> Iterable[Path]:
+    """Sign each system's ledger, and the index of ledgers. Raises Rejected."""
+    for name in systems:
+        ledger = Ledger(place.ledger(name))
+        if ledger.damage:
+            raise Rejected(Diagnostic("SIGN002", f"{ledger.path.name} is damaged: it is not signed"))
+        yield sign(signature_path(ledger.path), _head_of(ledger), private_key)
+        confirm(place, ledger)
+    path = index_path(place.ledgers)
+    yield sign(signature_path(path), Signed("index of ledgers", _index(place).marks), private_key)
 
 
 def read_case(path: Path) -> Case:

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 
 from avow.evidence.ledger import Entry, Ledger
+from avow.evidence.record import Evidence
 from avow.evidence.status import Status, effective
 from avow.files import digest_file
 from avow.verdict import Verdict
@@ -33,8 +35,14 @@ class Fault(StrEnum):
     """A record says what its method cannot say."""
     OUTDATED = "outdated"
     """An input has changed since: not tampering, but the evidence is stale."""
+    REPLACED = "replaced"
+    """The ledger is not the one that was there before, or was begun anew."""
+    REDIRECTED = "redirected"
+    """Where a file of its own should be, a link leads elsewhere."""
+    CLOCK = "clock"
+    """A record is from the future, or the clock went backwards between two records."""
     SIGNATURE = "signature"
-    """The ledger does not match its signature."""
+    """The ledger does not match its signature, or is not covered by it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,16 +64,32 @@ def audit(
     obligations: Mapping[str, str] | None = None,
     keys: Mapping[tuple[str, str], str] | None = None,
     strengths: Mapping[str, Verdict] | None = None,
+    engines: Mapping[tuple[str, str], str] | None = None,
+    now: datetime | None = None,
+    strict: bool = False,
 ) -> tuple[Discrepancy, ...]:
     """Every discrepancy, the ledger's own first. `root` is the workspace; `obligations` maps ids to digests as computed
-    now, `keys` (obligation id, method) to the key as of now, and `strengths` a backend's name to the most that it can
-    show, where the caller knows them."""
+    now, `keys` (obligation id, method) to the key as of now, `engines` the same to the backend that the plan names, and
+    `strengths` a backend's name to the most that it can show, where the caller knows them. With `now` (with a time
+    zone) records of the future are told. A file matters as long as its record is current, and with `strict` also as
+    long as it is the newest of its method. Raises OSError where the ledger cannot be read."""
     entries = ledger.records()
     found = [Discrepancy(Fault.LEDGER, f"line {d.line}", f"ledger line {d.line} {d.reason}") for d in ledger.damage]
+    if ledger.torn:
+        text = "the last line is half written: a run was killed; the next one will put it aside"
+        found.append(Discrepancy(Fault.LEDGER, "the end", text, serious=False))
+    found += _redirected(ledger)
     found += _misplaced(entries, system, obligations or {}, keys or {})
-    found += _impossible(entries, strengths or {})
-    found += _files(entries, root, keys)
+    found += _impossible(entries, strengths or {}, engines or {}, keys or {})
+    found += _clock(entries, now)
+    found += _files(entries, root, keys, strict)
     return tuple(dict.fromkeys(found))
+
+
+def _redirected(ledger: Ledger) -> Iterable[Discrepancy]:
+    for path in (ledger.path, ledger.path.with_name(ledger.path.name + ".head")):
+        if path.is_symlink():
+            yield Discrepancy(Fault.REDIRECTED, path.name, f"{path.name} is a link that leads elsewhere")
 
 
 def _misplaced(
@@ -92,9 +116,55 @@ def _misplaced(
             yield Discrepancy(Fault.MISPLACED, record.obligation, text)
 
 
-def _impossible(entries: tuple[Entry, ...], strengths: Mapping[str, Verdict]) -> Iterable[Discrepancy]:
+_SLACK = timedelta(hours=1)
+"""How far two clocks may differ (a ledger may travel between machines) before it is told."""
+
+
+def _clock(entries: tuple[Entry, ...], now: datetime | None) -> Iterable[Discrepancy]:
+    """Ages and expiries are counted by the clock: whoever sets it back makes old evidence young again."""
+    latest: datetime | None = None
+    for entry in entries:
+        record, where = entry.evidence, f"record {entry.number + 1} ({entry.evidence.obligation})"
+        started, ended = _times(record)
+        if started is None or ended is None:
+            text = f"{where} does not say when it was made: '{record.started[:40]}'"
+            yield Discrepancy(Fault.CLOCK, record.obligation, text, serious=False)
+            continue
+        if now is not None and started > now + _SLACK:
+            text = f"{where} is from the future ({record.started}): the clock was set back, or the record was made up"
+            yield Discrepancy(Fault.CLOCK, record.obligation, text)
+        if latest is not None and ended < latest - _SLACK:
+            text = f"{where} was made before the record that it follows: the clock was set back between them"
+            yield Discrepancy(Fault.CLOCK, record.obligation, text, serious=False)
+        latest = ended if latest is None else max(latest, ended)
+
+
+def _times(record: Evidence) -> tuple[datetime | None, datetime | None]:
+    """When the attempt started and ended; nothing where its record does not say."""
+    # a score takes its seconds from the record that it is about
+    seconds = 0.0 if "mutation" in record.details else max(record.seconds, 0.0)
+    try:
+        started = datetime.fromisoformat(record.started)
+        return (started, started + timedelta(seconds=seconds)) if started.tzinfo else (None, None)
+    except (ValueError, OverflowError):
+        return None, None
+
+
+def _impossible(
+    entries: tuple[Entry, ...],
+    strengths: Mapping[str, Verdict],
+    engines: Mapping[tuple[str, str], str],
+    keys: Mapping[tuple[str, str], str],
+) -> Iterable[Discrepancy]:
     for entry in entries:
         record = entry.evidence
+        pair = (record.obligation, record.method)
+        if pair in engines and keys.get(pair) == record.key and record.backend != engines[pair]:
+            text = (
+                f"record {entry.number + 1} answers for {record.method} as '{record.backend}', but the plan's "
+                f"{record.method} is '{engines[pair]}'"
+            )
+            yield Discrepancy(Fault.IMPOSSIBLE, record.obligation, text)
         most = strengths.get(record.backend)
         if most is not None and record.strength.supports and Status(record.strength).rank > Status(most).rank:
             text = (
@@ -111,7 +181,9 @@ def _impossible(entries: tuple[Entry, ...], strengths: Mapping[str, Verdict]) ->
             yield Discrepancy(Fault.IMPOSSIBLE, record.obligation, text)
 
 
-def _files(entries: tuple[Entry, ...], root: Path, keys: Mapping[tuple[str, str], str] | None) -> Iterable[Discrepancy]:
+def _files(
+    entries: tuple[Entry, ...], root: Path, keys: Mapping[tuple[str, str], str] | None, strict: bool
+) -> Iterable[Discrepancy]:
     left: dict[str, tuple[str, Entry]] = {}
     read: dict[str, tuple[str, Entry]] = {}
     newest: dict[tuple[str, str], str] = {}
@@ -122,11 +194,12 @@ def _files(entries: tuple[Entry, ...], root: Path, keys: Mapping[tuple[str, str]
             left[path] = (mark, entry)
         for path, mark in record.inputs.items():
             read[path] = (mark, entry)
-    relied_upon = newest if keys is None else keys
+    relied_upon = [newest] if keys is None else [keys, newest] if strict else [keys]
 
     def serious(entry: Entry) -> bool:
         """Only what a status rests on today can be undermined: files of past attempts may be cleaned away."""
-        return relied_upon.get((entry.evidence.obligation, entry.evidence.method)) == entry.evidence.key
+        pair = (entry.evidence.obligation, entry.evidence.method)
+        return any(known.get(pair) == entry.evidence.key for known in relied_upon)
 
     for path, (mark, entry) in left.items():
         yield from _compare(root, path, mark, entry, made=True, serious=serious(entry))
@@ -137,6 +210,9 @@ def _files(entries: tuple[Entry, ...], root: Path, keys: Mapping[tuple[str, str]
 
 def _compare(root: Path, path: str, mark: str, entry: Entry, *, made: bool, serious: bool) -> Iterable[Discrepancy]:
     behind = f"{path} (record {entry.number + 1}: {entry.evidence.obligation}, {entry.evidence.method})"
+    if made and ((root / path).is_symlink() or ".." in Path(path).parts):
+        text = f"{behind} is a link, or a path, that leads elsewhere"
+        yield Discrepancy(Fault.REDIRECTED, path, text, serious)
     try:
         now = digest_file(root / path)
     except (OSError, ValueError) as error:

@@ -6,15 +6,19 @@
   line; the next append moves those bytes to ``<file>.torn`` and goes on, and says so in `Ledger.repaired`.
 - A line in the middle that cannot be read, does not match its hash or does not follow its predecessor is *damage*: it
   is never used as evidence, and it is never passed over in silence (`Ledger.damage`, `avow audit`, a gate).
-- ``<file>.head`` names the newest record, so that cutting whole lines off the end is noticed too.
+- ``<file>.head`` names the newest record, so that cutting whole lines off the end is noticed too; the ``index`` of the
+  folder names the ledgers themselves (`avow.evidence.heads`).
+- A line has one spelling, byte for byte. Another encoding, a space or a key that stands twice is damage.
 - The same evidence appended twice is kept once.
 """
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
+import stat
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -22,11 +26,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.evidence.encoding import Unreadable, canonical, decode, encode
+from avow.evidence.heads import GENESIS as GENESIS
+from avow.evidence.heads import Event, index_path, note
 from avow.evidence.record import Evidence
-from avow.files import digest, write
-
-GENESIS = "0" * 64
-"""What the first record follows."""
+from avow.files import digest, read_regular, write
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +73,14 @@ class Ledger:
         """Every line that cannot be believed, and a missing end."""
         with self._lock:
             self._refresh()
-            return (*self._damage, *self._cut_off())
+            return (*self._damage, *self._garbage(), *self._cut_off())
+
+    @property
+    def torn(self) -> bool:
+        """Whether the last line is half written: a run was killed, and the next one will put it aside."""
+        with self._lock:
+            self._refresh()
+            return bool(self._tail) and not self._garbage()
 
     @property
     def head(self) -> str:
@@ -110,13 +120,14 @@ class Ledger:
                 if known is not None:
                     result.append(known)
                     continue
-                body = {"evidence": data, "n": number, "prev": previous}
-                mark = digest(canonical(body))
+                mark, line = _spell(identity, number, previous)
                 entry = Entry(number, previous, mark, evidence)
-                lines.append(canonical({**body, "hash": mark}) + "\n")
+                lines.append(line + "\n")
                 added[identity] = entry
                 result.append(entry)
                 previous, number = mark, number + 1
+            if lines and not self._lines:
+                note(index_path(self.path.parent), Event.BEGAN, self.path.stem)
             if lines:
                 self._write(file, "".join(lines).encode())
                 self._refresh()
@@ -129,6 +140,7 @@ class Ledger:
     def _forget(self) -> None:
         self._offset = 0
         self._lines = 0
+        self._tail = b""
         self._stated_head = GENESIS
         self._entries: list[Entry] = []
         self._damage: list[Damage] = []
@@ -142,7 +154,7 @@ class Ledger:
     @contextmanager
     def _locked(self) -> Iterator[int]:
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        file = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+        file = _open_file(str(self.path), os.O_RDWR | os.O_APPEND | os.O_CREAT)
         try:
             fcntl.flock(file, fcntl.LOCK_EX)
             yield file
@@ -182,7 +194,7 @@ class Ledger:
     def _refresh(self) -> None:
         """Read what was added since the last look (by this or another process)."""
         try:
-            with self.path.open("rb") as file:
+            with open(self.path, "rb", opener=_open_file) as file:
                 size = os.fstat(file.fileno()).st_size
                 if size < self._offset:
                     self._forget()
@@ -193,6 +205,7 @@ class Ledger:
             return
         whole = data[: data.rfind(b"\n") + 1]
         self._offset += len(whole)
+        self._tail = data[len(whole) :]
         for line in whole.split(b"\n")[:-1]:
             self._take(line)
 
@@ -209,18 +222,29 @@ class Ledger:
         if not follows:  # told, but the record itself may still be whole: dropping it could hide a refutation
             reason = "does not follow the record before it: a record was removed, inserted, moved or made unreadable"
             self._damage.append(Damage(number + 1, reason))
-        body = {"evidence": encode(entry.evidence), "n": entry.number, "prev": entry.previous}
-        identity = canonical(body["evidence"])
-        if digest(canonical(body)) != entry.hash:
+        identity = canonical(encode(entry.evidence))
+        mark, spelled = _spell(identity, entry.number, entry.previous)
+        if mark != entry.hash:
             self._damage.append(Damage(number + 1, f"was changed after it was written ({entry.evidence.obligation})"))
             return
+        if spelled.encode() != line:  # what is in it is what was written, but by another hand
+            self._damage.append(Damage(number + 1, "is not spelled as it was written (encoding, spaces, doubled keys)"))
+        if follows and identity in self._known:
+            self._damage.append(Damage(number + 1, f"repeats record {self._known[identity].number + 1}"))
         self._entries.append(entry)
         self._known.setdefault(identity, entry)
         self._by_key.setdefault((entry.evidence.obligation, entry.evidence.key), []).append(entry)
 
+    def _garbage(self) -> tuple[Damage, ...]:
+        """What stands behind the last line and is not the beginning of one."""
+        start = b'{"evidence":{'
+        if self._tail.startswith(start) or start.startswith(self._tail):
+            return ()
+        return (Damage(self._lines + 1, "is no record, nor the beginning of one"),)
+
     def _cut_off(self) -> tuple[Damage, ...]:
         try:
-            stated = json.loads(self._head_file.read_text())
+            stated = json.loads(read_regular(self._head_file))
             mark, count = str(stated["hash"]), int(stated["records"])
         except FileNotFoundError:
             return ()
@@ -233,6 +257,22 @@ class Ledger:
         ):
             return (Damage(self._lines, f"is not the newest record that {self._head_file.name} names"),)
         return ()
+
+
+def _spell(evidence: str, number: int, previous: str) -> tuple[str, str]:
+    """A line's hash and the line itself; `evidence` is the record's canonical text."""
+    tail = f'"n":{number},"prev":{canonical(previous)}}}'
+    mark = digest(f'{{"evidence":{evidence},{tail}')
+    return mark, f'{{"evidence":{evidence},"hash":"{mark}",{tail}'
+
+
+def _open_file(path: str, flags: int) -> int:
+    """Opens only what is a file: a pipe in its place would keep us waiting for ever."""
+    file = os.open(path, flags | os.O_NONBLOCK, 0o644)
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise OSError(errno.EINVAL, "not a regular file", path)
+    return file
 
 
 def read_line(line: bytes) -> Entry:

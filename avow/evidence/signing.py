@@ -1,19 +1,20 @@
 """Optional signatures (ed25519, offline, extra ``avow[signing]``): who vouches for a ledger up to its newest record.
 
 The signature is over the head's hash and the number of records; through the hash chain that covers every record. It
-stands beside the ledger as ``<ledger>.sig``, and stays valid for the records that it covers when others follow.
+stands beside the ledger as ``<ledger>.sig``, and stays valid for the records that it covers when others follow. The
+index of ledgers is signed in the same way: so a ledger that is gone as a whole, signature and all, is missed.
 """
 
 from __future__ import annotations
 
 import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from avow.diagnostics import Diagnostic, Rejected
-from avow.evidence.ledger import GENESIS, Ledger
-from avow.files import write
+from avow.files import read_regular, write
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
@@ -47,22 +48,29 @@ def new_key_pair(private: Path) -> Path:
     return public
 
 
-def sign(ledger: Ledger, private: Path) -> Path:
-    """Sign the newest record. Raises Rejected: no records, damage, no such key."""
+@dataclass(frozen=True, slots=True)
+class Signed:
+    """A chain that is signed: what it is called, and the hashes of its lines, oldest first."""
+
+    name: str
+    marks: tuple[str, ...]
+
+
+def sign(path: Path, chain: Signed, private: Path) -> Path:
+    """Sign the newest line, and with it all before; the signature is written to `path`. Raises Rejected: nothing to
+    sign, no such key."""
     key = _private(private)
-    entries = ledger.records()
-    if not entries or ledger.damage:
-        raise Rejected(Diagnostic("SIGN002", f"{ledger.path.name} has no records, or is damaged: it is not signed"))
-    head, count = entries[-1].hash, entries[-1].number + 1
-    signature = key.sign(_message(ledger.path.stem, head, count))
-    path = signature_path(ledger.path)
+    if not chain.marks:
+        raise Rejected(Diagnostic("SIGN002", f"{chain.name} has no records: it is not signed"))
+    head, count = chain.marks[-1], len(chain.marks)
+    signature = key.sign(_message(chain.name, head, count))
     public = key.public_key().public_bytes_raw().hex()
     write(path, json.dumps({"hash": head, "public_key": public, "records": count, "signature": signature.hex()}) + "\n")
     return path
 
 
-def verify_signature(ledger: Ledger, public: Path | None) -> str | None:
-    """What is wrong with a ledger's signature; None if nothing is.
+def verify_signature(path: Path, chain: Signed, public: Path | None) -> tuple[str | None, int]:
+    """What is wrong with a signature (None if nothing is), and how many of the chain's lines it covers.
 
     Without a key of one's own, the signature's own key is believed: then it only shows that nothing was changed since
     that key was used. Raises Rejected."""
@@ -70,22 +78,20 @@ def verify_signature(ledger: Ledger, public: Path | None) -> str | None:
     from cryptography.exceptions import InvalidSignature
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
-    path = signature_path(ledger.path)
     try:
-        data = json.loads(path.read_text())
+        data = json.loads(read_regular(path))
         head, count = str(data["hash"]), int(data["records"])
         signature, own = bytes.fromhex(data["signature"]), bytes.fromhex(data["public_key"])
         key = _public(public) if public is not None else Ed25519PublicKey.from_public_bytes(own)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        return f"{path.name} cannot be read as a signature: {error}"
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        return f"{path.name} cannot be read as a signature: {error}", 0
     try:
-        key.verify(signature, _message(ledger.path.stem, head, count))
+        key.verify(signature, _message(chain.name, head, count))
     except InvalidSignature:
-        return f"{path.name} is not a signature of this ledger by that key"
-    entries = {entry.number: entry.hash for entry in ledger.records()}
-    if count and entries.get(count - 1, GENESIS) != head:
-        return f"the {count} records that {path.name} covers are not those in the ledger"
-    return None
+        return f"{path.name} is not a signature of this ledger by that key", 0
+    if not 0 < count <= len(chain.marks) or chain.marks[count - 1] != head:
+        return f"the {count} records that {path.name} covers are not those in the ledger", 0
+    return None, count
 
 
 def _message(system: str, head: str, count: int) -> bytes:

@@ -127,11 +127,12 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         workspace = Workspace(Path.cwd())
         if "avow.pipeline.assess" not in sys.modules:
             return
-        from avow.pipeline.assess import known
+        from avow.pipeline.assess import is_settled, known
 
         complete = {a.system for a in known()} == {r.system for r in finished()}
         plugins = any(a.surveyed.system.plan.plugins for a in known())  # their code may be anywhere
-        if "verify" in self._selected and complete and not plugins and not self.failures and not self.runtime_errors:
+        undisturbed = complete and not plugins and not self.failures and not self.runtime_errors
+        if "verify" in self._selected and undisturbed and is_settled():
             shortcut.keep(workspace, finished())
 
     def _line(self, text: str) -> None:

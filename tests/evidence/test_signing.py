@@ -12,7 +12,20 @@ from avow.diagnostics import Rejected
 from avow.evidence.ledger import Ledger
 
 pytest.importorskip("cryptography")
-from avow.evidence.signing import new_key_pair, sign, signature_path, verify_signature
+from avow.evidence import signing
+from avow.evidence.signing import Signed, new_key_pair, signature_path
+
+
+def chain(ledger: Ledger) -> Signed:
+    return Signed(ledger.path.stem, tuple(entry.hash for entry in Ledger(ledger.path).records()))
+
+
+def sign(ledger: Ledger, key: Path) -> None:
+    signing.sign(signature_path(ledger.path), chain(ledger), key)
+
+
+def verify_signature(ledger: Ledger, public: Path | None) -> str | None:
+    return signing.verify_signature(signature_path(ledger.path), chain(ledger), public)[0]
 
 
 @pytest.fixture
@@ -29,7 +42,7 @@ def test_sign_and_verify(ledger: Ledger, tmp_path: Path) -> None:
     assert verify_signature(ledger, public) is None
     assert verify_signature(ledger, None) is None
     ledger.append(evidence("n.c"))  # what follows is not covered, and does not disturb
-    assert verify_signature(ledger, public) is None
+    assert signing.verify_signature(signature_path(ledger.path), chain(ledger), public) == (None, 2)
 
 
 def test_a_rewritten_ledger_does_not_match_its_signature(ledger: Ledger, tmp_path: Path) -> None:

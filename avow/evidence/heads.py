@@ -1,0 +1,189 @@
+"""The index of ledgers: which there are, and how far each was seen to reach.
+
+A ledger's own chain cannot tell that the whole file is gone, or that it was written anew from the first line. So beside
+the ledgers stands ``index``, a file of chained lines of its own:
+
+    {"event": "reached", "hash": "…", "head": "…", "n": 1, "prev": "…", "records": 36, "system": "rover", "time": "…"}
+
+- ``began``: the first record of a ledger is about to be written. A second one says that the file was deleted meanwhile.
+- ``reached``: a report was made of so many records, up to that one. They must be in the ledger for ever after.
+- ``lost``: a report stood here that was made of another ledger than the one that began.
+
+Reports and attestations name the head as well (`stated_head`), and may be kept elsewhere. Nothing of this is secret:
+somebody who writes ledger, index *and* reports anew is only found out by a signature or by a copy kept elsewhere.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+
+from avow.evidence.encoding import canonical
+from avow.files import digest, read_regular
+
+GENESIS = "0" * 64
+"""What the first record of a chain follows."""
+
+
+class Event(StrEnum):
+    BEGAN = "began"
+    REACHED = "reached"
+    LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """A line of the index. `records` is 0 where only the head is known."""
+
+    event: Event
+    system: str
+    records: int
+    head: str
+    time: str
+
+
+@dataclass(frozen=True, slots=True)
+class Index:
+    """What can be read of the index, and in words what cannot. `marks` are the lines' hashes, for signatures."""
+
+    statements: tuple[Statement, ...] = ()
+    marks: tuple[str, ...] = ()
+    damage: tuple[str, ...] = ()
+    exists: bool = False
+
+    def of(self, system: str) -> tuple[Statement, ...]:
+        return tuple(s for s in self.statements if s.system == system)
+
+    @property
+    def systems(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(s.system for s in self.statements))
+
+
+def index_path(ledgers: Path) -> Path:
+    """The index in a folder of ledgers."""
+    return ledgers / "index"
+
+
+def read_index(path: Path) -> Index:
+    """Raises OSError where there is a file that cannot be read."""
+    try:
+        data = read_regular(path)
+    except FileNotFoundError:
+        return Index()
+    found: list[Statement] = []
+    marks: list[str] = []
+    damage: list[str] = []
+    previous = GENESIS
+    *lines, torn = data.split(b"\n")
+    for number, line in enumerate(lines):
+        read = _read(line)
+        if read is None:
+            damage.append(f"line {number + 1} of the index of ledgers is not as it was written")
+            continue
+        statement, place, mark, follows = read
+        if place != number or follows != previous:
+            damage.append(f"line {number + 1} of the index of ledgers does not follow the line before it")
+        previous = mark
+        found.append(statement)
+        marks.append(mark)
+    if torn and not torn.startswith(b'{"event":'):  # else a run was killed while writing it: the next one mends it
+        damage.append("there is something behind the last line of the index of ledgers")
+    return Index(tuple(found), tuple(marks), tuple(damage), True)
+
+
+def note(path: Path, event: Event, system: str, records: int = 0, head: str = GENESIS) -> None:
+    """Add a line, unless the newest of that system says the same. Raises OSError: then nothing was added."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if event is not Event.BEGAN and _is_newest(read_index(path), event, system, records, head):
+        return
+    file = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        data = read_regular(path)
+        whole = data[: data.rfind(b"\n") + 1]
+        os.ftruncate(file, len(whole))  # what a killed run left half written
+        lines = whole.splitlines()
+        last = _read(lines[-1]) if lines else None
+        body = {
+            "event": event.value,
+            "head": head,
+            "n": len(lines),
+            "prev": last[2] if last else GENESIS,
+            "records": records,
+            "system": system,
+            "time": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
+        line = canonical({**body, "hash": digest(canonical(body))}).encode() + b"\n"
+        try:
+            if os.write(file, line) != len(line):
+                raise OSError(28, os.strerror(28), str(path))
+            os.fsync(file)
+        except BaseException:
+            os.ftruncate(file, len(whole))
+            raise
+    finally:
+        os.close(file)
+
+
+def _is_newest(index: Index, event: Event, system: str, records: int, head: str) -> bool:
+    newest = index.of(system)[-1:]
+    return bool(newest) and (newest[0].event, newest[0].records, newest[0].head) == (event, records, head)
+
+
+def _read(line: bytes) -> tuple[Statement, int, str, str] | None:
+    """(what it says, its number, its hash, what it follows); None for a line that is not as it was written."""
+    try:
+        data = json.loads(line)
+        body = {key: value for key, value in data.items() if key != "hash"}
+        written = canonical({**body, "hash": digest(canonical(body))}).encode()
+        statement = Statement(
+            Event(data["event"]), str(data["system"]), int(data["records"]), str(data["head"]), str(data["time"])
+        )
+        place, mark, follows = int(data["n"]), str(data["hash"]), str(data["prev"])
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+    return (statement, place, mark, follows) if written == line else None
+
+
+# -- the head as other files state it -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Anchor:
+    """A file that names a ledger's newest record as of some day: a report, or an attestation."""
+
+    where: str
+    system: str
+    head: str
+
+
+def stated_heads(path: Path, where: str) -> tuple[Anchor, ...]:
+    """What a ``report.json``, an ``attestation.jsonl`` or a folder with reports in it says of ledgers' heads; nothing
+    where it says nothing that can be read. Raises OSError for a file that cannot be read."""
+    if path.is_dir():
+        files = [*path.glob("report.json"), *path.glob("*/report.json"), *path.glob("attestation.jsonl")]
+        return tuple(a for file in sorted(files) for a in stated_heads(file, where or file.as_posix()))
+    found = []
+    for text in (lambda data: [data] if path.suffix == ".json" else data.splitlines())(read_regular(path)):
+        try:
+            found += [Anchor(where or path.as_posix(), *pair) for pair in _heads(json.loads(text))]
+        except (ValueError, RecursionError):
+            continue
+    return tuple(dict.fromkeys(anchor for anchor in found if anchor.head != GENESIS))
+
+
+def _heads(data: object) -> Iterable[tuple[str, str]]:
+    match data:
+        case {"ledger_head": str(head), "system": str(system)}:
+            yield system, head
+        case {"predicate": {"configuration": [*items]}}:
+            for item in items:
+                match item:
+                    case {"name": str(name), "digest": {"sha256": str(head)}} if name.startswith("ledger/"):
+                        yield name.removeprefix("ledger/"), head
