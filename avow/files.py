@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
+import stat
 import tempfile
 from pathlib import Path
 
@@ -14,9 +16,22 @@ def digest(data: bytes | str) -> str:
 
 
 def digest_file(path: Path) -> str:
-    """SHA-256 of a file's bytes. Raises OSError."""
+    """SHA-256 of a file's bytes. Raises OSError, also for what is no file and might have no end (a device, a pipe)."""
+    _must_be_regular(path)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def read_regular(path: Path) -> bytes:
+    """A file's bytes. Raises OSError, also for what is no file and might have no end (a device, a pipe)."""
+    _must_be_regular(path)
+    return path.read_bytes()
+
+
+def _must_be_regular(path: Path) -> None:
+    mode = path.stat().st_mode
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # opening a folder fails by itself
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
 
 
 def is_intact(path: Path, sha: str) -> bool:
