@@ -122,7 +122,8 @@ _SYNTAX = (
     Code(
         "RCL110",
         "nested too deeply",
-        "Formulas and types are nested 150 levels deep at most.",
+        "Formulas and types are nested 150 levels deep at most, and no constant or type has more than 20,000 parts when "
+        "all that it names is written out. Chains (`a and b and …`, `1 + 2 + …`) are not nested, however long.",
         "guarantee(" + "(" * 200 + "TRUE" + ")" * 200 + ")",
     ),
     Code(
@@ -225,7 +226,12 @@ _NAMES = (
         "A2, …, or G1, G2, … by its position.",
         _node(clauses="guarantee g (out.b) guarantee g (not out.b)"),
     ),
-    Code("RCL216", "topic listed twice", "A node lists a topic once.", _node(topics="bool t, bool t")),
+    Code(
+        "RCL216",
+        "topic listed twice",
+        "A node lists a topic once, or once for each variable that its messages carry; always with the same type.",
+        _node(topics="bool t, bool t"),
+    ),
     Code("RCL217", "no ROS type", "A topic has a ROS built-in type, or one of a package.", _node(topics="Bool t")),
     Code(
         "RCL218",
@@ -332,6 +338,12 @@ _LINTS = (
         "nothing to allow",
         "A comment `avow: allow` names something that is not the code of a lint.",
         "// avow: allow RCL999\n  guarantee(out.status == low)",
+    ),
+    _lint(
+        "RCL411",
+        "variable on two topics",
+        "Two topics carry the variable, and a monitor reads it from one of them.",
+        _node(topics="bool t matches(out.b), bool u matches(out.b)"),
     ),
 )
 

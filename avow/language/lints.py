@@ -169,6 +169,14 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
     elif silent:
         names = ", ".join(f"`{p.role}.{p.name}`" for p in silent[:6]) + (", …" if len(silent) > 6 else "")
         yield _warning("RCL405", f"`{node.name}` has no topics: nothing carries {names}", silent[0].span)
+    carriers: dict[tuple[Role, str], str] = {}
+    for topic in node.topics:
+        if topic.port is None:
+            continue
+        first = carriers.setdefault((topic.port.role, topic.port.name), topic.name)
+        if first != topic.name:
+            message = f"two topics carry `{topic.port.role}.{topic.port.name}`: `{first}` and `{topic.name}`"
+            yield _warning("RCL411", message, topic.span, "monitors read it from the first, unless the plan says which")
     for clause in node.assumptions:
         if clause.formula != TRUE and _always(clause.formula):
             message = f"the assumption `{clause.name}` says nothing: the types of the inputs make it true"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from avow.diagnostics import Span
 from avow.language.checker import Checker
@@ -128,20 +128,45 @@ def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bo
 
 
 def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]:
-    seen: dict[str, Span] = {}
+    """The topics. One topic may stand in the list several times, with a variable each time: its messages carry them
+    all, each in fields of its own."""
+    seen: dict[str, list[Topic]] = {}
     for tree in node.topics.parts if node.topics is not None else ():
         ros_type, name, role, matched = tree.parts
-        span = reports.source.span(tree.start, tree.end)
-        if name.text in seen:
-            notes: tuple[tuple[str, Span | None], ...] = ((f"`{name.text}` is first listed here", seen[name.text]),)
-            message = f"node `{scope.node}` lists the topic `{name.text}` twice"
-            reports.error("RCL216", message, name.start, name.end, notes=notes)
-            continue
-        seen[name.text] = span
         _check_ros_type(ros_type, reports)
-        shown = "/".join(part.text for part in ros_type.parts)
         port = _matched(tree, role, matched, scope, reports) if matched is not None else None
-        yield Topic(shown, name.text, port, span)
+        if matched is not None and port is None:
+            continue
+        shown = "/".join(part.text for part in ros_type.parts)
+        topic = Topic(shown, name.text, port, reports.source.span(tree.start, tree.end))
+        earlier = seen.setdefault(name.text, [])
+        if _goes_with(topic, earlier, name, reports):
+            earlier.append(topic)
+            yield topic
+
+
+def _goes_with(topic: Topic, earlier: Sequence[Topic], name: Token, reports: Reports) -> bool:
+    """Whether a topic may be listed again like this; reports it if not."""
+    other = next((t for t in earlier if _same_type(t) != _same_type(topic)), None)
+    message = f"the topic `{topic.name}` has two types"
+    hint = "a topic has one type: write the same, or another topic"
+    if other is None:
+        other = next((t for t in earlier if t.port == topic.port or t.port is None or topic.port is None), None)
+        message = f"the topic `{topic.name}` is listed twice"
+        hint = (
+            "remove one of the two; a topic that carries several variables is listed once for each, with `matches(…)`"
+        )
+    if other is None:
+        return True
+    notes: tuple[tuple[str, Span | None], ...] = ((f"`{topic.name}` is first listed here", other.span),)
+    reports.error("RCL216", message, name.start, name.end, hint=hint, notes=notes)
+    return False
+
+
+def _same_type(topic: Topic) -> tuple[str, ...]:
+    """A topic's type as it is in ROS 1 and 2 alike: ``package/msg/Type`` is ``package/Type``."""
+    parts = topic.ros_type.split("/")
+    return (parts[0], parts[-1], *(p for p in parts[1:-1] if p != "msg"))
 
 
 def _check_ros_type(tree: Tree, reports: Reports) -> None:

@@ -224,3 +224,41 @@ def test_circles_among_constants_and_types() -> None:
     assert any("RCL212" in e for e in errors("context { A = B + 1; B = A + 1; }"))
     assert any("RCL212" in e for e in errors("context { A : B; B : A; }"))
     assert any("RCL212" in e for e in errors("context { A : <A>; }"))
+
+
+TOPICS = "node n {{ inputs(a : REAL, b : REAL) outputs(o : BOOL) topics( {} ) guarantee( o <=> a < b ) }}"
+
+
+def test_several_variables_on_one_topic() -> None:
+    for sound in (
+        "p/T t matches(in.a), p/T t matches(in.b), bool o matches(out.o)",
+        "p/T t matches(in.a), p/msg/T t matches(in.b), p/T t matches(out.o)",
+    ):
+        contract, found = check_text(TOPICS.format(sound), "f")
+        assert contract is not None
+        assert [d.code for d in found] == []
+        assert [(t.name, t.port.name) for t in contract.nodes[0].topics if t.port is not None][:2] == [
+            ("t", "a"),
+            ("t", "b"),
+        ]
+
+
+@pytest.mark.parametrize(
+    ("topics", "message"),
+    [
+        ("p/T t matches(in.a), p/U t matches(in.b)", "RCL216 the topic `t` has two types"),
+        ("p/T t matches(in.a), p/srv/T t matches(in.b)", "RCL216 the topic `t` has two types"),
+        ("p/T t matches(in.a), p/T t matches(in.a)", "RCL216 the topic `t` is listed twice"),
+        ("p/T t matches(in.a), p/T t", "RCL216 the topic `t` is listed twice"),
+        ("p/T t, p/T t", "RCL216 the topic `t` is listed twice"),
+    ],
+)
+def test_what_is_ambiguous_about_a_topic(topics: str, message: str) -> None:
+    (found,) = errors(TOPICS.format(topics))
+    assert found.startswith(message)
+
+
+def test_a_variable_on_two_topics_is_worth_a_warning() -> None:
+    contract, found = check_text(TOPICS.format("p/T t matches(in.a), p/U u matches(in.a)"), "f")
+    assert contract is not None
+    assert "two topics carry `in.a`: `t` and `u`" in {d.message for d in found if d.code == "RCL411"}

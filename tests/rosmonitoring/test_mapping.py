@@ -191,3 +191,33 @@ def test_relations_latest_or_seen(make_system: Callable[..., System]) -> None:
     assert isinstance(latest, FunctionValue)
     assert isinstance(seen, FunctionValue)
     assert (len(latest.table), len(seen.table)) == (1, 2)
+
+
+SHARED = """
+node n {
+  inputs( x : REAL, y : REAL, word : {go, stop} )
+  outputs( o : BOOL )
+  topics( p/Pose pose matches(in.x), p/Pose pose matches(in.y), p/Pose pose matches(in.word), bool o matches(out.o) )
+  guarantee g ( out.o <=> in.x < in.y and in.word == go )
+}
+"""
+
+
+def test_one_topic_carries_several_variables(make_system: Callable[..., System]) -> None:
+    system = make_system(SHARED, {"in.x": "px", "in.y": "py", "out.o": "data"})
+    event = {"topic": "pose", "py": 2, "px": 1, "mode": "stop"}
+    for name, value in (("in.x", Fraction(1)), ("in.y", Fraction(2)), ("in.word", Element("stop"))):
+        assert value_of(system, name, event) == value
+
+
+def test_variables_that_look_alike_need_their_fields(make_system: Callable[..., System]) -> None:
+    """Otherwise both would be given the first number of the message, and the guarantee judged by that."""
+    system = make_system(SHARED, {"in.y": "py"})
+    found = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)[0]
+    assert set(found.rules) == {"in.y", "in.word", "out.o"}
+    assert found.hidden == {
+        "in.x": "the topic pose carries in.x and in.y, and the plan does not name the field of in.x"
+    }
+    system = make_system(SHARED, {})
+    found = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)[0]
+    assert set(found.hidden) == {"in.x", "in.y"}
