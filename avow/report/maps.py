@@ -14,6 +14,7 @@ from fractions import Fraction
 from markupsafe import Markup, escape
 
 from avow.assurance.model import MapView
+from avow.report.example import is_small
 from avow.verdict import Counterexample
 
 _NUMBER = r"[-+−]?\d{1,12}(?:[./]\d{1,12})?"
@@ -24,6 +25,11 @@ _PORT = re.compile(r"^[A-Za-z_]\w*\.[A-Za-z_]\w*")
 _SIZE = 300.0
 _MARGIN = 26.0
 _MOST_STEPS = 200
+_STYLE = (
+    "<style>text{font:10px 'Libertinus Serif',serif;fill:#5b6472}.spot{fill:#5b6472}.hit{fill:#a01c15}"
+    ".off{stroke:#a01c15;stroke-width:2;fill:none}"
+    ".way{fill:none;stroke:#a01c15;stroke-width:1.5;stroke-dasharray:4 3}</style>"
+)
 
 Place = tuple[Fraction, Fraction]
 
@@ -36,15 +42,29 @@ class _Visit:
 
 
 def draw_map(view: MapView, example: Counterexample) -> Markup:
-    """The map with the example's places marked; empty where it speaks of none, or the table holds no numbers."""
+    """The map with the example's places marked, and what it shows in words; empty where there is nothing to mark."""
+    svg, told = map_picture(view, example)
+    if not svg:
+        return Markup()
+    return Markup(f'<div class="where">{svg}<p class="quiet">{escape(told)}</p></div>')  # escaped piece by piece
+
+
+def map_picture(view: MapView, example: Counterexample, alone: bool = False) -> tuple[str, str]:
+    """The map as SVG, and in words; two empty texts where the example speaks of no place, or the table holds no
+    numbers. `alone`: with its own colours, for where the page's style sheet is not."""
     known = _known(view)
     if not known:
-        return Markup()
-    marked = [_Visit(place, name) for name, value in example.values for place in _places(name, value, view, known)]
+        return "", ""
+    marked = [
+        _Visit(place, name)
+        for name, value in example.values
+        if not is_small(name)
+        for place in _places(name, value, view, known)
+    ]
     path = list(_path(example, view, known))
     if not marked and not path:
-        return Markup()
-    return _svg(view, known, marked, path)
+        return "", ""
+    return _svg(view, known, marked, path, _STYLE if alone else "")
 
 
 def _known(view: MapView) -> dict[str, Place]:
@@ -88,7 +108,9 @@ def _path(example: Counterexample, view: MapView, known: dict[str, Place]) -> It
         before = set(now)
 
 
-def _svg(view: MapView, known: dict[str, Place], marked: Sequence[_Visit], path: Sequence[_Visit]) -> Markup:
+def _svg(
+    view: MapView, known: dict[str, Place], marked: Sequence[_Visit], path: Sequence[_Visit], style: str
+) -> tuple[str, str]:
     visits = (*marked, *path)
     inside = _frame(list(known.values()))
     near = [
@@ -108,7 +130,7 @@ def _svg(view: MapView, known: dict[str, Place], marked: Sequence[_Visit], path:
     parts = [
         (
             f'<svg class="map" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
-            f'width="{width:.0f}" height="{height:.0f}" role="img" aria-label="{escape(told)}">'
+            f'width="{width:.0f}" height="{height:.0f}" role="img" aria-label="{escape(told)}">{style}'
         )
     ]
     for label, place in known.items():
@@ -125,9 +147,7 @@ def _svg(view: MapView, known: dict[str, Place], marked: Sequence[_Visit], path:
         line = " ".join(f"{x:.1f},{y:.1f}" for x, y in (at(v.place) for v in way))
         parts.append(f'<polyline class="way" points="{line}"/>')
     parts.append("</svg>")
-    return Markup(
-        f'<div class="where">{"".join(parts)}<p class="quiet">{escape(told)}</p></div>'
-    )  # every text in it is escaped above
+    return "".join(parts), told  # every text in the picture is escaped above
 
 
 def _frame(places: Sequence[Place]) -> tuple[Place, Place]:

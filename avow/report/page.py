@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
@@ -21,7 +22,7 @@ from avow.assurance.traceability import COLUMNS, Row
 from avow.assurance.trend import trend
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
-from avow.report import picture, source, wording
+from avow.report import example, picture, source, wording
 from avow.report.maps import draw_map
 from avow.report.wording import history
 
@@ -33,6 +34,8 @@ _IN_FULL = 1500
 page over ten thousand is still a page that opens."""
 _ROWS = 600
 """So many guarantees have a row of their own in the summary; beyond that a node has one."""
+_A_LINE = 240
+"""Characters of a finding in the answer; all of it stands with the obligation."""
 _DRAWN = 2500
 """So many elements of the argument are drawn on one page; the other pictures are in gsn.svg and gsn.yaml."""
 
@@ -60,6 +63,9 @@ def environment() -> Environment:
         "bound_text": wording.bound_text,
         "derivation": _derivation,
         "draw_map": draw_map,
+        "example_run": example.run,
+        "example_values": example.values,
+        "small_values": example.small_values,
         "in_lines": wording.in_lines,
         "location": source.location,
         "source_lines": source.lines_of,
@@ -84,6 +90,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
     known, single = {view.id for view in case.obligations}, set(case.single_method)
     matrix, places = _matrix(case), source.places(case)
     rows = sum(len(found) for _, _, found in matrix)
+    listed = [item for item in case.open_items if not item.advice]
     views = sorted(case.obligations, key=_reading_order(case))
     return (
         environment()
@@ -104,7 +111,10 @@ def render_page(case: Case, json_digest: str = "") -> str:
             graph=_graph(case),
             places=places,
             failed=[gate for gate in case.gates if not gate.passed],
-            open_items=[item for item in case.open_items if not item.advice],
+            open_items=listed,
+            open_kinds=list(Counter(item.kind for item in listed).items()),
+            do_first=None if case.good else next((i for i in listed if i.suggestion and not i.handled), None),
+            findings={view.id: _found(view) for view in case.obligations},
             advice=[item for item in case.open_items if item.advice],
             single=[view for view in case.obligations if view.id in single],
             justified=_justified(case),
@@ -228,6 +238,13 @@ def _brief(view: ObligationView, places: Mapping[str, tuple[int, int]]) -> Marku
         f'<p class="quiet">{source.location(o.span, places)} <code>avow explain {escape(o.id)}</code></p>'
         "</div></details>\n"
     )
+
+
+def _found(view: ObligationView) -> str:
+    """What refutes a claim, in a line; empty where nothing does."""
+    shown = next((e.counterexample for e in (v.entry.evidence for v in view.counting) if e.counterexample), None)
+    text = shown.text() if shown is not None and not view.status.supports else ""
+    return text if len(text) <= _A_LINE else text[: _A_LINE - 1] + "…"
 
 
 def _counts(views: Sequence[ObligationView]) -> list[tuple[str, list[tuple[Status, int]], int]]:

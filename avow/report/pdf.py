@@ -11,9 +11,11 @@ from avow.assurance.model import Case, ObligationView, SourceView
 from avow.assurance.naming import short
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report import picture
+from avow.report import example, picture
+from avow.report.maps import map_picture
 from avow.report.source import plain_lines
 from avow.report.wording import MARKS, banner_tone, bound_text, clean, in_lines, tone, verdict_line
+from avow.verdict import Counterexample
 
 _MOST = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
@@ -21,6 +23,8 @@ _MOST = 500
 _LINES = 1200
 """Lines of a contract in the PDF, which then says so."""
 
+_MOST_COLUMNS = 9
+"""Columns of a run that fit on a page; a wider one is told by its reason alone."""
 _MOST_IN_A_PICTURE = 90
 _GATE = {
     "passes": {"word": "passes", "tone": "good"},
@@ -154,10 +158,29 @@ def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
                 "tool": f"{e.tool} {e.tool_version}",
                 "summary": e.summary,
                 "bound": bound_text(e.bound),
-                "counter": e.counterexample.text() if e.counterexample else "",
+                "counter": _counter(case, e.counterexample) if e.counterexample else None,
             }
             for e in evidence
         ],
+    }
+
+
+def _counter(case: Case, shown: Counterexample) -> dict[str, Any]:
+    """The contract's values and the run as on the page, without the tool's own words and the middle of long runs."""
+    told, found = example.values(shown), example.run(shown)
+    rows = [row for row in found.rows if not row.middle]
+    notes = [f"{found.left_out + found.beyond} rows in the middle are left out"] if found.left_out else []
+    if shown.loop is not None:
+        notes.append(f"after the last step the run returns to step {shown.loop}, and goes on like this for ever")
+    pictures = [map_picture(view, shown, alone=True) for view in case.maps]
+    return {
+        "why": shown.explanation or "what the contract leaves open",
+        "values": [[v.name, v.value, v.other] for v in told],
+        "other": any(v.other for v in told),
+        "columns": list(found.columns) if found.columns and len(found.columns) <= _MOST_COLUMNS else [],
+        "rows": [[row.label + (" ↺" if row.returns else ""), *([c.text, c.new] for c in row.cells)] for row in rows],
+        "note": "; ".join(notes),
+        "maps": [{"svg": svg, "told": words} for svg, words in pictures if svg],
     }
 
 

@@ -20,6 +20,8 @@
     if (place.classList.contains("off")) { all("#filter [data-by]").forEach((e) => { e.value = ""; }); sieve(); }
     for (let up = place; up; up = up.parentElement) if (up.tagName === "DETAILS") up.open = true;
     place.scrollIntoView({ block: "start" });
+    // rows that were not laid out yet had a guessed height: once they are, look again
+    requestAnimationFrame(() => requestAnimationFrame(() => place.scrollIntoView({ block: "start" })));
   };
   // The filter.
   const form = document.getElementById("filter");
@@ -95,10 +97,12 @@
     box.addEventListener("click", (event) => { if (moved) { event.preventDefault(); event.stopPropagation(); } }, true);
     picture.addEventListener("dragstart", (event) => event.preventDefault());
   });
-  // Paper has no folds.
+  // Paper has no folds: what has something to tell is opened; good news keeps to its line, logs stay on the screen.
   let folded = [];
+  const good = ["proved", "checked", "tested", "monitored", "reviewed", "justified", "linked"];
   addEventListener("beforeprint", () => {
-    folded = all("details:not([open])").filter((d) => !d.parentElement.closest(".ob") && !d.querySelector(".tree"));  // logs stay on the screen
+    folded = all("details:not([open])").filter((d) => !d.parentElement.closest(".ob") && !d.querySelector(".tree") && !d.dataset.screen
+      && !(d.classList.contains("ob") && d.dataset.kind !== "guarantee" && good.includes(d.dataset.status)));
     if (folded.length < 3000) folded.forEach((d) => { d.open = true; });
   });
   addEventListener("afterprint", () => { folded.forEach((d) => { d.open = false; }); folded = []; });
