@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
-from avow.calculus.derivation import Goal, Settled, SideCondition
+from avow.calculus.derivation import ClauseName, Goal, Settled, SideCondition
 from avow.calculus.discharge import Answers, Bounds, settle
+from avow.calculus.hierarchy import Level, composed_node, level, shown_contract, with_persistence
 from avow.calculus.meaning import Meanings
 from avow.calculus.rules import WHOLE, derive
 from avow.calculus.scenario import world
 from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
-from avow.system.plan import System
+from avow.language.contract import Node
+from avow.system.hierarchy import face, fold, inner_first, leaves, outermost, parents
+from avow.system.plan import ComposeGoal, Subsystem, System
+from avow.verdict import Verdict
 
 
 @dataclass(slots=True)
@@ -20,8 +24,17 @@ class Composition:
     """A system's derivations: of each goal of the plan, and of the whole system."""
 
     frame: Frame
+    """Every node by itself."""
     goals: tuple[Goal, ...]
+    """Subsystems first, those inside others before these."""
     meanings: Meanings
+    levels: Mapping[str, Level] = field(default_factory=dict)
+    """Goal → the frame in which the subsystems among its nodes are nodes."""
+    outermost: tuple[str, ...] = ()
+    """The nodes of the system as a whole."""
+    around: Mapping[str, str] = field(default_factory=dict)
+    """Node or subsystem → the subsystem that it is directly in."""
+    _level_meanings: dict[str, Meanings] = field(default_factory=dict)
     _answers: dict[str, Answers] = field(default_factory=dict)
     _machine: Machine | None = None
 
@@ -31,8 +44,45 @@ class Composition:
     def settled(self, goal: Goal, bounds: Bounds) -> Answers:
         """The goal's side conditions, settled once."""
         if goal.name not in self._answers:
-            self._answers[goal.name] = settle(self.frame, goal, bounds)
+            self._answers[goal.name] = settle(self.frame_of(goal), goal, bounds)
         return self._answers[goal.name]
+
+    def stands(self, goal: Goal, bounds: Bounds) -> Verdict:
+        """Whether a derivation stands, up to its hypotheses: it, and those of the subsystems that it is made of."""
+        verdicts = {self.settled(part, bounds).verdict for part in goal.inner_first()}
+        if Verdict.REFUTED in verdicts:
+            return Verdict.REFUTED
+        return Verdict.UNKNOWN if verdicts - {Verdict.PROVED} else Verdict.PROVED
+
+    def frame_of(self, goal: Goal) -> Frame:
+        """The frame in which a goal's nodes are nodes."""
+        return self.levels.get(goal.name, self.frame)
+
+    def meanings_of(self, goal: Goal) -> Meanings:
+        """Digests of what a goal is about."""
+        level = self.levels.get(goal.name)
+        if level is None:
+            return self.meanings
+        if goal.name not in self._level_meanings:
+            self._level_meanings[goal.name] = Meanings(level)
+        return self._level_meanings[goal.name]
+
+    def leaves(self, goal: Goal, nodes: Iterable[str]) -> tuple[str, ...]:
+        """The nodes of the contract that some nodes of a goal are made of."""
+        level = self.levels.get(goal.name)
+        return tuple(nodes) if level is None else level.leaves(nodes)
+
+    def where(self, node: str, clause: str) -> tuple[Goal, ClauseName] | None:
+        """The derivation that shows an assumption of a node, and what it is called there: the node's subsystem, or the
+        one around it where that carries it outward, …, or the whole system; None where it stays assumed."""
+        about = ClauseName(node, clause)
+        while (name := self.around.get(about.node)) is not None:
+            goal = self.goal(name)
+            if about not in goal.root.assumed:
+                return goal, about
+            about = ClauseName(name, str(about))
+        shown = {condition.about for condition in self.whole.conditions}
+        return (self.whole, about) if about in shown else None
 
     def known(self, goal: Goal) -> Mapping[SideCondition, Settled]:
         """The side conditions of a goal that have been settled; none if it was not asked for."""
@@ -48,26 +98,56 @@ class Composition:
     @property
     def whole(self) -> Goal:
         """The derivation over every node: the plan's own, or the one named ``whole``."""
-        everything = set(self.frame.graph.nodes)
+        everything = set(self.outermost)
         return next((goal for goal in self.goals if set(goal.nodes) == everything), self.goals[-1])
 
 
 def compose(system: System) -> Composition:
     """The derivations of a system. Pure. Raises Rejected for a plan whose formulas are wrong."""
-    built = frame(system)
-    goals = [derive(built, goal) for goal in system.plan.compose]
-    everything = set(built.graph.nodes)
-    if not any(set(goal.nodes) == everything for goal in goals) and WHOLE not in [goal.name for goal in goals]:
-        goals.append(derive(built))
-    return Composition(built, tuple(goals), Meanings(built))
+    flat = frame(system)
+    nodes = outermost(system)
+    faces = {name: face(system, flat.graph, name, inside) for name, inside in leaves(system.plan).items()}
+    composed: dict[str, Node] = {}
+    goals: dict[str, Goal] = {}
+    levels: dict[str, Level] = {}
+
+    def add(goal: ComposeGoal | None, members: tuple[str, ...], *, carry: bool = False) -> Goal:
+        parts = [faces[name] for name in members if name in faces]
+        built = level(flat, fold(system, flat.graph, parts), composed) if parts else flat
+        found = derive(built, goal, carry=carry)
+        found = replace(found, within=tuple(goals[part.node.name] for part in parts))
+        if isinstance(built, Level):
+            levels[found.name] = built
+            found = with_persistence(built, found)
+        goals[found.name] = found
+        return found
+
+    subsystems = {subsystem.name: subsystem for subsystem in system.plan.subsystems}
+    for name in inner_first(system.plan):
+        entry = subsystems[name]
+        goal = add(ComposeGoal(name, entry.members, entry.rule, entry.options, entry.span), entry.members, carry=True)
+        composed[name] = composed_node(levels.get(name, flat), goal, faces[name])
+        goals[name] = replace(goal, contract=shown_contract(composed[name]))
+    for wanted in system.plan.compose:
+        members = wanted.select or nodes
+        add(replace(wanted, select=members), members)
+    if not any(set(goal.nodes) == set(nodes) for goal in goals.values()) and WHOLE not in goals:
+        add(None, nodes)
+    return Composition(flat, tuple(goals.values()), Meanings(flat), levels, nodes, parents(system.plan))
+
+
+def asked(system: System, goal: str) -> ComposeGoal | Subsystem | None:
+    """What the plan says of a derivation."""
+    goals: tuple[ComposeGoal | Subsystem, ...] = (*system.plan.compose, *system.plan.subsystems)
+    return next((entry for entry in goals if entry.name == goal), None)
 
 
 def argument(composition: Composition, goal: str, key: str) -> str:
     """The plan's reason for a hypothesis of a goal, or nothing."""
-    for entry in composition.frame.system.plan.compose:
-        if entry.name == goal and isinstance(entry.options.data, dict):
-            given = entry.options.data.get(key)
-            if isinstance(given, dict):
-                signed = ", ".join(str(given[part]) for part in ("who", "date") if given.get(part))
-                return str(given["because"]) + (f" ({signed})" if signed else "")
+    entry = asked(composition.frame.system, goal)
+    if entry is not None and isinstance(entry.options.data, dict):
+        given = entry.options.data.get(key)
+        if isinstance(given, dict):
+            signed = ", ".join(str(given[part]) for part in ("who", "date") if given.get(part))
+            return str(given["because"]) + (f" ({signed})" if signed else "")
     return ""

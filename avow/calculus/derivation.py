@@ -122,6 +122,12 @@ class Goal:
     nodes: tuple[str, ...]
     root: Derivation
     findings: tuple[Diagnostic, ...] = ()
+    within: tuple[Goal, ...] = ()
+    """The derivations of those of the nodes that are subsystems: theirs has to stand too."""
+    contract: tuple[str, ...] = ()
+    """The derived contract of a subsystem in lines of text."""
+    together: bool = False
+    """Whether outputs of several nodes inside one subsystem are used together."""
 
     @property
     def conditions(self) -> tuple[SideCondition, ...]:
@@ -133,7 +139,20 @@ class Goal:
 
     @property
     def needs_persistence(self) -> bool:
-        return any(part.rule in (Rule.R3, Rule.R4) for part in self.root.walk())
+        return self.together or any(part.rule in (Rule.R3, Rule.R4) for part in self.root.walk())
+
+    def inner_first(self) -> tuple[Goal, ...]:
+        """The derivations of the subsystems inside, at whatever depth, each after those inside it; then this one."""
+        found: dict[str, Goal] = {}
+        stack: list[tuple[Goal, bool]] = [(self, False)]
+        while stack:
+            goal, done = stack.pop()
+            if done:
+                found[goal.name] = goal
+            elif goal.name not in found:
+                stack.append((goal, True))
+                stack.extend((inner, False) for inner in reversed(goal.within))
+        return tuple(found.values())
 
 
 @dataclass(frozen=True, slots=True)

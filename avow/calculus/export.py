@@ -12,24 +12,28 @@ from dataclasses import replace
 
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Goal
+from avow.calculus.hierarchy import carried, innermost
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
-from avow.language.terms import Role, Term, Variable
-from avow.logic.formula import free_variables, substitute
+from avow.language.sorts import FunctionSort
+from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
+from avow.logic.formula import free_variables, rename, substitute
 from avow.system.plan import Endpoint
 
 
 def derived_contract(composition: Composition, goal: Goal) -> Contract:
-    """The contract of the selected nodes taken together, as one node with the goal's name."""
+    """The contract of the selected nodes taken together, as one node with the goal's name; of subsystems among them,
+    the nodes inside count."""
     frame = composition.frame
+    nodes = composition.leaves(goal, goal.nodes)
     names = _Names()
     outputs: dict[str, Port] = {}
-    for node in goal.nodes:
+    for node in nodes:
         for port in frame.node(node).outputs:
             variable = frame.output(node, port.name)
             fresh = names.give(variable, Role.OUTPUT, node, port.name)
             outputs[fresh.name] = Port(Role.OUTPUT, fresh.name, port.sort, port.type_name)
     inputs: dict[str, Port] = {}
-    for node in goal.nodes:
+    for node in nodes:
         for port in frame.node(node).inputs:
             variable = frame.input(node, port.name)
             if variable not in names.given:
@@ -41,13 +45,18 @@ def derived_contract(composition: Composition, goal: Goal) -> Contract:
     assumptions: list[Clause] = []
     # What speaks of the step before was shown by induction over the system's own steps; a larger system that feeds the
     # values back has to show it again.
-    carried = [condition.about for condition in goal.conditions if condition.delayed]
-    for clause in (*goal.root.assumed, *carried):
-        original = frame.node(clause.node).clause(clause.clause)
-        term = frame.clause(clause.node, clause.clause)
-        label = f"{clause.node}_{clause.clause}"
+    parts = goal.inner_first()
+    delayed = [(part, condition.about) for part in parts for condition in part.conditions if condition.delayed]
+    for part, name in dict.fromkeys([*((goal, name) for name in goal.root.assumed), *delayed]):
+        level = composition.frame_of(part)
+        original = level.node(name.node).clause(name.clause)
+        apart = name in part.root.assumed and goal.name in composition.around.values()
+        term = carried(level, part, name) if apart else level.clause(name.node, name.clause)
+        label = re.sub(r"\W", "_", innermost(str(name)))
+        if apart:
+            term = _whatever(term, {v for v in names.given if names.given[v].role is Role.OUTPUT})
         assumptions.append(_clause(names, ClauseKind.ASSUMPTION, label, original, term, len(assumptions)))
-    used = {port for condition in goal.conditions for port in condition.environment}
+    used = {port for part in parts for condition in part.conditions for port in condition.environment}
     for assumed in frame.assumed:
         if assumed.port in used:
             term = substitute(assumed.formula, frame.mapping(assumed.node))
@@ -56,11 +65,21 @@ def derived_contract(composition: Composition, goal: Goal) -> Contract:
             assumptions.append(_clause(names, ClauseKind.ASSUMPTION, label, blank, term, len(assumptions)))
     guarantees = [
         _clause(names, ClauseKind.GUARANTEE, f"{node}_{clause.name}", clause, frame.clause(node, clause.name), k)
-        for k, (node, clause) in enumerate((n, c) for n in goal.nodes for c in frame.node(n).guarantees)
+        for k, (node, clause) in enumerate((n, c) for n in nodes for c in frame.node(n).guarantees)
     ]
     label = re.sub(r"\W", "_", goal.name if goal is not composition.whole else frame.system.name)
     whole = Node(label, tuple(inputs.values()), tuple(outputs.values()), (), tuple(assumptions), tuple(guarantees))
     return replace(frame.system.contract, files=(), nodes=(whole,))
+
+
+def _whatever(term: Term, outputs: set[Variable]) -> Term:
+    """What a subsystem assumes of values from inside as well is to hold whatever these are. One cannot say so of
+    relations; then the assumption speaks of outputs, and is hard to show."""
+    spoken = tuple(v for v in sorted(free_variables(term), key=lambda v: v.name) if v in outputs)
+    if not spoken or any(isinstance(v.sort, FunctionSort) for v in spoken):
+        return term
+    bound = {v: Variable(Role.BOUND, "any_" + re.sub(r"\W", "_", v.name), v.sort) for v in spoken}
+    return Quantified(Quantifier.FORALL, tuple(bound.values()), rename(term, bound))
 
 
 class _Names:

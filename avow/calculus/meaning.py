@@ -71,7 +71,8 @@ class Meanings:
         """The plan's environment assumptions (on some ports)."""
         wanted = None if ports is None else set(ports)
         formulas = digest(*(a.formula for a in self.frame.assumed if wanted is None or a.port in wanted))
-        return sha256("\n".join([formulas, *sorted(self.frame.own_inputs), "constant", *sorted(self.frame.constants)]))
+        own = (at if at == whose else f"{at} as {whose}" for at, whose in self.frame.own_inputs.items())
+        return sha256("\n".join([formulas, *sorted(own), "constant", *sorted(self.frame.constants)]))
 
     def all(self, selected: frozenset[str]) -> str:
         """Everything that is selected."""

@@ -103,7 +103,8 @@ def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = Non
     names = {id(part): f"{goal.name}.{number}" for number, part in enumerate(instances[:-1], start=1)}
     if instances:
         names[id(instances[-1])] = goal.name
-    written = [_lines(part, names, settled or {}) for part in instances or [goal.root]]
+    inner = frozenset(part.name for part in goal.within)
+    written = [_lines(part, names, settled or {}, inner) for part in instances or [goal.root]]
     conclusion = _conclusion(goal.root)
     conditions = tuple(
         Condition(_condition_text(condition), f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/{goal.name}.{condition.about}")
@@ -111,14 +112,15 @@ def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = Non
     )
     conditional: list[str] = []
     prefix = f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}"
-    if goal.needs_persistence:
-        conditional += [f"{prefix}/{goal.name}.persistence", f"{prefix}/{goal.name}.one-output"]
+    for part in reversed(goal.inner_first()):  # what is conditional inside is conditional outside
+        if part.needs_persistence:
+            conditional += [f"{prefix}/{part.name}.persistence", f"{prefix}/{part.name}.one-output"]
     conditional += [f"assumed: {name}" for name in goal.root.assumed]
     return Written(
         goal.name,
         goal.root.rule.value,
-        "\n\n".join(map(as_text, written)),
-        "\n".join(map(as_html, written)),
+        "\n\n".join([*map(as_text, written), *_joined(goal.contract)]),
+        "\n".join([*map(as_html, written), *(f"<pre>{html.escape(line)}</pre>" for line in _joined(goal.contract))]),
         "\n\n".join(map(as_latex, written)),
         _plain(conclusion.parts),
         tuple(dict.fromkeys(node for part in goal.root.walk() if part.rule is Rule.PREMISE for node in part.nodes)),
@@ -131,13 +133,19 @@ def write_goal(goal: Goal, settled: Mapping[SideCondition, Settled] | None = Non
 # -- lines -------------------------------------------------------------------------------------------------------------
 
 
-def _lines(part: Derivation, names: Mapping[int, str], settled: Mapping[SideCondition, Settled]) -> Lines:
+def _joined(lines: tuple[str, ...]) -> tuple[str, ...]:
+    return ("\n".join(lines),) if lines else ()
+
+
+def _lines(
+    part: Derivation, names: Mapping[int, str], settled: Mapping[SideCondition, Settled], inner: frozenset[str]
+) -> Lines:
     above: list[Line] = []
     for child in _shortened(part.children):
         if child is None:
             above.append(Line(("…",)))
         elif child.rule is Rule.PREMISE:
-            above.append(_contract(child.nodes[0]))
+            above.append(_contract(child.nodes[0], "derived" if child.nodes[0] in inner else ""))
             above += _condition_lines(child, settled)
 
         else:
@@ -158,9 +166,9 @@ def _shortened(children: tuple[Derivation, ...]) -> Iterator[Derivation | None]:
     yield from children[-3:]
 
 
-def _contract(node: str) -> Line:
+def _contract(node: str, remark: str = "") -> Line:
     i, o = Symbol("i", node), Symbol("o", node)
-    return Line(("∀", i, ",", o, "·", *_applied("A", node), "⇒", "◇", *_applied("G", node)))
+    return Line(("∀", i, ",", o, "·", *_applied("A", node), "⇒", "◇", *_applied("G", node)), remark)
 
 
 def _applied(kind: str, node: str) -> tuple[Part, ...]:

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from avow.calculus import answers
-from avow.calculus.composition import Composition, argument, compose
-from avow.calculus.derivation import Goal, Rule, SideCondition
+from avow.calculus.composition import Composition, argument, asked, compose
+from avow.calculus.derivation import ClauseName, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds
+from avow.calculus.hierarchy import innermost
 from avow.calculus.requirements import requirement_question
 from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
 from avow.calculus.variables import Frame
@@ -90,9 +91,9 @@ def _tasks(composition: Composition) -> Iterator[Task]:
 
 
 def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
-    frame, meanings = composition.frame, composition.meanings
+    frame, meanings = composition.frame_of(goal), composition.meanings_of(goal)
     selected = frozenset(goal.nodes)
-    plan = next((g for g in frame.system.plan.compose if g.name == goal.name), None)
+    plan = asked(frame.system, goal.name)
     span = plan.span if plan else None
     for finding in goal.findings:
         yield Task(
@@ -126,7 +127,7 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
                         ]
                     )
                 ),
-                (str(condition.about), *givers),
+                tuple(dict.fromkeys(map(innermost, (str(condition.about), *givers)))),
                 clause.span,
             ),
             answers.SideQuestion(goal.name, condition),
@@ -181,7 +182,7 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
             answers.ArgumentQuestion("because", assumed.because, "environment"),
         )
     reasons = {entry.port: entry.because for entry in frame.system.plan.environment}
-    for name in composition.whole.root.assumed:
+    for name in dict.fromkeys(ClauseName(*innermost(str(n)).split(".")) for n in composition.whole.root.assumed):
         node = frame.node(name.node)
         clause = node.clause(name.clause)
         ports = [v.name for v in ports_of(clause.formula)]
@@ -295,7 +296,7 @@ def supports(composition: Composition, requirement: Requirement) -> tuple[str, .
         owner, dot, _ = name.partition(".")
         goal = next((g for g in composition.goals if g.name == name), None)
         if goal is not None:
-            nodes: tuple[str, ...] = goal.root.guaranteed
+            nodes = composition.leaves(goal, goal.root.guaranteed)
         elif dot:
             found[name] = None
             continue

@@ -14,6 +14,7 @@ from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCon
 from avow.calculus.variables import Frame
 from avow.diagnostics import Diagnostic
 from avow.language.contract import Clause
+from avow.language.terms import Role
 from avow.system.formulas import ports_of
 from avow.system.graph import Edge, components
 from avow.system.plan import ComposeGoal, Endpoint
@@ -25,17 +26,22 @@ PERSISTENCE = "the outputs of {} persist once generated, until they are used tog
 ONE_OUTPUT = "{} give at most one output element for each input element"
 
 
-def derive(frame: Frame, goal: ComposeGoal | None = None) -> Goal:
-    """The derivation that a goal of the plan asks for; without one, that of the whole system."""
+def derive(frame: Frame, goal: ComposeGoal | None = None, *, carry: bool = False) -> Goal:
+    """The derivation that a goal of the plan asks for; without one, that of the whole system.
+
+    `carry`: an assumption that speaks of anything from outside the selection stays assumed in the conclusion, for a
+    larger derivation to show; otherwise one that speaks of something from inside as well is to be shown here.
+    """
     names = goal.select if goal is not None and goal.select else frame.graph.nodes
-    builder = _Builder(frame, tuple(names))
+    builder = _Builder(frame, tuple(names), carry)
     name = goal.name if goal is not None else WHOLE
     root: Derivation | None = None
     findings: list[Diagnostic] = []
     if goal is not None and goal.rule is not None:
         root = builder.as_asked(Rule(goal.rule))
         if root is None:
-            message = f"compose.{name}: {goal.rule} does not fit {', '.join(names)}: {_WANTED[Rule(goal.rule)]}"
+            where = f"{'subsystems' if carry else 'compose'}.{name}"
+            message = f"{where}: {goal.rule} does not fit {', '.join(names)}: {_WANTED[Rule(goal.rule)]}"
             findings.append(Diagnostic("PLAN125", message, goal.options.at("rule"), hint="leave the rule to Avow"))
     root = root or builder.found()
     return Goal(name, tuple(names), replace(root, name=name), tuple(findings))
@@ -53,6 +59,7 @@ _WANTED = {
 class _Builder:
     frame: Frame
     nodes: tuple[str, ...]
+    carry: bool = False
     selected: frozenset[str] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -91,6 +98,10 @@ class _Builder:
             sources = self.sources(node, clause)
             edges = [edge for edge in sources.values() if edge is not None and edge.source.node in given]
             environment = self.environment(node, [port for port, edge in sources.items() if edge is None])
+            beyond = [edge for edge in sources.values() if edge is not None and edge.source.node not in self.selected]
+            if self.carry and beyond:
+                kept.append(ClauseName(node, clause.name))
+                continue
             if sources and not edges and not (environment and all(edge is None for edge in sources.values())):
                 kept.append(ClauseName(node, clause.name))
                 continue
@@ -101,11 +112,12 @@ class _Builder:
 
     def sources(self, node: str, clause: Clause) -> dict[str, Edge | None]:
         """The inputs that a clause speaks of, and the edge that feeds each (None: the environment)."""
-        return {v.name: self.frame.graph.by_target.get(Endpoint(node, v.name)) for v in ports_of(clause.formula)}
+        inputs = (v.name for v in ports_of(clause.formula) if v.role is Role.INPUT)
+        return {name: self.frame.graph.by_target.get(Endpoint(node, name)) for name in inputs}
 
     def environment(self, node: str, ports: Sequence[str]) -> tuple[str, ...]:
         """The plan's assumptions on some environment inputs of a node."""
-        names = {f"{owner}.{port}" for owner in ("in", node) for port in ports}
+        names = {self.frame.entry(node, port) for port in ports}
         return tuple(a.port for a in self.frame.assumed if a.port in names)
 
     # -- instances -----------------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from avow.language.terms import Role, Term, Variable
 from avow.logic.formula import substitute
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition
 from avow.system.graph import Edge, Graph, dataflow
+from avow.system.hierarchy import apart
 from avow.system.plan import Endpoint, System
 
 SUFFIXES = ("", "@before", "@before@before")
@@ -28,8 +29,8 @@ class Frame:
     system: System
     graph: Graph
     assumed: tuple[Assumed, ...]
-    own_inputs: frozenset[str]
-    """Inputs of one node (``planner.map``) that the plan sets apart from the inputs of that name that others read."""
+    own_inputs: Mapping[str, str]
+    """Inputs (``planner.map``) that the plan sets apart from the inputs of that name that others read → as whose."""
     constants: frozenset[str]
     """Environment inputs (``in.map``, ``planner.map``) that keep their value."""
 
@@ -69,15 +70,20 @@ class Frame:
         edge = self.graph.by_target.get(Endpoint(node, port))
         if edge is None:
             sort = self.node(node).input(port).sort
-            own = f"{node}.{port}" in self.own_inputs
-            if (f"{node}.{port}" if own else f"in.{port}") in self.constants:
+            entry = self.entry(node, port)
+            if entry in self.constants:
                 earlier = 0
-            if own:
-                return system_variable(f"{node}.in.{port}", sort, earlier)
+            owner = entry.partition(".")[0]
+            if owner != "in":
+                return system_variable(f"{owner}.in.{port}", sort, earlier)
 
             return Variable(Role.INPUT, port + SUFFIXES[earlier], sort)
 
         return self.output(edge.source.node, edge.source.port, earlier + (1 if edge.delayed else 0))
+
+    def entry(self, node: str, port: str) -> str:
+        """What the plan calls an input from the environment: ``in.map``, or ``planner.map`` where it is set apart."""
+        return self.own_inputs.get(f"{node}.{port}", f"in.{port}")
 
     def environment(self, earlier: int = 0) -> dict[str, Term]:
         """What the plan assumes of the environment, labelled ``environment in.map``."""
@@ -114,7 +120,7 @@ class Frame:
 def frame(system: System) -> Frame:
     """Raises Rejected where the plan's formulas are wrong."""
     graph = dataflow(system)
-    own = frozenset(entry.port for entry in system.plan.environment if not entry.port.startswith("in."))
+    own = apart(system.plan, system.contract.nodes)
     nodes = {node.name: node for node in system.contract.nodes}
     constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
     return Frame(system, graph, environment_assumptions(system, graph), own, constants, nodes)

@@ -60,9 +60,10 @@ def command(
 
     chosen = [goal for goal in composition.goals if not goals or goal.name in goals]
     if as_graph:
-        from avow.system.picture import text
+        from avow.system.hierarchy import seen
+        from avow.system.picture import texts
 
-        click.echo(text(composition.frame.graph))
+        click.echo(texts(seen(system, composition.frame.graph)))
         return 0
     if as_latex:
         from avow.calculus.notation import write_goal
@@ -76,7 +77,9 @@ def command(
         goal = chosen[-1] if goals else composition.whole
         click.echo(to_rcl(derived_contract(composition, goal)), nl=False)
         return 0
-    prefixes = tuple(f"{name}." for name in goals) or ("",)
+    if goals:  # a derivation stands only with those of the subsystems that it is made of
+        chosen = list({part.name: part for goal in chosen for part in goal.inner_first()}.values())
+    prefixes = tuple(f"{goal.name}." for goal in chosen) if goals else ("",)
     obligations = [o for o in composition_obligations(system) if o.name.startswith(prefixes)]
 
     limits = _Limits(seconds, seed)
@@ -114,6 +117,14 @@ def to_json(
             "dangling": [str(endpoint) for endpoint in graph.dangling],
             "findings": [{"code": f.code, "severity": str(f.severity), "message": f.message} for f in graph.findings],
         },
+        "subsystems": [
+            {
+                "name": subsystem.name,
+                "nodes": list(subsystem.members),
+                "contract": list(composition.goal(subsystem.name).contract),
+            }
+            for subsystem in composition.frame.system.plan.subsystems
+        ],
         "derivations": [
             {
                 "name": w.name,
@@ -158,9 +169,15 @@ def _listing(
 
     from avow.calculus.notation import write_goal
     from avow.rendering import render
+    from avow.verdict import Verdict
 
     console = Console(highlight=False)
-    findings = [*composition.frame.graph.findings, *(f for goal in goals for f in goal.findings)]
+    levels = (composition.frame_of(goal).graph for goal in goals if goal.name in composition.levels)
+    findings = [
+        *composition.frame.graph.findings,
+        *(finding for graph in levels for finding in graph.findings),
+        *(finding for goal in goals for finding in goal.findings),
+    ]
     if findings:
         click.echo(render(findings), err=True)
     for goal in goals:
@@ -175,6 +192,15 @@ def _listing(
         console.print(line)
         if outcome.counterexample is not None and outcome.counterexample.values:
             console.print(Padding(Text(outcome.counterexample.text()), (0, 0, 0, 10)))
+    for goal in goals if composition.around else ():
+        parts = tuple(f"{part.name}." for part in goal.inner_first())
+        wrong = [
+            f"{o.name} is {outcome.verdict}"
+            for o, outcome in zip(obligations, outcomes, strict=True)
+            if o.name.startswith(parts) and outcome.verdict in (Verdict.REFUTED, Verdict.UNKNOWN, Verdict.ERROR)
+        ]
+        told = f"does not stand yet: {'; '.join(wrong[:4])}{'; …' if len(wrong) > 4 else ''}" if wrong else "stands"
+        console.print(Text(f"{goal.name} {told}"), soft_wrap=True)
     counts: dict[str, int] = {}
     for outcome in outcomes:
         counts[str(outcome.verdict)] = counts.get(str(outcome.verdict), 0) + 1

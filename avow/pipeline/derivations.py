@@ -6,7 +6,8 @@ from avow.assurance.model import Derivation, SideCondition
 from avow.calculus.composition import compose
 from avow.calculus.notation import Written, write_goal
 from avow.system.graph import dataflow
-from avow.system.picture import svg
+from avow.system.hierarchy import seen
+from avow.system.picture import sheet
 from avow.system.plan import System
 
 
@@ -17,7 +18,7 @@ def derivation_views(system: System) -> tuple[Derivation, ...]:
 
 def graph_svg(system: System) -> str:
     """The dataflow picture."""
-    return svg(dataflow(system))
+    return sheet(seen(system, dataflow(system)))
 
 
 def _view(system: System, written: Written) -> Derivation:

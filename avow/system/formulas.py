@@ -10,6 +10,7 @@ from avow.language.contract import Node
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Term, Variable, children
 from avow.system.graph import Edge, Graph
+from avow.system.hierarchy import leaves
 from avow.system.plan import Endpoint, EnvironmentInput, System
 from avow.system.temporal import parse_property, parse_state
 
@@ -75,7 +76,7 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
     found: list[Assumed] = []
     faults: list[Diagnostic] = []
     for entry in system.plan.environment:
-        holders = _endpoints(system, entry)
+        holders = endpoints(system, entry)
         outside = [e for e in holders if e in graph.environment]
         if not outside:
             providers = [str(graph.by_target[e].source) for e in holders if e in graph.by_target]
@@ -92,6 +93,8 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
             continue
         inputs = {e.port for e in graph.environment if e.node == owner}
         foreign = [v for v in ports_of(term) if v.role is not Role.INPUT or v.name not in inputs]
+        if foreign and entry.taken_in:
+            continue  # it speaks of an input that is provided here too
         if foreign:
             message = f"environment: {entry.port}: {foreign[0].qualified} is not the environment's to assume"
             hint = "only inputs that no node provides may be spoken of"
@@ -148,12 +151,14 @@ def ports_of(term: Term) -> tuple[Variable, ...]:
     return tuple(found)
 
 
-def _endpoints(system: System, entry: EnvironmentInput) -> Sequence[Endpoint]:
+def endpoints(system: System, entry: EnvironmentInput) -> Sequence[Endpoint]:
+    """The inputs that an entry of the plan's environment is about."""
     owner, _, port = entry.port.partition(".")
+    inside = leaves(system.plan).get(owner, (owner,))
     return [
         Endpoint(node.name, port)
         for node in system.contract.nodes
-        if owner in ("in", node.name) and port in [p.name for p in node.inputs]
+        if (owner == "in" or node.name in inside) and port in [p.name for p in node.inputs]
     ]
 
 

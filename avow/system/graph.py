@@ -74,8 +74,15 @@ def dataflow(system: System) -> Graph:
     edges = _declared(system, faults)
     taken = {edge.target for edge in edges}
     edges += _by_names(nodes, taken, faults)
+    return wired(nodes, edges, faults, {node.name: node.span for node in nodes})
+
+
+def wired(
+    nodes: Sequence[Node], edges: Iterable[Edge], faults: Iterable[Diagnostic], spans: Mapping[str, Span | None] | None
+) -> Graph:
+    """The graph of some nodes and edges. `spans`: where to tell of start-up deadlocks; None: not among the findings."""
     order = {node.name: k for k, node in enumerate(nodes)}
-    edges.sort(key=lambda e: (order[e.target.node], order[e.source.node], e.target.port, e.source.port))
+    edges = sorted(edges, key=lambda e: (order[e.target.node], order[e.source.node], e.target.port, e.source.port))
     fed = {edge.target for edge in edges}
     feeding = {edge.source for edge in edges}
     environment = tuple(
@@ -89,8 +96,7 @@ def dataflow(system: System) -> Graph:
     selves = {source for source, target in started if source == target}
     loops = [c for c in components(names, started) if len(c) > 1 or c[0] in selves]
     deadlocks = tuple(cycle for component in loops for cycle in cycles_in(component, started))
-    spans = {node.name: node.span for node in nodes}
-    faults += [_deadlock(cycle, edges, spans) for cycle in deadlocks]
+    told = [] if spans is None else [_deadlock(cycle, edges, spans) for cycle in deadlocks]
     by_consumer: dict[str, list[Edge]] = defaultdict(list)
     by_provider: dict[str, list[Edge]] = defaultdict(list)
     for edge in edges:
@@ -102,7 +108,7 @@ def dataflow(system: System) -> Graph:
         environment,
         dangling,
         deadlocks,
-        tuple(faults),
+        (*faults, *told),
         {edge.target: edge for edge in edges},
         {name: tuple(found) for name, found in by_consumer.items()},
         {name: tuple(found) for name, found in by_provider.items()},

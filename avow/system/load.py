@@ -9,18 +9,28 @@ from avow.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Contract
 from avow.system.formulas import check_formulas
 from avow.system.graph import dataflow
+from avow.system.include import include, still_open
 from avow.system.names import check_names
 from avow.system.plan import System
 from avow.system.plan_file import bare_plan, fill_methods, read_plan
+from avow.system.subsystems import check_subsystems, resolved
 
 PLAN_FILE = "plan.yaml"
+
+MAX_DEPTH = 30
+"""Systems within systems."""
 
 
 def load_system(folder: Path) -> System:
     """The system whose plan.yaml is in `folder`. A folder without a plan but with .rcl files is a bare system.
 
-    Raises Rejected with every fault found in the plan and in the contract.
+    Raises Rejected with every fault found in the plan, in the contract, and in the systems that it takes in.
     """
+    return _load(folder, (), {})
+
+
+def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System]) -> System:
+    """`within`: the folders of the systems that take this one in; `known`: those loaded already."""
     path = folder / PLAN_FILE
     if not path.is_file():
         if path.exists() or not folder.is_dir():
@@ -34,12 +44,33 @@ def load_system(folder: Path) -> System:
     faults += more
     if contract is None:
         raise Rejected(*faults)
-    faults += check_names(plan, root, contract)
+    chain = (*within, folder.resolve())
+
+    def part(inner: Path) -> System:
+        if inner in chain:
+            shown = " → ".join(name.name for name in (*chain[chain.index(inner) :], inner))
+            raise Rejected(Diagnostic("PLAN110", f"systems take in one another: {shown}"))
+        if len(chain) > MAX_DEPTH:
+            raise Rejected(Diagnostic("PLAN110", f"systems are taken in to more than {MAX_DEPTH} levels"))
+        if inner not in known:
+            known[inner] = _load(inner, chain, known)
+        return known[inner]
+
+    plan, contract, more = include(plan, contract, part)
+    faults += more
+    if any(fault.is_error for fault in more):
+        raise Rejected(*faults)
+    wrong = check_subsystems(plan, contract)
+    faults += (*wrong, *check_names(plan, root, contract))
+    if not wrong:
+        plan, more = resolved(plan, contract)
+        faults += more
     if any(fault.is_error for fault in faults):
         raise Rejected(*faults)
     guarantees = {node.name: tuple(clause.name for clause in node.guarantees) for node in contract.nodes}
     system = System(fill_methods(plan, guarantees), contract)
     graph = dataflow(system)
+    system = still_open(system, graph)
     faults += tuple(fault for fault in graph.findings if fault.is_error) + check_formulas(system, graph)
     if any(fault.is_error for fault in faults):
         raise Rejected(*faults)

@@ -18,10 +18,10 @@ def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic
     """Everything that the plan names and the contract does not have."""
     nodes = {node.name: node for node in contract.nodes}
     return (
-        *_connections(root, nodes),
-        *_environment(root, nodes),
+        *_connections(plan, root, nodes),
+        *_environment(plan, root, nodes),
         *_requirements(plan, root, nodes),
-        *_goals(root, nodes),
+        *_goals(plan, root, nodes),
         *_nodes(plan, root, nodes),
         *_model(root, nodes),
         *_scenario(plan, root, contract, nodes),
@@ -51,12 +51,15 @@ def _text_items(piece: Piece | None) -> list[Piece]:
     return piece.items if piece.items is not None else [piece]
 
 
-def _connections(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+def _connections(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    subsystems = {subsystem.name for subsystem in plan.subsystems}
     for index, piece in enumerate(_text_items(root.at("connections"))):
         for key, side in (("from", "output"), ("to", "input")):
             for item in _text_items(piece.at(key)):
                 name, _, port = item.text.partition(".")
                 where = f"connections[{index}].{key}"
+                if name in subsystems:
+                    continue  # avow.system.subsystems finds out whose port it is
                 if name not in nodes:
                     yield _unknown(f"{where}: node", name, nodes, item.span)
                     continue
@@ -65,7 +68,8 @@ def _connections(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
                     yield _unknown(f"{where}: {side}", item.text, [f"{name}.{p.name}" for p in ports], item.span)
 
 
-def _environment(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+def _environment(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    subsystems = {subsystem.name for subsystem in plan.subsystems}
     piece = root.at("environment")
     for name in (piece.entries or {}) if piece else ():
         owner, _, port = name.partition(".")
@@ -74,6 +78,8 @@ def _environment(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
             known = sorted({p.name for node in nodes.values() for p in node.inputs})
             if port not in known:
                 yield _unknown("environment: input", name, [f"in.{p}" for p in known], span)
+        elif owner in subsystems:
+            continue  # as above
         elif owner not in nodes:
             yield _unknown("environment: node", owner, ["in", *nodes], span)
         elif port not in [p.name for p in nodes[owner].inputs]:
@@ -81,7 +87,7 @@ def _environment(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
 
 
 def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
-    goals = [goal.name for goal in plan.compose]
+    goals = [*(goal.name for goal in plan.compose), *(subsystem.name for subsystem in plan.subsystems)]
     piece = root.at("requirements")
     for name, requirement in (piece.entries or {}).items() if piece else ():
         for item in _text_items(requirement.at("supported_by")):
@@ -95,12 +101,13 @@ def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[D
                 yield _unknown(where, item.text, [f"{owner}.{g.name}" for g in nodes[owner].guarantees], item.span)
 
 
-def _goals(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+def _goals(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    known = [*nodes, *(subsystem.name for subsystem in plan.subsystems)]
     piece = root.at("compose")
     for name, goal in (piece.entries or {}).items() if piece else ():
         for item in _text_items(goal.at("select")):
-            if item.text not in nodes:
-                yield _unknown(f"compose.{name}.select: node", item.text, nodes, item.span)
+            if item.text not in known:
+                yield _unknown(f"compose.{name}.select: node", item.text, known, item.span)
 
 
 def _nodes(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:

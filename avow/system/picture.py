@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from itertools import pairwise
@@ -21,22 +21,67 @@ _ARROWHEAD = (
 MAX_DRAWN = 200
 """More nodes than this are not drawn: nobody would find anything in the picture."""
 
+MAX_SHEETS = 40
+"""Subsystems of which the inside is drawn."""
 
-def svg(graph: Graph) -> str:
-    """The graph as SVG. Delayed edges are dashed; inputs from the environment are in italics, before who reads them."""
+
+def svg(graph: Graph, composed: Container[str] = ()) -> str:
+    """The graph as SVG. Delayed edges are dashed; inputs from the environment are in italics, before who reads them;
+    nodes that are `composed` of others have a double border."""
     if len(graph.nodes) > MAX_DRAWN:
         return _message(f"{len(graph.nodes)} nodes, {len(graph.edges)} edges: too many to draw")
+    drawn = _drawn(graph, composed)
+    title = f"<title>{escape(f'{len(graph.nodes)} nodes, {len(graph.edges)} edges')}</title>"
+    return "\n".join([_opened(drawn.width, drawn.height), title, _ARROWHEAD, *drawn.parts, "</svg>"])
+
+
+def sheet(parts: Sequence[tuple[str, Graph]]) -> str:
+    """Several graphs below one another, as `avow.system.hierarchy.seen` gives them: a system whose subsystems are
+    nodes, and the inside of each, in a frame with its name."""
+    names = {name for name, _ in parts if name}
+    if not names:
+        return svg(parts[0][1])
+    body: list[str] = []
+    width = height = 0
+    for name, graph in parts[:MAX_SHEETS]:
+        if len(graph.nodes) > MAX_DRAWN:
+            drawn = _Drawn(600, 60, (f'<text x="20" y="35">{len(graph.nodes)} nodes: too many to draw</text>',))
+        else:
+            drawn = _drawn(graph, names)
+        heading = ""
+        if name:
+            height += _LANE
+            frame = f'<rect x="4" y="4" width="{drawn.width - 8}" height="{drawn.height - 8}" fill="none" stroke="#889"'
+            heading = f'<text x="8" y="-6" font-weight="bold">inside {escape(name)}</text>{frame} rx="8"/>'
+        body.append(f'<g transform="translate(0 {height})">{heading}')
+        body += [*drawn.parts, "</g>"]
+        width, height = max(width, drawn.width), height + drawn.height
+    if len(parts) > MAX_SHEETS:
+        height += _LANE
+        body.append(f'<text x="8" y="{height - 8}">and {len(parts) - MAX_SHEETS} more subsystems</text>')
+    title = f"<title>{escape(f'{len(parts[0][1].nodes)} nodes, {len(names)} subsystems')}</title>"
+    return "\n".join([_opened(width, height), title, _ARROWHEAD, *body, "</svg>"])
+
+
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    width: int
+    height: int
+    parts: tuple[str, ...]
+
+
+def _opened(width: int, height: int) -> str:
+    return f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" {_FONT}>'
+
+
+def _drawn(graph: Graph, composed: Container[str]) -> _Drawn:
     columns, links = _columns(graph)
     place = _places(columns)
     bottom = max((y for _, y in place.values()), default=0) + _HEIGHT
     backward = [link for link in links if len(link.through) == 0 and place[link.source][0] >= place[link.target][0]]
     height = bottom + _MARGIN + (_LANE * (len(backward) + 1) if backward else 0)
     width = len(columns) * (_WIDTH + _GAP_X) - _GAP_X + 2 * _MARGIN
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" {_FONT}>',
-        f"<title>{escape(f'{len(graph.nodes)} nodes, {len(graph.edges)} edges')}</title>",
-        _ARROWHEAD,
-    ]
+    parts: list[str] = []
     lane = 0
     for link in links:
         if link in backward:
@@ -44,11 +89,10 @@ def svg(graph: Graph) -> str:
             parts.append(_back(link, place, bottom + _LANE * lane))
         else:
             parts.append(_forward(link, place))
-    parts += [_box(name, *place[name]) for name in graph.nodes]
+    parts += [_box(name, *place[name], double=name in composed) for name in graph.nodes]
     inputs = [name for column in columns for name in column if name.startswith(_INPUT)]
     parts += [_word(name.split(_GAP)[-1], *place[name]) for name in inputs]
-
-    return "\n".join([*parts, "</svg>"])
+    return _Drawn(width, height, tuple(parts))
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,18 +157,27 @@ def _middle(rows: Sequence[float]) -> float:
     return sum(rows) / len(rows) if rows else 0.0
 
 
-def text(graph: Graph) -> str:
-    """The graph as lines of text: what each node gets from where, providers first."""
+def text(graph: Graph, outside: str = "environment") -> str:
+    """The graph as lines of text: what each node gets from where, providers first; `outside`: what else there is."""
     lines: list[str] = []
     for layer in _layers(graph):
         for node in layer:
             lines.append(node)
             lines += [f"  ← {_edge_text(edge)}" for edge in graph.feeding(node)]
-            lines += [f"  ← {e.port} (environment)" for e in graph.environment if e.node == node]
+            lines += [f"  ← {e.port} ({outside})" for e in graph.environment if e.node == node]
             lines += [f"  → {e.port} (feeds nothing)" for e in graph.dangling if e.node == node]
     for cycle in graph.deadlocks:
         lines.append(f"start-up deadlock: {' → '.join((*cycle, cycle[0]))}")
     return "\n".join(lines)
+
+
+def texts(parts: Sequence[tuple[str, Graph]]) -> str:
+    """As `text`, of a system and of the inside of each of its subsystems (`avow.system.hierarchy.seen`)."""
+    found = []
+    for name, graph in parts:
+        lines = text(graph, "from outside" if name else "environment")
+        found.append(f"inside {name}:\n" + "\n".join(f"  {line}" for line in lines.splitlines()) if name else lines)
+    return "\n\n".join(found)
 
 
 def _edge_text(edge: Edge) -> str:
@@ -193,10 +246,11 @@ def _line(path: str, link: _Link, label: tuple[int, int]) -> str:
     return drawn + f'<text x="{label[0]}" y="{label[1]}" text-anchor="middle" font-size="11" fill="#222">{words}</text>'
 
 
-def _box(name: str, x: int, y: int) -> str:
+def _box(name: str, x: int, y: int, *, double: bool = False) -> str:
     shown = name if len(name) <= 20 else f"{name[:19]}…"
     middle = f'x="{x + _WIDTH // 2}" y="{y + _HEIGHT // 2 + 5}" text-anchor="middle"'
-    return (
+    outer = f'width="{_WIDTH + 8}" height="{_HEIGHT + 8}" fill="#fff" stroke="#335" rx="9"'
+    return (f'<rect x="{x - 4}" y="{y - 4}" {outer}/>' if double else "") + (
         f'<rect x="{x}" y="{y}" width="{_WIDTH}" height="{_HEIGHT}" fill="#eef3fa" stroke="#335" rx="6">'
         f"<title>{escape(name)}</title></rect><text {middle}>{escape(shown)}</text>"
     )

@@ -71,6 +71,8 @@ class EnvironmentInput:
     constant: bool = False
     """Whether its value is the same at every step (a map, a setting)."""
     assume_span: Span | None = field(default=None, compare=False, repr=False)
+    taken_in: bool = False
+    """Whether another system's plan says it, which is a subsystem here (`avow.system.include`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +163,22 @@ class ComposeGoal:
 
 
 @dataclass(frozen=True, slots=True)
+class Subsystem:
+    """Nodes (or other subsystems) taken together as one node, whose contract is derived from theirs.
+
+    `options` holds the place of every member, and the reasons that a derivation may want (`ComposeGoal`). `folder` is
+    that of another system where its nodes were taken from there.
+    """
+
+    name: str
+    members: tuple[str, ...]
+    rule: str | None
+    options: Located
+    folder: Path | None = None
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Finding:
     """An expected or accepted finding: an obligation's id without the system (glob allowed), and its verdict."""
 
@@ -213,6 +231,9 @@ class Plan:
     """Modules that hold further backends."""
     lints_off: tuple[str, ...]
     pictures: tuple[Picture, ...] = ()
+    subsystems: tuple[Subsystem, ...] = ()
+    included: tuple[Path, ...] = ()
+    """Files of other systems that were taken in as subsystems: what is said here depends on them too."""
 
     @property
     def root(self) -> Path:

@@ -29,6 +29,7 @@ from avow.system.plan import (
     Plan,
     Requirement,
     Scenario,
+    Subsystem,
     Table,
 )
 from avow.system.schema import check_shape
@@ -122,6 +123,7 @@ class _Reader:
             plugins=tuple(_texts(self.root.at("plugins"))),
             lints_off=tuple(_texts(self.root.at("lints_off"))),
             pictures=tuple(self.pictures(scenario)),
+            subsystems=tuple(self.subsystems()),
         )
 
     def pictures(self, scenario: Scenario | None) -> Iterator[Picture]:
@@ -288,6 +290,31 @@ class _Reader:
             for twice in [node for node, count in Counter(select).items() if count > 1]:
                 self.fault("PLAN110", f"compose.{name}.select: {twice!r} is named twice", piece.span)
             yield ComposeGoal(name, select, rule.text if rule else None, piece.located(), piece.span)
+
+    def subsystems(self) -> Iterator[Subsystem]:
+        for name, piece in self.entries("subsystems"):
+            nodes, folder, rule = piece.at("nodes"), piece.at("system"), piece.at("rule")
+            if nodes is None and folder is None:
+                self.fault("PLAN104", f"subsystems.{name}: either nodes or system is wanted", piece.span)
+            if nodes is not None and folder is not None:
+                self.fault("PLAN110", f"subsystems.{name}: either nodes or system, not both", folder.span)
+            path = self.beside(folder) if folder is not None else None
+            members = tuple(_texts(nodes))
+            place = self.root.at("subsystems")
+            span = place.key_span(name) if place is not None else piece.span
+            yield Subsystem(name, members, rule.text if rule else None, piece.located(), path, span)
+
+    def beside(self, piece: Piece) -> Path | None:
+        """A folder beside the system's, or below it."""
+        root = self.path.resolve().parent
+        path = inside(root.parent, f"{root.name}/{piece.text}") if not Path(piece.text).is_absolute() else None
+        if path is None:
+            message = f"the path {piece.text!r} leads out of the folder that holds the system's"
+            self.fault("PLAN108", message, piece.span, hint="../other: a system's folder beside this one")
+        elif not path.is_dir():
+            self.fault("PLAN107", f"there is no folder {piece.text!r} in {self.path.parent}", piece.span)
+            return None
+        return path
 
     def nodes(self) -> Iterator[NodePlan]:
         for name, piece in self.entries("nodes"):

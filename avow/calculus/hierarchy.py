@@ -1,0 +1,178 @@
+"""Subsystems as nodes of the calculus: their contracts are derived, and larger derivations use them as any node's.
+
+A clause of a subsystem is one of a node inside, about the same variables, so that nothing is lost or renamed. It
+guarantees all that its nodes guarantee, and assumes what its own derivation leaves assumed: what its nodes assume of
+values from outside it. Where such an assumption speaks of values from inside too, what the nodes behind these guarantee
+at that step may be used; it is carried outward as "if they do so, then".
+
+Why that is sound: outside, a subsystem's assumptions are shown at a step before its guarantees are used there (a loop
+that only closes outside is a loop of the larger derivation, and circular support in it is refused). Inside, its own
+derivation shows from them, step by step, every assumption that is not carried; then all its nodes' guarantees hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from avow.calculus.derivation import ClauseName, Goal
+from avow.calculus.rules import PERSISTENCE
+from avow.calculus.variables import Frame
+from avow.language.contract import Clause, ClauseKind, Node
+from avow.language.printer import show_term
+from avow.language.terms import Implies, Role, Term, Variable
+from avow.logic.formula import conjunction, free_variables, substitute
+from avow.system.hierarchy import Face, Folded
+from avow.system.plan import Endpoint
+
+
+@dataclass(slots=True)
+class Level(Frame):
+    """A system in which some subsystems are nodes; the variables are those of the whole system's nodes (`flat`)."""
+
+    flat: Frame = field(kw_only=True)
+    faces: Mapping[str, Face] = field(kw_only=True)
+
+    def output(self, node: str, port: str, earlier: int = 0) -> Variable:
+        at = self.meant(node, port)
+        return self.flat.output(at.node, at.port, earlier)
+
+    def input(self, node: str, port: str, earlier: int = 0) -> Variable:
+        at = self.meant(node, port)
+        return self.flat.input(at.node, at.port, earlier)
+
+    def entry(self, node: str, port: str) -> str:
+        at = self.meant(node, port)
+        return self.flat.entry(at.node, at.port)
+
+    def environment(self, earlier: int = 0) -> dict[str, Term]:
+        return self.flat.environment(earlier)
+
+    def initials(self, nodes: Iterable[str]) -> dict[str, Term]:
+        return self.flat.initials(self.leaves(nodes))
+
+    def leaves(self, nodes: Iterable[str]) -> tuple[str, ...]:
+        wanted: set[str] = set()
+        for name in nodes:
+            wanted |= self.faces[name].inside if name in self.faces else {name}
+        return tuple(name for name in self.flat.graph.nodes if name in wanted)
+
+    def meant(self, node: str, port: str) -> Endpoint:
+        """The port of a node inside that a subsystem's port stands for."""
+        face = self.faces.get(node)
+        return face.ports[Endpoint(node, port)] if face is not None else Endpoint(node, port)
+
+
+def level(flat: Frame, folded: Folded, composed: Mapping[str, Node]) -> Frame:
+    """The frame of a graph in which subsystems are nodes."""
+    if not folded.faces:
+        return flat
+    nodes = {name: composed[name] if name in folded.faces else flat.node(name) for name in folded.graph.nodes}
+    return Level(
+        flat.system,
+        folded.graph,
+        flat.assumed,
+        flat.own_inputs,
+        flat.constants,
+        nodes,
+        flat=flat,
+        faces=folded.faces,
+    )
+
+
+def composed_node(frame: Frame, goal: Goal, face: Face) -> Node:
+    """The subsystem with its derived contract: clauses are called ``camera.sharp``, as the node inside calls them."""
+    flat = frame.flat if isinstance(frame, Level) else frame
+    ports: dict[Variable, Term] = {}
+    for port in (*face.node.outputs, *face.node.inputs):
+        at = face.ports[Endpoint(face.node.name, port.name)]
+        find = flat.output if port.role is Role.OUTPUT else flat.input
+        ports[find(at.node, at.port)] = port.variable
+    clauses: dict[ClauseKind, list[Clause]] = {ClauseKind.ASSUMPTION: [], ClauseKind.GUARANTEE: []}
+    guaranteed = (ClauseName(name, clause.name) for name in goal.nodes for clause in frame.node(name).guarantees)
+    for kind, names in ((ClauseKind.ASSUMPTION, goal.root.assumed), (ClauseKind.GUARANTEE, guaranteed)):
+        for number, name in enumerate(names, start=1):
+            original = frame.node(name.node).clause(name.clause)
+            term = carried(frame, goal, name) if kind is ClauseKind.ASSUMPTION else frame.clause(name.node, name.clause)
+            formula = substitute(term, {v: ports[v] for v in free_variables(term) if v in ports})
+            clauses[kind].append(replace(original, kind=kind, name=str(name), position=number, formula=formula))
+    return replace(
+        face.node,
+        assumptions=tuple(clauses[ClauseKind.ASSUMPTION]),
+        guarantees=tuple(clauses[ClauseKind.GUARANTEE]),
+    )
+
+
+def carried(frame: Frame, goal: Goal, name: ClauseName) -> Term:
+    """An assumption that a subsystem's derivation leaves assumed, as the subsystem makes it: where it speaks of values
+    from inside, under what the nodes behind these guarantee at the same step (and assume: that is shown first).
+
+    A node to which the assuming one gives something at that step does not count: what it guarantees may rest on the
+    very assumption.
+    """
+    claim = frame.clause(name.node, name.clause)
+    selected = frozenset(goal.nodes)
+    inside = {frame.output(node, port.name) for node in goal.nodes for port in frame.node(node).outputs}
+    if inside.isdisjoint(free_variables(claim)):
+        return claim
+    after = _reached(name.node, frame.graph.consumers, selected)
+    known: dict[str, Term] = {}
+    for provider in _reached(name.node, frame.graph.providers, selected):
+        if provider not in after:
+            known |= {f"{provider}.{c.name}": frame.clause(provider, c.name) for c in frame.node(provider).clauses}
+    spoken = free_variables(claim)
+    near: dict[str, Term] = {}
+    growing = True
+    while growing:  # what shares no value with the claim cannot help
+        found = {k: term for k, term in known.items() if k not in near and not spoken.isdisjoint(free_variables(term))}
+        near |= found
+        spoken = spoken.union(*map(free_variables, found.values()))
+        growing = bool(found)
+    used = [near[label] for label in known if label in near]
+    return Implies(conjunction(used), claim) if used else claim
+
+
+def _reached(node: str, neighbours: Callable[..., tuple[str, ...]], selected: frozenset[str]) -> tuple[str, ...]:
+    """The other selected nodes to which edges of the same step lead, one way or the other."""
+    found: dict[str, None] = {}
+    stack = [node]
+    while stack:
+        for neighbour in reversed(neighbours(stack.pop(), delayed=False)):
+            if neighbour in selected and neighbour != node and neighbour not in found:
+                found[neighbour] = None
+                stack.append(neighbour)
+    return tuple(found)
+
+
+def with_persistence(frame: Level, goal: Goal) -> Goal:
+    """The goal with R3's hypothesis where a node is fed by several nodes inside one subsystem: seen from outside that
+    is one provider, and R1; but their outputs are used together all the same."""
+    selected = frozenset(goal.nodes)
+    found: list[str] = []
+    for node in goal.nodes:
+        behind: dict[str, set[str]] = {}
+        for edge in frame.graph.feeding(node):
+            if edge.source.node in selected and edge.source.node in frame.faces and edge.source.node != node:
+                source = frame.meant(edge.source.node, edge.source.port)
+                behind.setdefault(edge.source.node, set()).add(source.node)
+        found += [name for held in behind.values() if len(held) > 1 for name in sorted(held)]
+    if not found:
+        return goal
+    told = PERSISTENCE.format(", ".join(dict.fromkeys(found)))
+    root = replace(goal.root, hypotheses=tuple(dict.fromkeys((*goal.root.hypotheses, told))))
+    return replace(goal, root=root, together=True)
+
+
+def innermost(name: str) -> str:
+    """``reader.scaled`` of ``robot.sensor.reader.scaled``: the node's own clause."""
+    return ".".join(name.split(".")[-2:])
+
+
+def shown_contract(node: Node) -> tuple[str, ...]:
+    """A derived contract in lines of text."""
+    lines = [f"{node.name} as a node"]
+    lines += [f"  reads {', '.join(port.name for port in node.inputs)}"] if node.inputs else []
+    lines += [f"  puts out {', '.join(port.name for port in node.outputs)}"] if node.outputs else []
+    lines += [f"  assumes {clause.name}: {show_term(clause.formula)}" for clause in node.assumptions]
+    lines += [f"  guarantees {clause.name}: {show_term(clause.formula)}" for clause in node.guarantees]
+    return tuple(lines)

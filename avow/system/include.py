@@ -1,0 +1,131 @@
+"""Another system's folder as a subsystem: its nodes are taken in, wired among themselves as there.
+
+They bear the subsystem's name before their own (`left_camera`), so that one folder may be taken in more than once.
+What its plan assumes of the environment is assumed here of inputs that stay open; an input that something here provides
+has to be shown to be as its nodes assume. Methods, scenario, requirements and policy are not taken over: they are the
+other system's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from avow.diagnostics import Diagnostic, Rejected
+from avow.language.contract import Contract
+from avow.system.formulas import endpoints
+from avow.system.graph import Graph, dataflow
+from avow.system.hierarchy import outermost
+from avow.system.plan import Connection, Endpoint, EnvironmentInput, Plan, Subsystem, System
+
+Load = Callable[[Path], System]
+
+MAX_NODES = 5_000
+"""Two copies of two copies of …: soon too many."""
+
+
+def include(plan: Plan, contract: Contract, load: Load) -> tuple[Plan, Contract, tuple[Diagnostic, ...]]:
+    """Plan and contract with the systems that the plan's subsystems name taken in; what is wrong with them."""
+    faults: list[Diagnostic] = []
+    groups: list[Subsystem] = []
+    for subsystem in plan.subsystems:
+        if subsystem.folder is None:
+            groups.append(subsystem)
+            continue
+        try:
+            part = load(subsystem.folder)
+        except Rejected as rejected:
+            span = subsystem.options.at("system")
+            faults.append(Diagnostic("PLAN110", f"subsystems.{subsystem.name}: that system cannot be taken in", span))
+            faults += rejected.diagnostics
+            continue
+        clashes = _clashes(subsystem, contract, part.contract)
+        if len(contract.nodes) + len(part.contract.nodes) > MAX_NODES:
+            message = f"subsystems.{subsystem.name}: more than {MAX_NODES} nodes in all"
+            clashes = [Diagnostic("PLAN110", message, subsystem.options.at("system"))]
+        faults += clashes
+        if not clashes:
+            plan, contract, inner = _taken_in(plan, contract, subsystem, part)
+            groups += inner
+    return replace(plan, subsystems=tuple(groups)), contract, tuple(faults)
+
+
+def still_open(system: System, graph: Graph) -> System:
+    """Of inputs that something here provides, what was said of them where they were taken from is not assumed here."""
+    kept = tuple(
+        entry
+        for entry in system.plan.environment
+        if not entry.taken_in or any(endpoint in graph.environment for endpoint in endpoints(system, entry))
+    )
+    return replace(system, plan=replace(system.plan, environment=kept))
+
+
+def _clashes(subsystem: Subsystem, contract: Contract, part: Contract) -> list[Diagnostic]:
+    span = subsystem.options.at("system")
+    found: list[Diagnostic] = []
+    for what, mine, theirs in (
+        ("type", dict(contract.types), dict(part.types)),
+        ("constant", dict(contract.constants), dict(part.constants)),
+    ):
+        for name in theirs:
+            if name in mine and mine[name] != theirs[name]:
+                message = f"subsystems.{subsystem.name}: the {what} {name!r} is another one there"
+                found.append(Diagnostic("PLAN110", message, span, hint="give one of them another name"))
+    known = {node.name for node in contract.nodes}
+    for node in part.nodes:
+        if f"{subsystem.name}_{node.name}" in known:
+            message = f"subsystems.{subsystem.name}: its node {node.name!r} would be called as a node that is here"
+            found.append(Diagnostic("PLAN110", message, span, hint="give the subsystem another name"))
+    return found
+
+
+def _taken_in(
+    plan: Plan, contract: Contract, subsystem: Subsystem, part: System
+) -> tuple[Plan, Contract, tuple[Subsystem, ...]]:
+    def called(name: str) -> str:
+        return f"{subsystem.name}_{name}"
+
+    graph = dataflow(part)
+    connections = tuple(
+        Connection(
+            Endpoint(called(e.source.node), e.source.port),
+            Endpoint(called(e.target.node), e.target.port),
+            e.delayed,
+            e.initial,
+            subsystem.span,
+            e.initial_span,
+        )
+        for e in graph.edges
+    )
+    said = [replace(entry, port=_entry(subsystem.name, entry.port), taken_in=True) for entry in part.plan.environment]
+    covered = {entry.port for entry in said}
+    for at in graph.environment:
+        name = f"{subsystem.name}.{at.port}"
+        if name not in covered and f"{called(at.node)}.{at.port}" not in covered:
+            covered.add(name)  # another than what bears that name here: nothing says that they are one
+            said.append(EnvironmentInput(name, None, None, subsystem.span, taken_in=True))
+    inner = tuple(
+        replace(group, name=called(group.name), members=tuple(map(called, group.members)), span=subsystem.span)
+        for group in part.plan.subsystems
+    )
+    whole = replace(subsystem, members=tuple(called(name) for name in outermost(part)))
+    nodes = tuple(replace(node, name=called(node.name)) for node in part.contract.nodes)
+    merged = replace(
+        contract,
+        types=tuple({**dict(part.contract.types), **dict(contract.types)}.items()),
+        constants=tuple({**dict(part.contract.constants), **dict(contract.constants)}.items()),
+        nodes=contract.nodes + nodes,
+    )
+    larger = replace(
+        plan,
+        connections=plan.connections + connections,
+        environment=plan.environment + tuple(said),
+        included=tuple(dict.fromkeys((*plan.included, part.plan.path, *part.plan.contract_files, *part.plan.included))),
+    )
+    return larger, merged, (*inner, whole)
+
+
+def _entry(subsystem: str, port: str) -> str:
+    owner, _, name = port.partition(".")
+    return f"{subsystem}.{name}" if owner == "in" else f"{subsystem}_{owner}.{name}"
