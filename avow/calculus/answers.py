@@ -72,7 +72,7 @@ class SideQuestion:
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         goal = composition.goal(self.goal)
         settled = composition.settled(goal, bounds).settled[self.condition]
-        repairs = would_hold(composition.frame, goal, settled) if settled.verdict is Verdict.REFUTED else ()
+        repairs = would_hold(composition.frame_of(goal), goal, settled) if settled.verdict is Verdict.REFUTED else ()
         return side_answer(settled, repairs)
 
 

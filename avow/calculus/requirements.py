@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 from avow.calculus.answers import Answer, contracts, environment_claims, would_hold_if
 from avow.calculus.composition import Composition
-from avow.calculus.derivation import Phase
+from avow.calculus.derivation import Phase, Settled
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import QUICK_MS, implied
+from avow.calculus.hierarchy import innermost
 from avow.calculus.repair import environment, offers, providers
 from avow.calculus.variables import Frame
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
@@ -187,14 +188,15 @@ def rests_on(composition: Composition, labels: tuple[str, ...], bounds: Bounds) 
     A guarantee holds only where its node's assumptions do. What these were proved from are guarantees of other nodes,
     which hold only where *their* assumptions do, and so on: all of it stands behind the proof.
     """
-    frame, whole = composition.frame, composition.whole
-    settled = {str(about.about): answer for about, answer in composition.settled(whole, bounds).settled.items()}
-    discharged = {str(condition.about) for condition in whole.conditions}
+    frame = composition.frame
+    settled: dict[str, dict[str, Settled]] = {}
     found: dict[str, None] = {}
     seen: set[str] = set()
     todo = list(reversed(labels))
     while todo:
         name = todo.pop().removesuffix(" one step before")
+        if " " not in name:
+            name = innermost(name)
         if name in seen:
             continue
         seen.add(name)
@@ -206,10 +208,16 @@ def rests_on(composition: Composition, labels: tuple[str, ...], bounds: Bounds) 
             found[f"{node}/{Kind.GUARANTEE}/{clause}"] = None
             todo += [f"{node}.{assumption.name}" for assumption in reversed(frame.node(node).assumptions)]
             continue
-        goal = whole.name if name in discharged else "environment"
-        found[f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/{goal}.{name}"] = None
-        if name in settled:
-            todo += reversed(settled[name].needed)
+        shown = composition.where(node, clause)
+        if shown is None:
+            found[f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/environment.{name}"] = None
+            continue
+        goal, about = shown
+        found[f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/{goal.name}.{about}"] = None
+        if goal.name not in settled:
+            answers = composition.settled(goal, bounds).settled
+            settled[goal.name] = {str(condition.about): answer for condition, answer in answers.items()}
+        todo += reversed(settled[goal.name][str(about)].needed)
     return tuple(found)
 
 
