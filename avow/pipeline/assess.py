@@ -123,7 +123,8 @@ def build(assessment: Assessment) -> Case:
     ledger = ledger_of(workspace.ledger(system.name))
     plan = system.plan
     # read once, so that the texts that the report shows are those whose digests it names
-    texts = {workspace.relative(path): path.read_bytes() for path in (*plan.contract_files, plan.path)}
+    files = (*plan.contract_files, plan.path, *plan.included)
+    texts = {workspace.relative(path): path.read_bytes() for path in files}
     return build_case(
         system,
         assessment.surveyed.catalogue.obligations,

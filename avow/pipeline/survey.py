@@ -46,7 +46,8 @@ def survey(folder: Path) -> Survey | Rejected:
         listed = catalogue(system)
     except Rejected as rejected:
         return rejected
-    texts = [__version__, *(digest_file(path) for path in (system.plan.path, *system.plan.contract_files))]
+    files = (system.plan.path, *system.plan.contract_files, *system.plan.included)
+    texts = [__version__, *map(digest_file, files)]
     return Survey(system, listed, digest(json.dumps(texts)))
 
 

@@ -117,11 +117,12 @@ def _taken_in(
         constants=tuple({**dict(part.contract.constants), **dict(contract.constants)}.items()),
         nodes=contract.nodes + nodes,
     )
+    files = [path for path in (part.plan.path, *part.plan.contract_files) if path.is_file()]
     larger = replace(
         plan,
         connections=plan.connections + connections,
         environment=plan.environment + tuple(said),
-        included=tuple(dict.fromkeys((*plan.included, part.plan.path, *part.plan.contract_files, *part.plan.included))),
+        included=tuple(dict.fromkeys((*plan.included, *files, *part.plan.included))),
     )
     return larger, merged, (*inner, whole)
 
