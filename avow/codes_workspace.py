@@ -141,6 +141,12 @@ WORKSPACE_CODES = register(
         "Give a `report.json`, a ledger, or a commit.",
     ),
     declare(
+        "DIFF002",
+        "no place for the page",
+        "The page with the changes cannot be written where `--html` says.",
+        "Name a file in a folder that is there and may be written to.",
+    ),
+    declare(
         "CLI001",
         "no workspace",
         "No folder here or above has both a `contracts/` and a `dodo.py`.",

@@ -1,15 +1,39 @@
-"""What changed between two cases: claims, their meaning, statuses, gates, requirements."""
+"""What changed between two cases: claims, their meaning, statuses, gates, requirements; and why, from the evidence."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
-from avow.assurance.model import Case
-from avow.assurance.naming import requirement_claim
+from avow.assurance.model import Case, Currency, EvidenceView, ObligationView
+from avow.assurance.naming import requirement_claim, short
 from avow.evidence.ledger import Entry
 from avow.evidence.record import Evidence
-from avow.evidence.status import Status, roll_up
+from avow.evidence.status import Status, effective, roll_up
+
+ORDER = ("gate", "worse", "removed", "meaning", "added", "better", "rerun")
+"""Kinds of changes, what a reader must know first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The newest record of one method that counts for a claim; `gone` says why it does not any more, if so."""
+
+    record: Evidence
+    mark: str
+    """The ledger line's hash."""
+    gone: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What is known of a claim beyond where it stands."""
+
+    title: str = ""
+    answers: Mapping[str, Answer] = field(default_factory=dict)
+    """Method → its newest answer."""
+    below: tuple[str, ...] = ()
+    """Claims that it rests on and that fail."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,16 +43,21 @@ class Snapshot:
     name: str
     claims: Mapping[str, tuple[str, Status]]
     gates: Mapping[str, bool]
+    told: Mapping[str, Told] = field(default_factory=dict)
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    """Gate → why it fails or passes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One difference. `kind` is one of ``added``, ``removed``, ``meaning``, ``better``, ``worse``, ``gate``."""
+    """One difference. `kind` is one of `ORDER`; ``rerun``: asked again, and the answer is the same."""
 
     kind: str
     subject: str
     before: str
     after: str
+    title: str = ""
+    why: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
@@ -41,6 +70,8 @@ class Change:
                 return f"changed meaning: {self.subject} ({self.before} → {self.after})"
             case "gate":
                 return f"gate {self.subject}: {self.before} → {self.after}"
+            case "rerun":
+                return f"asked again: {self.subject} (still {self.after})"
             case _:
                 return f"{self.kind}: {self.subject}: {self.before} → {self.after}"
 
@@ -48,41 +79,141 @@ class Change:
 def of_case(case: Case) -> Snapshot:
     claims = {v.id: (v.obligation.digest, v.standing) for v in case.obligations if not v.advice}
     claims |= {requirement_claim(r.id): (r.text + r.formula + r.temporal, r.status) for r in case.requirements}
-    return Snapshot(case.system, claims, {gate.title: gate.passed for gate in case.gates})
+    told = {v.id: Told(v.obligation.claim, _answers(v), v.below) for v in case.obligations if not v.advice}
+    told |= {requirement_claim(r.id): Told(r.text or r.formula or r.temporal, {}, r.below) for r in case.requirements}
+    return Snapshot(
+        case.system, claims, {g.title: g.passed for g in case.gates}, told, {g.title: g.reason for g in case.gates}
+    )
 
 
 def of_ledger(name: str, entries: Iterable[Entry]) -> Snapshot:
     """A ledger without its contract: each method's newest record and those that answer the same question count."""
-    newest: dict[tuple[str, str], list[Evidence]] = {}
+    newest: dict[tuple[str, str], list[Entry]] = {}
     digests: dict[str, str] = {}
     for entry in entries:
         record = entry.evidence
         pair = (record.obligation, record.method)
-        newest[pair] = [*(e for e in newest.get(pair, []) if e.key == record.key), record]
+        newest[pair] = [*(e for e in newest.get(pair, []) if e.evidence.key == record.key), entry]
         digests[record.obligation] = record.obligation_digest
     grouped: dict[str, list[Evidence]] = {}
-    for (obligation, _), records in newest.items():
-        grouped.setdefault(obligation, []).extend(r for r in records if r.obligation_digest == digests[obligation])
-    return Snapshot(name, {o: (digests[o], roll_up(records)) for o, records in grouped.items()}, {})
+    answers: dict[str, dict[str, Answer]] = {}
+    for (obligation, method), found in newest.items():
+        counting = [e for e in found if e.evidence.obligation_digest == digests[obligation]]
+        grouped.setdefault(obligation, []).extend(e.evidence for e in counting)
+        if counting:
+            answers.setdefault(obligation, {})[method] = Answer(counting[-1].evidence, counting[-1].hash)
+    return Snapshot(
+        name,
+        {o: (digests[o], roll_up(records)) for o, records in grouped.items()},
+        {},
+        {o: Told("", found) for o, found in answers.items()},
+    )
 
 
 def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
     """Every difference: what got worse first."""
     changes: list[Change] = []
     for name in dict.fromkeys((*old.claims, *new.claims)):
+        before, after = old.told.get(name, Told()), new.told.get(name, Told())
+        title = after.title or before.title
         if name not in new.claims:
-            changes.append(Change("removed", name, old.claims[name][1], ""))
+            changes.append(Change("removed", name, old.claims[name][1], "", title))
         elif name not in old.claims:
-            changes.append(Change("added", name, "", new.claims[name][1]))
+            changes.append(Change("added", name, "", new.claims[name][1], title, tuple(_why(before, after))))
         else:
-            (meaning, before), (now, after) = old.claims[name], new.claims[name]
+            (meaning, was), (now, is_) = old.claims[name], new.claims[name]
+            why = tuple(_why(before, after))
             if meaning != now:
-                changes.append(Change("meaning", name, before, after))
-            elif before is not after:
-                changes.append(Change("better" if after.rank > before.rank else "worse", name, before, after))
+                changes.append(Change("meaning", name, was, is_, title, why))
+            elif was is not is_:
+                changes.append(Change("better" if is_.rank > was.rank else "worse", name, was, is_, title, why))
+            elif any(_asked_again(before, after)):
+                changes.append(Change("rerun", name, was, is_, title, why))
     word = {True: "passes", False: "fails"}
-    for title, passed in new.gates.items():
-        if title in old.gates and old.gates[title] != passed:
-            changes.append(Change("gate", title, word[old.gates[title]], word[passed]))
-    order = ("gate", "worse", "removed", "meaning", "added", "better")
-    return tuple(sorted(changes, key=lambda change: order.index(change.kind)))
+    for gate, passed in new.gates.items():
+        if gate in old.gates and old.gates[gate] != passed:
+            reason = (new.reasons[gate],) if new.reasons.get(gate) else ()
+            changes.append(Change("gate", gate, word[old.gates[gate]], word[passed], "", reason))
+    return tuple(sorted(changes, key=lambda change: ORDER.index(change.kind)))
+
+
+def _answers(view: ObligationView) -> dict[str, Answer]:
+    """For each method its newest record that counts; where none does, the newest, and why it does not."""
+    found: dict[str, Answer] = {}
+    for item in view.evidence:
+        record = item.entry.evidence
+        known = found.get(record.method)
+        if item.counts or known is None or known.gone:
+            found[record.method] = Answer(record, item.entry.hash, "" if item.counts else _gone(item))
+    return found
+
+
+def _gone(item: EvidenceView) -> str:
+    match item.currency:
+        case Currency.STALE:
+            return "the claim, an input, an option or a tool has changed since"
+        case Currency.WITHDRAWN:
+            return "the plan no longer uses the method for this claim"
+        case Currency.SET_ASIDE:
+            return "this run believed no earlier answer"
+        case _:
+            return "a newer answer takes its place"
+
+
+def _asked_again(before: Told, after: Told) -> Iterator[str]:
+    for method, answer in after.answers.items():
+        known = before.answers.get(method)
+        if known is not None and not answer.gone and known.mark != answer.mark:
+            yield method
+
+
+def _why(before: Told, after: Told) -> Iterator[str]:
+    """What the evidence says about a difference, method by method; then what the claim rests on."""
+    for method in dict.fromkeys((*after.answers, *before.answers)):
+        yield from _of_method(method, before.answers.get(method), after.answers.get(method))
+    came = [name for name in after.below if name not in before.below]
+    went = [name for name in before.below if name not in after.below]
+    if came:
+        yield f"it rests on {_list(list(map(short, came)))}, which {'does' if len(came) == 1 else 'do'} not hold now"
+    if went:
+        yield f"nothing is wrong any more with {_list(list(map(short, went)))}, on which it rests"
+
+
+def _of_method(method: str, old: Answer | None, new: Answer | None) -> Iterator[str]:
+    was = old if old is not None and not old.gone else None
+    now = new if new is not None and not new.gone else None
+    if now is not None and was is None and (old is None or old.mark != now.mark):
+        yield f"{method} answers now: {_said(now)}"
+    elif now is not None and was is None:
+        yield f"{method}'s answer counts again: {_said(now)}"
+    elif was is not None and now is None:
+        reason = f"does not count any more: {new.gone}" if new is not None else "is not there any more"
+        yield f"{method}'s answer ({effective(was.record)}) {reason}"
+    elif was is not None and now is not None and was.mark != now.mark:
+        changed = _list(list(_changed(was.record, now.record)))
+        reason = f"since {changed}" if changed else "with nothing changed that it depends on"
+        same = effective(was.record) is effective(now.record)
+        answer = f"{effective(now.record)} as before" if same else f"{effective(was.record)} → {_said(now)}"
+        yield f"{method} was asked again, {reason}: {answer}"
+
+
+def _said(answer: Answer) -> str:
+    summary = " ".join(answer.record.summary.split())
+    return f"{effective(answer.record)}{f', {summary}' if summary else ''}"
+
+
+def _changed(was: Evidence, now: Evidence) -> Iterator[str]:
+    """Which of the things that an answer depends on are others."""
+    if was.obligation_digest != now.obligation_digest:
+        yield "the claim means something else"
+    for path in dict.fromkeys((*was.inputs, *now.inputs)):
+        if was.inputs.get(path) != now.inputs.get(path):
+            yield f"{path} {'is new' if path not in was.inputs else 'is gone' if path not in now.inputs else 'changed'}"
+    if (was.tool, was.tool_version) != (now.tool, now.tool_version):
+        yield f"the tool is another ({was.tool} {was.tool_version} → {now.tool} {now.tool_version})"
+    if was.key != now.key and not (was.obligation_digest != now.obligation_digest or was.inputs != now.inputs):
+        yield "its options, the scenario, the wiring or a version changed"
+
+
+def _list(parts: Sequence[str]) -> str:
+    return ", ".join(parts[:4]) + (f" and {len(parts) - 4} more" if len(parts) > 4 else "")

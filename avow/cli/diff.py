@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from avow.assurance.compare import Change
+
+_SHOWN = 3
+"""Reasons on the terminal; the page and the JSON have all."""
 
 
 @click.command()
 @click.argument("old")
 @click.argument("new", required=False)
 @click.option("--json", "as_json", is_flag=True, help="For machines.")
-def command(old: str, new: str | None, as_json: bool) -> int:
-    """What changed from OLD to NEW: claims, what they mean, where they stand, gates.
+@click.option("--html", "page", type=click.Path(dir_okay=False), help="Write a page to this file, too.")
+def command(old: str, new: str | None, as_json: bool, page: str | None) -> int:
+    """What changed from OLD to NEW, and why: claims, what they mean, where they stand, gates, what was asked again.
 
     Each is a report (its folder or report.json), a ledger (.jsonl), or a git revision of the workspace: then the
     contracts and plans of that revision are held against today's ledger. NEW is the workspace as it is, if left out.
@@ -21,9 +29,19 @@ def command(old: str, new: str | None, as_json: bool) -> int:
     from avow.cli.snapshots import pair
 
     changes = [(system, change) for system, before, after in pair(old, new) for change in compare(before, after)]
+    if page is not None:
+        _write(page, old, new, changes)
     if as_json:
         listed = [
-            {"system": s, "kind": c.kind, "subject": c.subject, "before": c.before, "after": c.after}
+            {
+                "system": s,
+                "kind": c.kind,
+                "subject": c.subject,
+                "before": c.before,
+                "after": c.after,
+                "title": c.title,
+                "why": list(c.why),
+            }
             for s, c in changes
         ]
         click.echo(json.dumps({"changes": listed}, indent=1))
@@ -32,7 +50,31 @@ def command(old: str, new: str | None, as_json: bool) -> int:
     else:
         for system in dict.fromkeys(s for s, _ in changes):
             click.echo(f"{system}:")
-            for s, change in changes:
-                if s == system:
-                    click.echo(f"  {change.text}")
+            _tell([change for s, change in changes if s == system])
     return 0
+
+
+def _tell(changes: list[Change]) -> None:
+    for change in changes:
+        if change.kind != "rerun":
+            click.echo(f"  {change.text}")
+            for line in change.why[:_SHOWN]:
+                click.echo(f"      {line}")
+    again = [change for change in changes if change.kind == "rerun"]
+    if again:
+        click.echo(f"  asked again, with the same verdict: {len(again)} claim{'' if len(again) == 1 else 's'}")
+
+
+def _write(page: str, old: str, new: str | None, changes: list[tuple[str, Change]]) -> None:
+    """Raises Rejected where the page cannot be written."""
+    from pathlib import Path
+
+    from avow.diagnostics import Diagnostic, Rejected
+    from avow.files import write
+    from avow.report.comparison import render_comparison
+
+    text = render_comparison(old, new or "the workspace as it is", changes)
+    try:
+        write(Path(page), text.encode("utf-8", "replace").decode())
+    except OSError as error:
+        raise Rejected(Diagnostic("DIFF002", f"{page} cannot be written: {error.strerror}")) from None

@@ -98,8 +98,8 @@ def render_page(case: Case, json_digest: str = "") -> str:
         .render(
             case=case,
             line=wording.verdict_line(case),
-            style=Markup(_asset("style.css")),  # our own files, in the package
-            script=Markup(_asset("script.js")),
+            style=Markup(asset("style.css")),  # our own files, in the package
+            script=Markup(asset("script.js")),
             arrows=Markup(picture.ARROWS),
             views=views,
             known=known,
@@ -185,7 +185,7 @@ def render_traceability(case: Case, rows: Sequence[Row]) -> str:
             rows=rows,
             orphans=[row for row in rows if row.remark],
             columns=COLUMNS,
-            style=Markup(_asset("style.css")),
+            style=Markup(asset("style.css")),
         )
     )
 
@@ -196,12 +196,13 @@ def render_index(cases: Sequence[Case]) -> str:
     return (
         environment()
         .get_template("index.html.j2")
-        .render(rows=rows, good=all(case.good for case in cases), style=Markup(_asset("style.css")), quote=quote)
+        .render(rows=rows, good=all(case.good for case in cases), style=Markup(asset("style.css")), quote=quote)
     )
 
 
 @cache
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """The text of a file beside the templates."""
     return resources.files("avow.report").joinpath("templates", name).read_text(encoding="utf-8")
 
 

@@ -129,13 +129,16 @@ def test_diff_of_reports_and_ledgers(root: Path) -> None:
     other = root / "other.jsonl"
     Ledger(other).append_all([*records, evidence("radiationSensor.low", Verdict.REFUTED)])
     changes = json.loads(run(diff, "artifacts/ledger/rover.jsonl", str(other), "--json")[1])["changes"]
+    why = changes[0].pop("why")
     assert changes[0] == {
         "system": "rover",
         "kind": "worse",
         "subject": "rover/radiationSensor/guarantee/low",
         "before": "proved",
         "after": "contradictory",
+        "title": "",
     }
+    assert why == ["hoare was asked again, with nothing changed that it depends on: proved → refuted, refuted by hoare"]
     with pytest.raises(Rejected):
         run(diff, "no-such-revision", "reports/rover")
     with pytest.raises(Rejected):

@@ -1,4 +1,4 @@
-"""Counterexamples as small tables: nothing of the contract's is lost, runs are grouped by what they say, long ones cut."""
+"""Counterexamples as small tables: nothing of the contract's is lost, runs are grouped by what they say, and cut."""
 
 from __future__ import annotations
 
