@@ -6,6 +6,8 @@ Simple numbers are tried first: those between the thresholds that program and tr
 from __future__ import annotations
 
 import itertools
+import math
+import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,7 +17,7 @@ from avow.backends.hoare.outline import show
 from avow.backends.hoare.program import Assign, If, Match, Program, Statement, Update, While, statements
 from avow.backends.hoare.triples import Triple
 from avow.backends.hoare.wp import Condition
-from avow.language.sorts import INTEGER, NATURAL, REAL, Sort
+from avow.language.sorts import INTEGER, NATURAL, REAL, BoolSort, EnumSort, Sort
 from avow.language.terms import (
     Apply,
     Arithmetic,
@@ -35,7 +37,7 @@ from avow.logic.models import default_value
 from avow.logic.smt import replay, solve
 from avow.logic.translation import Unsupported
 from avow.logic.traversal import subterms
-from avow.logic.values import Value
+from avow.logic.values import Element, Value
 from avow.logic.values import show as show_value
 
 _NUMERIC: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
@@ -142,13 +144,29 @@ def _models(
 
 
 def _guesses(triple: Triple, program: Program, wanted: tuple[Variable, ...]) -> Iterator[dict[Variable, Value]]:
+    """From an input that meets the precondition: all small points, or a sample of them (the same one every time)."""
     between, at = _numbers((triple.full_pre, triple.post, *_expressions(program)))
     small = sorted({*between, *at, *map(Fraction, range(8)), Fraction(-1)})
-    numeric = [v for v in wanted if v.sort in _NUMERIC and v not in program.ghosts.values()]
-    pools = [[n for n in small if _fits(n, v.sort)] for v in numeric]
-    base = _filled({}, wanted)
-    for point in itertools.islice(itertools.product(*pools), _TRIED):
-        yield {**base, **{v: _stored(n, v.sort) for v, n in zip(numeric, point, strict=True)}}
+    pools: dict[Variable, list[Value]] = {}
+    for variable in wanted:
+        if variable in program.ghosts.values():
+            continue
+        match variable.sort:
+            case EnumSort(members=members):
+                pools[variable] = [Element(m) for m in members]
+            case BoolSort():
+                pools[variable] = [False, True]
+            case sort if sort in _NUMERIC:
+                pools[variable] = [_stored(n, sort) for n in small if _fits(n, sort)]
+    found = solve([triple.full_pre], timeout_ms=1000)
+    base = _filled(found.values if found.status == "sat" else {}, wanted)
+    yield base
+    points: Iterable[tuple[Value, ...]] = itertools.product(*pools.values())
+    if math.prod(map(len, pools.values())) > _TRIED:
+        rng = random.Random(0)
+        points = (tuple(rng.choice(pool) for pool in pools.values()) for _ in range(_TRIED))
+    for point in points:
+        yield {**base, **dict(zip(pools, point, strict=True))}
 
 
 def _filled(values: Mapping[Variable, Value], wanted: Iterable[Variable]) -> dict[Variable, Value]:

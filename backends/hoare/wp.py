@@ -173,15 +173,15 @@ def _while(statement: While, post: Term, side: Conditions) -> Term:
     known = (side.known, invariant)
     line, name = f"loop-{at.line}-{at.column}", f"line {at.line}"
     kept: Term = invariant
+    what = f"the loop at {name} keeps its invariant"
     before: tuple[Term, ...] = ()
     if statement.variant is not None:
         first = variable(f"variant~{at.line}~{at.column}", INTEGER)
         before = (Compare("==", first, statement.variant),)
         kept = conjunction((invariant, Compare("<", statement.variant, first)))
+        what += ", and its variant falls"
     body = weakest(statement.body, kept, side)
-    side.found.append(
-        Condition(f"{line}-kept", (*known, test, *before), body, f"the loop at {name} keeps its invariant", at)
-    )
+    side.found.append(Condition(f"{line}-kept", (*known, test, *before), body, what, at))
     side.found.append(
         Condition(f"{line}-suffices", (*known, negation(test)), post, f"the loop at {name} ends as wanted", at)
     )
