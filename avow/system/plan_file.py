@@ -352,7 +352,21 @@ class _Reader:
             name = f"{backend}-{number}"
             number += 1
         used.add(name)
-        return Method(name, backend, options.located(), tuple(_texts(options.at("guarantees"))))
+        return Method(name, backend, options.located(), self.taken_on(node, name, options.at("guarantees")))
+
+    def taken_on(self, node: str, method: str, piece: Piece | None) -> tuple[str, ...]:
+        """The clauses that a method names; none where the plan does not say, which stands for all of the node's."""
+        if piece is None:
+            return ()
+        where = f"nodes.{node}: {method}: guarantees"
+        names = [part.text for part in piece.items] if piece.items is not None else [piece.text]
+        if not names or not all(names) or piece.entries is not None:
+            hint = "leave the key out for all of the node's guarantees, or the method for none"
+            self.fault("PLAN105", f"{where}: names of guarantees are wanted, one at least", piece.span, hint)
+        for index, name in enumerate(names):
+            if name in names[:index] and piece.items is not None:
+                self.fault("PLAN105", f"{where}: {name!r} stands there twice", piece.items[index].span)
+        return tuple(names)
 
     def findings(self, key: str) -> Iterator[Finding]:
         for piece in self.items(key):
