@@ -85,7 +85,7 @@ def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, dict[
             env={
                 "AVOW_SYSTEM_ROOT": str(job.root.resolve()),
                 "HYPOTHESIS_STORAGE_DIRECTORY": str(place / ".hypothesis"),
-                "PYTHONDONTWRITEBYTECODE": "1",
+                "PYTHONDONTWRITEBYTECODE": "",  # or every run would compile the same modules
                 "PYTHONHASHSEED": "0",
                 "PYTHONPATH": os.environ.get("PYTHONPATH", ""),
             },

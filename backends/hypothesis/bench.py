@@ -18,6 +18,7 @@ from typing import Any
 from hypothesis import HealthCheck, Phase, assume, given, seed, settings
 from hypothesis import strategies as st
 from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
+from hypothesis.internal.conjecture import providers
 
 from avow.backends.hypothesis import wire
 from avow.backends.hypothesis.convention import Malformed, outputs
@@ -27,6 +28,11 @@ from avow.backends.hypothesis.pools import parse_cell, pools
 from avow.backends.hypothesis.process import PATIENCE, Subject, SubjectFailed
 from avow.language.sorts import BoolSort, FunctionSort, Sort
 from avow.logic.values import Value, show
+
+# Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
+# and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
+if hasattr(providers, "is_local_module_file"):
+    providers.is_local_module_file = lambda path: False
 
 SHRINKING = 4.0
 """Seconds spent on making a failing case simpler."""

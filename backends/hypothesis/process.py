@@ -100,6 +100,7 @@ class Subject:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},  # nothing is to appear beside the subject
             pass_fds=(there, back),
         )
         os.close(there)
