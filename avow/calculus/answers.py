@@ -72,7 +72,7 @@ class SideQuestion:
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         goal = composition.goal(self.goal)
         settled = composition.settled(goal, bounds).settled[self.condition]
-        repairs = would_hold(composition.frame_of(goal), goal, settled) if settled.verdict is Verdict.REFUTED else ()
+        repairs = would_hold(composition.frame_of(goal), goal, settled) if settled.verdict is not Verdict.PROVED else ()
         return side_answer(settled, repairs)
 
 
@@ -110,15 +110,18 @@ def side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ..
             details=details,
             vacuous=settled.vacuous,
         )
-    if bad.verdict is Verdict.REFUTED:
-        summary = _why_not(condition, bad) + "".join(
+    if bad.verdict is Verdict.REFUTED or bad.counterexample is not None:
+        fails = bad.verdict is not Verdict.REFUTED
+        summary = _induction_fails(condition, bad) if fails else _why_not(condition, bad)
+        summary += "".join(
             would_hold_if(found, "" if phase is Phase.SAME_STEP else f"at {phase.value} ") for phase, found in repairs
         )
         listed = [
             offer.data("" if phase is Phase.SAME_STEP else phase.value) for phase, found in repairs for offer in found
         ]
         details |= {"would_hold_if": listed} if listed else {}
-        return Answer(Verdict.REFUTED, summary, _counterexample(bad, condition), details=details)
+        details |= {"induction": "fails"} if fails else {}
+        return Answer(bad.verdict, summary, _counterexample(bad, condition), details=details)
     return Answer(Verdict.UNKNOWN, f"the solver gave up: {bad.reason or 'no reason given'}", details=details)
 
 
@@ -146,8 +149,22 @@ def _why(settled: Settled) -> str:
     return f"follows from {needed}"
 
 
+def _induction_fails(condition: SideCondition, case: Case) -> str:
+    at = f" at {', '.join(f'{name} = {value}' for name, value in shown)}" if (shown := _few(case)) else ""
+    return (
+        f"not inductive: {condition.about} holds at the first step, but induction fails{at}: that such a step is ever "
+        "reached is not shown"
+    )
+
+
+def _few(case: Case) -> tuple[tuple[str, str], ...]:
+    return case.counterexample.values[:6] if case.counterexample is not None else ()
+
+
 def _why_not(condition: SideCondition, case: Case) -> str:
     when = "" if case.phase is Phase.SAME_STEP else f" at {case.phase.value}"
+    if case.counterexample is not None and case.counterexample.trace:
+        when = f" at step {len(case.counterexample.trace)} of a run"
     if not condition.providers:
         return f"nothing makes {condition.about} hold{when}"
     return f"{', '.join(condition.providers)} may leave {condition.about} false{when}"
@@ -157,6 +174,11 @@ def _counterexample(case: Case, condition: SideCondition) -> Counterexample | No
     found = case.counterexample
     if found is None:
         return None
+    if found.trace:
+        return found
+    if case.verdict is not Verdict.REFUTED:
+        told = f"here induction fails, {condition.about} is false, if such a step is reached (@before: one step before)"
+        return Counterexample(found.values, told)
     when = "" if case.phase is Phase.SAME_STEP else f" ({case.phase.value}; @before is the value of the step before)"
     return Counterexample(found.values, f"{condition.about} is false{when}", found.trace, found.loop)
 

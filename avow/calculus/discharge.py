@@ -12,8 +12,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from avow.calculus.derivation import Case, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
+from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
 from avow.calculus.entailment import implied
+from avow.calculus.induction import Deeper, deeper, steps
 from avow.calculus.repair import Offer, environment, initial_values, offers, providers
 from avow.calculus.variables import Frame
 from avow.language.terms import Term
@@ -22,6 +23,9 @@ from avow.system.graph import components, cycle_in
 from avow.verdict import Verdict
 
 NARROW_MS = 4_000
+
+DEEPER_SECONDS = 4.0
+"""For more steps, where one step of induction fails."""
 
 Hypotheses = dict[str, Term]
 
@@ -63,7 +67,7 @@ class Answers:
 
 def settle(frame: Frame, goal: Goal, bounds: Bounds | None = None) -> Answers:
     """Discharge every side condition of a derivation, and judge its loops."""
-    solver = _Solver(frame, frozenset(goal.nodes), bounds or Bounds())
+    solver = _Solver(frame, frozenset(goal.nodes), bounds or Bounds(), frozenset(goal.root.assumed))
     settled = {condition: solver.condition(condition) for condition in goal.conditions}
     settled = _break_circles(solver, settled)
     loops = tuple(_loop(frame, goal, part, settled) for part in goal.root.walk() if part.rule is Rule.R4)
@@ -77,7 +81,7 @@ def would_hold(frame: Frame, goal: Goal, settled: Settled) -> tuple[tuple[Phase,
     might be circular.
     """
     condition = settled.condition
-    solver = _Solver(frame, frozenset(goal.nodes), Bounds())
+    solver = _Solver(frame, frozenset(goal.nodes), Bounds(), frozenset(goal.root.assumed))
     consumer = condition.consumer
     attempts = tuple(solver.attempts(condition, [*condition.providers], solver.selected))
     same, before = attempts[-1]
@@ -85,7 +89,7 @@ def would_hold(frame: Frame, goal: Goal, settled: Settled) -> tuple[tuple[Phase,
         return ()
     found: list[tuple[Phase, tuple[Offer, ...]]] = []
     for case in settled.cases:
-        if case.verdict is not Verdict.REFUTED:
+        if case.verdict is not Verdict.REFUTED and case.counterexample is None:
             continue
         hypotheses, claim = solver.question(condition, case.phase, same, before, len(attempts) > 1)
         near = [name for name in condition.providers if name in same]
@@ -108,6 +112,8 @@ class _Solver:
     frame: Frame
     selected: frozenset[str]
     bounds: Bounds
+    kept: frozenset[ClauseName]
+    """Assumptions that the conclusion leaves assumed: a node's own may be used for its other ones."""
 
     def condition(self, condition: SideCondition, allowed: frozenset[str] | None = None) -> Settled:
         """Settle one side condition; `allowed`: the nodes whose contracts may be used at the same step.
@@ -132,7 +138,40 @@ class _Solver:
                 return answer
             last = answer  # only the widest hypotheses refute: narrower ones may just have left something out
         assert last is not None
-        return last
+        return self.deeper(condition, last, *attempts[-1])
+
+    def deeper(
+        self, condition: SideCondition, settled: Settled, same: tuple[str, ...], before: tuple[str, ...]
+    ) -> Settled:
+        """A later step at which the assumption may be false refutes nothing before that step is shown to be reached:
+        from the initial values, by as many steps as it takes; else it is only induction that fails."""
+        first = next((case for case in settled.cases if case.phase is Phase.INITIAL), None)
+        later = next((case for case in settled.cases if case.phase is Phase.LATER), None)
+        if first is None or later is None or later.verdict is not Verdict.REFUTED:
+            return settled
+        found = Deeper()
+        if first.verdict is Verdict.PROVED:
+            frame = self.frame
+            asked = steps(
+                frame,
+                self.contracts(tuple(dict.fromkeys((*before, *self.selected_in_order))), 0) | frame.environment(),
+                self.contracts(same, 0) | frame.environment(),
+                frame.initials(self.selected),
+                frame.clause(condition.consumer, condition.clause),
+            )
+            patience = min(DEEPER_SECONDS, self.bounds.milliseconds / 1000)
+            found = deeper(asked, patience, self.bounds.seed, str(condition.about))
+        if found.proved is not None:
+            case = Case(Phase.LATER, Verdict.PROVED, found.proved, engine=found.engine)
+        elif found.run is not None:
+            case = replace(later, counterexample=found.run)
+        else:
+            case = replace(later, verdict=Verdict.UNKNOWN, reason="induction over steps fails")
+        return _settled(condition, tuple(case if one is later else one for one in settled.cases))
+
+    @property
+    def selected_in_order(self) -> tuple[str, ...]:
+        return tuple(node for node in self.frame.graph.nodes if node in self.selected)
 
     def attempts(
         self, condition: SideCondition, direct: list[str], allowed: frozenset[str]
@@ -199,7 +238,7 @@ class _Solver:
     ) -> tuple[Hypotheses, Term]:
         goal = self.frame.clause(condition.consumer, condition.clause)
         hypotheses = self.contracts(same, 0)
-        around = self.frame.environment(0)
+        around = self.frame.environment(0) | self.own(condition.consumer)
         if phase is Phase.LATER:
             hypotheses |= self.contracts(before, 1)
             around |= self.frame.environment(1)
@@ -207,6 +246,11 @@ class _Solver:
             around |= self.frame.initials(self.selected)
         hypotheses |= _about(around, [goal, *hypotheses.values()], direct=not wide)
         return hypotheses, goal
+
+    def own(self, consumer: str) -> Hypotheses:
+        """What a consumer assumes that stays assumed."""
+        names = (ClauseName(consumer, clause.name) for clause in self.frame.node(consumer).assumptions)
+        return {str(name): self.frame.clause(name.node, name.clause) for name in names if name in self.kept}
 
     def contracts(self, nodes: Iterable[str], earlier: int) -> Hypotheses:
         """Assumptions and guarantees of some nodes, labelled ``navigation.somewhere``."""
@@ -250,6 +294,8 @@ def _settled(condition: SideCondition, cases: tuple[Case, ...]) -> Settled:
             owner = label.split(".")[0]
             if label.startswith(("environment ", "initial ")):
                 continue
+            if owner == condition.consumer and not label.endswith(" one step before"):
+                continue  # its own, and still assumed in the conclusion
             (used_before if label.endswith(" one step before") else used)[owner] = None
     return Settled(condition, verdict, cases, tuple(used), tuple(used_before))
 

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from random import Random
 
-from avow.calculus.answering import Stuck
+from avow.calculus.answering import Doubts, Stuck
+from avow.calculus.answering import judge as judge_formula
 from avow.calculus.answers import Answer
 from avow.calculus.discharge import Bounds
 from avow.calculus.ltl import Lasso, demands_progress, violation
@@ -20,6 +21,7 @@ from avow.calculus.narrowing import Holds
 from avow.calculus.scenario import CannotRun, world
 from avow.calculus.transition import Machine, Step, Walk
 from avow.calculus.variables import Frame
+from avow.language.terms import Term
 from avow.logic.clock import now
 from avow.logic.formula import free_variables
 from avow.logic.values import Value
@@ -131,6 +133,52 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
         bound=_bound(explored) | {"n": len(explored.steps)},
         details={"exhaustive": False},
     )
+
+
+def refuting_run(machine: Machine, name: str, claim: Term, bounds: Bounds) -> tuple[Answer | None, str]:
+    """The shortest run over the scenario at whose last step a claim is false, and nothing about it is in doubt: every
+    clause was evaluated exactly at every step. Else, in words, how far it was looked for."""
+    doubts = Doubts()
+    holds = judge_formula(machine.world, claim, doubts=doubts, about=name)
+    end = now() + bounds.milliseconds / 1000
+    before: dict[_Memory, tuple[_Memory, Step] | None] = {}
+    try:
+        before |= dict.fromkeys(machine.initial())
+        waiting = deque(before)
+        while waiting:
+            if now() > end or len(before) > MAX_STATES:
+                return None, f"no run of the {len(before)} kinds of steps looked at over the scenario makes it false"
+            memory = waiting.popleft()
+            for step in machine.judged(memory, (holds,)):
+                if not holds(step.values):
+                    steps = [step]
+                    while (last := before[memory]) is not None:
+                        memory, earlier = last
+                        steps.insert(0, earlier)
+                    return _false_at_the_end(machine, name, claim, steps, doubts), ""
+                if step.memory not in before:
+                    before[step.memory] = (memory, step)
+                    waiting.append(step.memory)
+    except CannotRun:
+        return None, ""
+    allowed = "that the scenario allows" if not (machine.short or doubts.inexact) else "looked at over the scenario"
+    return None, f"no run of the {len(before)} kinds of steps {allowed} makes it false"
+
+
+def _false_at_the_end(machine: Machine, name: str, claim: Term, steps: list[Step], doubts: Doubts) -> Answer | None:
+    if doubts.inexact or any(True for step in steps for _ in machine.unconfirmed(step)):
+        return None
+    spoken = [v.qualified for v in sorted(free_variables(claim), key=lambda v: v.qualified)]
+    outputs = [f"{node}.{port.name}" for node in machine.order for port in machine.frame.node(node).outputs]
+    names = list(dict.fromkeys([*spoken, *outputs]))[:MAX_SHOWN]
+    trace = tuple(step.shown([n for n in names if n not in machine.constants]) for step in steps)
+    told = f"{name} is false at step {len(steps)} of a run of the composed contracts"
+    broken = sorted({clause for step in steps for clause in step.broken})
+    if broken:
+        told += f"; on the way an assumption does not hold: {', '.join(broken)}"
+    bound: dict[str, object] = {"steps": len(steps), "scenario": machine.world.scenario.digest}
+    shown = Counterexample(trace[-1], told, trace)
+    return Answer(Verdict.REFUTED, told, shown, bound=bound, details={"genuine": True, "run": len(steps)})
 
 
 def _tried(machine: Machine, frame: Frame, name: str, formula: Property, bounds: Bounds) -> Answer | None:

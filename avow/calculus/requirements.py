@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 from avow.calculus.answers import Answer, contracts, environment_claims, would_hold_if
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Phase, Settled
-from avow.calculus.discharge import Bounds
+from avow.calculus.discharge import DEEPER_SECONDS, Bounds
 from avow.calculus.entailment import QUICK_MS, implied
 from avow.calculus.hierarchy import innermost
-from avow.calculus.repair import environment, offers, providers
+from avow.calculus.induction import deeper, steps
+from avow.calculus.repair import environment, initial_values, offers, providers
 from avow.calculus.variables import Frame
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.files import digest as sha256
@@ -41,71 +42,142 @@ class FormulaQuestion:
     support: tuple[str, ...]
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
-        """Every way is tried in short rounds first: what one way cannot show, at any length, another may in no time."""
-        answer: Answer | None = None
-        for limit in dict.fromkeys((min(QUICK_MS, bounds.milliseconds), bounds.milliseconds)):
-            answer = self.attempt(composition, replace(bounds, milliseconds=limit))
-            if answer.verdict is not Verdict.UNKNOWN or "step" in answer.details:
-                return answer
-        assert answer is not None
-        return answer
+        """In short rounds first: what one way cannot show, at any length, another may in no time. A run over the plan's
+        scenario that breaks the formula is looked for before anything takes long."""
+        quick = min(QUICK_MS, bounds.milliseconds)
+        answer = self.attempt(composition, replace(bounds, milliseconds=quick))
+        if answer.verdict is not Verdict.UNKNOWN:
+            return answer
+        run, searched = self.broken_by_a_run(composition, bounds)
+        if run is not None:
+            listed = {key: answer.details[key] for key in ("would_hold_if",) if key in answer.details}
+            return replace(run, details=run.details | listed)
+        if "step" not in answer.details and bounds.milliseconds > quick:
+            answer = self.attempt(composition, bounds, patient=True)
+        if answer.verdict is not Verdict.UNKNOWN or not searched:
+            return answer
+        return replace(answer, summary=f"{answer.summary}; {searched}")
 
-    def attempt(self, composition: Composition, bounds: Bounds) -> Answer:
+    def broken_by_a_run(self, composition: Composition, bounds: Bounds) -> tuple[Answer | None, str]:
+        """A run of the composed contracts over the plan's scenario, at one of whose steps the formula is false; else
+        how far it was looked for."""
+        from avow.calculus.model_checking import refuting_run
+        from avow.calculus.scenario import CannotRun
+
+        if composition.frame.system.plan.scenario is None:
+            return None, ""
+        try:
+            machine = composition.machine(bounds.seed)
+        except CannotRun:
+            return None, ""
+        return refuting_run(machine, self.name, system_term(composition.frame, self.formula), bounds)
+
+    def attempt(self, composition: Composition, bounds: Bounds, *, patient: bool = False) -> Answer:
+        """One round. The `patient` one, after a quick one, asks only the widest question of each kind: what nothing
+        settles costs a few times the limit, and no more."""
         frame = composition.frame
         everything = tuple(f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees)
         goal = system_term(frame, self.formula)
+        delayed = any(edge.delayed for edge in frame.graph.edges)
         last: Entailment | None = None
-        for clauses in dict.fromkeys((self.support, everything)):
-            if not clauses:
+        for clauses in dict.fromkeys((everything,) if patient else (self.support, everything)):
+            if not clauses or (patient and delayed):
                 continue
             last = self.ask(contracts(frame, clauses) | frame.environment(), goal, bounds)
             if last.verdict is Verdict.PROVED:
                 return self.proved(composition, (last,), Phase.SAME_STEP, bounds)
+        if delayed:
+            return self.by_induction(composition, everything, goal, bounds, patient)
         assert last is not None
-        if not any(edge.delayed for edge in frame.graph.edges):
-            return self.repaired(frame, goal, self.not_proved(last, genuine=True))
-        return self.by_induction(composition, everything, goal, bounds)
+        return self.repaired(frame, goal, self.not_proved(last))
 
-    def repaired(self, frame: Frame, goal: Term, answer: Answer) -> Answer:
-        """A refutation with what would make it hold; any other answer as it is."""
-        if answer.verdict is not Verdict.REFUTED:
+    def repaired(
+        self, frame: Frame, goal: Term, answer: Answer, further: Mapping[str, Term] | None = None, when: str = ""
+    ) -> Answer:
+        """A refutation, or a step at which induction fails, with what would make it hold; another answer as it is."""
+        if answer.verdict is not Verdict.REFUTED and "induction" not in answer.details:
             return answer
         nodes = frame.graph.nodes
         everything = tuple(f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees)
-        hypotheses = contracts(frame, everything) | frame.environment()
+        hypotheses = contracts(frame, everything) | frame.environment() | dict(further or {})
         spoken = free_variables(goal)
-        near = [place for place in providers(frame, nodes) if not spoken.isdisjoint(place.ports)]
-        found = offers(frame, hypotheses, goal, (*near, *environment(frame, nodes)))
+        places = [place for place in providers(frame, nodes) if not spoken.isdisjoint(place.ports)]
+        places += environment(frame, nodes)
+        if when == Phase.INITIAL.value:
+            delayed = [e.target.node for e in frame.graph.edges if e.delayed]
+            places += [place for node in dict.fromkeys(delayed) for place in initial_values(frame, node)]
+        found = offers(frame, hypotheses, goal, places)
         if not found:
             return answer
-        listed = {"would_hold_if": [offer.data() for offer in found]}
-        return replace(answer, summary=answer.summary + would_hold_if(found), details=answer.details | listed)
+        listed = {"would_hold_if": [offer.data(when) for offer in found]}
+        told = would_hold_if(found, f"at {when} " if when else "")
+        return replace(answer, summary=answer.summary + told, details=answer.details | listed)
 
-    def by_induction(self, composition: Composition, everything: tuple[str, ...], goal: Term, bounds: Bounds) -> Answer:
+    def by_induction(
+        self, composition: Composition, everything: tuple[str, ...], goal: Term, bounds: Bounds, patient: bool
+    ) -> Answer:
         frame = composition.frame
         now = contracts(frame, everything) | frame.environment()
-        first = self.ask(now | frame.initials(frame.graph.nodes), goal, bounds)
+        initial = frame.initials(frame.graph.nodes)
+        quick = replace(bounds, milliseconds=min(QUICK_MS, bounds.milliseconds))
+        first = self.ask(now | initial, goal, quick)
+        if patient and first.verdict is Verdict.UNKNOWN:
+            first = self.ask(now | initial, goal, bounds)
         if first.verdict is not Verdict.PROVED:
-            return self.not_proved(first, genuine=True, when="at the first step")
+            return self.repaired(frame, goal, self.not_proved(first, "at the first step"), initial, Phase.INITIAL.value)
         itself = {f"{self.name} one step before": system_term(frame, self.formula, 1)}
         before = contracts(frame, everything, 1) | frame.environment(1)
         later = first
-        for earlier in (
-            itself,
-            itself | before,
-        ):  # mostly it keeps itself, and the contracts of a step less make it quick
+        # Mostly it keeps itself; and the contracts of a step less make it quick.
+        for earlier in (itself | before,) if patient else (itself, itself | before):
             later = self.ask(now | earlier, goal, bounds)
             if later.verdict is Verdict.PROVED:
                 return self.proved(composition, (first, later), Phase.LATER, bounds)
-        return self.not_proved(later, genuine=False, when="at a later step (perhaps never reached)")
+        if later.verdict is not Verdict.REFUTED:
+            return self.not_proved(later)
+        asked = steps(frame, now, now, initial, goal)
+        more = deeper(asked, min(DEEPER_SECONDS, bounds.milliseconds / 1000), bounds.seed, self.name)
+        if more.proved is not None:
+            further = Entailment(Verdict.PROVED, needed=more.proved, engine=more.engine)
+            return self.proved(composition, (first, further), Phase.LATER, bounds, more.steps)
+        if more.run is not None:
+            told = f"a run of {more.steps} steps makes {self.name} false"
+            details: dict[str, object] = {"genuine": True, "run": more.steps}
+            answer = Answer(Verdict.REFUTED, told, more.run, bound={"steps": more.steps}, details=details)
+            return self.repaired(frame, goal, answer, itself | before, Phase.LATER.value)
+        return self.repaired(frame, goal, self.induction_fails(later), itself | before, Phase.LATER.value)
+
+    def induction_fails(self, answer: Entailment) -> Answer:
+        """There is a step that does not keep the formula; whether it is ever reached is not known."""
+        values = answer.counterexample.values if answer.counterexample is not None else ()
+        told = f"here induction fails, {self.name} is false, if such a step is reached (@before: one step before)"
+        shown = Counterexample(values, told)
+        at = ", ".join(f"{name} = {value}" for name, value in values[:6])
+        return Answer(
+            Verdict.UNKNOWN,
+            f"not inductive: {self.name} holds at the first step, but induction fails at {at or 'some step'}: that it "
+            "is ever reached is not shown; a stronger invariant among the guarantees would settle it",
+            shown,
+            details={"genuine": False, "induction": "fails", "step": dict(values)},
+        )
 
     def ask(self, hypotheses: Mapping[str, Term], goal: Term, bounds: Bounds) -> Entailment:
         return implied(hypotheses, goal, timeout_ms=bounds.milliseconds, seed=bounds.seed)
 
-    def proved(self, composition: Composition, answers: tuple[Entailment, ...], phase: Phase, bounds: Bounds) -> Answer:
+    def proved(
+        self,
+        composition: Composition,
+        answers: tuple[Entailment, ...],
+        phase: Phase,
+        bounds: Bounds,
+        before: int = 1,
+    ) -> Answer:
+        """`before`: so many steps before were needed to prove the next."""
         needed = tuple(dict.fromkeys(label for answer in answers for label in answer.needed))
         beyond = [n for n in _guarantees(composition.frame, needed) if n not in self.support and self.support]
         how = "at the first step, and from one step to the next" if phase is Phase.LATER else "at every step"
+        if before > 1:
+            how = f"at the first {before} steps, and from each {before} steps to the next"
         summary = f"follows {how} from {', '.join(needed) or 'the types alone'}"
         if beyond:
             summary += f" (not named as its support: {', '.join(beyond)})"
@@ -113,23 +185,16 @@ class FormulaQuestion:
             Verdict.PROVED,
             summary,
             hypotheses=rests_on(composition, needed, bounds),
-            details={"needed": list(needed), "phase": phase.value},
+            details={"needed": list(needed), "phase": phase.value} | ({"k": before} if before > 1 else {}),
             vacuous=any(answer.vacuous for answer in answers),
         )
 
-    def not_proved(self, answer: Entailment, *, genuine: bool, when: str = "") -> Answer:
-        details: dict[str, object] = {"genuine": genuine}
+    def not_proved(self, answer: Entailment, when: str = "") -> Answer:
+        details: dict[str, object] = {"genuine": True}
         if answer.verdict is Verdict.REFUTED and answer.counterexample is not None:
             told = f"the contracts allow {self.name} to be false{' ' + when if when else ''}"
-            shown = Counterexample(answer.counterexample.values, told)
-            if genuine:
-                return Answer(Verdict.REFUTED, told, shown, details=details)
-            return Answer(
-                Verdict.UNKNOWN,
-                f"not inductive: {shown.text()}; a stronger invariant among the guarantees would settle it",
-                details=details | {"step": dict(shown.values)},
-            )
-        return Answer(Verdict.UNKNOWN, f"the solver gave up: {answer.reason}", details=details)
+            return Answer(Verdict.REFUTED, told, Counterexample(answer.counterexample.values, told), details=details)
+        return Answer(Verdict.UNKNOWN, f"the solver gave up: {answer.reason}", details={"genuine": False})
 
 
 @dataclass(frozen=True, slots=True)
