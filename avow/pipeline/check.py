@@ -67,20 +67,20 @@ def _method(system: System, node: str, method: Method) -> Iterable[Diagnostic]:
         yield Diagnostic("PLAN090", f"'{method.id}' is the name of an engine of Avow's own", method.options.span)
         return
     tool = method_backend(system, method)
-    wrong = tuple(_schema(tool.options_schema, method.options))
+    wrong = tuple(_schema(tool.options_schema, method.options, f"nodes.{node}: {method.id}"))
     yield from wrong
     if not any(d.is_error for d in wrong):
         yield from tool.check(method_job(system, system.contract.node(node), method))
 
 
-def _schema(schema: Mapping[str, Any], options: Located) -> Iterable[Diagnostic]:
+def _schema(schema: Mapping[str, Any], options: Located, whole: str) -> Iterable[Diagnostic]:
     from avow.system.schema import violations
 
     data = options.data
     if isinstance(data, Mapping):
         own = {k: v for k, v in data.items() if k not in COMMON_OPTIONS}
         options = Located(own, options.span, options.spans)
-    yield from violations(options, schema)
+    yield from violations(options, schema, whole)
 
 
 def show(found: Iterable[Diagnostic]) -> None:

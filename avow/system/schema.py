@@ -28,16 +28,17 @@ def check_shape(piece: Piece) -> tuple[Diagnostic, ...]:
     return _faults(piece, plan_schema())
 
 
-def violations(options: Located, schema: Mapping[str, Any]) -> tuple[Diagnostic, ...]:
-    """Everything in which a part of a plan departs from a schema of its own, such as a backend's for its options."""
-    return _faults(_piece(options, ()), schema)
+def violations(options: Located, schema: Mapping[str, Any], whole: str = "the plan") -> tuple[Diagnostic, ...]:
+    """Everything in which a part of a plan departs from a schema of its own, such as a backend's for its options.
+    `whole` is what that part is called."""
+    return _faults(_piece(options, ()), schema, whole)
 
 
-def _faults(piece: Piece, schema: Mapping[str, Any]) -> tuple[Diagnostic, ...]:
+def _faults(piece: Piece, schema: Mapping[str, Any], whole: str = "the plan") -> tuple[Diagnostic, ...]:
     from jsonschema import Draft202012Validator, validators  # slow to import
 
     validator = validators.extend(Draft202012Validator, {"pattern": _pattern})(schema)  # type: ignore[no-untyped-call]
-    found = [d for error in validator.iter_errors(piece.data) for d in _explain(error, piece)]
+    found = [d for error in validator.iter_errors(piece.data) for d in _explain(error, piece, whole)]
     return tuple(sorted(found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0)))
 
 
@@ -69,12 +70,12 @@ def suggest(word: str, known: Iterable[str]) -> str | None:
     return f"known: {shown}"
 
 
-def key_path(path: Iterable[str | int]) -> str:
-    """``connections[0].to``, for messages."""
+def key_path(path: Iterable[str | int], whole: str = "the plan") -> str:
+    """``connections[0].to``, for messages; `whole` where the path is empty."""
     text = ""
     for step in path:
         text += f"[{step}]" if isinstance(step, int) else (f".{step}" if text else step)
-    return text or "the plan"
+    return text or whole
 
 
 def _pattern(validator: Any, pattern: str, instance: Any, schema: Any) -> Iterator[Any]:
@@ -85,10 +86,10 @@ def _pattern(validator: Any, pattern: str, instance: Any, schema: Any) -> Iterat
         yield ValidationError(f"{instance!r} does not match {pattern!r}")
 
 
-def _explain(error: Any, root: Piece) -> Iterator[Diagnostic]:
+def _explain(error: Any, root: Piece, whole: str) -> Iterator[Diagnostic]:
     path: tuple[str | int, ...] = tuple(error.absolute_path)
     piece = root.at(*path) or root
-    where = key_path(path)
+    where = key_path(path, whole)
     about = error.schema.get("description") if isinstance(error.schema, dict) else None
     wanted = f" (expected: {about})" if about else ""
     if "propertyNames" in error.absolute_schema_path:
@@ -131,10 +132,41 @@ def _explain(error: Any, root: Piece) -> Iterator[Diagnostic]:
             yield Diagnostic("PLAN105", f"{where}: {_show(error.instance)} has not the right form{wanted}", piece.span)
         case "minLength" | "minItems" | "minProperties":
             yield Diagnostic("PLAN105", f"{where}: must not be empty{wanted}", piece.span)
+        case "oneOf" | "anyOf":
+            ways = _alternatives(error.validator_value)
+            fitting = [e for e in error.context if not _another_kind(e, error)]
+            if not error.context:
+                yield Diagnostic("PLAN105", f"{where}: either {ways} is wanted, not both{wanted}", piece.span)
+            elif not fitting:
+                message = f"{where}: {ways} is wanted, not {_show(error.instance)}{wanted}"
+                yield Diagnostic("PLAN105", message, piece.span)
+            elif all(e.validator == "required" and e.absolute_path == error.absolute_path for e in fitting):
+                yield Diagnostic("PLAN104", f"{where}: {ways} is missing{wanted}", piece.span)
+            else:
+                for inner in fitting:
+                    yield from _explain(inner, root, whole)
         case "maxProperties":
             yield Diagnostic("PLAN105", f"{where}: exactly one key is wanted{wanted}", piece.span)
         case _:
             yield Diagnostic("PLAN105", f"{where}: {str(error.message)[:300]}{wanted}", piece.span)
+
+
+def _another_kind(inner: Any, outer: Any) -> bool:
+    """Whether an alternative is out of the question: it is for a list, say, and a text stands there."""
+    at = list(inner.absolute_schema_path)[len(list(outer.absolute_schema_path))]
+    alternative = outer.validator_value[at]
+    kinds = alternative.get("type", []) if isinstance(alternative, dict) else []
+    return inner.validator == "type" and list(inner.absolute_path) == list(outer.absolute_path) and bool(kinds)
+
+
+def _alternatives(schemas: Iterable[Any]) -> str:
+    """What they are for: kinds of values, or keys that go together."""
+    said: list[str] = []
+    for schema in schemas:
+        kinds = schema.get("type", [])
+        words = [str(_KINDS.get(k, k)) for k in ([kinds] if isinstance(kinds, str) else kinds)]
+        said += words or [" with ".join(repr(key) for key in schema.get("required", []))]
+    return " or ".join(dict.fromkeys(said))
 
 
 _KINDS = {

@@ -145,6 +145,8 @@ class _Work:
         """The rule, or why there is none."""
         name = port.variable.qualified
         entry = self.mapping().get(name)
+        if isinstance(entry, Mapping) and not entry.keys() & {"scenario", "previous", "constructor"}:
+            _keys(entry, port.sort)
         topic = _topic(self.node, port)
         edge = self.edge(port)
         if isinstance(entry, Mapping) and entry.get("scenario"):
@@ -176,8 +178,6 @@ class _Work:
         elif isinstance(entry, list):
             entry = {"fields": entry}
         entry = entry or {}
-        if isinstance(entry, Mapping) and not (isinstance(sort, DataSort) and "constructor" in entry):
-            _keys(entry, sort)
         initial = self.literal(entry, "initial", variable)
         if isinstance(sort, DataSort) and "constructor" in entry:
             return self.choice(sort, variable, topic, entry, initial)

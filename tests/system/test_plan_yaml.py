@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from avow.diagnostics import Diagnostic, Rejected
+from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.system.plan import Located
 from avow.system.plan_file import read_plan
-from avow.system.schema import plan_schema
+from avow.system.schema import plan_schema, violations
 from avow.system.strict_yaml import read_yaml, scalar
 
 
@@ -90,6 +91,48 @@ def test_faults_are_located(tmp_path: Path, text: str | bytes, line: int, column
     fault = next(d for d in found if words in d.message)
     assert fault.span is not None
     assert (fault.span.line, fault.span.column) == (line, column), fault
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("nodes: {n: {methods: [{hoare: {guarantees: []}}]}}", "n: hoare: guarantees: names of guarantees are wanted"),
+        ("nodes: {n: {methods: [{hoare: {guarantees: }}]}}", "n: hoare: guarantees: names of guarantees are wanted"),
+        ("nodes: {n: {methods: [{hoare: {guarantees: [[g]]}}]}}", "names of guarantees are wanted"),
+        ("nodes: {n: {methods: [{hoare: {guarantees: {g: 1}}}]}}", "names of guarantees are wanted"),
+        ("nodes: {n: {methods: [{hoare: {guarantees: [g, g]}}]}}", "'g' stands there twice"),
+        ("compose: {D1: {select: []}}", "compose.D1.select: must not be empty"),
+    ],
+)
+def test_an_empty_choice_is_not_everything(tmp_path: Path, text: str, words: str) -> None:
+    (fault,) = faults(tmp_path, text + "\n")
+    assert words in fault.message
+    assert fault.code == "PLAN105"
+    assert fault.span is not None
+    assert fault.span.column > 10
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"a": 5}, "n: tool: the key 'b' is missing"),
+        ({"b": 5}, "b: text or a list is wanted, not 5"),
+        ({"b": [5]}, "b[0]: text is wanted, not 5"),
+        ({"b": "x", "c": 1, "d": 2}, "n: tool: either 'c' or 'd' is wanted, not both"),
+        ({"b": "x", "e": 1}, "n: tool: 'c' or 'd' is missing"),
+    ],
+)
+def test_options_that_depart_from_a_schema_are_told_in_words(options: dict[str, object], message: str) -> None:
+    schema = {
+        "type": "object",
+        "properties": {"b": {"oneOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}},
+        "required": ["b"],
+        "oneOf": [{"required": ["c"]}, {"required": ["d"]}],
+    }
+    if "e" not in options and "d" not in options:
+        del schema["oneOf"]
+    found = violations(Located(options, Span("plan.yaml", 1, 1, 1, 2)), schema, "n: tool")
+    assert [d.message for d in found] == [message]
 
 
 def test_did_you_mean(tmp_path: Path) -> None:
