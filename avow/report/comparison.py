@@ -21,7 +21,7 @@ _HEADINGS = {
     "rerun": "Asked again, with the same verdict",
 }
 _WORDS = {
-    "gate": "gates changed",
+    "gate": "of the gates changed",
     "worse": "worse",
     "removed": "gone",
     "meaning": "changed meaning",

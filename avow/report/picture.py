@@ -62,7 +62,7 @@ def draw(
     style = f"<style>{_STYLE}</style>" if alone else ""
     frame = f'<rect class="paper" width="{right:.0f}" height="{bottom:.0f}"/>' if alone else ""
     size = f'viewBox="0 0 {right:.0f} {bottom:.0f}" width="{right:.0f}" height="{bottom:.0f}"'
-    head = f'<svg{space} class="gsn" role="img" aria-label="{escape(clean(label))}" {size}>'
+    head = f'<svg{space} class="gsn" role="group" aria-label="{escape(clean(label))}" {size}>'
     return f"{head}{style}{frame}{ARROWS if alone else ''}{''.join(parts)}</svg>"
 
 

@@ -40,7 +40,7 @@
       row.classList.toggle("off", !on);
       if (on) n += 1;
     });
-    shown.textContent = n === rows.length ? "" : n + " of " + rows.length;
+    shown.textContent = (n === rows.length ? "all " : n + " of ") + rows.length;
   };
   if (form) {
     form.hidden = false;
@@ -97,6 +97,16 @@
     box.addEventListener("click", (event) => { if (moved) { event.preventDefault(); event.stopPropagation(); } }, true);
     picture.addEventListener("dragstart", (event) => event.preventDefault());
   });
+  // What scrolls sideways can be reached and scrolled with the keyboard.
+  const reachable = () => all(".scroll:not([role])").forEach((box) => {
+    if (box.scrollWidth > box.clientWidth + 1) box.tabIndex = 0;
+    else box.removeAttribute("tabindex");
+  });
+  let measuring = 0;
+  const measure = () => { clearTimeout(measuring); measuring = setTimeout(reachable, 150); };
+  addEventListener("resize", measure);
+  document.addEventListener("toggle", measure, true);
+  reachable();
   // Paper has no folds: what has something to tell is opened; good news keeps to its line, logs stay on the screen.
   let folded = [];
   const good = ["proved", "checked", "tested", "monitored", "reviewed", "justified", "linked"];
