@@ -1,8 +1,8 @@
 """Requirements from other tools: CSV and ReqIF 1.x, as `Requirement`s and as the ``requirements:`` section of a plan.
 
 CSV has a header row; its columns are found by their names (``id``, ``statement``, ``text``…), whatever their case.
-ReqIF: every SPEC-OBJECT, with its attributes by their LONG-NAMEs. XML that declares a document type is refused: nothing
-is fetched, nothing is expanded. Errors are diagnostics with codes REQS001 to REQS004, located where there is a line.
+ReqIF: every SPEC-OBJECT that is no heading, in the order of the specification (`avow.assurance.reqif`). Errors are
+diagnostics with codes REQS001 to REQS004, located where there is a line.
 """
 
 from __future__ import annotations
@@ -11,16 +11,28 @@ import csv
 import io
 import json
 import re
-import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from avow.assurance.reqif import read_objects
 from avow.diagnostics import Diagnostic, Rejected, Span
 from avow.system.plan import Requirement
 
 _COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "id": ("id", "requirement", "requirement id", "identifier", "key", "req", "reqif.foreignid"),
-    "text": ("text", "statement", "description", "sentence", "reqif.text", "title", "name", "reqif.name"),
+    "id": ("id", "requirement", "requirement id", "identifier", "key", "req", "reqif.foreignid", "object identifier"),
+    "text": (
+        "text",
+        "statement",
+        "description",
+        "sentence",
+        "reqif.text",
+        "title",
+        "name",
+        "reqif.name",
+        "requirement text",
+        "object text",
+        "primary text",
+    ),
     "formula": ("formula", "formalised as", "formalization", "formalisation", "rcl"),
     "temporal": ("temporal", "temporal property", "ltl"),
     "supported_by": ("supported_by", "supported by", "guarantees", "allocated to"),
@@ -34,7 +46,7 @@ def read_requirements(path: Path) -> tuple[Requirement, ...]:
         data = path.read_bytes()
     except OSError as error:
         raise Rejected(Diagnostic("REQS001", f"{path} cannot be read: {error.strerror}")) from None
-    if path.suffix.lower() in (".reqif", ".xml"):
+    if path.suffix.lower() in (".reqif", ".reqifz", ".xml"):
         return read_reqif(data, str(path))
     try:
         text = data.decode("utf-8-sig")
@@ -72,29 +84,23 @@ def read_csv(text: str, file: str) -> tuple[Requirement, ...]:
 
 def read_reqif(data: bytes, file: str) -> tuple[Requirement, ...]:
     """Raises Rejected."""
-    if b"<!DOCTYPE" in data[:100_000] or b"<!ENTITY" in data:
-        raise Rejected(Diagnostic("REQS003", f"{file} declares a document type or entities: that is not accepted"))
-    try:
-        root = ElementTree.fromstring(data)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        line = error.position[0] if isinstance(error, ElementTree.ParseError) else 1
-        raise Rejected(Diagnostic("REQS003", f"{file} is no XML: {error}", _at(file, line))) from None
-    names = {
-        e.get("IDENTIFIER", ""): _bare(e.get("LONG-NAME", ""))
-        for e in root.iter()
-        if _tag(e).startswith("ATTRIBUTE-DEFINITION-")
-    }
-    enumerated = {e.get("IDENTIFIER", ""): e.get("LONG-NAME", "") for e in root.iter() if _tag(e) == "ENUM-VALUE"}
     found = []
-    for thing in root.iter():
-        if _tag(thing) == "SPEC-OBJECT":
-            values = dict(_values(thing, names, enumerated))
-            cells = {field: next((values[n] for n in known if values.get(n)), "") for field, known in _COLUMNS.items()}
-            cells["id"] = cells["id"] or thing.get("LONG-NAME", "") or thing.get("IDENTIFIER", "")
-            found.append((1, cells))
+    for thing, values in read_objects(data, file):
+        cells = {field: next((values[n] for n in known if values.get(n)), "") for field, known in _COLUMNS.items()}
+        cells["id"] = cells["id"] or thing.name or thing.identifier
+        found.append((thing.line, cells))
     if not found:
-        raise Rejected(Diagnostic("REQS002", f"{file} holds no SPEC-OBJECT", _at(file, 1)))
+        raise Rejected(Diagnostic("REQS002", f"{file} holds no requirement, but for headings", _at(file, 1)))
+    if not any(cells["text"] for _, cells in found):
+        raise Rejected(
+            Diagnostic("REQS002", _no_text(data, file), hint=f"name it one of: {', '.join(_COLUMNS['text'])}")
+        )
     return _requirements(found, file)
+
+
+def _no_text(data: bytes, file: str) -> str:
+    names = dict.fromkeys(name for _, values in read_objects(data, file) for name in values if name)
+    return f"{file} has no attribute with the requirements' text; its attributes: {', '.join(names)}"[:400]
 
 
 def plan_section(requirements: Iterable[Requirement]) -> str:
@@ -134,32 +140,6 @@ def _requirements(rows: Iterable[tuple[int, Mapping[str, str]]], file: str) -> t
     if faults:
         raise Rejected(*faults)
     return tuple(found.values())
-
-
-def _values(
-    thing: ElementTree.Element, names: Mapping[str, str], enumerated: Mapping[str, str]
-) -> Iterator[tuple[str, str]]:
-    for value in thing.iter():
-        tag = _tag(value)
-        if not tag.startswith("ATTRIBUTE-VALUE-"):
-            continue
-        reference = next((e.text or "" for e in value.iter() if _tag(e).startswith("ATTRIBUTE-DEFINITION-")), "")
-        name = names.get(reference.strip())
-        if not name:
-            continue
-        if tag == "ATTRIBUTE-VALUE-XHTML":
-            holder = next((e for e in value.iter() if _tag(e) == "THE-VALUE"), None)
-            text = " ".join("".join(holder.itertext()).split()) if holder is not None else ""
-        elif tag == "ATTRIBUTE-VALUE-ENUMERATION":
-            marks = [(e.text or "").strip() for e in value.iter() if _tag(e) == "ENUM-VALUE-REF"]
-            text = ", ".join(enumerated.get(mark, mark) for mark in marks)
-        else:
-            text = value.get("THE-VALUE", "").strip()
-        yield name, text
-
-
-def _tag(element: ElementTree.Element) -> str:
-    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
 def _bare(name: str) -> str:
