@@ -67,6 +67,7 @@ from avow.evidence.audit import Discrepancy
 from avow.evidence.claims import Standing, judge
 from avow.evidence.ledger import GENESIS, Entry
 from avow.evidence.obligation import Kind, Obligation
+from avow.evidence.record import Evidence
 from avow.evidence.status import Status, best_link, effective, hypotheses, roll_up, weigh
 from avow.system.plan import Requirement, System
 from avow.verdict import Link, Verdict
@@ -200,7 +201,8 @@ def _evidence(facts: Facts) -> tuple[dict[str, tuple[EvidenceView, ...]], tuple[
 def _views(entries: list[Entry], digest: str, planned: Mapping[str, str], run: RunInfo) -> list[EvidenceView]:
     """Where each record stands in time. All answers to today's question count, so that none hides a refutation; but of
     several that say the same only the newest, and none that failed to answer where the same method did answer: leaving
-    these out cannot change the status."""
+    these out cannot change the status. What a method says in support is not believed where its newest score of mutants
+    shows that it would say so of anything."""
 
     def currency(entry: Entry) -> Currency:
         record = entry.evidence
@@ -208,11 +210,22 @@ def _views(entries: list[Entry], digest: str, planned: Mapping[str, str], run: R
             return Currency.WITHDRAWN
         if planned[record.method] != record.key or record.obligation_digest != digest:
             return Currency.STALE
-        if run.fresh and record.run != run.id and not weigh(record).refuted:
+        if run.fresh and record.run != run.id and not weigh(record).refuted and not _is_hollow(record):
             return Currency.SET_ASIDE
         return Currency.CURRENT
 
     standing = [currency(entry) for entry in entries]
+    scored = {
+        e.evidence.method: e.evidence
+        for e, c in zip(entries, standing, strict=True)
+        if c is Currency.CURRENT and "mutation" in e.evidence.details
+    }
+    hollow = {method for method, record in scored.items() if _is_hollow(record)}
+    for at, entry in enumerate(entries):
+        record = entry.evidence
+        speaks = _is_hollow(record) or weigh(record).support is not None
+        if standing[at] is Currency.CURRENT and speaks and _is_hollow(record) != (record.method in hollow):
+            standing[at] = Currency.SUPERSEDED
     answered = {
         e.evidence.method for e, c in zip(entries, standing, strict=True) if c is Currency.CURRENT and not _failed(e)
     }
@@ -235,6 +248,11 @@ def _views(entries: list[Entry], digest: str, planned: Mapping[str, str], run: R
 
 def _failed(entry: Entry) -> bool:
     return entry.evidence.verdict in (Verdict.ERROR, Verdict.NOT_RUN, Verdict.UNKNOWN)
+
+
+def _is_hollow(record: Evidence) -> bool:
+    """Whether it is a score that says that the method notices no mutant."""
+    return record.vacuous and "mutation" in record.details and record.verdict.supports
 
 
 def _hypotheses(entries: tuple[Entry, ...]) -> tuple[str, ...]:

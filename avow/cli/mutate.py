@@ -9,13 +9,16 @@ import click
 @click.argument("system")
 @click.option("--method", help="Only methods of this id.")
 @click.option("--node", help="Only this node.")
-@click.option("--limit", default=4, show_default=True, help="Mutants for each guarantee.")
-@click.option("-n", "jobs", default=2, show_default=True, help="How many at once.")
+@click.option("--limit", type=click.IntRange(1), default=4, show_default=True, help="Mutants for each guarantee.")
+@click.option("-n", "jobs", type=click.IntRange(1), default=2, show_default=True, help="How many at once.")
 def command(system: str, method: str | None, node: str | None, limit: int, jobs: int) -> int:
     """Put near misses of each guarantee in its place and see whether the methods that support it notice.
 
-    Scores go into the ledger and the report. Evidence that notices no mutant is hollow: exit code 1.
+    Scores go into the ledger and the report, which is rendered again. Evidence that notices no mutant is hollow: it
+    supports nothing from then on, and the exit code is 1.
     """
+    import os
+
     from avow.cli.workspace import system_folder, workspace
     from avow.diagnostics import Rejected
     from avow.pipeline.mutation import hunt
@@ -26,12 +29,26 @@ def command(system: str, method: str | None, node: str | None, limit: int, jobs:
     surveyed = survey(system_folder(system))
     if isinstance(surveyed, Rejected):
         raise surveyed
-    works = tuple(w for w in surveyed.catalogue.works if method in (None, w.method) and node in (None, w.node))
+    every = [w for w in surveyed.catalogue.works if not w.is_engine]
+    for what, name, known in (("node", node, {w.node for w in every}), ("method", method, {w.method for w in every})):
+        if name is not None and name not in known:
+            raise click.UsageError(f"no {what} of the plan is called '{name}'; known: {', '.join(sorted(known))}")
+    works = tuple(w for w in every if method in (None, w.method) and node in (None, w.node))
     scores = hunt(place, works, this_run(), limit, jobs)
     for score in scores:
         lost = f"   survives: {'; '.join(score.survivors)}" if score.survivors else ""
+        lost += f"   not judged: {'; '.join(score.unjudged)}" if score.unjudged else ""
         click.echo(f"{score.obligation.partition('/')[2]:<44} {score.method:<14} {score.killed}/{score.mutants}{lost}")
     hollow = [s for s in scores if s.hollow]
     if not scores:
         click.echo("no current evidence to examine: run `doit verify` first")
-    return 1 if hollow else 0
+        return 0
+    os.chdir(place.root)
+    from doit.cmd_base import ModuleTaskLoader
+    from doit.doit_cmd import DoitMain
+
+    from avow.pipeline.tasks import config, pipeline
+
+    tasks = {"DOIT_CONFIG": config(place.root), "task_avow": lambda: pipeline(place.root)}
+    rendered = int(DoitMain(ModuleTaskLoader(tasks)).run(["run", f"report:{surveyed.system.name}"]) or 0)
+    return rendered or (1 if hollow else 0)

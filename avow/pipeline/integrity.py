@@ -26,13 +26,14 @@ def discrepancies(
     system = ledger.path.stem
     plugins = surveyed.system.plan.plugins if surveyed else ()
     works = surveyed.catalogue.works if surveyed else ()
+    planned = {work.engine for work in works if not work.is_engine}
     found = audit(
         ledger,
         workspace.root,
         system=system,
         obligations={o.id: o.digest for o in surveyed.catalogue.obligations} if surveyed else None,
         keys=surveyed.keys if surveyed else None,
-        strengths={name: backend(name, plugins).strength for name in names()},
+        strengths={name: backend(name, plugins).strength for name in (*names(), *planned)},
         engines={(o.id, work.method): work.engine for work in works for o in work.obligations},
         now=datetime.now(UTC),
         strict=strict,

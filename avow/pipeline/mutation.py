@@ -1,9 +1,11 @@
 """Hunting hollow evidence: would a method that supports a guarantee notice if the guarantee said something else?
 
 For each guarantee that a method supports, near misses of it (`avow.logic.mutants`) are put in its place, and the
-method is run on them. A mutant that the method does not support is *killed*. Evidence that no mutant disturbs supports
-nothing: it is recorded as vacuous. The score is appended to the ledger with the evidence that it is about; methods that
-a person's judgement guides (reviews, measurements) do not read the formula and have no score.
+method is run on them. A mutant that it refutes is *killed*, and so is one that a prover, asked in the same way, no
+longer proves. A mutant that could not be judged (no row of a table speaks of it, its trigger was not met, the tool
+failed) is neither killed nor a survivor: not to understand a question is not to see through it. Evidence that no judged
+mutant disturbs supports nothing: it is recorded as vacuous. The score is appended to the ledger with the evidence that
+it is about; methods that a person's judgement guides (reviews, measurements) do not read the formula and have no score.
 """
 
 from __future__ import annotations
@@ -19,10 +21,10 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import Evidence
 from avow.pipeline import worker
 from avow.pipeline.altered import Altered, chosen
-from avow.pipeline.discharge import ledger_of
+from avow.pipeline.discharge import RETRY, ledger_of
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work, method_backend, planned_method
-from avow.verdict import Link
+from avow.verdict import Link, Outcome, Verdict
 from avow.workspace import Workspace
 
 _Task = tuple[Work, Obligation, Evidence]
@@ -30,20 +32,23 @@ _Task = tuple[Work, Obligation, Evidence]
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """How many near misses of a guarantee a method noticed. `survivors` says what was changed in the others."""
+    """How many near misses of a guarantee a method noticed. `survivors` and `unjudged` say what was changed in the
+    others."""
 
     obligation: str
     method: str
-    mutants: int
+    killed: int
     survivors: tuple[str, ...]
+    unjudged: tuple[str, ...]
 
     @property
-    def killed(self) -> int:
-        return self.mutants - len(self.survivors)
+    def mutants(self) -> int:
+        """How many were judged."""
+        return self.killed + len(self.survivors)
 
     @property
     def hollow(self) -> bool:
-        """Not one of several mutants was noticed."""
+        """Mutants were judged, and not one was noticed."""
         return self.mutants > 0 and self.killed == 0
 
 
@@ -75,22 +80,40 @@ def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
     work, obligation, record = task
     node = work.system.contract.node(work.node)
     mutants = chosen(node, node.clause(obligation.name), limit)
-    survivors = []
+    killed, survivors, unjudged = 0, [], []
     for number, mutant in enumerate(mutants):
         folder = Path(tempfile.mkdtemp(prefix="avow-mutant-"))
         try:
             report = worker.run(workspace, work, (obligation,), folder, Altered(obligation.name, number, limit))
         finally:
             shutil.rmtree(folder, ignore_errors=True)
-        if report.outcomes[0].verdict.supports and not report.outcomes[0].vacuous:
-            survivors.append(mutant.change)
-    score = Score(obligation.id, work.method, len(mutants), tuple(survivors))
+        match _noticed(report.outcomes[0], record):
+            case True:
+                killed += 1
+            case False:
+                survivors.append(mutant.change)
+            case None:
+                unjudged.append(mutant.change)
+    score = Score(obligation.id, work.method, killed, tuple(survivors), tuple(unjudged))
     ledger_of(workspace.ledger(work.system.name)).append(_scored(record, score, run))
     return score
 
 
+def _noticed(outcome: Outcome, record: Evidence) -> bool | None:
+    """Whether the method saw through a mutant; None where it did not judge it."""
+    if outcome.verdict is Verdict.REFUTED:
+        return True
+    if outcome.verdict.supports:
+        return None if outcome.vacuous else False
+    # a prover need not refute: it proved the guarantee, and does not prove the mutant
+    is_prover = record.verdict is Verdict.PROVED and record.strength is Verdict.PROVED
+    return True if is_prover and outcome.verdict is Verdict.UNKNOWN and not outcome.details.get(RETRY) else None
+
+
 def _scored(record: Evidence, score: Score, run: Run) -> Evidence:
-    details = {"killed": score.killed, "mutants": score.mutants, "survivors": list(score.survivors)}
+    details: dict[str, object] = {"killed": score.killed, "mutants": score.mutants, "survivors": list(score.survivors)}
+    if score.unjudged:
+        details["unjudged"] = list(score.unjudged)
     return replace(
         record,
         details={**record.details, "mutation": details},

@@ -32,7 +32,7 @@ def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, s
         verdict = "[green]every gate passes[/]" if r.exit_code == 0 else "[red]a gate fails[/]"
         table.add_row(r.system, *(str(r.counts.get(word, "")) or "" for word in shown), verdict)
     for name in broken:
-        table.add_row(name, *("" for _ in shown), "[red]not read: see above[/]")
+        table.add_row(name, *("" for _ in shown), "[red]not done: see above[/]")
     console.print()
     console.print(table)
     for r in results:
@@ -67,7 +67,7 @@ def job_summary(results: Sequence[Result], broken: Sequence[str]) -> str:
     for r in sorted(results, key=lambda r: r.system):
         verdict = "✅ every gate passes" if r.exit_code == 0 else "❌ a gate fails"
         lines.append(f"| {r.system} | {' | '.join([*(str(r.counts.get(w, '')) for w in shown), verdict])} |")
-    lines += [f"| {name} | {'| ' * len(shown)}❌ not read |" for name in broken]
+    lines += [f"| {name} | {'| ' * len(shown)}❌ not done |" for name in broken]
     failing = [(r.system, title, reason) for r in results for title, passed, reason in r.gates if not passed]
     lines += ["", *(f"- **{_inline(system)}**: {_inline(title)}: {_inline(why)}" for system, title, why in failing)]
     return "\n".join(lines) + "\n"
