@@ -22,6 +22,7 @@ _NEEDS = {
     "needs_dafny": lambda: shutil.which("dafny") is not None,
     "needs_dot": lambda: shutil.which("dot") is not None,
     "needs_latex": lambda: shutil.which("pdflatex") is not None,
+    "needs_pacti": lambda: importlib.util.find_spec("pacti") is not None,
     "needs_spin": lambda: shutil.which("spin") is not None and shutil.which("gcc") is not None,
 }
 
