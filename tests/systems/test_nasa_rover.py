@@ -11,10 +11,12 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from avow.calculus.composition import Composition, compose
 from avow.calculus.derivation import Phase, Rule
 from avow.calculus.obligations import composition_obligations, requirement_obligations, settle_all
+from avow.cli import simulate
 from avow.logic.evaluate import compile_term
 from avow.logic.values import FunctionValue
 from avow.system.load import load_system
@@ -61,9 +63,9 @@ def composition() -> Composition:
 
 
 def requirement(name: str, limits: Limits | None = None, of: System | None = None) -> Outcome:
-    of = of or system()
-    [obligation] = [o for o in requirement_obligations(of) if o.name == name]
-    [outcome] = settle_all(compose(of), [obligation], limits or Limits())
+    composed = compose(of) if of else composition()  # one composition shares what its answers have in common
+    [obligation] = [o for o in requirement_obligations(composed.frame.system) if o.name == name]
+    [outcome] = settle_all(composed, [obligation], limits or Limits())
     return outcome
 
 
@@ -136,17 +138,97 @@ def test_the_loop_the_paper_does_not_mention_has_a_first_element() -> None:
 # -- the published R1.4 ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_with_the_published_margin_the_battery_is_not_proved(tmp_path: Path) -> None:
+def copy(tmp_path: Path, *changes: tuple[str, str], use: str = "0.03") -> System:
+    """The rover with changed texts; with another use of a step, over charges that are as far apart."""
     for file in FOLDER.rglob("*"):
         target = tmp_path / "nasa_rover" / file.relative_to(FOLDER)
         if file.is_file() and file.suffix in {".rcl", ".yaml", ".csv"}:
             target.parent.mkdir(parents=True, exist_ok=True)
             text = file.read_text(encoding="utf-8")
-            target.write_text(text.replace(SHIPPED_R1_4, PUBLISHED_R1_4), encoding="utf-8")
-    faulty = load_system(tmp_path / "nasa_rover")
+            for old, new in (*changes, ("Use = 0.03", f"Use = {use}")):
+                text = text.replace(old, new)
+            target.write_text(text, encoding="utf-8")
+    charges = {max(1 - k * Fraction(use), Fraction(0)) for k in range(60)}
+    table = tmp_path / "nasa_rover" / "models" / "charges.csv"
+    table.write_text("\n".join(["charge", *map(str, sorted(charges))]), encoding="utf-8")
+    return load_system(tmp_path / "nasa_rover")
+
+
+SMALL = ("in.count: 7", "in.count: 2")
+PUBLISHED = (SHIPPED_R1_4, PUBLISHED_R1_4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["R1", "R1_kept"])
+def test_with_the_published_margin_avow_finds_the_run_to_an_empty_battery(tmp_path: Path, name: str) -> None:
+    """The solver builds no map; the search over the plan's scenario needs none built."""
+    faulty = copy(tmp_path, PUBLISHED)
     assert PUBLISHED_R1_4 in (tmp_path / "nasa_rover" / "system.rcl").read_text(encoding="utf-8")
-    assert requirement("R1_kept", Limits(0.3), faulty).verdict is Verdict.UNKNOWN
+    outcome = requirement(name, of=faulty)
+    assert outcome.verdict is Verdict.REFUTED
+    assert outcome.counterexample is not None
+    places = [int(dict(step)["Hardware.position"]) for step in outcome.counterexample.trace]
+    charges = [Fraction(dict(step)["Hardware.charge"]) for step in outcome.counterexample.trace]
+    assert charges[-1] == 0 or charges[-1] < USE * AWAY[places[-1], CHARGER]
+    for place, following, before, after in zip(places, places[1:], charges, charges[1:], strict=False):
+        assert place == following or (place, following) in STEPS
+        assert after == 1 or before - USE <= after <= before
+
+
+# -- the contracts, run on the grid ------------------------------------------------------------------------------------
+
+
+def test_the_charges_of_the_scenario_are_a_step_apart() -> None:
+    with (FOLDER / "models" / "charges.csv").open(encoding="utf-8") as file:
+        charges = [Fraction(row["charge"]) for row in csv.DictReader(file)]
+    assert charges == sorted({max(1 - k * USE, Fraction(0)) for k in range(60)})
+    with (FOLDER / "models" / "mission.csv").open(encoding="utf-8") as file:
+        assert tuple(int(row["cell"]) for row in csv.DictReader(file)) == MISSION
+
+
+@pytest.mark.slow
+def test_every_step_on_the_grid_is_looked_at() -> None:
+    for name in ("R1_grid", "PLANS_grid"):
+        outcome = requirement(name)
+        assert outcome.verdict is Verdict.CHECKED, outcome.summary
+        assert outcome.details["exhaustive"] is True
+
+
+def test_a_small_mission_on_the_grid(tmp_path: Path) -> None:
+    of = copy(tmp_path, SMALL, use="0.08")
+    for name in ("R1_grid", "PLANS_grid"):
+        outcome = requirement(name, of=of)
+        assert outcome.verdict is Verdict.CHECKED, outcome.summary
+        assert outcome.details["exhaustive"] is True
+
+
+FREE_MOVES = "(in.step(out.planC(k), out.planC(k + 1)) and in.free(out.planC(k)) and in.free(out.planC(k + 1)))"
+SHORTEST = "in.away(out.planC(k), in.charger) + k == out.lengthC"
+
+
+@pytest.mark.parametrize(
+    ("name", "faults"),
+    [
+        ("R1_grid", (PUBLISHED,)),
+        ("R1_grid", (("in.energy - Use <= out.charge", "in.energy - 3 * Use <= out.charge"),)),
+        ("PLANS_grid", ((FREE_MOVES, "in.free(out.planC(k))"), (SHORTEST, "out.lengthC <= 2"))),
+    ],
+)
+def test_faults_are_found_on_the_grid(tmp_path: Path, name: str, faults: tuple[tuple[str, str], ...]) -> None:
+    outcome = requirement(name, of=copy(tmp_path, SMALL, *faults, use="0.08"))
+    assert outcome.verdict is Verdict.REFUTED, outcome.summary
+    assert outcome.counterexample is not None
+    last = [dict(step) for step in outcome.counterexample.trace]
+    if name == "R1_grid":
+        assert any(Fraction(step["Hardware.charge"]) == 0 for step in last)
+
+
+def test_a_run_is_shown() -> None:
+    arguments = [str(FOLDER), "--seed", "1", "--steps", "5"]
+    result = CliRunner().invoke(simulate.command, arguments, standalone_mode=False)
+    assert result.exception is None
+    assert "step 5" in result.output
+    assert "ComputePlan2Destination.planD    {0: 0, " in result.output
 
 
 def test_the_counterexample_meets_every_contract_but_the_repaired_clause() -> None:
