@@ -73,7 +73,7 @@ def test_an_initial_value_that_breaks_the_assumption_is_found(tmp_path: Path) ->
         "out.at(0, 0) and out.at(9, 9)",
     )
     assert plan != REPAIRED
-    _, answers = settled(case_study(tmp_path, "remote_inspection", plan), milliseconds=2_000)
+    _, answers = settled(case_study(tmp_path, "remote_inspection", plan), milliseconds=700)
     clause = {str(condition.about): answer for condition, answer in answers.settled.items()}
     assert clause["navigation.was_somewhere"].verdict is not Verdict.PROVED
     assert answers.verdict is not Verdict.PROVED
@@ -84,7 +84,7 @@ def test_waypoints_too_close_are_found_at_the_hair(tmp_path: Path) -> None:
     just_enough = case_study(tmp_path, "remote_inspection", REPAIRED)
     assert settled(just_enough, "D1")[1].verdict is Verdict.PROVED
     closer = REPAIRED.replace("-0.5 <= x - x' <= 0.5", "-0.49 <= x - x' <= 0.49")
-    _, answers = settled(case_study(tmp_path, "remote_inspection", closer), "D1", 4_000)
+    _, answers = settled(case_study(tmp_path, "remote_inspection", closer), "D1", 1_500)
     clause = {condition.clause: answer for condition, answer in answers.settled.items()}
     assert clause["one_waypoint"].verdict is Verdict.REFUTED
     shown = clause["one_waypoint"].cases[0].counterexample

@@ -95,7 +95,7 @@ def test_refines(tmp_path: Path) -> None:
 @pytest.mark.needs_dafny
 @pytest.mark.parametrize(
     "name",
-    ["relational", "steps", *(pytest.param(n, marks=pytest.mark.slow) for n in ("calculus", "r4"))],
+    ["relational", *(pytest.param(n, marks=pytest.mark.slow) for n in ("steps", "calculus", "r4"))],
 )
 def test_the_rules_are_proved(tmp_path: Path, name: str) -> None:
     completed = run(["dafny", "/compile:0", str(PROOFS / f"{name}.dfy")], seconds=120)
@@ -104,6 +104,7 @@ def test_the_rules_are_proved(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.needs_dafny
+@pytest.mark.slow
 def test_dafny_would_notice(tmp_path: Path) -> None:
     """The same proof without its persistence premise does not verify."""
     source = (PROOFS / "calculus.dfy").read_text()
