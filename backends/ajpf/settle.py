@@ -105,10 +105,10 @@ def _summary(
         parts.append(f"{_count(counted)} {'holds' if len(counted) == 1 else 'hold'} in every reachable state")
     elif verdict is Verdict.REFUTED:
         failing = by_verdict[Verdict.REFUTED]
-        parts.append(f"{len(failing)} of {_count(counted)} fail{'s' if len(failing) == 1 else ''}{_which(failing)}")
+        parts.append(f"{_some(failing, counted)} fail{'s' if len(failing) == 1 else ''}{_which(failing)}")
     else:
         failing = by_verdict[verdict]
-        parts.append(f"{len(failing)} of {_count(counted)}: {verdict}: {results[failing[0].key].reason}")
+        parts.append(f"{_some(failing, counted)}: {verdict}: {results[failing[0].key].reason}")
     if vacuous:
         every = len(vacuous) == len([p for p in claim.properties if p.trigger is not None])
         if every:
@@ -133,6 +133,11 @@ def _summary(
 
 def _count(properties: Sequence[Property]) -> str:
     return "the property" if len(properties) == 1 else f"{len(properties)} properties"
+
+
+def _some(these: Sequence[Property], all_of_them: Sequence[Property]) -> str:
+    every = _count(all_of_them)
+    return every if len(these) == len(all_of_them) == 1 else f"{len(these)} of {every}"
 
 
 def _which(properties: Sequence[Property]) -> str:

@@ -39,8 +39,8 @@ from avow.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Contract, Node, Port
 from avow.language.printer import show_sort as show
 from avow.language.printer import show_term
-from avow.language.sorts import BOOL, INTEGER, NATURAL, FunctionSort, SequenceSort, Sort, components
-from avow.language.terms import Apply, Role, Term, Variable
+from avow.language.sorts import BOOL, INTEGER, NATURAL, FunctionSort, SequenceSort, Sort, TupleSort, components
+from avow.language.terms import Apply, Role, Term, TupleTerm, Variable
 from avow.logic.formula import free_variables, substitute
 
 T = TypeVar("T")
@@ -70,6 +70,22 @@ def check(source: Source, contract: Contract, node: Node, table: Table) -> Check
     """Raises Rejected, with everything that is wrong (codes ``HOARE200``, ``HOARE300``, ``HOARE400``)."""
     checker = _Checker(source, contract, node)
     return checker.run(table)
+
+
+def _covers(term: Term, sort: Sort, used: set[Variable]) -> bool:
+    """Whether a term can have every value of an input's sort, whatever the terms of other inputs have: it is made of
+    variables that are free to take them. Those are then used up."""
+    match term:
+        case Variable() | Apply(function=Variable()):
+            head = term if isinstance(term, Variable) else term.function
+            assert isinstance(head, Variable)
+            free = head not in used and (term.sort == sort or (term.sort, sort) == (INTEGER, NATURAL))
+            used.add(head)
+            return free
+        case TupleTerm(items=items) if isinstance(sort, TupleSort):
+            return all(_covers(item, part, used) for item, part in zip(items, sort.items, strict=True))
+        case _:
+            return False
 
 
 class _Checker:
@@ -286,11 +302,11 @@ class _Checker:
         for (role, name), found in sorted(terms.items(), key=lambda item: item[0]):
             if role is not Role.INPUT:
                 continue
-            head = found.function if isinstance(found, Apply) else found
-            if isinstance(head, Variable) and head not in used:
-                used.add(head)
+            sort = self.node.input(name).sort
+            if _covers(found, sort, used):
                 continue
-            said.append(f"in.{name} is {show_term(found, 'unicode')}: the plan covers no other value of it")
+            kind = "" if found.sort == sort else f", {show(found.sort)}"
+            said.append(f"in.{name} is {show_term(found, 'unicode')}{kind}: the plan covers no other value of it")
         said += [
             f"in.{name}(…) is {show_term(p.meaning, 'unicode')}: the plan covers no other relation"
             for (role, name), p in sorted(predicates.items())

@@ -158,6 +158,12 @@ def expect(expression: Expression, sort: Sort, names: Names) -> None:
     match expression:
         case Name(name=name, prefix=None) if name not in names.vocabulary.values:
             names.sorts.setdefault(name, sort)
+        case Tuple(items=items) if isinstance(sort, TupleSort):
+            for item, part in zip(items, sort.items, strict=False):
+                expect(item, part, names)
+        case Sequence(items=items) if isinstance(sort, SequenceSort):
+            for item in items:
+                expect(item, sort.item, names)
         case Call(function=Name(name=name, prefix=None), arguments=arguments):
             if name in names.vocabulary.constructors:
                 parameters = names.vocabulary.constructors[name][1].parameters

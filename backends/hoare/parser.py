@@ -52,7 +52,7 @@ def parse_program(text: str, file: str) -> Source:
 def parse_expression(text: str, place: Span) -> Expression:
     """An expression from the plan, every part of which is reported at `place`. Raises Rejected."""
     try:
-        expression: Expression = _parse(text, place.file, "expression")
+        expression: Expression = _parse(text, place.file, "expression", place)
     except Rejected as rejected:
         raise Rejected(
             *(Diagnostic(d.code, f'in "{text}": {d.message}', place, hint=d.hint) for d in rejected.diagnostics)
@@ -60,7 +60,7 @@ def parse_expression(text: str, place: Span) -> Expression:
     return expression
 
 
-def _parse(text: str, file: str, start: str) -> Any:
+def _parse(text: str, file: str, start: str, place: Span | None = None) -> Any:
     lark = _lark()
     last: Token | None = None
     try:
@@ -71,7 +71,7 @@ def _parse(text: str, file: str, start: str) -> Any:
         for token in tokens:
             interactive.feed_token(token)
             last = token
-        result = _Build(file).transform(interactive.feed_eof(last))
+        result = _Build(file, place).transform(interactive.feed_eof(last))
     except UnexpectedCharacters as error:
         span = Span(file, error.line, error.column, error.line, error.column + 1)
         raise Rejected(Diagnostic("HOARE100", f"this character has no meaning here: {error.char!r}", span)) from error
@@ -147,13 +147,15 @@ def _too_deep(root: Any) -> Span | None:
 
 @v_args(meta=True)
 class _Build(Transformer_NonRecursive):  # type: ignore[misc]
-    """Syntax tree from Lark's, without recursion."""
+    """Syntax tree from Lark's, without recursion. `place` is that of every part, if it is given."""
 
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, place: Span | None = None) -> None:
         super().__init__()
-        self._file = file
+        self._file, self._place = file, place
 
     def _span(self, meta: Any) -> Span:
+        if self._place is not None:
+            return self._place
         if meta.empty:
             return Span(self._file, 1, 1, 1, 1)
         return Span(self._file, meta.line, meta.column, meta.end_line, meta.end_column)
