@@ -84,6 +84,8 @@ def trace(case: Case) -> tuple[Row, ...]:
                 stack += [(below, through) for below in reversed(requirements[claim].rests_on)]
             elif claim in views:
                 rows += _rows(views[claim], requirement.id, through)
+                # a guarantee is worth what its node's contract is worth: what shows that is part of the trace
+                stack += [(below, through) for below in reversed(views[claim].rests_on)]
             else:
                 rows.append(Row(requirement.id, through, obligation=claim, remark="orphan: no such claim"))
         if len(rows) == before:

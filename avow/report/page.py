@@ -18,7 +18,7 @@ from avow.assurance.argument import Argument, Element, build_argument
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.assurance.policy import techniques
-from avow.assurance.traceability import COLUMNS, Row
+from avow.assurance.traceability import Row
 from avow.assurance.trend import trend
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
@@ -176,18 +176,35 @@ def _ticks(text: str) -> Markup:
 
 
 def render_traceability(case: Case, rows: Sequence[Row]) -> str:
-    """The traceability matrix as a page, orphans first told."""
+    """The traceability matrix as a page: coverage and orphans first, then each requirement with what it rests on."""
+    guarantees = {view.id for view in case.obligations if view.obligation.kind is Kind.GUARANTEE}
+    serving = {row.obligation for row in rows if row.requirement and row.obligation in guarantees}
+    reached = {row.requirement for row in rows if row.requirement and row.evidence}
     return (
         environment()
         .get_template("traceability.html.j2")
         .render(
             case=case,
-            rows=rows,
-            orphans=[row for row in rows if row.remark],
-            columns=COLUMNS,
+            orphans=_by_claim([row for row in rows if row.remark]),
+            paths={r.id: _by_claim([row for row in rows if row.requirement == r.id]) for r in case.requirements},
+            others=_by_claim([row for row in rows if not row.requirement]),
+            reached=len(reached),
+            guarantees=len(guarantees),
+            serving=len(serving),
+            known={view.id for view in case.obligations},
+            total=len(rows),
             style=Markup(asset("style.css")),
         )
     )
+
+
+def _by_claim(rows: Sequence[Row]) -> list[tuple[Row, list[Row]]]:
+    """Paths to one claim together: the first of them, and all that bear evidence."""
+    found: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        key = (row.requirement, row.derivation, row.obligation, row.remark, "" if row.obligation else str(len(found)))
+        found.setdefault(key, []).append(row)
+    return [(group[0], [row for row in group if row.method]) for group in found.values()]
 
 
 def render_index(cases: Sequence[Case]) -> str:
@@ -196,7 +213,13 @@ def render_index(cases: Sequence[Case]) -> str:
     return (
         environment()
         .get_template("index.html.j2")
-        .render(rows=rows, good=all(case.good for case in cases), style=Markup(asset("style.css")), quote=quote)
+        .render(
+            rows=rows,
+            failing=[case for case in cases if not case.good],
+            examined=[case for case in cases if wording.banner_tone(case) == "open"],
+            style=Markup(asset("style.css")),
+            quote=quote,
+        )
     )
 
 

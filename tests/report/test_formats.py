@@ -14,7 +14,7 @@ import jsonschema
 import junitparser
 import pytest
 import yaml
-from assurance.sample import case, evidence, guarantee, node_plan, rover_case, system
+from assurance.sample import case, evidence, guarantee, node_plan, obligation, rover_case, system
 
 from avow.assurance.argument import build_argument
 from avow.assurance.codec import case_schema
@@ -243,6 +243,56 @@ def test_a_path_goes_through_the_derivation() -> None:
         "rover/system/composition/D1-position",
         "rover/localisation/guarantee/one_position",
     }
+
+
+def test_what_a_guarantee_rests_on_is_part_of_the_trace() -> None:
+    from avow.evidence.obligation import Kind
+    from avow.system.plan import Requirement
+
+    g, sane = guarantee("n", "g"), obligation("n", Kind.SANITY, "realizable")
+    subject = system({"n": ["g"]}, requirements=[Requirement("R", "t", None, None, ("n.g",))])
+    found = case(subject, [g, sane], [evidence(g), evidence(sane, Verdict.REFUTED, "sanity")])
+    told = {r.obligation: (r.requirement, r.verdict) for r in trace(found)}
+    assert told[sane.id] == ("R", "refuted")
+
+
+def test_the_matrix_page_counts_what_is_covered() -> None:
+    from avow.report.page import render_traceability
+    from avow.system.plan import Requirement
+
+    g, h = guarantee("n", "g"), guarantee("n", "h")
+    subject = system(
+        {"n": ["g", "h"]},
+        requirements=[Requirement("R", "t", None, None, ("n.g",)), Requirement("LONELY", "t", None, None, ())],
+    )
+    found = case(subject, [g, h], [evidence(g), evidence(g, Verdict.TESTED, "hypothesis"), evidence(h)])
+    text = render_traceability(found, trace(found))
+    assert "<b>1 of 2</b> requirements lead to evidence" in text
+    assert "<b>1 of 2</b> guarantees serve a requirement" in text
+    assert "<b>2 orphans</b>" in text
+    assert text.count('href="index.html#rover/n/guarantee/g"') == 1, "one row for a claim, with all of its evidence"
+    assert "hypothesis" in text
+
+
+def test_the_index_does_not_call_known_bad_material_passed() -> None:
+    from avow.report.page import render_index
+    from avow.system.plan import Finding, Requirement
+
+    g = guarantee("n", "g")
+    bad = system(
+        {"n": ["g"]},
+        policy="reproduction",
+        requirements=[Requirement("R", "t", None, None, ("n.g",))],
+        expected=[Finding("n/guarantee/g", "refuted")],
+    )
+    examined = case(bad, [g], [evidence(g, Verdict.REFUTED)])
+    good = case(system({}), [], [])
+    assert examined.exit_code == 0
+    text = render_index([examined, good])
+    assert "Every system that is relied upon passes its gates; 1 system is only examined" in " ".join(text.split())
+    assert text.count("</span> passes</span>") == 1
+    assert "only examined, and as bad as expected" in render_index([examined])
+    assert "Every system that is relied upon" not in render_index([examined])
 
 
 # -- trend ----------------------------------------------------------------------------------------------------------
