@@ -10,6 +10,10 @@ import tempfile
 from pathlib import Path
 
 
+PART = ".part"
+"""How the name of a file ends that is still being written; one that stays was left by a killed process."""
+
+
 def digest(data: bytes | str) -> str:
     """SHA-256, in hexadecimal."""
     return hashlib.sha256(data.encode() if isinstance(data, str) else data).hexdigest()
@@ -43,12 +47,17 @@ def is_intact(path: Path, sha: str) -> bool:
 
 
 def write(path: Path, content: str | bytes) -> bool:
-    """Put `content` in place of the file in one step; says whether that changed anything."""
+    """Put `content` in place of the file in one step; says whether that changed anything. A device or a pipe is written
+    to, and stays what it is."""
     data = content.encode() if isinstance(content, str) else content
+    if path.exists() and not path.is_file() and not path.is_dir():
+        with path.open("wb") as stream:
+            stream.write(data)
+        return True
     if path.is_file() and path.read_bytes() == data:
         return False
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=PART)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)

@@ -81,8 +81,8 @@ def audit(
     found += _redirected(ledger)
     found += _misplaced(entries, system, obligations or {}, keys or {})
     found += _impossible(entries, strengths or {}, engines or {}, keys or {})
-    found += _clock(entries, now)
     found += _files(entries, root, keys, strict)
+    found += _clock(entries, now)
     return tuple(dict.fromkeys(found))
 
 

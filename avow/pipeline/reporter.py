@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import shutil
 import sys
@@ -13,6 +14,7 @@ from typing import IO, Any
 from doit.reporter import ConsoleReporter
 
 from avow import process
+from avow.files import PART
 from avow.pipeline import shortcut
 from avow.pipeline.results import exit_code, finished
 from avow.workspace import Workspace
@@ -40,6 +42,8 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
     def initialize(self, tasks: dict[str, Any], selected_tasks: list[str]) -> None:
         self._selected = list(selected_tasks)
         self._run_lock = _lock_run(self.outstream)
+        if self._run_lock is not None and "avow.pipeline.stages" in sys.modules:
+            _sweep(Workspace(Path.cwd()))
 
     def execute_task(self, task: Any) -> None:
         with self._lock:
@@ -150,6 +154,14 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
     def _clear(self) -> None:
         if self._live:
             self.outstream.write("\r" + " " * (shutil.get_terminal_size().columns - 1) + "\r")
+
+
+def _sweep(workspace: Workspace) -> None:
+    """Remove what a killed run left half written; no other run is under way now."""
+    for folder in (workspace.artifacts, workspace.reports):
+        for left in folder.rglob(f".*{PART}"):
+            with contextlib.suppress(OSError):
+                left.unlink()
 
 
 def _lock_run(out: IO[str]) -> IO[str] | None:

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Sequence
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.evidence.obligation import Kind
+from avow.evidence.record import Evidence
 from avow.report.source import plain_lines
-from avow.report.wording import clean, verdict_line, where
+from avow.report.wording import clean, mutation, verdict_line, where
 
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
 _LONG = 200
@@ -88,8 +89,13 @@ def _guarantees(case: Case) -> list[ObligationView]:
 
 
 def _row(view: ObligationView) -> tuple[str, ...]:
-    methods = ", ".join(f"{i.entry.evidence.method} {i.entry.evidence.verdict}" for i in view.counting)
+    methods = ", ".join(_answer(item.entry.evidence) for item in view.counting)
     return _md(short(view.id)), _md(view.criticality), view.standing.value, _md(methods), _md(where(view))
+
+
+def _answer(evidence: Evidence) -> str:
+    score = mutation(evidence)
+    return f"{evidence.method} {evidence.verdict}{f' ({score})' if score else ''}"
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

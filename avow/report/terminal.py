@@ -15,6 +15,7 @@ from avow.report.wording import (
     bound_text,
     history,
     in_lines,
+    mutation,
     outline,
     rerun,
     tone,
@@ -50,6 +51,8 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
         tool = escape(f"({e.tool} {e.tool_version}, link {e.link})")
         out.print(f"\n{_status(Status(e.verdict))}{vacuous} by [bold]{escape(e.method)}[/] {tool}")
         out.print(f"  {escape(e.summary)}")
+        if mutation(e):
+            out.print(f"  {escape(mutation(e))}")
         if e.bound:
             out.print(f"  [dim]within: {escape(bound_text(e.bound))}[/]")
         for hypothesis in e.hypotheses:

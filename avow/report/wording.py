@@ -192,10 +192,16 @@ def bound_text(bound: Mapping[str, Any]) -> str:
 
 
 def mutation(evidence: Evidence) -> str:
-    """How sharp the tests are, where the method measured it (details: ``mutation``): ``46 of 50 mutants killed``."""
+    """How sharp the evidence is, where it was measured (details: ``mutation``): ``46 of 50 mutants killed``, and what
+    was changed in those that it did not notice, or that could not be judged."""
     match evidence.details.get("mutation"):
-        case {"killed": int(killed), "mutants": int(mutants)}:
-            return f"{killed} of {mutants} mutants killed"
+        case {"killed": int(killed), "mutants": int(mutants), **more}:
+            parts = [f"{killed} of {mutants} mutants killed"]
+            for key, words in (("survivors", "not noticed"), ("unjudged", "not judged")):
+                match more.get(key):
+                    case [_, *_] as listed:
+                        parts.append(f"{words}: {', '.join(map(str, listed))}")
+            return "; ".join(parts)
         case {"score": int() | float() as score}:
             return f"mutation score {score:.0%}"
         case int() | float() as score if not isinstance(score, bool):

@@ -142,3 +142,17 @@ def test_another_method_still_counts() -> None:
     tested = evidence("n.g", Verdict.TESTED, "hypothesis")
     found = case(subject, [guarantee("n", "g")], [PROOF, scored(0, 4), tested])
     assert found.obligations[0].status is Status.TESTED
+
+
+def test_scores_are_in_the_report(tmp_path: Path) -> None:
+    from avow.report import render_all
+
+    subject = system({"n": ["g"]}, plans=[node_plan("n", "low", "hoare")])
+    mutation = {"killed": 3, "mutants": 4, "survivors": ["18 becomes 19"], "unjudged": ["low becomes mid"]}
+    found = case(subject, [guarantee("n", "g")], [evidence("n.g", details={"mutation": mutation})])
+    render_all(found, tmp_path)
+    score = "3 of 4 mutants killed; not noticed: 18 becomes 19; not judged: low becomes mid"
+    for name in ("index.html", "report.md"):
+        assert score in (tmp_path / name).read_text(), name
+    listed = json.loads((tmp_path / "report.json").read_text())["obligations"][0]["evidence"][0]["entry"]["evidence"]
+    assert listed["details"]["mutation"] == mutation
