@@ -98,6 +98,13 @@ def test_a_comment_reruns_nothing_below_the_check(robot: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     assert {stage.split()[0] for stage in ran(done)} <= {"check", "export", "obligations"}
     assert len(ledger(robot)) == records
+    # but the report shows the contract as it stands now, and agrees with it
+    assert "// a cold room" in (robot / "reports" / "thermostat" / "report.md").read_text()
+    sources = case(robot)["sources"]
+    assert isinstance(sources, list)
+    assert "// a cold room" in sources[0]["text"]
+    checked = run(robot, "avow", "report", "--check", "reports/thermostat")
+    assert checked.returncode == 0, checked.stdout
 
 
 def test_a_threshold_breaks_what_depends_on_it_and_nothing_else(robot: Path) -> None:
