@@ -83,6 +83,28 @@ class Report:
     """Name → text of logs and results to be kept beside the artifacts."""
 
 
+@dataclass(frozen=True, slots=True)
+class Translated:
+    """A node in a notation of a backend's own."""
+
+    files: Mapping[str, str]
+    """Name → text; names are relative to a folder of the node's own."""
+    missing: tuple[Diagnostic, ...] = ()
+    """A warning for each guarantee that is not in them, with the reason."""
+
+
+@runtime_checkable
+class Translates(Protocol):
+    """What a backend may offer besides: notations for `avow translate --to …`."""
+
+    translations: Mapping[str, str]
+    """Notation → what it is, in a few words."""
+
+    def translate(self, notation: str, system: System, node: Node) -> Translated:
+        """Pure, like `export`. Raises Rejected where nothing of the node can be said in the notation."""
+        ...
+
+
 @runtime_checkable
 class Backend(Protocol):
     """See `docs/adding-a-backend.md`."""

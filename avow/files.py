@@ -9,7 +9,6 @@ import stat
 import tempfile
 from pathlib import Path
 
-
 PART = ".part"
 """How the name of a file ends that is still being written; one that stays was left by a killed process."""
 

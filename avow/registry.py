@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib
 from collections.abc import Iterable
 from importlib.metadata import EntryPoint, entry_points
 
-from avow.backend import Backend
+from avow.backend import Backend, Translates
 from avow.diagnostics import Diagnostic, Rejected
 
 GROUP = "avow.backends"
@@ -53,6 +54,21 @@ def backend(name: str, plugins: tuple[str, ...] = ()) -> Backend:
         broken = Diagnostic("BACKEND003", f"the backend '{name}' ({point.value}) does not load: {error}")
         raise Rejected(broken) from error
     return _promise(found, point.value)
+
+
+def translators(plugins: tuple[str, ...] = ()) -> dict[str, Translates]:
+    """Notation → the backend that translates into it. A backend that does not load offers none; of two that offer one
+    notation, the first by name has it."""
+    found: dict[str, Translates] = {}
+    offered: list[object] = []
+    for name in names():
+        with contextlib.suppress(Rejected):
+            offered.append(backend(name, plugins))
+    for one in (*offered, *_plugins(plugins)):
+        if isinstance(one, Translates):
+            for notation in one.translations:
+                found.setdefault(notation, one)
+    return found
 
 
 def _plugins(modules: Iterable[str]) -> tuple[Backend, ...]:

@@ -6,6 +6,8 @@ terminal, and long lines are cut to what surrounds the place.
 
 from __future__ import annotations
 
+import os
+import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePath
@@ -17,6 +19,8 @@ from avow.diagnostics import Diagnostic, Severity, Span
 
 _WIDTH = 100
 _TAB = 4
+_READ = 20_000_000
+"""Bytes of a file that are looked at for the lines to show."""
 _COLOURS = {Severity.ERROR: "31", Severity.WARNING: "33", Severity.NOTE: "36"}
 
 
@@ -50,12 +54,20 @@ class _Lines:
             text = self._texts.get(file)
             if text is None:
                 try:
-                    text = Path(file).read_bytes()[:20_000_000].decode("utf-8", "replace")
+                    text = _read(Path(file))
                 except (OSError, ValueError):
                     text = ""
             self._split[file] = text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
         lines = self._split[file]
         return lines[line - 1] if 0 < line <= len(lines) and any(lines) else None
+
+
+def _read(path: Path) -> str:
+    """A file's text; nothing of what is no file, and might have no end. Raises OSError, ValueError."""
+    if not path.is_file():
+        return ""
+    with path.open("rb") as stream:
+        return stream.read(_READ).decode("utf-8", "replace")
 
 
 def _block(diagnostic: Diagnostic, lines: _Lines, colour: bool) -> str:
@@ -134,16 +146,24 @@ def to_json(diagnostics: Iterable[Diagnostic]) -> dict[str, Any]:
 def _as_json(diagnostic: Diagnostic) -> dict[str, Any]:
     span = diagnostic.span
     return {
-        "file": span.file if span else None,
+        "file": _decoded(span.file) if span else None,
         "line": span.line if span else None,
         "column": span.column if span else None,
         "end_line": span.end_line if span else None,
         "end_column": span.end_column if span else None,
         "severity": str(diagnostic.severity),
         "code": diagnostic.code,
-        "message": diagnostic.message,
-        "hint": diagnostic.hint,
+        "message": _decoded(diagnostic.message),
+        "hint": _decoded(diagnostic.hint) if diagnostic.hint is not None else None,
     }
+
+
+def _decoded(text: str) -> str:
+    """The text without the lone surrogates that Python has for a file name's bytes: no JSON reader takes those."""
+    return text if text.isascii() else _SURROGATES.sub("\ufffd", text)
+
+
+_SURROGATES = re.compile("[\ud800-\udfff]")
 
 
 def to_sarif(diagnostics: Sequence[Diagnostic], *, version: str = "") -> dict[str, Any]:
@@ -180,12 +200,12 @@ def _as_result(diagnostic: Diagnostic, rule: int) -> dict[str, Any]:
         "ruleId": diagnostic.code,
         "ruleIndex": rule,
         "level": str(diagnostic.severity),
-        "message": {"text": text},
+        "message": {"text": _decoded(text)},
     }
     if diagnostic.span is not None:
         result["locations"] = [{"physicalLocation": _location(diagnostic.span)}]
     related = [
-        {"id": i, "physicalLocation": _location(place), "message": {"text": note}}
+        {"id": i, "physicalLocation": _location(place), "message": {"text": _decoded(note)}}
         for i, (note, place) in enumerate(diagnostic.notes, 1)
         if place is not None
     ]
@@ -196,7 +216,7 @@ def _as_result(diagnostic: Diagnostic, rule: int) -> dict[str, Any]:
 
 def _location(span: Span) -> dict[str, Any]:
     path = PurePath(span.file)
-    uri = quote(path.as_posix())
+    uri = quote(os.fsencode(path.as_posix()))
     if path.is_absolute():
         uri = "file://" + uri
     return {

@@ -6,6 +6,7 @@ Exit codes, the same for all: 0 all is well; 1 a gate or a check fails; 2 bad in
 from __future__ import annotations
 
 import importlib
+import io
 import os
 import sys
 from typing import Any
@@ -75,6 +76,9 @@ def main(arguments: list[str] | None = None) -> None:
     """The entry point. Bad input ends with located messages and code 2, never with a traceback."""
     from avow.diagnostics import Rejected
 
+    for stream in (sys.stdout, sys.stderr):  # a sign that the terminal has not, or a file's name that is no text
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         result: Any = _avow.main(arguments, standalone_mode=False)
         code = result if isinstance(result, int) else 0

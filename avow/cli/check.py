@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from avow.cli.paths import PathArgument
+
 if TYPE_CHECKING:
     from avow.diagnostics import Diagnostic
 
 
 @click.command()
-@click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("paths", nargs=-1, required=True, type=PathArgument())
 @click.option("--json", "as_json", is_flag=True, help="For machines: see avow/language/check.schema.json.")
 @click.option("--sarif", is_flag=True, help="For machines: SARIF 2.1.0.")
 @click.option("--off", "off", multiple=True, metavar="CODE", help="A warning that is not wanted (may be repeated).")

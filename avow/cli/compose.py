@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from avow.cli.paths import PathArgument
+
 if TYPE_CHECKING:
     from avow.calculus.composition import Composition
     from avow.calculus.derivation import Goal
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=Path))
+@click.argument("path", type=PathArgument())
 @click.option("--goal", "goals", multiple=True, metavar="NAME", help="Only this derivation (may be repeated).")
 @click.option("--json", "as_json", is_flag=True, help="For machines: see docs/schemas/compose.schema.json.")
 @click.option("--latex", "as_latex", is_flag=True, help="The derivations as LaTeX, nothing else.")

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from avow.cli.paths import PathArgument
+
 if TYPE_CHECKING:
     from avow.diagnostics import Diagnostic
 
 
 @click.command()
-@click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path, allow_dash=True))
+@click.argument("paths", nargs=-1, required=True, type=PathArgument(allow_dash=True))
 @click.option("--check", is_flag=True, help="Change nothing; code 1 where a file is not in the canonical layout.")
 @click.option("--diff", is_flag=True, help="Change nothing; show what would change.")
 def command(paths: tuple[Path, ...], check: bool, diff: bool) -> int:
@@ -24,17 +26,14 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool) -> int:
     from avow.diagnostics import Rejected
     from avow.files import write
     from avow.language.format import format_text
-    from avow.language.load import read_source
+    from avow.language.load import MAX_BYTES, decode, read_source
     from avow.language.source import Source
-    from avow.rendering import render
+    from avow.rendering import printable, render
 
     faults: list[Diagnostic] = []
     changed = 0
-    for path in _files(paths):
-        if str(path) == "-":
-            source: Source | Diagnostic = Source("<stdin>", sys.stdin.read())
-        else:
-            source = read_source(path)
+    for path in _files(paths, faults):
+        source = decode(sys.stdin.buffer.read(MAX_BYTES + 1), "<stdin>") if str(path) == "-" else read_source(path)
         if not isinstance(source, Source):
             faults.append(source)
             continue
@@ -53,10 +52,10 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool) -> int:
         if diff:
             _show_diff(before, formatted, source.file)
         elif check:
-            click.echo(f"{path} is not in the canonical layout")
+            click.echo(f"{printable(str(path))} is not in the canonical layout")
         else:
-            write(path, formatted)
-            click.echo(f"formatted {path}")
+            write(path.resolve(), formatted)  # through a symbolic link, not in its place
+            click.echo(f"formatted {printable(str(path))}")
     if faults:
         click.echo(render(faults), err=True)
         return 2
@@ -70,9 +69,13 @@ def _show_diff(before: str, after: str, file: str) -> None:
     click.echo("".join(lines), nl=False)
 
 
-def _files(paths: tuple[Path, ...]) -> list[Path]:
+def _files(paths: tuple[Path, ...], faults: list[Diagnostic]) -> list[Path]:
+    from avow.diagnostics import Diagnostic
+
     found: dict[Path, None] = {}
     for path in paths:
-        for file in sorted(path.rglob("*.rcl")) if path.is_dir() else (path,):
-            found[file] = None
+        files = sorted(path.rglob("*.rcl")) if path.is_dir() else [path]
+        if not files:
+            faults.append(Diagnostic("RCL002", f"{path} holds no .rcl file"))
+        found.update(dict.fromkeys(files))
     return list(found)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from avow.cli.paths import PathArgument
+
 _DODO = '''"""The pipeline as doit tasks: `doit verify` does everything for every system under contracts/."""
 
 from pathlib import Path
@@ -22,7 +24,7 @@ def task_avow():
 
 
 @click.command()
-@click.argument("directory", type=click.Path(file_okay=False, path_type=Path))
+@click.argument("directory", type=PathArgument(file_okay=False))
 def command(directory: Path) -> int:
     """Make DIRECTORY a workspace with one system that verifies. Nothing that exists is overwritten."""
     from importlib import resources

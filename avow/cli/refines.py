@@ -7,10 +7,12 @@ from pathlib import Path
 
 import click
 
+from avow.cli.paths import PathArgument
+
 
 @click.command()
-@click.argument("concrete", type=click.Path(path_type=Path, dir_okay=False))
-@click.argument("abstract", type=click.Path(path_type=Path, dir_okay=False))
+@click.argument("concrete", type=PathArgument(dir_okay=False))
+@click.argument("abstract", type=PathArgument(dir_okay=False))
 @click.option("--node", metavar="NAME", help="Only this node; by default every node of ABSTRACT.")
 @click.option("--json", "as_json", is_flag=True, help="For machines.")
 @click.option("--seconds", default=10.0, show_default=True, help="Time for one question to the solver.")

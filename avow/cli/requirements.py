@@ -6,9 +6,11 @@ import json
 
 import click
 
+from avow.cli.paths import PathArgument
+
 
 @click.command()
-@click.argument("file", type=click.Path(exists=True, dir_okay=False))
+@click.argument("file", type=PathArgument(exists=True, dir_okay=False))
 @click.option("--json", "as_json", is_flag=True, help="For machines.")
 def command(file: str, as_json: bool) -> int:
     """The requirements in FILE (CSV or ReqIF) as the `requirements:` section of a plan.yaml, on standard output."""

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from avow.cli.paths import PathArgument
+
 if TYPE_CHECKING:
     from avow.language.contract import Node
     from avow.logic.sanity import SanityResult
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=Path))
+@click.argument("path", type=PathArgument())
 @click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
 @click.option("--json", "as_json", is_flag=True, help="For machines: see docs/schemas/sanity.schema.json.")
 @click.option("--all", "everything", is_flag=True, help="List also what is as it should be.")

@@ -4,44 +4,133 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, cast
 
 import click
 
+from avow.cli.paths import PathArgument
+
 if TYPE_CHECKING:
+    from avow.diagnostics import Diagnostic
     from avow.language.contract import Contract
+    from avow.system.plan import System
 
 NOTATIONS = {
     **dict.fromkeys(("rcl", "text", "unicode", "latex", "json"), "avow.language.translate"),
     "smtlib": "avow.logic.contract_smtlib",
 }
-"""Notation → the module with its function ``to_<notation>(contract) -> str``, imported when it is asked for."""
+"""Notation → the module with its function ``to_<notation>(contract) -> str``, imported when it is asked for. Further
+notations are those of the backends (`avow.backend.Translates`)."""
 
 
 @click.command()
-@click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--to", "notation", required=True, type=click.Choice(sorted(NOTATIONS)), help="The notation.")
-@click.option("-o", "--output", type=click.Path(path_type=Path, dir_okay=False), help="Write to this file.")
-def command(paths: tuple[Path, ...], notation: str, output: Path | None) -> int:
+@click.argument("paths", nargs=-1, required=True, type=PathArgument())
+@click.option(
+    "--to",
+    "notation",
+    required=True,
+    metavar="NOTATION",
+    help=f"One of {', '.join(sorted(NOTATIONS))}; or one that a backend offers, such as dafny or rml.",
+)
+@click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
+@click.option("-o", "--output", type=PathArgument(), help="Write to this file, or (dafny, rml) into this folder.")
+def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], output: Path | None) -> int:
     """Print a contract in another notation.
 
-    PATHS are the .rcl files of one contract, or a system's folder.
+    PATHS are the .rcl files of one contract, or a system's folder (whose plan the notations of backends may need). Code
+    1 where guarantees are left out, since the notation cannot say them; 2 where nothing can be translated.
     """
-    from avow.files import write
+    if notation not in NOTATIONS:
+        return _by_backend(notation, paths, nodes, output)
     from avow.language.load import load_contract
 
+    contract = _only(load_contract(_files(paths)), nodes)
     module = importlib.import_module(NOTATIONS[notation])
     translate = cast("Callable[[Contract], str]", getattr(module, f"to_{notation}"))
-    text = translate(load_contract(_files(paths)))
-    if output is None:
-        click.echo(text, nl=False)
-    else:
-        write(output, text)
+    _put(translate(contract), output)
     return 0
 
 
+def _by_backend(notation: str, paths: tuple[Path, ...], nodes: tuple[str, ...], output: Path | None) -> int:
+    from avow.diagnostics import Rejected
+    from avow.registry import translators
+    from avow.rendering import render
+    from avow.system.load import load_bare, load_system
+
+    system = load_system(paths[0]) if len(paths) == 1 and paths[0].is_dir() else load_bare(_files(paths))
+    known = translators(system.plan.plugins)
+    if notation not in known:
+        every = ", ".join(sorted({*NOTATIONS, *known}))
+        raise click.UsageError(f"there is no notation '{notation}'; known: {every}")
+    files: dict[str, str] = {}
+    missing: list[Diagnostic] = []
+    refused: list[Diagnostic] = []
+    for node in _only(system.contract, nodes).nodes:
+        try:
+            made = known[notation].translate(notation, system, node)
+        except Rejected as rejected:
+            refused += rejected.diagnostics
+            continue
+        missing += made.missing
+        files.update({f"{_folder(node.name, system)}/{name}": text for name, text in made.files.items()})
+    if refused or missing:
+        click.echo(render([*refused, *missing]), err=True)
+    if not files:
+        return 2
+    _put_all(files, output)
+    return 1 if refused or missing else 0
+
+
+def _only(contract: Contract, nodes: tuple[str, ...]) -> Contract:
+    from dataclasses import replace
+
+    from avow.diagnostics import Diagnostic, Rejected
+
+    known = [node.name for node in contract.nodes]
+    if unknown := [name for name in nodes if name not in known]:
+        raise Rejected(Diagnostic("CLI003", f"there is no node '{unknown[0]}'", hint=f"known: {', '.join(known)}"))
+    return replace(contract, nodes=tuple(n for n in contract.nodes if n.name in nodes)) if nodes else contract
+
+
+def _folder(node: str, system: System) -> str:
+    """A folder's name for a node: names of RCL are safe file names but for their primes, and case may not tell two
+    apart."""
+    folded = [other.name for other in system.contract.nodes if other.name.casefold() == node.casefold()]
+    return node if len(folded) == 1 else f"{node}_{folded.index(node) + 1}"
+
+
+def _put_all(files: dict[str, str], output: Path | None) -> None:
+    """Several files go into a folder; on the terminal, each under its name."""
+    from avow.files import write
+
+    if output is None:
+        for name, text in files.items():
+            click.echo((f"// ---- {name}\n" if len(files) > 1 else "") + text, nl=False)
+        return
+    if output.exists() and not output.is_dir():
+        raise click.UsageError(f"{output} is a file, and this notation has {len(files)} files: name a folder")
+    for name, text in files.items():
+        if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
+            raise click.UsageError(f"the backend wants to write outside the folder: {name}")
+        write(output / name, text)
+        click.echo(f"wrote {output / name}")
+
+
+def _put(text: str, output: Path | None) -> None:
+    from avow.files import write
+
+    if output is None:
+        click.echo(text, nl=False)
+    elif output.is_dir():
+        raise click.UsageError(f"{output} is a folder; name a file")
+    else:
+        write(output, text)
+
+
 def _files(paths: tuple[Path, ...]) -> list[Path]:
+    from avow.diagnostics import Diagnostic, Rejected
+
     found: list[Path] = []
     for path in paths:
         if (path / "plan.yaml").is_file():
@@ -49,7 +138,10 @@ def _files(paths: tuple[Path, ...]) -> list[Path]:
 
             found.extend(read_plan(path / "plan.yaml")[0].contract_files)
         elif path.is_dir():
-            found.extend(sorted(path.glob("*.rcl")))
+            files = sorted(path.glob("*.rcl"))
+            if not files:
+                raise Rejected(Diagnostic("RCL002", f"{path} holds neither a plan.yaml nor an .rcl file"))
+            found.extend(files)
         else:
             found.append(path)
     return found

@@ -31,6 +31,8 @@ def workspace(start: Path | None = None) -> Workspace:
 
 def system_folder(name: str) -> Path:
     """A system by its folder, or by its name in the current workspace. Raises Rejected."""
+    if not name:
+        raise Rejected(Diagnostic("CLI002", "the system's name is empty", hint="the current folder is written `.`"))
     path = Path(name)
     if path.is_dir():
         return path

@@ -5,6 +5,7 @@ Every function reports all that is wrong at once. Nothing here raises anything b
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -72,12 +73,20 @@ def read_source(path: Path) -> Source | Diagnostic:
     file = str(path)
     start = Span(file, 1, 1, 1, 1)
     try:
+        if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # opening a folder fails by itself
+            return Diagnostic("RCL002", "the file cannot be read: it is a device or a pipe", start)
         with path.open("rb") as stream:
             data = stream.read(MAX_BYTES + 1)
     except OSError as error:
         return Diagnostic("RCL002", f"the file cannot be read: {error.strerror or error}", start)
     except ValueError:  # a NUL in the name
         return Diagnostic("RCL002", "the file cannot be read: its name is not a file name", start)
+    return decode(data, file)
+
+
+def decode(data: bytes, file: str) -> Source | Diagnostic:
+    """The text that a file's (or a pipe's) bytes are, or why they are none."""
+    start = Span(file, 1, 1, 1, 1)
     if len(data) > MAX_BYTES:
         return Diagnostic("RCL003", f"the file is larger than {MAX_BYTES // 1_000_000} MB", start)
     try:

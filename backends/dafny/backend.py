@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from avow import process
-from avow.backend import Job, Limits, Report, Tool
+from avow.backend import Job, Limits, Report, Tool, Translated
 from avow.backends.dafny.codes import CODES
 from avow.backends.dafny.judge import Settled, settle
 from avow.backends.dafny.modules import Generated, generate, lines_map
@@ -16,7 +17,9 @@ from avow.backends.dafny.printer import NotExpressible
 from avow.backends.dafny.runner import INSTALL, dafny
 from avow.backends.dafny.scanner import Scan, scan
 from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.language.contract import Node
 from avow.system.paths import inside
+from avow.system.plan import System
 from avow.system.schema import suggest
 from avow.verdict import Link, Outcome, Verdict
 
@@ -51,6 +54,7 @@ class DafnyBackend:
     link = Link.GENERATED
     options_schema: Mapping[str, Any] = SCHEMA
     codes = CODES
+    translations: Mapping[str, str] = {"dafny": "Dafny types, predicates, a specification and a skeleton for each node"}
     green_means = (
         "Dafny proved that the implementation's Step meets this guarantee for all inputs that meet the assumptions "
         "(and Env, where it says more), that it always ends, and that such inputs exist. "
@@ -104,6 +108,22 @@ class DafnyBackend:
             "guarantees.json": lines_map(generated),
             f"skeleton/{generated.impl_file}": generated.skeleton,
         }
+
+    def translate(self, notation: str, system: System, node: Node) -> Translated:
+        """Types, contract, specification and skeleton, as `export` has them, of all the node's guarantees."""
+        names = [clause.name for clause in node.guarantees]
+        try:
+            generated = generate(node, names)
+        except NotExpressible as problem:
+            message = f"node '{node.name}' cannot be put into Dafny: {problem.what}"
+            raise Rejected(Diagnostic("DFY105", message, problem.span or node.span)) from None
+        missing = tuple(
+            Diagnostic("DFY105", f"{node.name}.{name}: {reason}", node.clause(name).span, Severity.WARNING)
+            for name, reason in generated.uncovered
+        )
+        if len(missing) == len(names):
+            raise Rejected(*(replace(fault, severity=Severity.ERROR) for fault in missing))
+        return Translated({**_specification(generated), generated.impl_file: generated.skeleton}, missing)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         tool = dafny()

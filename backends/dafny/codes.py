@@ -31,4 +31,10 @@ CODES = register(
         "Verify this node with another method.",
         warning=True,
     ),
+    declare(
+        "DFY105",
+        "no translation",
+        "`avow translate --to dafny` was asked for a clause or a type that has no counterpart in Dafny.",
+        "Rewrite what the message names, or do without it.",
+    ),
 )

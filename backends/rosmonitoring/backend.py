@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from avow.backend import Job, Limits, Report, Tool
+from avow.backend import Job, Limits, Report, Tool, Translated
 from avow.backends.rosmonitoring.codes import CODES
 from avow.backends.rosmonitoring.schema import SCHEMA
 from avow.diagnostics import Diagnostic, Rejected, Severity
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from avow.backends.rosmonitoring.engine import Monitor, Violation
     from avow.backends.rosmonitoring.options import Setup
     from avow.evidence.obligation import Obligation
+    from avow.language.contract import Node
+    from avow.system.plan import System
 
 KEPT = 200
 """Violations of one trace that are written to the log; all are counted."""
@@ -34,6 +37,7 @@ class RosMonitoringBackend:
     link = Link.MAPPED
     options_schema: Mapping[str, Any] = SCHEMA
     codes = CODES
+    translations: Mapping[str, str] = {"rml": "an RML specification for each node, by the plan's mapping"}
     green_means = (
         "On the recorded events the guarantee held at every judgement, by exact evaluation. It shows nothing of other "
         "runs; that the mapping reads the messages rightly is a person's judgement."
@@ -94,6 +98,25 @@ class RosMonitoringBackend:
             f"{stem}.rml": made.text,
             f"{stem}_monitor.json": json.dumps(report, indent=2, ensure_ascii=False) + "\n",
         }
+
+    def translate(self, notation: str, system: System, node: Node) -> Translated:
+        """The node's guarantees as one RML specification, by the mapping of the plan's first method of this backend."""
+        from avow.backends.rosmonitoring.configuration import identifier
+        from avow.backends.rosmonitoring.options import setup
+        from avow.backends.rosmonitoring.rml_translate import translate
+
+        options = next((m.options for m in system.plan.node(node.name).methods if m.backend == self.name), None)
+        found, faults = setup(system, node, options)
+        if faults:
+            raise Rejected(*faults)
+        made = translate(found, node.guarantees)
+        missing = tuple(
+            Diagnostic("MON105", f"{node.name}.{name}: {reason}", node.clause(name).span, Severity.WARNING)
+            for name, reason in made.refused.items()
+        )
+        if len(missing) == len(node.guarantees):
+            raise Rejected(*(replace(fault, severity=Severity.ERROR) for fault in missing))
+        return Translated({f"{identifier('', node.name)}.rml": made.text}, missing)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         from avow import __version__

@@ -24,6 +24,12 @@ CODES = register(
         "Map it to a topic, or verify the guarantee with another method.",
         warning=True,
     ),
+    declare(
+        "MON105",
+        "not in RML",
+        "The guarantee has no RML equivalent, or the plan does not say how its variables are read from messages.",
+        "Map the variables that the message names (`docs/backends/rosmonitoring.md`); Avow's own engine judges more.",
+    ),
     declare("MON104", "no such node", "The system has no node of that name.", "Use the name from the hint."),
     declare("MON201", "unreadable trace", "The trace's file cannot be read.", "Correct the path."),
     declare(

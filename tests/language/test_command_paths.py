@@ -1,0 +1,204 @@
+"""Whatever stands where a path is wanted: a message and exit code 2, never a traceback, a hang, or a harmed file."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from avow.cli import COMMANDS, main
+
+GOOD = "node n { inputs( a : REAL ) outputs( b : BOOL ) topics() guarantee( b <=> a > 0 ) }\n"
+
+
+def fifo(folder: Path) -> None:
+    os.mkfifo(folder / "odd.rcl")
+
+
+def broken(folder: Path) -> None:
+    (folder / "odd.rcl").symlink_to("nowhere")
+
+
+def loop(folder: Path) -> None:
+    (folder / "odd.rcl").symlink_to("odd.rcl")
+
+
+def folder_called_rcl(folder: Path) -> None:
+    (folder / "odd.rcl").mkdir()
+
+
+def large(folder: Path) -> None:
+    (folder / "odd.rcl").write_text(GOOD + "//" + "x" * 10_000_000)
+
+
+def long_line(folder: Path) -> None:
+    (folder / "odd.rcl").write_text(GOOD + "x" * 3_900_000)
+
+
+def binary(folder: Path) -> None:
+    (folder / "odd.rcl").write_bytes(b"node \xff\xfe")
+
+
+def nul(folder: Path) -> None:
+    (folder / "odd.rcl").write_text("node\0")
+
+
+def below_a_file(folder: Path) -> None:
+    (folder / "odd.rcl").symlink_to(folder / "good.rcl" / "x")
+
+
+def nothing(folder: Path) -> None:
+    pass
+
+
+ODD: tuple[Callable[[Path], None], ...] = (
+    *(fifo, broken, loop, folder_called_rcl, large, long_line, binary, nul, below_a_file, nothing),
+)
+FORMS = {
+    "check": ("check", "@"),
+    "json": ("check", "--json", "@"),
+    "sarif": ("check", "--sarif", "@"),
+    "fmt": ("fmt", "@"),
+    "translate": ("translate", "--to", "text", "@"),
+    "rml": ("translate", "--to", "rml", "@"),
+    "sanity": ("sanity", "@"),
+    "compose": ("compose", "@"),
+    "refines": ("refines", "@", "good.rcl"),
+    "refined": ("refines", "good.rcl", "@"),
+}
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int | str | None, str]:
+    with pytest.raises(SystemExit) as leave:
+        main(arguments)
+    said = capsys.readouterr()
+    return leave.value.code, said.out + said.err
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "good.rcl").write_text(GOOD)
+    return tmp_path
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("odd", ODD)
+def test_odd_files(odd: Callable[[Path], None], form: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    odd(place)
+    code, said = run([a.replace("@", "odd.rcl") for a in FORMS[form]], capsys)
+    assert code == 2, said
+    assert said.strip()
+    assert len(said) < 5000
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("path", ["", "/dev/null", "/dev/zero", "x" * 300 + ".rcl", "good.rcl/y.rcl", "a\nb %20é.rcl"])
+def test_odd_paths(path: str, form: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = run([a.replace("@", path) if a == "@" else a for a in FORMS[form]], capsys)
+    assert code == 2, said
+    assert said.strip()
+
+
+def paths_of(command: click.Command) -> list[str]:
+    return [p.name or "" for p in command.params if isinstance(p, click.Argument)]
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_no_command_takes_an_empty_argument_for_the_current_folder(
+    name: str, place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import importlib
+
+    command = importlib.import_module(f"avow.cli.{name}").command
+    wanted = paths_of(command)
+    if not wanted:
+        pytest.skip("takes no argument")
+    more = ["--to", "text"] if name == "translate" else []
+    before = sorted(place.rglob("*"))
+    code, said = run([name, *[""] * len(wanted), *more], capsys)
+    assert code == 2, (code, said)
+    assert "Traceback" not in said
+    assert sorted(place.rglob("*")) == before
+    assert (place / "good.rcl").read_text() == GOOD
+
+
+def test_folders_without_contracts(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (place / "empty").mkdir()
+    for form in ("check", "fmt", "translate", "sanity", "compose"):
+        code, said = run([a.replace("@", "empty") for a in FORMS[form]], capsys)
+        assert code == 2, (form, said)
+        assert "no" in said
+
+
+def test_a_file_name_that_is_no_text(place: Path) -> None:
+    """Python has lone surrogates for its bytes, which no JSON reader and no terminal takes."""
+    import json
+
+    name = os.fsdecode(b"\xffa.rcl")
+    try:
+        (place / name).write_text("node n {")
+    except OSError:
+        pytest.skip("this file system wants UTF-8 names")
+    for form in ("check", "json", "sarif", "fmt", "translate"):
+        arguments = [a.replace("@", name) for a in FORMS[form]]
+        done = subprocess.run(
+            [sys.executable, "-m", "avow", *arguments], capture_output=True, timeout=60, check=False, cwd=place
+        )
+        assert done.returncode == 2
+        assert b"Traceback" not in done.stderr
+        done.stdout.decode("utf-8")
+        if form in ("json", "sarif"):
+            assert "\\ud" not in json.dumps(json.loads(done.stdout))
+        if form == "sarif":
+            assert b'"uri": "%FFa.rcl"' in done.stdout
+
+
+def test_fmt_writes_through_a_link_and_refuses_bad_input(place: Path) -> None:
+    from avow.cli.fmt import command
+
+    (place / "link.rcl").symlink_to("good.rcl")
+    (place / "good.rcl").write_text("node n{inputs()outputs(b:BOOL)topics()G(b)}")
+    assert CliRunner().invoke(command, ["link.rcl"], standalone_mode=False).return_value == 0
+    assert (place / "link.rcl").is_symlink()
+    assert "guarantee( b )" in (place / "good.rcl").read_text()
+    for data in (b"\xff", b"", b"x" * 5_000_000, b"node n {\0"):
+        done = CliRunner().invoke(command, ["-"], input=data, standalone_mode=False)
+        assert done.exception is None
+        assert done.return_value == 2
+
+
+def test_writing_to_a_device_leaves_it_one(tmp_path: Path) -> None:
+    """`-o /dev/null`, as root, must not put a file in its place."""
+    import threading
+
+    from avow.files import write
+
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    got: list[bytes] = []
+    reader = threading.Thread(target=lambda: got.append(pipe.read_bytes()))
+    reader.start()
+    assert write(pipe, "text")
+    reader.join(timeout=20)
+    assert got == [b"text"]
+    assert pipe.is_fifo()
+
+
+def test_output_in_a_poor_encoding(place: Path) -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
+    done = subprocess.run(
+        [sys.executable, "-m", "avow", "translate", "--to", "unicode", "good.rcl"],
+        capture_output=True,
+        timeout=60,
+        check=False,
+        env=environment,
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"\\u2194" in done.stdout
