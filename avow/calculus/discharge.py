@@ -138,7 +138,22 @@ class _Solver:
                 return answer
             last = answer  # only the widest hypotheses refute: narrower ones may just have left something out
         assert last is not None
-        return self.deeper(condition, last, *attempts[-1])
+        return self.by_itself(condition, *attempts[-1]) or self.deeper(condition, last, *attempts[-1])
+
+    def by_itself(self, condition: SideCondition, same: tuple[str, ...], before: tuple[str, ...]) -> Settled | None:
+        """Where a node feeds itself at the same step, and what it guarantees would show what it assumes: circular."""
+        consumer = condition.consumer
+        if not self.feeds(consumer, consumer, delayed=False):
+            return None
+        guaranteed = {
+            f"{consumer}.{g.name}": self.frame.clause(consumer, g.name) for g in self.frame.node(consumer).guarantees
+        }
+        phases = (Phase.INITIAL, Phase.LATER) if before or condition.delayed else (Phase.SAME_STEP,)
+        cases = tuple(self.case(condition, phase, same, before, True, NARROW_MS, guaranteed) for phase in phases)
+        answer = _settled(condition, cases)
+        if answer.verdict is not Verdict.PROVED:
+            return None
+        return replace(answer, verdict=Verdict.REFUTED, circle=(consumer,))
 
     def deeper(
         self, condition: SideCondition, settled: Settled, same: tuple[str, ...], before: tuple[str, ...]
@@ -155,7 +170,7 @@ class _Solver:
             asked = steps(
                 frame,
                 self.contracts(tuple(dict.fromkeys((*before, *self.selected_in_order))), 0) | frame.environment(),
-                self.contracts(same, 0) | frame.environment(),
+                self.contracts(same, 0) | frame.environment() | self.own(condition.consumer),
                 frame.initials(self.selected),
                 frame.clause(condition.consumer, condition.clause),
             )
@@ -220,8 +235,10 @@ class _Solver:
         before: tuple[str, ...],
         wide: bool,
         patience: int,
+        more: Mapping[str, Term] | None = None,
     ) -> Case:
         hypotheses, goal = self.question(condition, phase, same, before, wide)
+        hypotheses |= more or {}
         answer = implied(hypotheses, goal, timeout_ms=patience, seed=self.bounds.seed)
         return Case(
             phase,
