@@ -36,7 +36,7 @@ def short(claim: str) -> str:
 
 def sanity_property(obligation: Obligation) -> str:
     """Which of the sanity properties an obligation is about: its name up to the clause, if it names one."""
-    for name in (*FOUNDATION, *ADVICE, "vacuous", "tautology"):
+    for name in (*FOUNDATION, *ADVICE, "vacuous", "tautology", "unmeetable"):
         if obligation.name == name or (obligation.name.startswith(name) and not obligation.name[len(name)].isalnum()):
             return name
     return obligation.name

@@ -91,7 +91,16 @@ def _ask(
         return "sat", solver.model(), (), ""
     if result == z3.unsat:
         return "unsat", None, tuple(switches[s.get_id()][1] for s in solver.unsat_core()), ""
-    return "unknown", None, (), str(solver.reason_unknown())
+    return "unknown", None, (), _reason(solver)
+
+
+def _reason(solver: z3.Solver) -> str:
+    """Why it gave up, for people."""
+    reason = str(solver.reason_unknown()).strip("()")
+    return "no answer in time" if reason in _IN_TIME else f"the solver gave up: {reason}" if reason else "no answer"
+
+
+_IN_TIME = ("canceled", "interrupted", "interrupted from keyboard", "timeout", "max. memory exceeded")
 
 
 @contextlib.contextmanager
@@ -111,19 +120,43 @@ def _wall(timeout_ms: int) -> int:
 def _ask_qsat(
     translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]], timeout_ms: int
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
-    solver = z3.TryFor(z3.Tactic("qsat", ctx=translator.context), _wall(timeout_ms)).solver()
     everything = [*assertions, *(expr for _, expr in tracked)]
+    tactic = "nlqsat" if _real_polynomials(everything) else "qsat"
+    solver = z3.TryFor(z3.Tactic(tactic, ctx=translator.context), _wall(timeout_ms)).solver()
     solver.add(*everything)
     result = solver.check()
     if result == z3.sat:
         return "sat", solver.model(), (), ""
     if result == z3.unsat and _arithmetic_only(everything):
         return "unsat", None, tuple(label for label, _ in tracked), ""
-    return "unknown", None, (), str(solver.reason_unknown())
+    return "unknown", None, (), _reason(solver)
 
 
 def _arithmetic_only(exprs: Iterable[Expr]) -> bool:
     """Whether only numbers and truth values occur: where qsat is complete, and its `unsat` taken."""
+    return all(z3.is_bool(e) or z3.is_arith(e) for e in _parts(exprs)) and not any(map(_is_applied, _parts(exprs)))
+
+
+def _real_polynomials(exprs: Iterable[Expr]) -> bool:
+    """Whether only reals and truth values occur, and reals are multiplied: another engine knows about these."""
+    parts = list(_parts(exprs))
+    plain = all(z3.is_bool(e) or z3.is_real(e) for e in parts) and not any(map(_is_applied, parts))
+    divided = any(z3.is_div(e) and not z3.is_rational_value(e.arg(1)) for e in parts)
+    return (
+        plain and not divided and any(z3.is_mul(e) and sum(not _is_number(a) for a in e.children()) > 1 for e in parts)
+    )
+
+
+def _is_number(expr: Expr) -> bool:
+    return bool(z3.is_rational_value(expr))
+
+
+def _is_applied(expr: Expr) -> bool:
+    return bool(z3.is_app(expr) and expr.num_args() and expr.decl().kind() == z3.Z3_OP_UNINTERPRETED)
+
+
+def _parts(exprs: Iterable[Expr]) -> Iterator[Expr]:
+    """Every subexpression once, without quantifiers themselves."""
     seen: set[int] = set()
     stack = list(exprs)
     while stack:
@@ -133,13 +166,9 @@ def _arithmetic_only(exprs: Iterable[Expr]) -> bool:
         seen.add(expr.get_id())
         if z3.is_quantifier(expr):
             stack.append(expr.body())
-        elif not (z3.is_bool(expr) or z3.is_arith(expr)):
-            return False
-        elif z3.is_app(expr):
-            if expr.num_args() and expr.decl().kind() == z3.Z3_OP_UNINTERPRETED:
-                return False
+        else:
+            yield expr
             stack.extend(expr.children())
-    return True
 
 
 def _minimal(

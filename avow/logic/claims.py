@@ -14,6 +14,8 @@ always bad: `vacuous-G1` claims that guarantee G1 is *not* vacuous. Nothing here
 | redundant                | the guarantee (assumption) does not follow from the others               | warning  |
 | unconstrained            | the guarantees exclude some value of the output                          | warning  |
 | undetermined             | the inputs determine the output                                          | note     |
+| unmeetable               | the providers of its inputs leave room for the assumption (asked of a    | error    |
+|                          | whole system: `avow.calculus.providers`)                                 |          |
 | unneeded                 | the assumption rules out inputs for which no output meets the guarantees | note     |
 """
 
@@ -43,6 +45,7 @@ class Property(StrEnum):
     UNCONSTRAINED = "unconstrained"
     UNDETERMINED = "undetermined"
     UNNEEDED = "unneeded"
+    UNMEETABLE = "unmeetable"
 
 
 _SEVERITY = {

@@ -104,13 +104,13 @@ def _demand(formula: Term, outputs: Sequence[Variable], at: Mapping[Variable, Va
         return "cannot be met"
     if answer.status != "sat":
         return "cannot be met together with the others"
-    parts = []
+    firm: list[str] = []
+    loose: list[str] = []
     for output in mentioned:
         value = answer.values[output]
         text = _shown(formula, output, value, at, seed)
-        parts.append(f"{output.qualified} = {text}" if text else f"for example {output.qualified} = {show(value)}")
-    firm = [part for part in parts if not part.startswith("for example")]
-    return f"demands {' and '.join(firm)}" if firm else f"allows {' and '.join(parts)}"
+        (firm if text else loose).append(f"{output.qualified} = {text or show(value)}")
+    return f"demands {' and '.join(firm)}" if firm else f"allows for example {' and '.join(loose)}"
 
 
 def _shown(formula: Term, output: Variable, value: Value, at: Mapping[Variable, Value], seed: int) -> str:

@@ -13,6 +13,7 @@ from fractions import Fraction
 from avow.language.sorts import (
     BOOL,
     INTEGER,
+    NATURAL,
     REAL,
     FunctionSort,
     IntegerSort,
@@ -66,6 +67,8 @@ class Candidates:
     outputs: tuple[Variable, ...]
     constants: list[Variable] = field(default_factory=list)
     axioms: list[Term] = field(default_factory=list)
+    least: list[Term] = field(default_factory=list)
+    """Axioms too, that not every question needs: a natural number that is chosen is the least one that there is."""
     values: dict[Variable, list[Term]] = field(default_factory=dict)
     lower: dict[Variable, list[Definition]] = field(default_factory=dict)
     upper: dict[Variable, list[Definition]] = field(default_factory=dict)
@@ -177,6 +180,10 @@ def _choose(
         chosen = substitute(guard, fresh)
         found.axioms.append(Implies(Quantified(Quantifier.EXISTS, tuple(variables), guard), chosen))
         found.blocks.append(tuple(fresh.values()))
+        if [variable.sort for variable in variables] == [NATURAL]:
+            (variable,) = variables
+            smallest = Implies(guard, Compare("<=", fresh[variable], variable))
+            found.least.append(Quantified(Quantifier.FORALL, (variable,), smallest))
         for constant in fresh.values():
             found.chosen.setdefault(constant.sort, []).append(constant)
     else:
@@ -316,9 +323,11 @@ def _definition(
     equations: list[Term] = []
     direct: dict[Variable, Term] = {}
     for parameter, argument in zip(parameters, arguments, strict=True):
-        if isinstance(argument, Variable) and argument in rest and argument.sort == parameter.sort:
+        if isinstance(argument, Variable) and argument in rest and _stands_for(parameter, argument):
             rest.remove(argument)
             direct[argument] = parameter
+            if argument.sort != parameter.sort:
+                equations.append(Compare("<=", Literal(0, INTEGER), parameter))
         else:
             equations.append(Compare("==", parameter, argument))
     body = conjunction(substitute(part, direct) for part in (*conditions, *equations))
@@ -326,6 +335,11 @@ def _definition(
     if used:
         body = Quantified(Quantifier.EXISTS, tuple(used), body)
     return Definition(tuple(parameters), body)
+
+
+def _stands_for(parameter: Variable, argument: Variable) -> bool:
+    """Whether a function's parameter may stand for a variable (an integer for a natural: where it is not negative)."""
+    return argument.sort == parameter.sort or (argument.sort, parameter.sort) == (NATURAL, INTEGER)
 
 
 def _branch(
@@ -345,7 +359,7 @@ def _branch(
         return
     direct: dict[Variable, Term] = {v: t for v, t in known.items() if v not in open_variables}
     for parameter, argument in zip(definition.parameters, arguments, strict=True):
-        if isinstance(argument, Variable) and argument in open_variables and argument.sort == parameter.sort:
+        if isinstance(argument, Variable) and argument in open_variables and _stands_for(parameter, argument):
             direct.setdefault(argument, parameter)
     result = substitute(value, direct)
     if any(v in open_variables for v in free_variables(result)):

@@ -7,10 +7,13 @@ contract's formulas is then often free of quantifiers. The meaning stays the sam
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from avow.logic.solver import z3
 from avow.logic.z3_sorts import Expr
+
+_FEW = 16
+"""A quantifier over more whole numbers stays one."""
 
 _MANY = 64
 """Conjunctions of more parts are left alone: each part may be looked at once for each variable."""
@@ -28,6 +31,52 @@ def eliminate_points(constants: Sequence[Expr], conjuncts: Sequence[Expr]) -> tu
         left, parts = step
         parts = _flat(parts)
     return left, parts
+
+
+def expand(constants: Sequence[Expr], conjuncts: Sequence[Expr]) -> Iterator[tuple[list[Expr], list[Expr]]]:
+    """The same for each of a variable's few values, where the conjuncts bound a whole number by numbers."""
+    left, parts = list(constants), list(conjuncts)
+    for constant in left:
+        values = _range(constant, parts) if z3.is_int(constant) and len(parts) <= _MANY else None
+        if values is not None:
+            rest = [c for c in left if c is not constant]
+            for number in values:
+                value = z3.IntVal(number, constant.ctx)
+                yield from expand(rest, [z3.simplify(z3.substitute(p, (constant, value))) for p in parts])
+            return
+    yield left, parts
+
+
+def _range(constant: Expr, parts: Sequence[Expr]) -> range | None:
+    low: int | None = None
+    high: int | None = None
+    for part in parts:
+        for one, two, upper, strict in _bounds(part):
+            if one.eq(constant) and z3.is_int_value(two):
+                number = two.as_long()
+                if upper:
+                    high = min(number - strict, number if high is None else high)
+                else:
+                    low = max(number + strict, number if low is None else low)
+    if low is None or high is None or high - low >= _FEW:
+        return None
+    return range(low, high + 1)
+
+
+def _bounds(part: Expr) -> Iterator[tuple[Expr, Expr, bool, bool]]:
+    """(x, t, whether t is an upper bound of x, whether it is out of bounds itself), for each side of a comparison."""
+    negated = z3.is_not(part)
+    atom = part.arg(0) if negated else part
+    for test, upper, strict in (
+        (z3.is_le, True, False),
+        (z3.is_lt, True, True),
+        (z3.is_ge, False, False),
+        (z3.is_gt, False, True),
+    ):
+        if test(atom):
+            one, two = (z3.simplify(side) if not z3.is_const(side) else side for side in atom.children())
+            yield one, two, upper != negated, strict != negated
+            yield two, one, upper == negated, strict != negated
 
 
 def _flat(conjuncts: Sequence[Expr]) -> list[Expr]:

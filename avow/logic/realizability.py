@@ -14,17 +14,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from avow.language.sorts import REAL, FunctionSort
+from avow.language.sorts import REAL, FunctionSort, SequenceSort
 from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
 from avow.logic.clock import now
 from avow.logic.demands import Definition, candidates
 from avow.logic.formula import conjunction, free_variables, negation, substitute
+from avow.logic.sequences import defined, flatten
 from avow.logic.smt import Translator, Unsupported, check, entails, replay, search_tables, solve
 from avow.logic.solver import z3
 from avow.logic.translation import Expr, Meaning
 from avow.logic.values import Value
 from avow.logic.witness import Cases, Fixed, Witness, instantiate, witnesses
 from avow.verdict import Verdict
+
+_PATIENT_MS = 1_000
+"""From this much time on for one attempt, all that is known of the chosen constants is told."""
 
 Formulas = Mapping[str, Term]
 Given = Mapping[Variable, Value]
@@ -85,11 +89,29 @@ def realizable(
 ) -> Realizability:
     """Decide it. `given` fixes some inputs (a scenario): the answer is then about these only. `doubtful`: it is likely
     not to be, and inputs without an output are looked for first."""
+    start = now()
+    answer = _with_functions(inputs, outputs, assumptions, guarantees, given or {}, timeout_ms, seed, doubtful)
+    if answer is not None:
+        return answer
+    left = max(100, timeout_ms - int((now() - start) * 1000))
+    return _grouped(inputs, outputs, assumptions, guarantees, given or {}, left, seed, doubtful)
+
+
+def _grouped(
+    inputs: Sequence[Variable],
+    outputs: Sequence[Variable],
+    assumptions: Formulas,
+    guarantees: Formulas,
+    given: Given,
+    timeout_ms: int,
+    seed: int,
+    doubtful: bool,
+) -> Realizability:
     needed: set[str] = set()
     engines: list[str] = []
     open_question: Realizability | None = None
     for group in groups(guarantees, outputs):
-        answer = Search(inputs, group, assumptions, given or {}, timeout_ms, seed).decide(doubtful)
+        answer = Search(inputs, group, assumptions, given, timeout_ms, seed).decide(doubtful)
         if answer.verdict is Verdict.REFUTED:
             return answer
         if answer.verdict is not Verdict.PROVED:
@@ -100,6 +122,45 @@ def realizable(
         return open_question
     ordered = tuple(label for label in assumptions if label in needed)
     return Realizability(Verdict.PROVED, needed=ordered, engine=", ".join(dict.fromkeys(engines)) or "z3")
+
+
+def _with_functions(
+    inputs: Sequence[Variable],
+    outputs: Sequence[Variable],
+    assumptions: Formulas,
+    guarantees: Formulas,
+    given: Given,
+    timeout_ms: int,
+    seed: int,
+    doubtful: bool,
+) -> Realizability | None:
+    """Decide it with functions in the place of sequences; None if that is not possible, or does not help.
+
+    An output counts only if no element outside it matters. An input without such an output is then asked about as it
+    stands: some other output may do there.
+    """
+    sequences = [v for v in (*inputs, *outputs) if isinstance(v.sort, SequenceSort) and v not in given]
+    formulas = {(True, label): formula for label, formula in assumptions.items()}
+    formulas |= {
+        (False, label): conjunction((formula, defined(formula, [v for v in outputs if v in sequences])))
+        for label, formula in guarantees.items()
+    }
+    flat = flatten(formulas, sequences) if sequences else None
+    if flat is None:
+        return None
+    assumed, wanted = (
+        {label: formula for (kind, label), formula in flat.formulas.items() if kind is which} for which in (True, False)
+    )
+    answer = _grouped(
+        flat.variables(inputs), flat.variables(outputs), assumed, wanted, given, timeout_ms // 2, seed, doubtful
+    )
+    if answer.verdict is Verdict.REFUTED:
+        values = flat.values(answer.inputs)
+        group = next(g for g in groups(guarantees, outputs) if set(answer.group) <= set(g.guarantees))
+        at = None if values is None else {v: values[v] for v in inputs if v in values}
+        search = Search(inputs, group, assumptions, given, timeout_ms // 4, seed)
+        return search.judge(at, timeout_ms // 4) if at is not None else None
+    return answer if answer.verdict is Verdict.PROVED else None
 
 
 class Search:
@@ -171,7 +232,7 @@ class Search:
         if answer.status == "unsat":
             return Realizability(Verdict.PROVED, needed=tuple(c for c in answer.core if c != label), engine="z3")
         if answer.status == "sat":
-            return self._judge({**answer.values, **self.given}, limit)
+            return self.judge({**answer.values, **self.given}, limit)
         self.reason = answer.reason
         return None
 
@@ -196,6 +257,8 @@ class Search:
         translator = Translator()
         fixed = self._fixed(translator)
         facts = self._defeated(translator, guarantees, fixed, few)
+        if limit >= _PATIENT_MS:
+            facts += [translator.term(axiom, fixed) for axiom in self.found.least]
         facts += translator.background([*self.inputs, *self.found.constants])
         tracked = [(label, translator.term(formula, fixed)) for label, formula in self.assumptions.items()]
         answer = check(translator, facts, tracked=tracked, timeout_ms=limit, seed=self.seed)
@@ -250,7 +313,7 @@ class Search:
             if inputs is None:
                 return None
             before = len(self.witnesses)
-            answer = self._judge(inputs, max(100, limit // 2))
+            answer = self.judge(inputs, max(100, limit // 2))
             if answer is not None or len(self.witnesses) == before:
                 return answer
         return None
@@ -282,7 +345,7 @@ class Search:
             return None
         return {**{v: values[v] for v in self.inputs}, **self.given}
 
-    def _judge(self, inputs: Mapping[Variable, Value], limit: int) -> Realizability | None:
+    def judge(self, inputs: Mapping[Variable, Value], limit: int) -> Realizability | None:
         """Is there no output at these inputs? If there is one, it becomes a witness."""
         inputs = {v: value for v, value in inputs.items() if v in self.inputs or v in self.given}
         if not replay(self.assumptions.values(), inputs, timeout_ms=limit):
@@ -296,7 +359,7 @@ class Search:
         )
         if answer.status == "unsat":
             return Realizability(Verdict.REFUTED, inputs, tuple(self.group.guarantees), engine=answer.engine)
-        if answer.status == "sat":
+        if answer.status == "sat" and answer.values.keys() >= set(self.group.outputs):
             witness = {output: Fixed(answer.values[output]) for output in self.group.outputs}
             if witness not in self.witnesses:
                 self.witnesses.append(witness)

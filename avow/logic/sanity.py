@@ -106,29 +106,26 @@ def outcomes(
 ) -> tuple[Outcome, ...]:
     """For the pipeline: one outcome for each obligation id, given its claim's name (an unknown name is an error)."""
     results = {r.name: r for r in analyse(node, scenario=scenario, bounds=bounds, wanted=set(obligations.values()))}
-    found = []
-    for identity, name in obligations.items():
-        result = results.get(name)
-        if result is None:
-            found.append(Outcome(identity, Verdict.ERROR, f"{node.name} has no sanity claim named {name}"))
-            continue
-        details: dict[str, object] = {"severity": str(result.severity), "clauses": list(result.clauses)}
-        if result.because:
-            details["because"] = result.because
-        if result.conflicts:
-            details["conflicts"] = [{"clauses": list(c), "counterexample": e.text()} for c, e in result.conflicts]
-        bound: dict[str, object] = {"scenario": True} if result.bounded else {}
-        found.append(
-            Outcome(
-                identity,
-                result.verdict,
-                result.explanation or _SUMMARY[result.verdict],
-                result.counterexample,
-                bound=bound,
-                details=details,
-            )
-        )
-    return tuple(found)
+    return tuple(as_outcome(identity, node.name, name, results.get(name)) for identity, name in obligations.items())
+
+
+def as_outcome(identity: str, node: str, name: str, result: SanityResult | None) -> Outcome:
+    """A result as the outcome of an obligation; None says that there is no such claim."""
+    if result is None:
+        return Outcome(identity, Verdict.ERROR, f"{node} has no sanity claim named {name}")
+    details: dict[str, object] = {"severity": str(result.severity), "clauses": list(result.clauses)}
+    if result.because:
+        details["because"] = result.because
+    if result.conflicts:
+        details["conflicts"] = [{"clauses": list(c), "counterexample": e.text()} for c, e in result.conflicts]
+    return Outcome(
+        identity,
+        result.verdict,
+        result.explanation or _SUMMARY[result.verdict],
+        result.counterexample,
+        bound={"scenario": True} if result.bounded else {},
+        details=details,
+    )
 
 
 _SUMMARY = {
@@ -383,13 +380,15 @@ class _Analysis:
             "different": Not(Compare("==", output, again[output])),
         }
         for given in self._attempts():
-            answer = solve(question, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed, given=given)
+            answer = solve(
+                question, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed, given=given, shown=False
+            )
             if answer.status == "unsat" and not given:
                 return _Finding(Verdict.PROVED, engine=answer.engine, because=self._if_refuted("consistent"))
             if answer.status == "sat":
                 values = {v: value for v, value in {**answer.values, **given}.items() if v.role is not Role.BOUND}
                 text = f"the guarantees allow both values of out.{name}"
-                shown = Counterexample(show_values(values))
+                shown = Counterexample(show_values(values)) if values else None
                 because = self._if_refuted(f"unconstrained-{name}")
                 return _Finding(Verdict.REFUTED, text, counterexample=shown, because=because, engine=answer.engine)
         return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
@@ -407,7 +406,7 @@ class _Analysis:
         """Can they hold together? If not, the texts say so of the smallest set that cannot."""
         from avow.logic.smt import solve
 
-        answer = solve(formulas, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed)
+        answer = solve(formulas, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed, shown=False)
         if answer.status == "unknown" and self.scenario:
             within = solve(formulas, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed, given=self.scenario)
             # An example in the scenario is an example; that there is none in it proves nothing.

@@ -16,12 +16,13 @@ from dataclasses import dataclass, field
 from itertools import chain
 
 from avow.language.sorts import BOOL, DataSort, FunctionSort, OpaqueSort, SequenceSort, SetSort, Sort, TupleSort
-from avow.language.terms import Quantified, Term, Variable
+from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
 from avow.logic.checking import DEFAULT_TIMEOUT_MS, Answer, Engine, Status, check, z3_version
 from avow.logic.clock import now
 from avow.logic.counterexample import show_values
-from avow.logic.formula import free_variables, negation
+from avow.logic.formula import conjunction, free_variables, negation
 from avow.logic.models import Model
+from avow.logic.sequences import defined, flatten
 from avow.logic.solver import z3
 from avow.logic.translation import Expr, Meaning, Translator, Unsupported
 from avow.logic.traversal import subterms
@@ -84,21 +85,27 @@ def solve(
     seed: int = 0,
     variables: Iterable[Variable] = (),
     given: Mapping[Variable, Value] | None = None,
+    shown: bool = True,
 ) -> Solution:
     """Can all formulas hold together? With labels, `unsat` names a minimal conflicting set of them.
 
     `variables` are further variables whose values are wanted; `given` fixes the values of some. Unsupported constructs,
-    time-outs and models that cannot be replayed are `unknown`, with the reason.
+    time-outs and models that cannot be replayed are `unknown`, with the reason. If the values need not be `shown`, then
+    they may be missing: polynomials can be solved by numbers that have no exact decimal.
     """
     start = time.monotonic()
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
     free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
     try:
-        solution = _solve(Translator(), labelled, free, given or {}, timeout_ms, seed)
+        solution = _within_bounds(labelled, free, given or {}, timeout_ms, seed) or _solve(
+            Translator(), labelled, free, given or {}, timeout_ms, seed
+        )
     except Unsupported as error:
         solution = Solution("unknown", reason=f"Avow cannot express {error.what} for the solver")
     except z3.Z3Exception as error:
         solution = Solution("unknown", reason=f"Z3: {error}")
+    if solution.status == "unknown" and not shown and _has_solution(labelled, free, given or {}, timeout_ms, seed):
+        solution = Solution("sat")
     if solution.status == "unknown" and not given and timeout_ms >= _PATIENT_MS:
         solution = _second_opinion(labelled, timeout_ms) or solution
     return Solution(
@@ -277,6 +284,69 @@ def _solve(
                 return Solution("sat", values)
             reason = "the solver's model could not be replayed"
     return Solution("unknown", reason=reason or "no answer in time")
+
+
+def _within_bounds(
+    labelled: Mapping[str, Term],
+    free: frozenset[Variable],
+    given: Mapping[Variable, Value],
+    timeout_ms: int,
+    seed: int,
+) -> Solution | None:
+    """Where there are sequences or divisions: values for which nothing outside a sequence matters, and no division by
+    zero. Sequences are asked about as functions; if these formulas contradict one another, so do the original ones."""
+    if not any(_is_partial(formula) for formula in labelled.values()):
+        return None
+    inside = conjunction(map(defined, labelled.values()))
+    sequences = [v for v in free if isinstance(v.sort, SequenceSort) and v not in given]
+    flat = flatten({**labelled, _INSIDE: inside}, sequences)
+    formulas = dict(flat.formulas if flat else {**labelled, _INSIDE: inside})
+    variables = frozenset(flat.variables(free) if flat else free)
+    found = _solve(Translator(), formulas, variables, given, timeout_ms // 3, seed)
+    if found.status == "sat":
+        values = flat.values(found.values) if flat else found.values
+        if values is not None and replay(labelled.values(), {**values, **given}):
+            return Solution("sat", values, engine=found.engine)
+    if flat is None:
+        return None
+    del formulas[_INSIDE]
+    anywhere = _solve(Translator(), formulas, variables, given, timeout_ms // 3, seed)
+    return anywhere if anywhere.status == "unsat" else None
+
+
+_INSIDE = "within the bounds"
+
+
+def _has_solution(
+    labelled: Mapping[str, Term],
+    free: frozenset[Variable],
+    given: Mapping[Variable, Value],
+    timeout_ms: int,
+    seed: int,
+) -> bool:
+    """Whether formulas without quantifiers, functions and partial operations hold together: there, what the solver
+    finds is a solution even if it cannot be written down."""
+    parts = [part for formula in labelled.values() for part in subterms(formula)]
+    if any(isinstance(part, Quantified | Apply) for part in parts) or any(map(_is_partial, labelled.values())):
+        return False
+    if any(isinstance(v.sort, FunctionSort | OpaqueSort) for v in free):
+        return False
+    try:
+        translator = Translator()
+        fixed = {variable: translator.value(value, variable.sort) for variable, value in given.items()}
+        facts = [translator.term(formula, fixed) for formula in labelled.values()]
+        asked = [*translator.background(free - set(fixed)), *facts]
+        return check(translator, asked, timeout_ms=timeout_ms, seed=seed).status == "sat"
+    except (Unsupported, z3.Z3Exception):
+        return False
+
+
+def _is_partial(formula: Term) -> bool:
+    """Whether sequences or divisions occur."""
+    return any(
+        isinstance(part.sort, SequenceSort) or (isinstance(part, Arithmetic) and part.operator == "/")
+        for part in subterms(formula)
+    )
 
 
 def _is_simple(value: Value) -> bool:

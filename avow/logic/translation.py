@@ -47,7 +47,7 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.logic.one_point import eliminate_points
+from avow.logic.one_point import eliminate_points, expand
 from avow.logic.solver import z3
 from avow.logic.traversal import Steps, run
 from avow.logic.z3_sorts import Expr, Meaning, Sorts, Unsupported
@@ -177,7 +177,8 @@ class Translator(Sorts):
                 return z3.Length(value)
             case Index(sequence=sequence_term, index=index_term):
                 value, at = yield self._terms((sequence_term, index_term), bound, meanings)
-                return value[at]
+                # Z3's element outside a sequence may be no value of the sort: a negative number for a natural.
+                return self.clamped(value[at], term.sort)
             case SequenceRange(low=low, high=high, sort=sequence):
                 return self._range(low, high, sequence, term.span)
             case SetTerm():
@@ -273,11 +274,11 @@ class Translator(Sorts):
         allowed = [member for member in members if member is not None]
         if term.quantifier is Quantifier.FORALL:
             left, parts = eliminate_points(constants, [*allowed, z3.Not(body)])
-            return self._all(left, parts)
+            return self._every([self._all(rest, denied) for rest, denied in expand(left, parts)])
         if term.quantifier is Quantifier.EXISTS:
             left, parts = eliminate_points(constants, [*allowed, body])
-            within = self._every(parts)
-            return z3.Exists(left, within) if left else within
+            options = [self._some(rest, required) for rest, required in expand(left, parts)]
+            return options[0] if len(options) == 1 else z3.Or([*options, z3.Not(self.true())])
         within = self._every([*allowed, body])
         if any(isinstance(variable.sort, FunctionSort) for variable in term.variables):
             raise Unsupported("unique existence of a function", term.span)
@@ -293,6 +294,10 @@ class Translator(Sorts):
         consequence = last.arg(0) if z3.is_not(last) else z3.Not(last)
         body = z3.Implies(self._every(conditions), consequence) if conditions else consequence
         return z3.ForAll(constants, body) if constants else body
+
+    def _some(self, constants: list[Expr], parts: list[Expr]) -> Expr:
+        within = self._every(parts)
+        return z3.Exists(constants, within) if constants else within
 
     def _every(self, parts: list[Expr]) -> Expr:
         return self.all_of(parts) if parts else self.true()

@@ -161,6 +161,18 @@ class Sorts:
             case _:
                 return None
 
+    def clamped(self, expr: Expr, sort: Sort) -> Expr:
+        """The expression where it is a value of the sort, else some value of the sort that depends on it alone."""
+        match sort:
+            case NaturalSort():
+                return z3.If(expr >= 0, expr, z3.IntVal(0, self.context))
+            case TupleSort(items=items) if self.member(sort, expr) is not None:
+                datatype = self.sort(sort)
+                parts = (self.clamped(datatype.accessor(0, k)(expr), item) for k, item in enumerate(items))
+                return datatype.constructor(0)(*parts)
+            case _:
+                return expr
+
     def function_member(self, sort: FunctionSort, function: Callable[..., Expr]) -> Expr | None:
         arguments = [self.fresh("k", parameter) for parameter in sort.parameters]
         inside = self.member(sort.result, function(*arguments))

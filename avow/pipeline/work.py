@@ -76,9 +76,12 @@ def language_work(system: System) -> Work:
 
 def sanity_work(system: System, node: Node) -> Work:
     """Is this node's contract worth verifying? (design: page "Obligations…", kind sanity)"""
+    from avow.calculus.providers import provider_claims
     from avow.logic.claims import claims, node_key
 
     meaning = node_key(node)
+    of_the_node = [(claim, meaning) for claim in claims(node)]
+    of_its_providers = [(asked.claim, asked.digest) for asked in provider_claims(system, node)]
     obligations = tuple(
         Obligation(
             system.name,
@@ -87,12 +90,12 @@ def sanity_work(system: System, node: Node) -> Work:
             claim.name,
             claim.sentence,
             claim.formula,
-            meaning,
+            digest,
             claim.clauses,
             claim.span,
             claim.severity is not Severity.ERROR,
         )
-        for claim in claims(node)
+        for claim, digest in (*of_the_node, *of_its_providers)
     )
     return _work(system, node.name, SANITY, obligations, _z3_version(), _scenario(system))
 
