@@ -81,17 +81,17 @@ def judge(world: World, formula: Term, *, finite: bool = False, doubts: Doubts |
         bounded = compile_term(closed, domains=world.domains)
     except NotEvaluable as reason:
         raise CannotRun(f"a formula cannot be evaluated: {reason.reason}") from None
-    lazy = lazy_names(closed)
+    ways = [(exact, lazy_names(closed)), (bounded, lazy_names(closed, world.domains))]
 
     def holds(found: Mapping[str, Value]) -> bool:
         values = {**found, **{known: found[name] for name, known in names}} if names else found
-        values, wanted = opened(values, lazy) if lazy else (values, [])
         reason: NotEvaluable | None = None
-        for evaluator in (exact, bounded):
+        for evaluator, lazy in ways:
             if evaluator is None:
                 continue
+            asking, wanted = opened(values, lazy) if lazy else (values, [])
             try:
-                truth = bool(evaluator(values))
+                truth = bool(evaluator(asking))
             except NotEvaluable as stopped:
                 reason = stopped
                 if wanted:

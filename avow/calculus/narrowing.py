@@ -8,16 +8,18 @@ decide. So one open function stands for all functions that complete it, and a se
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 from avow.language.contract import Clause
 from avow.language.sorts import FunctionSort, SequenceSort
 from avow.language.terms import And, Apply, Compare, Implies, Role, Term, Variable
 from avow.logic import values as values_
-from avow.logic.evaluate import Evaluator, NotEvaluable, compile_term
+from avow.logic.evaluate import Domains, Evaluator, NotEvaluable, compile_term, finite_values
 from avow.logic.formula import free_variables
 from avow.logic.values import Data, FunctionValue, Opaque, Value
 
@@ -65,9 +67,27 @@ def is_open(value: Value) -> bool:
             return False
 
 
-def lazy_names(formula: Term) -> tuple[str, ...]:
-    """The free variables of a formula whose values may be open."""
-    return tuple(v.qualified for v in free_variables(formula) if isinstance(v.sort, FunctionSort | SequenceSort))
+Lazy = tuple[tuple[str, tuple[Point, ...] | None], ...]
+"""Variables whose values may be open; of a function, all points that there are, if they are finitely many."""
+
+MAX_POINTS = 10_000
+
+
+def lazy_names(formula: Term, domains: Domains | None = None) -> Lazy:
+    """The free variables of a formula whose values may be open. `domains`: for quantifiers over these values only."""
+    return tuple(
+        (v.qualified, _points(v.sort, domains) if isinstance(v.sort, FunctionSort) else None)
+        for v in free_variables(formula)
+        if isinstance(v.sort, FunctionSort | SequenceSort)
+    )
+
+
+def _points(sort: FunctionSort, domains: Domains | None) -> tuple[Point, ...] | None:
+    ranges = [finite_values(parameter, domains) for parameter in sort.parameters]
+    known = [values for values in ranges if values is not None]
+    if len(known) < len(ranges) or math.prod(map(len, known)) > MAX_POINTS:
+        return None
+    return tuple(product(*known))
 
 
 def decided(value: Value, point: Point, result: Value) -> Value:
@@ -86,17 +106,17 @@ def _order(entry: tuple[Point, Value]) -> tuple[object, ...]:
     return tuple((0, a, "") if isinstance(a, int | Fraction) else (1, 0, str(a)) for a in entry[0])
 
 
-def opened(found: Mapping[str, Value], names: Sequence[str]) -> tuple[Mapping[str, Value], list[tuple[str, Point]]]:
+def opened(found: Mapping[str, Value], names: Lazy) -> tuple[Mapping[str, Value], list[tuple[str, Point]]]:
     """The valuation with its open values ready to be asked, and where the questions to them will be noted."""
     wanted: list[tuple[str, Point]] = []
     asking: Values = {}
-    for name in names:
+    for name, points in names:
         value = found.get(name)
         if value is None or not is_open(value):
             continue
         match value:
             case FunctionValue(table=table, default=default):
-                asking[name] = FunctionValue(_OpenTable(name, table, wanted), default)
+                asking[name] = FunctionValue(_OpenTable(name, table, wanted, points), default)
             case values_.Sequence(items=items):
                 asks: Any = _OpenItems(name, items, wanted)
                 asking[name] = values_.Sequence(asks)
@@ -108,10 +128,17 @@ class _Asked(NotEvaluable):
 
 
 class _OpenTable(Mapping[Point, Value]):
-    """A table that says which point it was asked for. Asked for all of them at once, it has no answer."""
+    """A table that says which point it was asked for. Asked for all, it asks for one after the other, if there is an
+    end to them."""
 
-    def __init__(self, name: str, table: Mapping[Point, Value], wanted: list[tuple[str, Point]]) -> None:
-        self._name, self._table, self._wanted = name, table, wanted
+    def __init__(
+        self,
+        name: str,
+        table: Mapping[Point, Value],
+        wanted: list[tuple[str, Point]],
+        points: tuple[Point, ...] | None,
+    ) -> None:
+        self._name, self._table, self._wanted, self._points = name, table, wanted, points
 
     def get(self, point: Point, default: Any = None) -> Value:
         found = self._table.get(point)
@@ -123,26 +150,28 @@ class _OpenTable(Mapping[Point, Value]):
     def __getitem__(self, point: Point) -> Value:
         return self.get(point)
 
-    def _all(self) -> Any:
-        raise NotEvaluable(f"{self._name} is not known at all its points")
+    def _all(self) -> dict[Point, Value]:
+        if self._points is None:
+            raise NotEvaluable(f"{self._name} is not known at all its points")
+        return {point: self.get(point) for point in self._points}
 
     def __iter__(self) -> Iterator[Point]:
-        raise NotEvaluable(f"{self._name} is not known at all its points")
+        return iter(self._all())
 
     def __len__(self) -> int:
-        raise NotEvaluable(f"{self._name} is not known at all its points")
+        return len(self._all())
 
     def items(self) -> Any:
-        return self._all()
+        return self._all().items()
 
     def keys(self) -> Any:
-        return self._all()
+        return self._all().keys()
 
     def values(self) -> Any:
-        return self._all()
+        return self._all().values()
 
     def __eq__(self, other: object) -> bool:
-        return bool(self._all())
+        return self._all() == other
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -210,7 +239,7 @@ class Forcing:
     arguments: tuple[Evaluator, ...] | None
     when: tuple[Evaluator, ...]
     value: Evaluator
-    lazy: tuple[str, ...]
+    lazy: Lazy
 
     def forced(self, found: Mapping[str, Value], point: Point | None) -> tuple[Value, ...] | None:
         """The only value that is possible, if this equation says so of this port (at this point)."""
@@ -264,7 +293,7 @@ def _forcing(head: Term, value: Term, when: tuple[Term, ...]) -> Forcing | None:
             None if arguments is None else tuple(map(compile_term, arguments)),
             tuple(map(compile_term, when)),
             compile_term(value),
-            tuple(dict.fromkeys(name for part in parts for name in lazy_names(part))),
+            tuple(dict(entry for part in parts for entry in lazy_names(part)).items()),
         )
     except NotEvaluable:
         return None

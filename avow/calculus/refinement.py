@@ -6,7 +6,7 @@ assumptions of B imply those of A; these and A's guarantees imply B's guarantees
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,9 +14,10 @@ from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
 from avow.diagnostics import Diagnostic
 from avow.language.contract import Clause, Node, Port
+from avow.language.printer import show_type
 from avow.language.sorts import FunctionSort, SequenceSort, Sort, TupleSort
 from avow.language.terms import Quantified, Term
-from avow.logic.formula import sort_digest, transform
+from avow.logic.formula import rename, sort_digest, transform
 from avow.system.graph import fits
 from avow.verdict import Counterexample, Verdict
 
@@ -51,9 +52,13 @@ class Refinement:
         return Verdict.UNKNOWN if verdicts - {Verdict.PROVED} else Verdict.PROVED
 
 
-def refines(concrete: Node, abstract: Node, bounds: Bounds | None = None) -> Refinement:
-    """Does the first node refine the second? Ports are matched by name; types by what they are, not by their names."""
+def refines(
+    concrete: Node, abstract: Node, bounds: Bounds | None = None, renames: Mapping[str, str] | None = None
+) -> Refinement:
+    """Does the first node refine the second? Ports are matched by name, after `renames` (the first node's name of a
+    port → the second's); types by what they are, not by their names."""
     bounds = bounds or Bounds()
+    concrete = renamed(concrete, renames or {})
     faults = _ports(concrete, abstract)
     if faults:
         return Refinement(concrete.name, abstract.name, faults, ())
@@ -78,6 +83,30 @@ def refines(concrete: Node, abstract: Node, bounds: Bounds | None = None) -> Ref
     return Refinement(concrete.name, abstract.name, (), tuple(demands))
 
 
+def renamed(node: Node, names: Mapping[str, str]) -> Node:
+    """A node with some ports under other names. Another port that has such a name is called otherwise."""
+    taken = {*names.values()}
+
+    def called(port: Port) -> str:
+        name = names.get(port.name, port.name)
+        while port.name not in names and name in taken:
+            name += "'"
+        return name
+
+    def change(ports: tuple[Port, ...]) -> tuple[Port, ...]:
+        return tuple(replace(port, name=called(port)) for port in ports)
+
+    if not names:
+        return node
+    inputs, outputs = change(node.inputs), change(node.outputs)
+    given = {
+        old.variable: new.variable for old, new in zip((*node.inputs, *node.outputs), (*inputs, *outputs), strict=True)
+    }
+    assumptions = tuple(replace(a, formula=rename(a.formula, given)) for a in node.assumptions)
+    guarantees = tuple(replace(g, formula=rename(g.formula, given)) for g in node.guarantees)
+    return replace(node, inputs=inputs, outputs=outputs, topics=(), assumptions=assumptions, guarantees=guarantees)
+
+
 def _ports(concrete: Node, abstract: Node) -> tuple[Diagnostic, ...]:
     faults: list[Diagnostic] = []
     inputs = {port.name: port for port in abstract.inputs}
@@ -85,23 +114,35 @@ def _ports(concrete: Node, abstract: Node) -> tuple[Diagnostic, ...]:
     for port in concrete.inputs:
         given = inputs.get(port.name)
         if given is None:
-            message = f"{concrete.name} wants an input {port.name!r} that {abstract.name} does not have"
+            message = f"{concrete.name} wants an input {port.name!r} that {_the(abstract, concrete)} does not have"
             faults.append(Diagnostic("PLAN126", message, port.span))
         elif not _same(given.sort, port.sort):
             faults.append(_other_type(concrete, port, abstract, given))
     for port in abstract.outputs:
         made = outputs.get(port.name)
         if made is None:
-            message = f"{concrete.name} has no output {port.name!r}, which {abstract.name} gives"
+            message = f"{concrete.name} has no output {port.name!r}, which {_the(abstract, concrete)} gives"
             faults.append(Diagnostic("PLAN126", message, concrete.span))
         elif not _same(made.sort, port.sort):
             faults.append(_other_type(concrete, made, abstract, port))
     return tuple(faults)
 
 
+def _the(abstract: Node, concrete: Node) -> str:
+    return abstract.name if abstract.name != concrete.name else f"the {abstract.name} to be refined"
+
+
 def _other_type(concrete: Node, port: Port, abstract: Node, other: Port) -> Diagnostic:
-    message = f"{port.name!r} is {port.type_name} in {concrete.name} and {other.type_name} in {abstract.name}"
+    mine, theirs = _written(port), _written(other)
+    where = (concrete.name, abstract.name) if concrete.name != abstract.name else ("the first", "the second")
+    message = f"{port.name!r} is {mine} in {where[0]} and {theirs} in {where[1]}"
     return Diagnostic("PLAN126", message, port.span)
+
+
+def _written(port: Port) -> str:
+    """The type as the port's declaration has it, and what that is, if it is a name."""
+    meant = show_type(port.sort)
+    return port.type_name if meant == port.type_name else f"{port.type_name} = {meant}"
 
 
 def _same(given: Sort, wanted: Sort) -> bool:

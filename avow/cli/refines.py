@@ -3,89 +3,182 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from avow.cli.paths import PathArgument
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from avow.calculus.discharge import Bounds
+    from avow.calculus.refinement import Demand, Refinement
+    from avow.language.contract import Node
+    from avow.verdict import Verdict
+
+MAX_SECONDS = 86_400
+
 
 @click.command()
-@click.argument("concrete", type=PathArgument(dir_okay=False))
-@click.argument("abstract", type=PathArgument(dir_okay=False))
-@click.option("--node", metavar="NAME", help="Only this node; by default every node of ABSTRACT.")
+@click.argument("concrete", type=PathArgument())
+@click.argument("abstract", type=PathArgument())
+@click.option("--node", metavar="NAME", help="Only this node, or NEW=OLD; by default every node of ABSTRACT.")
+@click.option("--rename", "renames", multiple=True, metavar="NEW=OLD", help="CONCRETE's port NEW is ABSTRACT's OLD.")
 @click.option("--json", "as_json", is_flag=True, help="For machines.")
 @click.option("--seconds", default=10.0, show_default=True, help="Time for one question to the solver.")
-@click.option("--seed", default=0, show_default=True, help="The solver's seed.")
-def command(concrete: Path, abstract: Path, node: str | None, as_json: bool, seconds: float, seed: int) -> int:
-    """Does CONCRETE refine ABSTRACT: assume no more, and guarantee no less? Nodes and ports are matched by name; a
-    single node in each file is matched whatever its name.
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0, 2**31 - 1), help="The solver's seed.")
+def command(
+    concrete: Path,
+    abstract: Path,
+    node: str | None,
+    renames: tuple[str, ...],
+    as_json: bool,
+    seconds: float,
+    seed: int,
+) -> int:
+    """Does CONCRETE refine ABSTRACT: assume no more, and guarantee no less?
+
+    Each is an .rcl file, whose nodes are compared one by one, or a system's folder, of which the contract that is
+    derived of all its nodes is compared. Nodes and ports are matched by name (--node, --rename); a single node on
+    each side whatever its name.
 
     Code 1 where it does not, or where the solver gave up; 2 for bad input.
     """
     from avow.calculus.discharge import Bounds
     from avow.calculus.refinement import refines
     from avow.diagnostics import Diagnostic, Rejected
-    from avow.language.load import load_contract
     from avow.verdict import Verdict
 
-    if seconds <= 0:
-        raise Rejected(Diagnostic("CLI004", f"--seconds {seconds}: a time above 0 is wanted"))
-    new, old = load_contract([concrete]), load_contract([abstract])
-    pairs = [(n, m) for m in old.nodes for n in new.nodes if n.name == m.name and node in (None, m.name)]
-    if not pairs and node is None and len(new.nodes) == len(old.nodes) == 1:
-        pairs = [(new.nodes[0], old.nodes[0])]
-    missing = [m.name for m in old.nodes if node in (None, m.name) and all(m is not b for _, b in pairs)]
-    if node is not None and not pairs:
-        known = ", ".join(m.name for m in old.nodes)
-        raise Rejected(Diagnostic("CLI003", f"there is no node '{node}' in both files", hint=f"{abstract}: {known}"))
-    if not pairs:
-        raise Rejected(Diagnostic("CLI003", f"no node of {abstract} is in {concrete}"))
+    if not (0 < seconds <= MAX_SECONDS) or math.isnan(seconds):
+        raise Rejected(Diagnostic("CLI004", f"--seconds {seconds}: a time above 0 is wanted, of at most a day"))
     bounds = Bounds(max(1, int(seconds * 1000)), seed)
-    found = [refines(n, m, bounds) for n, m in pairs]
-    good = not missing and all(result.verdict is Verdict.PROVED for result in found)
+    new, stands = _nodes(concrete, bounds)
+    old, _ = _nodes(abstract, bounds)
+    pairs, missing = _pairs(new, old, node, concrete, abstract)
+    names = _renamed(renames, [n for n, _ in pairs])
+    found = [refines(n, m, bounds, names) for n, m in pairs]
+    good = not missing and stands is Verdict.PROVED and all(result.verdict is Verdict.PROVED for result in found)
     if as_json:
-        document = {
-            "refines": good,
-            "missing": missing,
-            "nodes": [
-                {
-                    "concrete": result.concrete,
-                    "abstract": result.abstract,
-                    "verdict": str(result.verdict),
-                    "ports": [fault.message for fault in result.faults],
-                    "clauses": [
-                        {
-                            "clause": f"{demand.node}.{demand.clause.name}",
-                            "kind": str(demand.clause.kind),
-                            "verdict": str(demand.verdict),
-                            "needed": list(demand.needed),
-                            "vacuous": demand.vacuous,
-                            "counterexample": dict(demand.counterexample.values) if demand.counterexample else None,
-                        }
-                        for demand in result.demands
-                    ],
-                }
-                for result in found
-            ],
-        }
-        click.echo(json.dumps(document, indent=1, ensure_ascii=False))
+        document = {"refines": good, "missing": missing, "nodes": [_data(result) for result in found]}
+        click.echo(json.dumps(document | {"derivation": str(stands)}, indent=1, ensure_ascii=False))
         return 0 if good else 1
     for name in missing:
         click.echo(f"{name}: not in {concrete}")
+    if stands is not Verdict.PROVED:
+        click.echo(f"{concrete}: its own derivation is {stands}: `avow compose {concrete}` says why")
     for result in found:
-        click.echo(f"{result.concrete} refines {result.abstract}: {result.verdict}")
-        for fault in result.faults:
-            click.echo(f"  {fault.message}")
-        for demand in result.demands:
-            if demand.verdict is Verdict.PROVED and not demand.vacuous:
-                continue
-            what = "assumes" if demand.clause.kind == "assumption" else "must guarantee"
-            click.echo(f"  {demand.verdict}: {demand.node} {what} {demand.clause.name}")
-            if demand.counterexample is not None:
-                click.echo(f"    {demand.counterexample.text()}")
-            elif demand.reason:
-                click.echo(f"    {demand.reason}")
-            elif demand.vacuous:
-                click.echo("    only because the hypotheses contradict one another")
+        _print(result, str(concrete), str(abstract))
     return 0 if good else 1
+
+
+def _nodes(path: Path, bounds: Bounds) -> tuple[tuple[Node, ...], Verdict]:
+    """The nodes to compare, and whether they may be relied on: a derived contract only if its derivation stands."""
+    from avow.language.load import load_contract
+    from avow.verdict import Verdict
+
+    if not path.is_dir():
+        return load_contract([path]).nodes, Verdict.PROVED
+    from avow.calculus.composition import compose
+    from avow.calculus.export import derived_contract
+    from avow.diagnostics import Rejected
+    from avow.system.load import load_system
+
+    composition = compose(load_system(path))
+    errors = [finding for finding in composition.frame.graph.findings if finding.is_error]
+    if errors:
+        raise Rejected(*errors)
+    whole = composition.whole
+    return derived_contract(composition, whole).nodes, composition.stands(whole, bounds)
+
+
+def _pairs(
+    new: tuple[Node, ...], old: tuple[Node, ...], asked: str | None, concrete: Path, abstract: Path
+) -> tuple[list[tuple[Node, Node]], list[str]]:
+    """What is compared with what, and what of ABSTRACT has no counterpart. Raises Rejected."""
+    from avow.diagnostics import Diagnostic, Rejected
+
+    if asked is not None:
+        mine, _, theirs = asked.partition("=") if "=" in asked else (asked, "", asked)
+        for name, nodes, path in ((mine, new, concrete), (theirs, old, abstract)):
+            if name not in [n.name for n in nodes]:
+                known = ", ".join(n.name for n in nodes)
+                raise Rejected(Diagnostic("CLI003", f"{path} has no node '{name}'", hint=f"it has: {known}"))
+        one = next(n for n in new if n.name == mine)
+        return [(one, m) for m in old if m.name == theirs], []
+    if len(new) == len(old) == 1:
+        return [(new[0], old[0])], []
+    by_name = {n.name: n for n in new}
+    pairs = [(by_name[m.name], m) for m in old if m.name in by_name]
+    if not pairs:
+        hint = f"{concrete} has: {', '.join(by_name)}; compare two by --node NEW=OLD"
+        raise Rejected(Diagnostic("CLI003", f"no node of {abstract} is in {concrete}", hint=hint))
+    return pairs, [m.name for m in old if m.name not in by_name]
+
+
+def _renamed(texts: tuple[str, ...], nodes: list[Node]) -> Mapping[str, str]:
+    """Raises Rejected."""
+    from avow.diagnostics import Diagnostic, Rejected
+
+    ports = {port.name for node in nodes for port in (*node.inputs, *node.outputs)}
+    found: dict[str, str] = {}
+    for text in texts:
+        mine, equals, theirs = text.partition("=")
+        if not (equals and mine and theirs) or mine in found or theirs in found.values():
+            message = f"--rename {text}: wanted is NEW=OLD, each port once"
+            raise Rejected(Diagnostic("CLI003", message, hint=f"ports: {', '.join(sorted(ports))}"))
+        if mine not in ports:
+            hint = f"ports: {', '.join(sorted(ports))}"
+            raise Rejected(Diagnostic("CLI003", f"--rename {text}: there is no port '{mine}'", hint=hint))
+        found[mine] = theirs
+    return found
+
+
+def _data(result: Refinement) -> dict[str, object]:
+    return {
+        "concrete": result.concrete,
+        "abstract": result.abstract,
+        "verdict": str(result.verdict),
+        "ports": [fault.message for fault in result.faults],
+        "clauses": [
+            {
+                "clause": f"{demand.node}.{demand.clause.name}",
+                "kind": str(demand.clause.kind),
+                "verdict": str(demand.verdict),
+                "needed": list(demand.needed),
+                "vacuous": demand.vacuous,
+                "counterexample": dict(demand.counterexample.values) if demand.counterexample else None,
+            }
+            for demand in result.demands
+        ],
+    }
+
+
+def _print(result: Refinement, concrete: str, abstract: str) -> None:
+    click.echo(f"{result.concrete} ({concrete}) refines {result.abstract} ({abstract}): {result.verdict}")
+    for fault in result.faults:
+        click.echo(f"  {fault.message}")
+    for demand in result.demands:
+        told = _told(demand, concrete, abstract)
+        if told:
+            click.echo(f"  {demand.verdict}: {told}")
+
+
+def _told(demand: Demand, concrete: str, abstract: str) -> str:
+    from avow.language.contract import ClauseKind
+    from avow.verdict import Verdict
+
+    if demand.verdict is Verdict.PROVED:
+        if not demand.vacuous:
+            return ""
+        return f"{demand.clause.name}, but only because what is assumed or guaranteed contradicts itself"
+    if demand.clause.kind is ClauseKind.ASSUMPTION:
+        what = f"{concrete} assumes {demand.clause.name}, which {abstract} does not"
+    else:
+        what = f"{abstract} guarantees {demand.clause.name}, which {concrete} need not keep"
+    if demand.counterexample is not None:
+        values = ", ".join(f"{name} = {value}" for name, value in demand.counterexample.values)
+        return f"{what}: at {values}" if values else what
+    return f"{what}: {demand.reason}" if demand.reason else what

@@ -9,6 +9,8 @@ import pytest
 from avow.calculus.composition import compose
 from avow.calculus.export import derived_contract
 from avow.calculus.refinement import refines
+from avow.cli.refines import command as refines_command
+from avow.diagnostics import Rejected
 from avow.language.contract import Node
 from avow.language.load import check_text
 from avow.language.translate import to_rcl
@@ -17,6 +19,7 @@ from avow.verdict import Verdict
 
 from .case_study import REPAIRED
 from .make import case_study, make, node, settled
+from .test_commands import invoke
 
 
 def only(text: str, context: str = "") -> Node:
@@ -101,3 +104,78 @@ def test_hierarchy(tmp_path: Path) -> None:
     _, answers = settled(system)
     assert answers.verdict is Verdict.PROVED
     assert answers.goal.root.nodes == ("source", "inner", "sink") or len(answers.goal.root.nodes) == 3
+
+
+# -- the command -------------------------------------------------------------------------------------------------------
+
+OTHER = BASE.replace("node n", "node m").replace("x : REAL", "y : REAL").replace("out.x", "out.y")
+
+
+def command(tmp_path: Path, new: str, old: str, *options: str) -> tuple[object, str]:
+    (tmp_path / "new.rcl").write_text(new)
+    (tmp_path / "old.rcl").write_text(old)
+    return invoke(refines_command, str(tmp_path / "new.rcl"), str(tmp_path / "old.rcl"), *options)
+
+
+def test_renamed_ports_and_nodes(tmp_path: Path) -> None:
+    code, output = command(tmp_path, OTHER, BASE)
+    assert code == 1
+    assert "m has no output 'x', which n gives" in output
+    assert command(tmp_path, OTHER, BASE, "--rename", "y=x")[0] == 0
+    assert command(tmp_path, OTHER.replace(">= in.r", "> in.r - 1"), BASE, "--rename", "y=x")[0] == 1
+    assert command(tmp_path, OTHER + BASE, BASE, "--node", "m=n", "--rename", "y=x")[0] == 0
+
+
+def test_a_renamed_port_does_not_meet_another_of_that_name(tmp_path: Path) -> None:
+    """The new node's own x has nothing to do with the old one's."""
+    new = node("n", "r : REAL", "x : REAL, y : REAL", "A reading: 0 <= in.r <= 10", "G: out.x >= in.r and out.y < 0")
+    assert command(tmp_path, new, BASE)[0] == 0
+    code, output = command(tmp_path, new, BASE, "--rename", "y=x")
+    assert code == 1
+    assert "guarantees above, which" in output
+
+
+def test_counterexamples_say_whose_clause_it_is(tmp_path: Path) -> None:
+    _, output = command(tmp_path, BASE.replace("<= 10", "< 10"), BASE)
+    assert "new.rcl assumes reading, which" in output
+    assert output.rstrip().endswith("old.rcl does not: at in.r = 10")
+    _, output = command(tmp_path, BASE.replace("out.x >=", "out.x >"), BASE.replace("out.x >=", "out.x - 1 >="))
+    assert "old.rcl guarantees above, which" in output
+    assert "out.x = " in output
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--node", "k"], "has no node 'k'"),
+        (["--node", "n=k"], "old.rcl has no node 'k'"),
+        (["--rename", "y"], "wanted is NEW=OLD"),
+        (["--rename", "q=x"], "there is no port 'q'"),
+        (["--rename", "r=x", "--rename", "r=y"], "each port once"),
+        (["--seconds", "nan"], "a time above 0"),
+        (["--seconds", "inf"], "a time above 0"),
+    ],
+)
+def test_bad_options(tmp_path: Path, options: list[str], words: str) -> None:
+    with pytest.raises(Rejected) as rejected:
+        command(tmp_path, BASE, BASE, *options)
+    assert words in rejected.value.diagnostics[0].message
+
+
+def test_systems_are_compared_by_what_is_derived_of_them(tmp_path: Path) -> None:
+    first = node("a", "r : REAL", "m : REAL", "A: in.r >= 0", "G: out.m == in.r + 1")
+    second = node("b", "m : REAL", "x : REAL", "A: in.m >= 1", "G: out.x >= in.m")
+    for name, text in {
+        "old": first + second,
+        "weak": first + second.replace("out.x >= in.m", "out.x >= in.m - 1"),
+        "open": first.replace("in.r + 1", "in.r") + second.replace("in.m >= 1", "in.m >= 2"),
+    }.items():
+        make(tmp_path / name, text)
+    code, output = invoke(refines_command, str(tmp_path / "weak"), str(tmp_path / "old"))
+    assert code == 1
+    assert "guarantees b_G1, which" in output
+    assert invoke(refines_command, str(tmp_path / "old"), str(tmp_path / "old"))[0] == 0
+    assert invoke(refines_command, str(tmp_path / "old"), str(tmp_path / "weak"))[0] == 0
+    code, output = invoke(refines_command, str(tmp_path / "open"), str(tmp_path / "open"))
+    assert code == 1
+    assert "its own derivation is refuted" in output, "a derived contract is worth what its derivation is"

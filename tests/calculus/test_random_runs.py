@@ -1,0 +1,270 @@
+"""Small random systems that put out functions and sequences, over delays and loops, against all their runs."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+from avow.calculus.composition import Composition, compose
+from avow.calculus.obligations import composition_obligations, requirement_obligations, settle_all
+from avow.language.contract import Port
+from avow.language.sorts import BoolSort, EnumSort, FunctionSort, SequenceSort, Sort
+from avow.logic.evaluate import compile_term
+from avow.logic.values import Element, FunctionValue, Sequence, Value
+from avow.system.plan import Endpoint
+from avow.verdict import Outcome, Verdict
+
+from .make import make, node
+
+Values = dict[str, Value]
+
+CONTEXT = "context { Tint : {red, blue}; Paint : Tint --> Tint; Row : <Tint>; }\n"
+TYPES = {"t": "Tint", "f": "Paint", "s": "Row", "b": "BOOL"}
+SYSTEMS = 8
+ROWS = [(), ("red",), ("blue",), ("red", "blue")]
+TINTS = [Element("red"), Element("blue")]
+
+
+def tint(chance: random.Random, names: list[str], depth: int = 2) -> str:
+    own = [n for n in names if n.rpartition(".")[2][0] in "tf"]
+    name = chance.choice(own) if own and chance.random() < 0.8 else chance.choice(["red", "blue"])
+    if name.rpartition(".")[2].startswith("f") and "." in name:
+        return f"{name}({tint(chance, names, depth - 1) if depth else chance.choice(['red', 'blue'])})"
+    return name
+
+
+def atom(chance: random.Random, names: list[str]) -> str:
+    flags = [n for n in names if n.rpartition(".")[2].startswith("b")]
+    rows = [n for n in names if n.rpartition(".")[2].startswith("s")]
+    maps = [n for n in names if n.rpartition(".")[2].startswith("f")]
+    kind = chance.random()
+    if flags and kind < 0.25:
+        return chance.choice(flags)
+    if rows and kind < 0.45:
+        row = chance.choice(rows)
+        return chance.choice(
+            [f"length({row}) == {chance.randint(0, 2)}", f"{tint(chance, names)} in {row}", f"length({row}) >= 1"]
+        )
+    if maps and kind < 0.6:
+        return f"forall(c in Tint | {chance.choice(maps)}(c) {chance.choice(['==', '!='])} {tint(chance, names, 0)})"
+    return f"{tint(chance, names)} == {tint(chance, names)}"
+
+
+def formula(chance: random.Random, names: list[str], depth: int = 2) -> str:
+    if depth == 0 or chance.random() < 0.3:
+        return atom(chance, names) if chance.random() < 0.7 else f"(not {atom(chance, names)})"
+    operator = chance.choice(["and", "or", "or", "->", "<=>"])
+    return f"({formula(chance, names, depth - 1)} {operator} {formula(chance, names, depth - 1)})"
+
+
+def random_system(seed: int) -> tuple[str, str, str]:
+    """Two or three nodes; each reads some outputs of earlier ones at once, and some of any of them one step later."""
+    chance = random.Random(seed)
+    count = chance.randint(2, 3)
+    outputs = [[f"{chance.choice('tfsb')}{k}" for _ in range(1)] for k in range(count)]
+    text, edges, ports = CONTEXT, [], []
+    for k in range(count):
+        inputs = [name for earlier in outputs[:k] for name in earlier if chance.random() < 0.7]
+        for other, names in enumerate(outputs):
+            if chance.random() < 0.35:
+                late = f"{names[0]}_{other}"
+                inputs.append(late)
+                edges.append((f"n{other}.{names[0]}", f"n{k}.{late}"))
+        if chance.random() < 0.3:
+            inputs.append("b_e")
+        reads = [f"in.{name}" for name in inputs]
+        writes = [f"out.{name}" for name in outputs[k]]
+        clauses = [f"A a: {formula(chance, reads, 1)}"] if reads and chance.random() < 0.5 else []
+        clauses += [f"G g{j}: {formula(chance, [*reads, *writes, *writes])}" for j in range(chance.randint(1, 2))]
+        described = [", ".join(f"{n} : {TYPES[n[0]]}" for n in part) for part in (inputs, outputs[k])]
+        text += node(f"n{k}", *described, *clauses)
+        ports += [f"n{k}.{name}" for name in (*inputs, *outputs[k])]
+    first = {"t": ["red", "blue"], "b": ["TRUE", "FALSE"], "s": ["<red>"], "f": []}
+    given: dict[str, str] = {}
+    for source, _ in edges:
+        values = first[source.partition(".")[2][0]]
+        given.setdefault(source, chance.choice(values) if values and chance.random() < 0.8 else "")
+    shown = [
+        f"{{from: {source}, to: {target}, delayed: true{', initial: ' + given[source] if given[source] else ''}}}"
+        for source, target in edges
+    ]
+    rows = ", ".join(f'"<{", ".join(row)}>"' for row in ROWS)
+    claim = formula(chance, ports)
+    plan = f"connections: [{', '.join(shown)}]\nscenario: {{domains: {{Row: [{rows}]}}}}\n"
+    plan += f"requirements: {{ALWAYS: {{text: t, temporal: '{claim}'}}, R: {{text: t, formula: '{claim}'}}}}\n"
+    return text, plan.replace(f"temporal: '{claim}'", f"temporal: 'always ({claim})'"), claim
+
+
+def everything(sort: Sort) -> list[Value]:
+    match sort:
+        case BoolSort():
+            return [False, True]
+        case EnumSort():
+            return list(TINTS)
+        case SequenceSort():
+            return [Sequence(tuple(map(Element, row))) for row in ROWS]
+        case FunctionSort():
+            return [
+                FunctionValue({(a,): r for a, r in zip(TINTS, results, strict=True)}, TINTS[0])
+                for results in product(TINTS, repeat=2)
+            ]
+    raise AssertionError(sort)
+
+
+class Enumeration:
+    """All runs, found by trying everything."""
+
+    def __init__(self, composition: Composition, claim: str) -> None:
+        self.frame = composition.frame
+        self.graph = self.frame.graph
+        contract = self.frame.system.contract
+        self.ports: dict[str, Port] = {f"{n.name}.{p.name}": p for n in contract.nodes for p in n.outputs}
+        self.inputs = [(n.name, p.name) for n in contract.nodes for p in n.inputs]
+        self.outside = sorted({e.port for e in self.graph.environment})
+        self.late = sorted({str(e.source) for e in self.graph.edges if e.delayed})
+        self.clauses = {
+            n.name: ([compile_term(a.formula) for a in n.assumptions], [compile_term(g.formula) for g in n.guarantees])
+            for n in contract.nodes
+        }
+        from avow.system.temporal import parse_state
+
+        self.claim = compile_term(parse_state(claim, contract, None))
+
+    def local(self, name: str, values: Mapping[str, Value]) -> Values:
+        found = {f"out.{p}": values[f"{name}.{p}"] for n, _, p in (x.partition(".") for x in self.ports) if n == name}
+        for owner, port in self.inputs:
+            if owner == name:
+                edge = self.graph.by_target.get(Endpoint(name, port))
+                where = f"in.{port}" if edge is None else f"{edge.source}{'@before' if edge.delayed else ''}"
+                found[f"in.{port}"] = values[where]
+        return found
+
+    def starts(self) -> Iterator[Values]:
+        initial = {str(e.source): e.initial for e in self.graph.edges if e.delayed}
+        known = {"red": TINTS[0], "blue": TINTS[1], "TRUE": True, "FALSE": False, "<red>": Sequence((TINTS[0],))}
+        ranges = [
+            everything(self.ports[n].sort) if (given := initial[n]) is None else [known[given]] for n in self.late
+        ]
+        combinations: Iterator[tuple[Value, ...]] = product(*ranges)
+        for combination in combinations:
+            yield dict(zip(self.late, combination, strict=True))
+
+    def steps(self, before: Values) -> Iterator[tuple[Values, frozenset[str]]]:
+        """Every complete step, and the nodes whose assumptions do not hold."""
+        names = [*self.ports, *(f"in.{port}" for port in self.outside)]
+        ranges = [everything(p.sort) for p in self.ports.values()] + [[False, True] for _ in self.outside]
+        for combination in product(*ranges):
+            values: Values = dict(zip(names, combination, strict=True))
+            values |= {f"{name}@before": value for name, value in before.items()}
+            broken = set()
+            for name, (assumed, promised) in self.clauses.items():
+                local = self.local(name, values)
+                if not all(holds(local) for holds in assumed):
+                    broken.add(name)
+                elif not all(holds(local) for holds in promised):
+                    break
+            else:
+                yield values, frozenset(broken)
+
+    def holds(self, values: Values) -> bool:
+        given: Values = {}
+        for name in self.clauses:
+            given |= {
+                f"{k.partition('.')[0]}.{name}.{k.partition('.')[2]}": v for k, v in self.local(name, values).items()
+            }
+        return bool(self.claim(given))
+
+    def always(self, *, trusting: bool) -> bool:
+        """Whether the claim holds at every step of every run; `trusting`: of those at which every assumption does."""
+        waiting = list(self.starts())
+        seen: set[str] = set()
+        while waiting:
+            before = waiting.pop()
+            if (mark := str({name: str(value) for name, value in before.items()})) in seen:
+                continue
+            seen.add(mark)
+            for values, broken in self.steps(before):
+                if trusting and broken:
+                    continue
+                if not self.holds(values):
+                    return False
+                waiting.append({name: values[name] for name in self.late})
+        return True
+
+    def may_break(self, node_name: str, clause: str) -> bool:
+        """Whether, after steps at which every assumption holds, this one may be false though all behind it is kept."""
+        index = [a.name for a in self.frame.node(node_name).assumptions].index(clause)
+        behind, stack = {node_name}, [node_name]
+        while stack:
+            for edge in self.graph.feeding(stack.pop()):
+                if not edge.delayed and edge.source.node not in behind:
+                    behind.add(edge.source.node)
+                    stack.append(edge.source.node)
+        waiting, seen = list(self.starts()), set()
+        names = [n for n in self.ports if n.partition(".")[0] in behind - {node_name}]
+        while waiting:
+            before = waiting.pop()
+            if (mark := str({name: str(value) for name, value in before.items()})) in seen:
+                continue
+            seen.add(mark)
+            ranges = [everything(self.ports[n].sort) for n in names] + [[False, True] for _ in self.outside]
+            for combination in product(*ranges):
+                values: Values = {n: everything(p.sort)[0] for n, p in self.ports.items()}
+                values |= dict(zip([*names, *(f"in.{port}" for port in self.outside)], combination, strict=True))
+                values |= {f"{name}@before": value for name, value in before.items()}
+                kept = all(
+                    holds(self.local(name, values))
+                    for name in behind - {node_name}
+                    for holds in (*self.clauses[name][0], *self.clauses[name][1])
+                )
+                if kept and not self.clauses[node_name][0][index](self.local(node_name, values)):
+                    return True
+            waiting += [{n: v[n] for n in self.late} for v, broken in self.steps(before) if not broken]
+        return False
+
+
+class Limits:
+    seconds = 2.0
+    seed = 0
+
+
+def compare(tmp_path: Path, seed: int, told: Counter[str]) -> None:
+    text, plan, claim = random_system(seed)
+    system = make(tmp_path / str(seed), text, plan)
+    composition = compose(system)
+    obligations = [*requirement_obligations(system), *composition_obligations(system)]
+    found: dict[str, Outcome] = {
+        o.name: outcome for o, outcome in zip(obligations, settle_all(composition, obligations, Limits()), strict=True)
+    }
+    truth = Enumeration(composition, claim)
+    about = f"seed {seed}:\n{text}\n{plan}"
+    if any(name.startswith("start.") and outcome.verdict is Verdict.REFUTED for name, outcome in found.items()):
+        return
+    always, trusting = truth.always(trusting=False), truth.always(trusting=True)
+    assert found["ALWAYS"].verdict is (Verdict.CHECKED if always else Verdict.REFUTED), about + found["ALWAYS"].summary
+    match found["R"].verdict:
+        case Verdict.PROVED:
+            assert trusting, about
+        case Verdict.REFUTED:
+            assert not always, about + found["R"].summary
+    told[f"ALWAYS {found['ALWAYS'].verdict}"] += 1
+    told[f"R {found['R'].verdict}"] += 1
+    for condition in composition.whole.conditions:
+        outcome = found[f"{composition.whole.name}.{condition.about}"]
+        told[f"side {outcome.verdict}"] += 1
+        if outcome.verdict is Verdict.REFUTED and "circle" not in outcome.details:
+            assert truth.may_break(condition.consumer, condition.clause), about + outcome.summary
+
+
+@pytest.mark.parametrize("block", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 5))])
+def test_runs_are_what_an_enumeration_finds(tmp_path: Path, block: int) -> None:
+    told: Counter[str] = Counter()
+    for seed in range(block * SYSTEMS, (block + 1) * SYSTEMS):
+        compare(tmp_path, seed, told)
+    assert told["ALWAYS checked"] >= 1
+    assert told["ALWAYS refuted"] >= 1
