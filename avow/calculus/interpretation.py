@@ -1,4 +1,4 @@
-"""The plan's finite scenario as values: which inputs it fixes, and to what."""
+"""The plan's finite scenario as values: which inputs it fixes, and to what; which few values others may have."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from avow.language.sorts import (
     StringSort,
 )
 from avow.language.terms import Variable
+from avow.logic.finite import Ranges
 from avow.logic.values import Element, FunctionValue, Value
-from avow.system.plan import Scenario
+from avow.system.plan import Scenario, System
 
 
 def interpretation(node: Node, scenario: Scenario | None) -> dict[Variable, Value]:
@@ -38,6 +39,30 @@ def interpretation(node: Node, scenario: Scenario | None) -> dict[Variable, Valu
                     found[port.variable] = value
                 break
     return found
+
+
+def ranges(system: System, node: Node) -> Ranges:
+    """The few values that the scenario gives to sorts, and to this node's inputs that are not functions. Values that
+    cannot be read give no range (the plan's checks report them)."""
+    from avow.calculus.scenario import CannotRun, world
+    from avow.calculus.variables import frame
+
+    if system.plan.scenario is None or not system.plan.scenario.domains:
+        return Ranges()
+    try:
+        found = world(frame(system))
+    except CannotRun:
+        return Ranges()
+    inputs: dict[Variable, tuple[Value, ...]] = {}
+    for port in node.inputs:
+        texts = found.domain(("in", node.name), port)
+        if texts is None or isinstance(port.sort, FunctionSort):
+            continue
+        try:
+            inputs[port.variable] = tuple(found.parse(text, port.sort) for text in texts)
+        except CannotRun:
+            continue
+    return Ranges(found.domains, inputs)
 
 
 def _relation(sort: FunctionSort, scenario: Scenario, table_name: str, columns: tuple[str, ...]) -> Value | None:

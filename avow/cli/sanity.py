@@ -32,7 +32,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     PATH is a system's folder or an .rcl file. Code 1 where something is refuted that is an error, 2 for bad input.
     """
     from avow.calculus import providers
-    from avow.calculus.interpretation import interpretation
+    from avow.calculus.interpretation import interpretation, ranges
     from avow.cli.workspace import system_folder
     from avow.diagnostics import Diagnostic, Rejected
     from avow.logic.sanity import Bounds, analyse
@@ -48,7 +48,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
 
     def settle(node: Node) -> tuple[SanityResult, ...]:
         scenario = interpretation(node, system.plan.scenario)
-        own = analyse(node, system.contract, scenario=scenario, bounds=bounds)
+        own = analyse(node, system.contract, scenario=scenario, ranges=ranges(system, node), bounds=bounds)
         return own + providers.settle(providers.provider_claims(system, node), node, bounds)
 
     chosen = [node for node in system.contract.nodes if not nodes or node.name in nodes]

@@ -16,6 +16,7 @@ from avow.diagnostics import Severity, Span
 from avow.language.contract import ClauseKind, Contract, Node
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.logic.claims import Claim, Property, claims, node_key, triggers
+from avow.logic.finite import Ranges
 from avow.logic.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.logic.values import Value
 from avow.verdict import Counterexample, Outcome, Verdict
@@ -83,14 +84,16 @@ def analyse(
     contract: Contract | None = None,
     *,
     scenario: Given | None = None,
+    ranges: Ranges | None = None,
     bounds: Bounds | None = None,
     wanted: Collection[str] | None = None,
 ) -> tuple[SanityResult, ...]:
-    """Settle a node's claims, in their order; with `wanted`, only the claims of these names.
+    """Settle a node's claims, in their order; with `wanted`, only the claims of these names. `scenario` fixes some
+    inputs, `ranges` says which few values others (and quantified variables) have, where no answer for all is found.
 
     `contract` is not consulted (formulas are whole); it is accepted so that callers need not know that.
     """
-    analysis = _Analysis(node, scenario or {}, bounds or Bounds())
+    analysis = _Analysis(node, scenario or {}, ranges or Ranges(), bounds or Bounds())
     results = []
     for claim in claims(node):
         if wanted is not None and claim.name not in wanted:
@@ -102,10 +105,17 @@ def analyse(
 
 
 def outcomes(
-    node: Node, obligations: Mapping[str, str], *, scenario: Given | None = None, bounds: Bounds | None = None
+    node: Node,
+    obligations: Mapping[str, str],
+    *,
+    scenario: Given | None = None,
+    ranges: Ranges | None = None,
+    bounds: Bounds | None = None,
 ) -> tuple[Outcome, ...]:
     """For the pipeline: one outcome for each obligation id, given its claim's name (an unknown name is an error)."""
-    results = {r.name: r for r in analyse(node, scenario=scenario, bounds=bounds, wanted=set(obligations.values()))}
+    wanted = set(obligations.values())
+    found = analyse(node, scenario=scenario, ranges=ranges, bounds=bounds, wanted=wanted)
+    results = {result.name: result for result in found}
     return tuple(as_outcome(identity, node.name, name, results.get(name)) for identity, name in obligations.items())
 
 
@@ -160,9 +170,10 @@ def _result(node: Node, claim: Claim, finding: _Finding, seconds: float) -> Sani
 class _Analysis:
     """One node under analysis. Each claim is settled once, others ask for it."""
 
-    def __init__(self, node: Node, scenario: Given, bounds: Bounds) -> None:
+    def __init__(self, node: Node, scenario: Given, ranges: Ranges, bounds: Bounds) -> None:
         self.node = node
         self.scenario = scenario
+        self.ranges = ranges
         # What is merely worth knowing is not worth waiting for.
         self.limits = {True: bounds, False: replace(bounds, milliseconds=max(1, bounds.milliseconds // 3))}
         self.bounds = bounds
@@ -221,23 +232,36 @@ class _Analysis:
         from avow.logic.conflicts import conflicts
         from avow.logic.realizability import Realizability, groups, realizable
 
-        def ask(given: Given) -> Realizability:
+        def ask(
+            assumptions: Mapping[str, Term], guarantees: Mapping[str, Term], given: Given | None = None
+        ) -> Realizability:
             limit = 2 * self.bounds.milliseconds
             return realizable(
                 self.inputs,
                 self.outputs,
-                self.assumptions,
-                self.guarantees,
+                assumptions,
+                guarantees,
                 given=given,
                 timeout_ms=limit,
                 seed=self.bounds.seed,
             )
 
-        answer, bounded = ask({}), False
+        answer, bounded = ask(self.assumptions, self.guarantees), False
         if answer.verdict is Verdict.UNKNOWN and self.scenario:
-            within = ask(self.scenario)
+            within = ask(self.assumptions, self.guarantees, self.scenario)
             if within.verdict is not Verdict.UNKNOWN:
                 answer, bounded = within, within.verdict is Verdict.PROVED
+        if answer.verdict is Verdict.UNKNOWN and self.ranges:
+            assumed = {label: self.ranges.within(f) for label, f in self.assumptions.items()}
+            free = [v for v in self.inputs if v not in self.scenario]
+            wanted = {label: self.ranges.within(f) for label, f in self.guarantees.items()}
+            assumed |= self.ranges.assumptions(free)
+            within = ask(assumed, wanted, self.scenario)
+            if within.verdict is Verdict.PROVED and self._some(
+                assumed
+            ):  # a refutation need not be one where quantifiers range over everything
+                needed = tuple(label for label in within.needed if label in self.assumptions)
+                answer, bounded = replace(within, needed=needed), True
         if answer.verdict is Verdict.PROVED:
             self.needed = answer.needed
             if self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
@@ -398,6 +422,13 @@ class _Analysis:
     def _attempts(self) -> tuple[Given, ...]:
         """Without the scenario first: an answer without it is worth more."""
         return ({}, self.scenario) if self.scenario else ({},)
+
+    def _some(self, assumed: Mapping[str, Term]) -> bool:
+        """Whether any input of the scenario meets these: without one, nothing has been checked."""
+        from avow.logic.smt import solve
+
+        limit = self.bounds.milliseconds
+        return solve(assumed, timeout_ms=limit, given=self.scenario, shown=False).status == "sat"
 
     def _if_refuted(self, name: str) -> str | None:
         return name if name in self.claims and self._other(name).verdict is Verdict.REFUTED else None

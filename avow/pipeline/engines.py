@@ -13,7 +13,7 @@ from avow.system.plan import System
 def discharge_sanity(system: System, node: Node, obligations: Sequence[Obligation], limits: Limits) -> Report:
     """Settle sanity claims of one node by the solver."""
     from avow.calculus import providers
-    from avow.calculus.interpretation import interpretation
+    from avow.calculus.interpretation import interpretation, ranges
     from avow.logic.sanity import Bounds, outcomes
     from avow.logic.smt import z3_version
 
@@ -21,7 +21,7 @@ def discharge_sanity(system: System, node: Node, obligations: Sequence[Obligatio
     bounds = Bounds(seed=limits.seed)
     linked = {asked.claim.name: asked for asked in providers.provider_claims(system, node)}
     own = {o.id: o.name for o in obligations if o.name not in linked}
-    found = outcomes(node, own, scenario=given, bounds=bounds)
+    found = outcomes(node, own, scenario=given, ranges=ranges(system, node), bounds=bounds)
     found += providers.outcomes(node, {o.id: linked[o.name] for o in obligations if o.name in linked}, bounds)
     return Report(found, "z3", z3_version())
 
