@@ -1,11 +1,11 @@
 """What would make it hold: where an entailment between contracts fails, a clause with which it would not.
 
 Looked for are a further guarantee of a provider (in its own ports), a further assumption about the environment's
-inputs, and, at the first step, a condition on an initial value: each the weakest there is, by quantifier elimination,
-where the formulas allow that (`avow.logic.eliminate`). Where they do not, a provider that delivers all that the goal
-speaks of is offered the goal itself. An offer is checked: with it the goal is proved; it does not contradict what else
-is known; and of a guarantee it is not known that the node could not keep it. The search is bounded in time: that
-nothing is offered says nothing.
+inputs, and, at the first step, a condition on an initial value: each the weakest there is, by quantifier elimination
+where the formulas allow that (`avow.logic.eliminate`), or by trying all values where they are few. Where neither does,
+a place that can speak of all that the goal speaks of (by other names, where equations say so) gets the goal itself. An
+offer is checked: with it the goal is proved; it does not contradict what else is known; and of a guarantee it is not
+known that the node could not keep it. The search is bounded in time: that nothing is offered says nothing.
 """
 
 from __future__ import annotations
@@ -13,12 +13,29 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
+from avow.calculus.enumeration import enumerated
 from avow.calculus.variables import Frame
 from avow.language.printer import show_term
-from avow.language.terms import TRUE, And, Compare, Implies, Not, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import (
+    TRUE,
+    And,
+    Compare,
+    Iff,
+    Implies,
+    Literal,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    Role,
+    Term,
+    Variable,
+    Widen,
+)
 from avow.logic.eliminate import eliminable, remedy
-from avow.logic.formula import conjunction, disjunction, free_variables, rename
+from avow.logic.formula import conjunction, disjunction, free_variables, rename, substitute
 from avow.logic.smt import entails, solve
 from avow.system.plan import Endpoint
 from avow.verdict import Verdict
@@ -30,6 +47,7 @@ _STEP_MS = 500
 _MOST_HYPOTHESES = 40
 _MOST_PLACES = 8
 _LONGEST = 300
+_MOST_REWRITINGS = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +113,25 @@ def offers(
 
 
 def _offer(frame: Frame, known: Mapping[str, Term], goal: Term, place: Place) -> Offer | None:
+    found = _eliminated(known, goal, place)
+    if found is None or not found[1]:
+        # What elimination cannot do, or only without some hypothesis, trying every value can, if they are few.
+        tried = enumerated(known, goal, tuple(place.ports), _STEP_MS)
+        found = tried if tried is not None and (tried[1] or found is None) else found
+    if found is None:
+        rewritten = _rewritten(known, goal, place)
+        found = (rewritten, False) if rewritten is not None else None
+    if found is None:
+        return None
+    formula = rename(found[0], place.ports)
+    if place.kind == "guarantee" and not _may_be_kept(frame, place.of, formula):
+        return None
+    return Offer(place.kind, place.of, formula, found[1])
+
+
+def _eliminated(known: Mapping[str, Term], goal: Term, place: Place) -> tuple[Term, bool] | None:
+    """By quantifier elimination; else the goal itself, if the place can speak of all that it does. And whether it is
+    the weakest."""
     usable = {label: term for label, term in known.items() if eliminable(term)}
     assumption: Term | None = None
     weakest = False
@@ -109,20 +146,56 @@ def _offer(frame: Frame, known: Mapping[str, Term], goal: Term, place: Place) ->
         return None
     if len(usable) < len(known) and solve({**known, "offer": assumption}, timeout_ms=_STEP_MS).status == "unsat":
         return None
-    formula = rename(assumption, place.ports)
-    if place.kind == "guarantee" and not _may_be_kept(frame, place.of, formula):
+    return assumption, weakest
+
+
+def _rewritten(known: Mapping[str, Term], goal: Term, place: Place) -> Term | None:
+    """The goal, with what equations among the hypotheses say its variables are: ``f(x)`` as ``f(k + 1)``."""
+    equations: dict[Variable, Term] = {}
+    stack = list(known.values())
+    while stack:
+        match stack.pop():
+            case And(items=items):
+                stack += items
+            case Iff(left=Variable() as left, right=right) if left not in place.ports:
+                equations.setdefault(left, right)
+            case Iff(left=left, right=Variable() as right) if right not in place.ports:
+                equations.setdefault(right, left)
+            case Compare(operator="==", left=Variable() as left, right=right) if left not in place.ports:
+                equations.setdefault(left, right)
+            case Compare(operator="==", left=left, right=Variable() as right) if right not in place.ports:
+                equations.setdefault(right, left)
+    term = goal
+    for _ in range(_MOST_REWRITINGS):
+        foreign = free_variables(term) - frozenset(place.ports)
+        if not foreign:
+            break
+        usable = {v: equations[v] for v in foreign if v in equations and v not in free_variables(equations[v])}
+        if not usable:
+            return None
+        term = substitute(term, usable)
+    if term == goal or not free_variables(term) <= frozenset(place.ports):
         return None
-    return Offer(place.kind, place.of, formula, weakest)
+    together = {**known, "the offer": term}
+    if entails(together, goal, timeout_ms=_STEP_MS).verdict is not Verdict.PROVED:
+        return None
+    return term if solve(together, timeout_ms=_STEP_MS).status == "sat" else None
 
 
-_OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">"}
+_OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">", "==": "!=", "!=": "=="}
+
+
+def _is_whole(value: object) -> bool:
+    return not isinstance(value, bool | str) and isinstance(value, int | Fraction) and value == int(value) >= 0
 
 
 def _tidy(term: Term) -> Term:
-    """``not x >= 1`` as ``x < 1``: elimination leaves the first. Only numbers are compared by these operators."""
+    """``not x >= 1`` as ``x < 1``, and ``k > 2.0`` of an integer as ``k > 2``: elimination leaves the first."""
     match term:
         case Not(body=Compare(operator=operator, left=left, right=right)) if operator in _OPPOSITE:
-            return Compare(_OPPOSITE[operator], left, right)
+            return _tidy(Compare(_OPPOSITE[operator], left, right))
+        case Compare(left=Widen(term=left), right=Literal(value=value)) if _is_whole(value):
+            return Compare(term.operator, left, Literal(int(value), left.sort))
         case And(items=items):
             return conjunction(map(_tidy, items))
         case Or(items=items):
@@ -151,16 +224,30 @@ def providers(frame: Frame, nodes: Iterable[str], earlier: int = 0) -> Iterator[
 
 
 def environment(frame: Frame, nodes: Iterable[str], earlier: int = 0) -> Iterator[Place]:
-    """The inputs of some nodes that nothing provides: each alone, as the plan would have it."""
+    """The inputs of some nodes that nothing provides: each alone, as the plan would have it; then a node's together."""
+    nodes = tuple(nodes)
     ports: dict[Variable, tuple[str, Variable]] = {}
     for name in nodes:
         for port in frame.node(name).inputs:
             if Endpoint(name, port.name) not in frame.graph.by_target:
-                own = f"{name}.{port.name}"
-                entry = own if own in frame.own_inputs else f"in.{port.name}"
+                entry = frame.entry(name, port.name)
                 ports.setdefault(frame.input(name, port.name, earlier), (entry, port.variable))
     for variable, (entry, called) in ports.items():
         yield Place("environment", entry, {variable: called})
+    for name in nodes:
+        yield from _together(frame, name, earlier)
+
+
+def _together(frame: Frame, name: str, earlier: int) -> Iterator[Place]:
+    """All environment inputs of one node, under the entry that the plan reads as that node's."""
+    outside = [endpoint for endpoint in frame.graph.environment if endpoint.node == name]
+    for endpoint in outside if len(outside) > 1 else ():
+        entry = frame.entry(name, endpoint.port)
+        first = next(e for e in frame.graph.environment if frame.entry(e.node, e.port) == entry)
+        if first.node == name:
+            ports = {frame.input(name, e.port, earlier): frame.node(name).input(e.port).variable for e in outside}
+            yield Place("environment", entry, ports)
+            return
 
 
 def initial_values(frame: Frame, consumer: str) -> Iterator[Place]:

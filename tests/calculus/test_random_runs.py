@@ -146,12 +146,17 @@ class Enumeration:
 
     def starts(self) -> Iterator[Values]:
         initial = {str(e.source): e.initial for e in self.graph.edges if e.delayed}
-        known = {"red": TINTS[0], "blue": TINTS[1], "TRUE": True, "FALSE": False, "<red>": Sequence((TINTS[0],))}
-        ranges = [
+        known: Values = {
+            "red": TINTS[0],
+            "blue": TINTS[1],
+            "TRUE": True,
+            "FALSE": False,
+            "<red>": Sequence((TINTS[0],)),
+        }
+        ranges: list[list[Value]] = [
             everything(self.ports[n].sort) if (given := initial[n]) is None else [known[given]] for n in self.late
         ]
-        combinations: Iterator[tuple[Value, ...]] = product(*ranges)
-        for combination in combinations:
+        for combination in product(*ranges):
             yield dict(zip(self.late, combination, strict=True))
 
     def steps(self, before: Values) -> Iterator[tuple[Values, frozenset[str]]]:

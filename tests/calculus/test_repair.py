@@ -72,6 +72,75 @@ def test_what_cannot_be_eliminated_gets_the_assumption_itself(tmp_path: Path) ->
     assert "out.at(2)" in str(offer["clause"])
 
 
+MANY = (
+    "context { Col : {red, orange, green}; Go : {go(Col), rest}; Fun : INTEGER --> INTEGER; Rel : INTEGER --> BOOL; }\n"
+)
+SWITCH = node(
+    "a",
+    "c : Go",
+    "f : Fun",
+    "G: in.c in {rest, go(green)} -> out.f(0) > 0",
+    "G: forall(k in INTEGER | out.f(k) == 1 or out.f(k) < 0)",
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "of", "clause", "weakest"),
+    [
+        pytest.param(
+            node("a", "lo : INTEGER, hi : INTEGER", "x : INTEGER", "G: out.x == in.hi - in.lo")
+            + node("b", "x : INTEGER", "", "A s: in.x >= 0"),
+            "in.lo",
+            "assume ( 0 <= in.hi - in.lo )",
+            True,
+            id="about two inputs together",
+        ),
+        pytest.param(
+            SWITCH + node("b", "f : Fun", "", "A s: in.f(0) > 0"),
+            "in.c",
+            "assume ( in.c in {go(green), rest} )",
+            True,
+            id="values with parts, behind a function",
+        ),
+        pytest.param(
+            node("a", "k : INTEGER, f : Rel", "x : BOOL", "G: out.x <=> in.f(in.k + 1)")
+            + node("b", "x : BOOL", "", "A s: in.x"),
+            "in.k",
+            "assume ( in.f(in.k + 1) )",
+            False,
+            id="by what an equation says",
+        ),
+        pytest.param(
+            node("a", "e : INTEGER", "x : Col", "G: in.e > 3 or out.x in {red, green}")
+            + node("b", "x : Col", "", "A s: in.x in {red, orange}"),
+            "a",
+            "guarantee ( out.x != green )",
+            True,
+            id="a set",
+        ),
+        pytest.param(
+            node("a", "k : INTEGER", "x : REAL", "G: out.x == in.k / 2") + node("b", "x : REAL", "", "A s: in.x > 1"),
+            "in.k",
+            "assume ( in.k > 2 )",
+            True,
+            id="an integer that becomes a real",
+        ),
+    ],
+)
+def test_what_is_offered(tmp_path: Path, text: str, of: str, clause: str, weakest: bool) -> None:
+    """And what the offer says makes it hold, where it says that it belongs."""
+    outcome = outcomes(make(tmp_path / "first", MANY + text))["whole.b.s"]
+    assert outcome.verdict is Verdict.REFUTED
+    offer = next(offer for offer in offered(outcome) if offer["of"] == of)
+    assert (offer["clause"], offer["weakest"]) == (clause, weakest)
+    plan = "{}"
+    if offer["kind"] == "guarantee":
+        text = text.replace("\n}", f"\n  {clause}\n}}", 1)
+    else:
+        plan = f'environment: {{{of}: {{assume: "{clause.removeprefix("assume ")}", because: offered}}}}'
+    assert outcomes(make(tmp_path / "again", MANY + text, plan))["whole.b.s"].verdict is Verdict.PROVED
+
+
 @pytest.mark.parametrize("claim", ["out.x == 3", "out.x == 3 and out.x > in.e"])
 def test_nothing_is_offered_where_nothing_helps(tmp_path: Path, claim: str) -> None:
     text = node("a", "e : INTEGER", "x : INTEGER", f"G: {claim}") + node("b", "x : INTEGER", "", "A: in.x == 4")

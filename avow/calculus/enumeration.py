@@ -1,0 +1,76 @@
+"""Which of finitely many values of some ports make an entailment hold: the weakest condition, as a set of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import product
+
+from avow.language.sorts import BoolSort, DataSort, EnumSort, SetSort, Sort, TupleSort
+from avow.language.terms import Compare, Construct, EnumValue, In, Literal, Not, SetTerm, Term, TupleTerm, Variable
+from avow.logic.evaluate import finite_values
+from avow.logic.formula import conjunction, disjunction, free_variables, substitute
+from avow.logic.smt import entails, solve
+from avow.logic.values import Data, Element, Value
+from avow.verdict import Verdict
+
+MOST = 24
+"""Values that are tried: each is a question to the solver."""
+
+
+def enumerated(
+    known: Mapping[str, Term], goal: Term, ports: Sequence[Variable], timeout_ms: int
+) -> tuple[Term, bool] | None:
+    """A condition on some of the ports with which the goal follows, and whether it is the weakest. None where there is
+    none, or where they have too many values."""
+    spoken = free_variables(goal).union(*map(free_variables, known.values()))
+    finite = [(v, values) for v in ports if v in spoken and (values := finite_values(v.sort))]
+    # A relation's values are as finite as its points, and a question each: only what can be written as a set is tried.
+    if not finite or math.prod(len(values) for _, values in finite) > MOST:
+        return None
+    good: list[tuple[Term, ...]] = []
+    bad: list[tuple[Term, ...]] = []
+    possible = sure = True
+    for choice in product(*(values for _, values in finite)):
+        terms = tuple(value_term(value, v.sort) for (v, _), value in zip(finite, choice, strict=True))
+        given = {v: term for (v, _), term in zip(finite, terms, strict=True)}
+        facts = {label: substitute(term, given) for label, term in known.items()}
+        verdict = entails(facts, substitute(goal, given), timeout_ms=timeout_ms).verdict
+        (good if verdict is Verdict.PROVED else bad).append(terms)
+        sure = sure and verdict is not Verdict.UNKNOWN
+    variables = [v for v, _ in finite]
+    if not good or not bad:
+        return None
+    found = Not(_one_of(variables, bad)) if len(bad) < len(good) else _one_of(variables, good)
+    together = {**known, "the condition": found}
+    possible = solve(together, timeout_ms=timeout_ms).status == "sat"
+    if not possible or entails(together, goal, timeout_ms=timeout_ms).verdict is not Verdict.PROVED:
+        return None
+    return found, sure and frozenset(variables) >= spoken & frozenset(ports)
+
+
+def value_term(value: Value, sort: Sort) -> Term:
+    """A value as RCL writes it. Only of sorts with finitely many values."""
+    match sort, value:
+        case EnumSort(), Element(name=name):
+            return EnumValue(name, sort)
+        case DataSort(), Data(constructor=constructor, arguments=arguments):
+            parameters = sort.constructor(constructor).parameters
+            return Construct(constructor, tuple(map(value_term, arguments, parameters)), sort)
+        case TupleSort(items=items), tuple():
+            return TupleTerm(tuple(map(value_term, value, items)), sort)
+        case BoolSort(), bool():
+            return Literal(value, sort)
+    raise AssertionError(f"{value} of {sort}")
+
+
+def _one_of(variables: Sequence[Variable], choices: Sequence[tuple[Term, ...]]) -> Term:
+    if len(variables) == 1:
+        [variable] = variables
+        options = [option for (option,) in choices]
+        if len(options) == 1:
+            return Compare("==", variable, options[0])
+        return In(variable, SetTerm(tuple(options), SetSort(variable.sort)))
+    return disjunction(
+        conjunction(Compare("==", v, term) for v, term in zip(variables, choice, strict=True)) for choice in choices
+    )
