@@ -192,13 +192,15 @@ def _evidence(facts: Facts) -> tuple[dict[str, tuple[EvidenceView, ...]], tuple[
             orphans.append(entry)
     digests = {o.id: o.digest for o in facts.obligations}
     result = {
-        name: tuple(_views(entries, digests[name], dict(facts.planned.get(name, ())), facts.run))
+        name: tuple(_views(entries, digests[name], dict(facts.planned.get(name, ())), facts.run, facts.today))
         for name, entries in grouped.items()
     }
     return result, tuple(orphans)
 
 
-def _views(entries: list[Entry], digest: str, planned: Mapping[str, str], run: RunInfo) -> list[EvidenceView]:
+def _views(
+    entries: list[Entry], digest: str, planned: Mapping[str, str], run: RunInfo, today: date
+) -> list[EvidenceView]:
     """Where each record stands in time. All answers to today's question count, so that none hides a refutation; but of
     several that say the same only the newest, and none that failed to answer where the same method did answer: leaving
     these out cannot change the status. What a method says in support is not believed where its newest score of mutants
@@ -210,6 +212,8 @@ def _views(entries: list[Entry], digest: str, planned: Mapping[str, str], run: R
             return Currency.WITHDRAWN
         if planned[record.method] != record.key or record.obligation_digest != digest:
             return Currency.STALE
+        if _has_expired(record, today):
+            return Currency.EXPIRED
         if run.fresh and record.run != run.id and not weigh(record).refuted and not _is_hollow(record):
             return Currency.SET_ASIDE
         return Currency.CURRENT
@@ -248,6 +252,17 @@ def _views(entries: list[Entry], digest: str, planned: Mapping[str, str], run: R
 
 def _failed(entry: Entry) -> bool:
     return entry.evidence.verdict in (Verdict.ERROR, Verdict.NOT_RUN, Verdict.UNKNOWN)
+
+
+def _has_expired(record: Evidence, today: date) -> bool:
+    """Whether support was given until a day that is past, or that cannot be read. A refutation does not expire."""
+    until = record.details.get("valid_until")
+    if until is None or weigh(record).support is None:
+        return False
+    try:
+        return date.fromisoformat(str(until)) < today
+    except ValueError:
+        return True
 
 
 def _is_hollow(record: Evidence) -> bool:

@@ -152,6 +152,8 @@ def _gone(item: EvidenceView) -> str:
     match item.currency:
         case Currency.STALE:
             return "the claim, an input, an option or a tool has changed since"
+        case Currency.EXPIRED:
+            return "it was given until a day that is past"
         case Currency.WITHDRAWN:
             return "the plan no longer uses the method for this claim"
         case Currency.SET_ASIDE:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from datetime import date
 
 from avow.assurance.facts import Facts
-from avow.assurance.model import MethodInfo, ObligationView, Suggestion
+from avow.assurance.model import Currency, MethodInfo, ObligationView, Suggestion
 from avow.assurance.policy import Demand, Policy, costs
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
@@ -123,6 +123,10 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             return Suggestion(f"find out why the tool failed (its message and log are with the evidence), then {again}")
         case Status.VACUOUS:
             return Suggestion("give a scenario in which the claim's trigger is met", cost=50)
+        case Status.STALE if expired := _expired(view):
+            return Suggestion(
+                f"renew the {' and the '.join(expired)}: what was given was valid until a day that is past", cost=30
+            )
         case Status.STALE:
             return Suggestion(
                 f"run `avow verify {facts.system}`: the plan's methods have not answered the claim as it is now"
@@ -145,6 +149,11 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             "narrow the question (a scenario in the plan), raise the time limit, or accept it with a reason", cost=20
         )
     return _new_method(view, demand, used, facts)
+
+
+def _expired(view: ObligationView) -> tuple[str, ...]:
+    """The methods whose answers were given until a day that is past, and that have given none since."""
+    return tuple(dict.fromkeys(v.entry.evidence.method for v in view.evidence if v.currency is Currency.EXPIRED))
 
 
 def _wants_a_reason(view: ObligationView) -> bool:

@@ -102,6 +102,8 @@ class Currency(StrEnum):
     """Not of this run, which believes no earlier support (``--fresh``)."""
     STALE = "stale"
     """The claim, an input, an option or a tool has changed since."""
+    EXPIRED = "expired"
+    """Whoever gave it said until when it may be relied upon (``valid_until`` in its details), and that day is past."""
     WITHDRAWN = "withdrawn"
     """The plan no longer uses this method for this claim."""
 

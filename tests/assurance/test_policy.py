@@ -169,6 +169,22 @@ def test_age_reviewers_links_hypotheses() -> None:
     assert TODAY.isoformat() == "2026-11-21"
 
 
+@pytest.mark.parametrize(("until", "good"), [("2026-11-21", True), ("2026-11-20", False), ("some day", False)])
+def test_what_is_given_until_a_day_ends_with_it(until: str, good: bool) -> None:
+    """A review says itself how long it may be relied upon; the backend reads no clock, so its record never changes."""
+    review = replace(REVIEW, details={**REVIEW.details, "valid_until": until})
+    found = the_case("sil1", review)
+    assert gate(found)[0] is good
+    assert found.obligations[0].status is (Status.REVIEWED if good else Status.STALE)
+    assert found.exit_code == (0 if good else 1)
+    if not good:
+        assert (
+            "renew the review" in found.gates[[g.id for g in found.gates].index("guarantees-high")].suggestions[0].text
+        )
+    rejected = replace(review, verdict=Verdict.REFUTED)
+    assert the_case("sil1", rejected).obligations[0].status is Status.REFUTED
+
+
 def test_the_cheapest_step_is_named() -> None:
     def step(found: Case) -> str:
         suggestion = found.obligations[0].suggestion

@@ -9,6 +9,7 @@ import random
 import re
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -329,6 +330,73 @@ def test_a_row_of_the_scenario_reruns_what_looks_at_it(tmp_path: Path) -> None:
     assert {name for name, method in moved if name.startswith("system/requirement/")}, (
         "temporal requirements look at it"
     )
+
+
+FILES: dict[str, tuple[str, str]] = {
+    # file: (nodes, methods) that look at it; the rest is documentation of how data came about
+    "data/navigation_runs.csv": ("navigation", "arrival standstill report-spread"),
+    "models/agent.gwen": ("agent", "ajpf"),
+    "models/agent.py": ("agent", "hypothesis"),
+    "models/agent_environment.yaml": ("agent", "ajpf"),
+    "models/agent_impl.dfy": ("agent", "dafny"),
+    "models/localisation_node.py": ("localisation", "review"),
+    "models/make_trace.py": ("", ""),
+    "models/radiation_sensor.imp": ("radiationSensor", "hoare"),
+    "models/radiation_sensor.py": ("radiationSensor", "hypothesis"),
+    "models/radiation_sensor_impl.dfy": ("radiationSensor", "dafny"),
+    "models/simulate_navigation.py": ("", ""),
+    "reviews/localisation.yaml": ("localisation", "review"),
+    "traces/nominal.jsonl": ("agent localisation navigation radiationSensor", "rosmonitoring"),
+}
+
+
+@pytest.mark.slow
+def test_each_file_of_the_case_study_reruns_who_looks_at_it(tmp_path: Path) -> None:
+    """Programs, data of experiments, review records and what was reviewed, traces: each method of exactly those."""
+    folder = copied(SHIPPED, tmp_path)
+    before = keys(folder)
+    for name, (nodes, methods) in FILES.items():
+        path = folder / name
+        text = path.read_bytes()
+        path.write_bytes(text + b"\n\n")
+        moved = changed(before, keys(folder))
+        path.write_bytes(text)
+        wanted = {(n, m) for n, m in before if n.split("/")[0] in nodes.split() and m in methods.split()}
+        assert moved == wanted, name
+        assert bool(wanted) == bool(nodes)
+
+
+def test_the_order_of_nodes_and_the_names_of_files_mean_nothing(tmp_path: Path) -> None:
+    folder = copied(FERRY, tmp_path)
+    before = keys(folder)
+    contract = next(folder.glob("*.rcl"))
+    head, *nodes = re.split(r"^(?=node )", contract.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert len(nodes) > 1
+    contract.unlink()
+    (folder / "renamed.rcl").write_text(head + "".join(reversed(nodes)), encoding="utf-8")
+    assert changed(before, keys(folder)) == set()
+
+
+def test_another_backend_tool_or_solver_reruns_what_it_answered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from avow.pipeline import work
+    from avow.registry import backend
+
+    folder = copied(FERRY, tmp_path)
+    before = keys(folder)
+    hoare = type(backend("hoare", ()))
+    with monkeypatch.context() as patch:
+        patch.setattr(hoare, "version", "another", raising=False)
+        assert {method for _, method in changed(before, keys(folder))} == {"hoare"}
+    tools = hoare.tools
+    with monkeypatch.context() as patch:
+        patch.setattr(hoare, "tools", lambda self: tuple(replace(t, version="0.0") for t in tools(self)))
+        assert {method for _, method in changed(before, keys(folder))} == {"hoare"}
+    with monkeypatch.context() as patch:
+        patch.setattr(work, "_z3_version", lambda: "another")
+        assert {method for _, method in changed(before, keys(folder))} == {"sanity", "compose"}
+    assert changed(before, keys(folder)) == set()
 
 
 def test_wiring_reruns_the_monitors_and_only_them(tmp_path: Path) -> None:
