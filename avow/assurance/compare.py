@@ -144,14 +144,16 @@ def _answers(view: ObligationView) -> dict[str, Answer]:
         record = item.entry.evidence
         known = found.get(record.method)
         if item.counts or known is None or known.gone:
-            found[record.method] = Answer(record, item.entry.hash, "" if item.counts else _gone(item))
+            found[record.method] = Answer(record, item.entry.hash, "" if item.counts else _gone(item, view))
     return found
 
 
-def _gone(item: EvidenceView) -> str:
+def _gone(item: EvidenceView, view: ObligationView) -> str:
     match item.currency:
+        case Currency.STALE if item.entry.evidence.obligation_digest != view.obligation.digest:
+            return "the claim means something else now"
         case Currency.STALE:
-            return "the claim, an input, an option or a tool has changed since"
+            return "an input, an option or a tool has changed since"
         case Currency.EXPIRED:
             return "it was given until a day that is past"
         case Currency.WITHDRAWN:
@@ -176,9 +178,13 @@ def _why(before: Told, after: Told) -> Iterator[str]:
     came = [name for name in after.below if name not in before.below]
     went = [name for name in before.below if name not in after.below]
     if came:
-        yield f"it rests on {_list(list(map(short, came)))}, which {'does' if len(came) == 1 else 'do'} not hold now"
+        yield f"it rests on {_list(list(map(short, came)))}, which {_be(came)} not shown now"
     if went:
-        yield f"nothing is wrong any more with {_list(list(map(short, went)))}, on which it rests"
+        yield f"{_list(list(map(short, went)))}, on which it rested, {_be(went)} no obstacle any more"
+
+
+def _be(names: Sequence[str]) -> str:
+    return "is" if len(names) == 1 else "are"
 
 
 def _of_method(method: str, old: Answer | None, new: Answer | None) -> Iterator[str]:

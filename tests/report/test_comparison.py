@@ -67,7 +67,7 @@ def test_an_answer_that_does_not_count_any_more_says_why() -> None:
     stale = only(made(record), made(record, keys={(TARGET.id, "hoare"): "another"}))
     assert (stale.kind, stale.after) == ("worse", "stale")
     assert stale.why == (
-        "hoare's answer (proved) does not count any more: the claim, an input, an option or a tool has changed since",
+        "hoare's answer (proved) does not count any more: an input, an option or a tool has changed since",
     )
     withdrawn = only(made(record), made(record, keys={}))
     assert "the plan no longer uses the method" in withdrawn.why[0]
@@ -80,6 +80,13 @@ def test_another_meaning_is_no_loss_and_no_gain() -> None:
     assert "the claim means something else" in change.why[0]
 
 
+def test_another_meaning_is_named_where_the_old_answer_does_not_count() -> None:
+    other = replace(TARGET, digest="f" * 64)
+    record = evidence(TARGET)
+    change = only(made(record), made(record, keys={(TARGET.id, "hoare"): "k"}, target=other))
+    assert change.why == ("hoare's answer (proved) does not count any more: the claim means something else now",)
+
+
 def test_consequences_name_their_cause() -> None:
     subject, obligations, records, keys, extras = rover_parts()
     old = of_case(case(subject, obligations, records, keys=keys, **extras))
@@ -87,11 +94,11 @@ def test_consequences_name_their_cause() -> None:
     new = of_case(case(subject, obligations, broken, keys={**keys, **keys_of(broken)}, **extras))
     found = {c.subject: c for c in compare(old, new)}
     assert found["rover/agent/guarantee/exit_on_danger"].kind == "worse"
-    resting = [c for c in found.values() if any("agent.exit_on_danger, which does not hold now" in w for w in c.why)]
+    resting = [c for c in found.values() if any("agent.exit_on_danger, which is not shown now" in w for w in c.why)]
     assert resting
     back = {c.subject: c for c in compare(new, old)}
     for change in resting:
-        assert any("nothing is wrong any more with" in line for line in back[change.subject].why)
+        assert any("on which it rested" in line for line in back[change.subject].why)
 
 
 def test_comparing_is_fair_both_ways() -> None:
