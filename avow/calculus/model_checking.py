@@ -25,7 +25,7 @@ from avow.language.terms import Term
 from avow.logic.clock import now
 from avow.logic.formula import free_variables
 from avow.logic.values import Value
-from avow.system.temporal import Property, State, states_of
+from avow.system.temporal import Operator, Property, State, Temporal, states_of
 from avow.verdict import Counterexample, Verdict
 
 MAX_STATES = 50_000
@@ -278,16 +278,20 @@ def _shown_run(
     name: str,
     formula: Property,
     steps: list[Step],
-    back: int,
+    back: int | None,
     stuck: Stuck | None,
     bound: dict[str, object],
 ) -> Answer:
     """A run that breaks the property, as a counterexample."""
     trace = tuple(step.shown(_interesting(machine, frame, formula)) for step in steps)
+    false = _false_at(machine, frame, formula, steps)
     if stuck is not None:
         told = f"stuck after step {len(steps)}: {stuck.text()}"
+    elif false is not None:
+        told = f"at step {false + 1} it is false"
+        steps, trace, back = steps[: false + 1], trace[: false + 1], None
     else:
-        told = f"from step {back + 1} on, the run repeats"
+        told = f"from step {back + 1} on, the run repeats" if back is not None else ""
     broken = sorted({clause for step in steps for clause in step.broken})
     if broken:
         told += f"; on the way an assumption does not hold: {', '.join(broken)}"
@@ -302,6 +306,15 @@ def _shown_run(
         summary = f"{told}: {doubt}"
         return Answer(Verdict.UNKNOWN, summary, shown, bound=bound, details={"exhaustive": False})
     return Answer(Verdict.REFUTED, f"a run of the composed contracts breaks {name}: {told}", shown, bound=bound)
+
+
+def _false_at(machine: Machine, frame: Frame, formula: Property, steps: Sequence[Step]) -> int | None:
+    """Of ``always F``: the step at which F is false. What comes after it does not matter."""
+    match formula:
+        case Temporal(operator=Operator.ALWAYS, parts=(State() as state,)):
+            holds = _judges(machine, frame, state)[state]
+            return next((number for number, step in enumerate(steps) if not holds(step.values)), None)
+    return None
 
 
 def _interesting(machine: Machine, frame: Frame, formula: Property) -> list[str]:

@@ -107,10 +107,8 @@ class Machine:
             variable = self.frame.input(endpoint.node, endpoint.port)
             port = self.frame.node(endpoint.node).input(endpoint.port)
             names.setdefault(variable.qualified, self.world.choices(endpoint.node, port))
-            if {
-                f"in.{endpoint.port}",
-                str(endpoint),
-            } & self.frame.constants and variable.qualified not in self.constants:
+            entry = self.frame.entry(endpoint.node, endpoint.port)
+            if entry in self.frame.constants and variable.qualified not in self.constants:
                 self.constants.append(variable.qualified)
         facts = [
             judge(self.world, term, doubts=self.doubts, about=label) for label, term in self.frame.environment().items()
