@@ -118,7 +118,7 @@ class Generator:
         and once more all else by chance: that no threshold is left to luck."""
         chance = random.Random(0)
         for name, sort in self.ports.items():
-            for value in self.pools.scalars.get(sort, ()):
+            for value in self.pools.edges.get(sort, ()):
                 for data in (b"", chance.randbytes(BYTES)):
                     inputs = {**self.case(Source(data), failing), name: value}
                     yield inputs
@@ -158,9 +158,8 @@ class Generator:
             case TupleSort(items=items):
                 value = self._row(source, items, near, depth)
             case SequenceSort(item=item):
-                value = Sequence(
-                    tuple(self._value(source, item, near, depth + 1, False) for _ in range(source.below(_COUNT)))
-                )
+                each = range(source.below(_COUNT))
+                value = Sequence(tuple(self._value(source, item, near, depth + 1, source.coin()) for _ in each))
             case FunctionSort():
                 value = self._function(source, sort, near, depth)
             case SetSort():
@@ -173,8 +172,11 @@ class Generator:
         known = self.shared.get((sort,)) if self._inside else None
         if known and source.coin():
             return source.of(known)[0]
-        if source.below(3) < 2:
+        chosen = source.below(8)
+        if chosen < 5:
             return source.of(self.pools.scalars[sort])
+        if chosen == 5:  # what parameters and elements are drawn from, so that it sometimes is one of these
+            return source.of(self.pools.near[sort])
         match sort:
             case RealSort():
                 return Fraction(source.signed(2000), source.of((1, 2, 4, 10)))

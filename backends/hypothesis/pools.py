@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -18,12 +19,17 @@ from avow.language.sorts import (
     FunctionSort,
     Sort,
 )
-from avow.language.terms import Literal, Term
+from avow.language.terms import Arithmetic, Literal, Negative, Term
+from avow.logic.evaluate import NotEvaluable, evaluate
+from avow.logic.formula import free_variables
 from avow.logic.traversal import subterms
 from avow.logic.values import Element, Value
 
 STEP = Fraction(1, 1000)
 """How close to a threshold a value is tried on either side."""
+
+MANY = 6
+"""Constants up to which their sums and differences are tried as well."""
 
 SMALL = 4
 """Identifiers and coordinates are drawn from so few that relations meet."""
@@ -37,6 +43,8 @@ class Pools:
     scalars: Mapping[Sort, tuple[Value, ...]]
     near: Mapping[Sort, tuple[Value, ...]]
     rows: Mapping[str, tuple[tuple[Value, ...], ...]] = field(default_factory=dict)
+    edges: Mapping[Sort, tuple[Value, ...]] = field(default_factory=dict)
+    """Those of the scalars that are to be tried in any case: the thresholds, and what lies around them."""
 
 
 def pools(formulas: Iterable[Term], rows: Mapping[str, tuple[tuple[Value, ...], ...]]) -> Pools:
@@ -50,24 +58,29 @@ def pools(formulas: Iterable[Term], rows: Mapping[str, tuple[tuple[Value, ...], 
                     strings |= {part.value, part.value + "x"}
                 else:
                     numbers.add(Fraction(part.value))
+            elif isinstance(part, Arithmetic | Negative) and not free_variables(part):
+                with contextlib.suppress(NotEvaluable):
+                    value = evaluate(part, {})  # `4 * Flow` is a threshold as much as 2 is
+                    numbers.add(Fraction(value) if isinstance(value, int | Fraction) else Fraction(0))
     around = _around(numbers)
-    whole = tuple(int(n) for n in around if n.denominator == 1)
+    few = sorted({*numbers, Fraction(0)}) if len(numbers) <= MANY else []
+    # An output's threshold may be reached from an input by adding or taking away.
+    combined = _simple((*around, *(a + b for a in few for b in few), *(a - b for a in few for b in few)))
     small = tuple(range(SMALL))
     inside = tuple(int(n) for n in sorted(numbers) if n.denominator == 1 and n not in small)
     texts = tuple(sorted(strings, key=lambda s: (len(s), s)))
-    scalars: dict[Sort, tuple[Value, ...]] = {
-        REAL: around,
-        INTEGER: whole,
-        NATURAL: tuple(n for n in whole if n >= 0),
-        STRING: texts,
-    }
     near: dict[Sort, tuple[Value, ...]] = {
         REAL: (*map(Fraction, small), *(n for n in _simple(numbers) if n not in small)),
         INTEGER: (*small, -1, *inside),
         NATURAL: (*small, *(n for n in inside if n >= 0)),
         STRING: texts,
     }
-    return Pools(scalars, near, rows)
+    return Pools(_by_sort(combined, texts), near, rows, _by_sort(around, texts))
+
+
+def _by_sort(numbers: tuple[Fraction, ...], texts: tuple[str, ...]) -> dict[Sort, tuple[Value, ...]]:
+    whole = tuple(int(n) for n in numbers if n.denominator == 1)
+    return {REAL: numbers, INTEGER: whole, NATURAL: tuple(n for n in whole if n >= 0), STRING: texts}
 
 
 def _around(numbers: Iterable[Fraction]) -> tuple[Fraction, ...]:
