@@ -7,9 +7,12 @@ mostly the same answer, whatever else runs; wall-clock time is bounded by a mult
 from __future__ import annotations
 
 import contextlib
+import math
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
 WALL = 20
 """Wall-clock time allowed, as a multiple of the limit in processor time."""
@@ -34,26 +37,85 @@ def watchdog(milliseconds: int, interrupt: Callable[[], None]) -> Iterator[threa
 
     Z3's own limit is in wall-clock time, and sometimes it misses it altogether (seen: 84 s for 16 ms).
     """
-    done = threading.Event()
-    interrupted = threading.Event()
-    used = _clock()
     limit = milliseconds / 1000
-    cpu_end = used() + limit
-    wall_end = time.monotonic() + limit * WALL + 1
-
-    def bark() -> None:
-        wait = limit
-        while not done.wait(wait):
-            left = min(cpu_end - used(), wall_end - time.monotonic())
-            if left <= 0:
-                interrupted.set()
-                interrupt()
-            wait = max(left, 0.02)
-
-    dog = threading.Thread(target=bark, daemon=True)
-    dog.start()
+    used = _clock()
+    watched = _Watched(used, used() + limit, time.monotonic() + limit * WALL + 1, interrupt)
+    _kennel.dog.watch(watched, limit)
     try:
-        yield interrupted
+        yield watched.interrupted
     finally:
-        done.set()
-        dog.join()
+        with watched.lock:  # from here on nothing is interrupted: it would be what is asked next
+            watched.done = True
+            watched.interrupt = _nothing  # the list of blocks must not keep alive what it holds
+
+
+def _nothing() -> None:
+    pass
+
+
+@dataclass(slots=True, eq=False)
+class _Watched:
+    """A block that is being watched."""
+
+    used: Callable[[], float]
+    cpu_end: float
+    wall_end: float
+    interrupt: Callable[[], None]
+    interrupted: threading.Event = field(default_factory=threading.Event)
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    done: bool = False
+
+    def look(self) -> float | None:
+        """Interrupt it if it is beyond its limit. How many seconds it has at least, or None where it is done."""
+        with self.lock:
+            if self.done:
+                return None
+            left = min(self.cpu_end - self.used(), self.wall_end - time.monotonic())
+            if left <= 0:
+                self.interrupted.set()
+                self.interrupt()
+            return max(left, 0.02)
+
+
+class _Dog:
+    """One thread for all blocks: most are done long before their limit, and a thread for each would cost more than they
+    do. It sleeps until the first limit that it knows of may be reached, and looks again."""
+
+    def __init__(self) -> None:
+        self.condition = threading.Condition()
+        self.watched: list[_Watched] = []
+        self.wakes = math.inf
+        self.thread: threading.Thread | None = None
+
+    def watch(self, block: _Watched, limit: float) -> None:
+        with self.condition:
+            self.watched.append(block)
+            if self.thread is None or not self.thread.is_alive():
+                self.thread = threading.Thread(target=self.run, daemon=True, name="watchdog")
+                self.thread.start()
+            elif time.monotonic() + limit < self.wakes:
+                self.condition.notify()
+
+    def run(self) -> None:
+        with self.condition:
+            while True:
+                known = [(block, block.look()) for block in self.watched]
+                self.watched = [block for block, left in known if left is not None]
+                wait = min((left for _, left in known if left is not None), default=None)
+                self.wakes = math.inf if wait is None else time.monotonic() + wait
+                self.condition.wait(wait)
+
+
+class _Kennel:
+    """Holds the dog. A process that was forked has none of its parent's threads, and gets its own."""
+
+    def __init__(self) -> None:
+        self.renew()
+        if hasattr(os, "register_at_fork"):
+            os.register_at_fork(after_in_child=self.renew)
+
+    def renew(self) -> None:
+        self.dog = _Dog()
+
+
+_kennel = _Kennel()
