@@ -10,6 +10,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from avow import registry
+from avow.codes_workspace import of_backend
+from avow.pipeline.keys import surroundings
+from avow.pipeline.work import method_job
+from avow.system.load import load_system
+
 PAGE = Path(__file__).parent.parent.parent / "docs" / "adding-a-backend.md"
 
 
@@ -41,3 +49,35 @@ def test_the_example_works_as_a_plugin(workspace: Path) -> None:
     assert (record["verdict"], record["tool"], record["method"]) == ("tested", "coin", "coin")
     assert (workspace / "artifacts" / "toss" / "n" / "coin" / "coin.txt").is_file()
     shutil.rmtree(workspace / "artifacts")
+
+
+def test_the_optional_members_are_read(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page's codes, and its claims of what is not looked at, on the page's backend."""
+    backend, codes = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    for stem, members in (
+        ("plain", ""),
+        ("full", "    codes = CODES\n    uses_scenario = False\n    uses_wiring = False\n"),
+    ):
+        text = codes + backend.replace('    name = "coin"\n', f'    name = "coin"\n{members}')
+        (workspace / f"coin_{stem}.py").write_text(text)
+    monkeypatch.syspath_prepend(str(workspace))
+    folder = workspace / "contracts" / "toss"
+    folder.mkdir()
+    (folder / "system.rcl").write_text(
+        "node n { inputs(a : NATURAL) outputs(b : BOOL) topics() guarantee same (out.b <=> in.a > 0) }\n"
+    )
+    seen = {}
+    for stem in ("plain", "full"):
+        for domain in ("0..3", "0..4"):
+            scenario = f"scenario: {{domains: {{NATURAL: {domain}}}}}"
+            plan = f"plugins: [coin_{stem}]\n{scenario}\nnodes: {{n: {{methods: [coin]}}}}\n"
+            (folder / "plan.yaml").write_text(plan)
+            system = load_system(folder)
+            method = system.plan.node("n").methods[0]
+            seen[stem, domain] = surroundings(
+                registry.backend("coin", (f"coin_{stem}",)), method_job(system, system.contract.node("n"), method), ""
+            )
+    assert seen["plain", "0..3"] != seen["plain", "0..4"]
+    assert seen["full", "0..3"] == seen["full", "0..4"]
+    assert list(of_backend(registry.backend("coin", ("coin_full",)))) == ["COIN101"]
+    assert of_backend(registry.backend("coin", ("coin_plain",))) == {}
