@@ -160,7 +160,11 @@ class _Reader:
     def resolve(self, piece: Piece) -> Path | None:
         path = inside(self.path.parent, piece.text)
         if path is None:
-            self.fault("PLAN108", f"the path {piece.text!r} leads out of the system's folder", piece.span)
+            shown = piece.text if len(piece.text) <= 200 else piece.text[:197] + "…"
+            what = (
+                "leads out of the system's folder" if shown == piece.text else "is too long, or leads out of the folder"
+            )
+            self.fault("PLAN108", f"the path {shown!r} {what}", piece.span)
         return path
 
     def present(self, piece: Piece, path: Path) -> bool:

@@ -41,7 +41,7 @@ def write_skeleton(folder: Path, node: str, *, method: str | None = None) -> Pat
         write(path, generate(job.node, methods[0].guarantees).skeleton)
     except NotExpressible as problem:
         message = f"node '{node}' cannot be put into Dafny: {problem.what}"
-        raise Rejected(Diagnostic("DFY104", message, problem.span or job.node.span)) from None
+        raise Rejected(Diagnostic("DFY105", message, problem.span or job.node.span)) from None
     except OSError as error:
         raise Rejected(Diagnostic("DFY102", f"'{name}' cannot be written: {error}", place)) from None
     return path

@@ -34,7 +34,7 @@ CODES = register(
     declare(
         "DFY105",
         "no translation",
-        "`avow translate --to dafny` was asked for a clause or a type that has no counterpart in Dafny.",
+        "A skeleton or a translation was asked for, and a clause or a type has no counterpart in Dafny.",
         "Rewrite what the message names, or do without it.",
     ),
 )

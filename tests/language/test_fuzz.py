@@ -1,6 +1,6 @@
 """Whatever the text: diagnostics and no exception, in bounded time and memory; what is accepted means the same after
 `fmt` and `translate --to rcl`. AVOW_FUZZ=200000 makes it a long run, and AVOW_FUZZ_SEED another one; longer ones are
-`python -m tests.language.fuzzing`.
+`cd tests; python -m language.fuzzing`.
 """
 
 from __future__ import annotations

@@ -223,3 +223,13 @@ def test_published_schema_is_the_one_in_use() -> None:
 
     published = Path(__file__).parents[2] / "docs/schemas/plan.schema.json"
     assert json.loads(published.read_text()) == plan_schema()
+
+
+@pytest.mark.parametrize("path", ["x" * 300, "a/" * 3000 + "b", "x" * 70_000 + ".csv"])
+@pytest.mark.parametrize(
+    "form", ["contract: {}\n", "scenario: {{tables: {{t: {}}}}}\n", "plugins: []\nmodel: {{ros_graph: {}}}\n"]
+)
+def test_a_path_that_no_file_can_have(tmp_path: Path, form: str, path: str) -> None:
+    found = faults(tmp_path, form.format(path))
+    assert found
+    assert all(len(d.message) < 1000 for d in found)
