@@ -39,7 +39,7 @@ def command(
     """Combine the contracts of a system's nodes by the rules R1-R4, and discharge the side conditions.
 
     PATH is a system's folder, its name in this workspace, or an .rcl file (without a plan, names link). Code 1 where a
-    side condition is refuted or a loop cannot start, 2 for bad input.
+    side condition is refuted or not inductive, or a loop cannot start, 2 for bad input.
     """
     from avow.calculus.composition import compose
     from avow.calculus.obligations import composition_obligations, settle_all
@@ -90,7 +90,8 @@ def command(
         click.echo(json.dumps(to_json(composition, chosen, obligations, outcomes), indent=1, ensure_ascii=False))
     else:
         _listing(composition, chosen, obligations, outcomes)
-    return 1 if any(outcome.verdict is Verdict.REFUTED for outcome in outcomes) else 0
+    fails = (o.verdict is Verdict.REFUTED or o.details.get("induction") == "fails" for o in outcomes)
+    return 1 if any(fails) else 0
 
 
 class _Limits:
