@@ -11,7 +11,7 @@ from avow.assurance.policy import Demand, Policy, costs
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, effective, join, link_rank, weigh
-from avow.verdict import Verdict
+from avow.verdict import Link, Verdict
 
 
 def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date) -> str | None:
@@ -131,6 +131,12 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             return Suggestion(
                 f"run `avow verify {facts.system}`: the plan's methods have not answered the claim as it is now"
             )
+    if demand is None and view.status is Status.JUSTIFIED:
+        return Suggestion(
+            "a person's reason is not enough here: let a contract guarantee it, or take it as a risk under "
+            "`accepted:`, with a name, a date and an expiry",
+            cost=30,
+        )
     used = _planned(view, facts)
     by_name = {method.name: method for method in facts.methods}
     tried = {v.entry.evidence.method for v in view.counting}
@@ -186,9 +192,13 @@ def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], f
             return False
         return strong_enough or Status(info.strength) in demand.one_of
 
+    def dear(info: MethodInfo) -> int:
+        """Persons are dearer than machines, and what must be installed first than what is here."""
+        by_hand = 5 if info.link is Link.GUIDED else 0
+        return order.get(info.strength, 9) + by_hand + (0 if info.available else 5)
+
     fitting = sorted(
-        (info for info in facts.methods if fits(info)),
-        key=lambda info: (order.get(info.strength, 9) + (0 if info.available else 5), -link_rank(info.link), info.name),
+        (info for info in facts.methods if fits(info)), key=lambda i: (dear(i), -link_rank(i.link), i.name)
     )
     node = view.obligation.node
     if not fitting:
@@ -198,8 +208,9 @@ def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], f
         return Suggestion(f"add {wanted} under nodes.{node}.methods", cost=60)
     best = fitting[0]
     install = "" if best.available else f" (first: {best.install})"
+    others = " or ".join(f"`{info.name}`" for info in fitting[1:3])
     return Suggestion(
-        f"add `{best.name}` under nodes.{node}.methods: {best.title}{install}",
+        f"add `{best.name}` under nodes.{node}.methods: {best.title}{install}{f'; or {others}' if others else ''}",
         best.name,
         10 + order.get(best.strength, 9),
     )

@@ -36,7 +36,7 @@ def gates(
         _kind(facts, obligations, excused, Kind.COMPOSITION, "The composition is justified", facts.policy.composition),
         *_guarantees(facts, obligations, excused),
         _derivations(facts, derivations, views, excused),
-        _requirements(facts, requirements, views, excused),
+        _requirements(facts, requirements, derivations, views, excused),
         *_certified(facts, grade),
     )
 
@@ -121,10 +121,16 @@ def _kind(
         title,
         failing,
         excused,
-        lambda view: view.status.value,
+        lambda view: _short_of(view.status, good),
         _holding([v.status.supports for v in of_kind], asked=bool(good)),
+        " or ".join(good),
         idle=not good,
     )
+
+
+def _short_of(status: Status, good: Sequence[Status]) -> str:
+    """``justified, but proved or checked is asked``; of what supports nothing the bare word."""
+    return f"{status}, but {' or '.join(good)} is asked" if status.supports else status.value
 
 
 def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Iterable[Gate]:
@@ -178,14 +184,26 @@ def _derivations(
 
 
 def _requirements(
-    facts: Facts, requirements: Sequence[RequirementView], views: Mapping[str, ObligationView], excused: set[str]
+    facts: Facts,
+    requirements: Sequence[RequirementView],
+    derivations: Sequence[DerivationView],
+    views: Mapping[str, ObligationView],
+    excused: set[str],
 ) -> Gate:
     good = facts.policy.requirements
     failing = [r for r in requirements if good and r.status not in good]
-    bad = [r for r in failing if not _all_excused(r.below, excused)]
+    causes = {r.id: r.below if r.below else _weak(r, derivations, views, good) for r in failing}
+    bad = [r for r in failing if not _all_excused(causes[r.id], excused)]
     let_off = tuple(requirement_claim(r.id) for r in failing if r not in bad)
-    reason = "; ".join(f"{r.id} is {r.status}{f': {_because(r.below)}' if r.below else ''}" for r in bad[:5])
-    suggestions = {s.text: s for r in bad for name in r.below if name in views for s in _suggestion(views[name])}
+    reason = "; ".join(
+        f"{r.id} is {_short_of(r.status, good)}{f': {_because(causes[r.id])}' if causes[r.id] else ''}" for r in bad[:5]
+    )
+    found = [s for r in bad for name in causes[r.id] if name in views for s in _suggestion(views[name])]
+    if any(not (r.formula or r.temporal or r.below or causes[r.id]) for r in bad):
+        found.append(
+            Suggestion("state the requirement as a `formula` or a `temporal` one: prose is linked by a person", cost=20)
+        )
+    suggestions = {s.text: s for s in sorted(found, key=lambda s: (s.cost, s.text))}
     return Gate(
         "requirements",
         "Every requirement is answered",
@@ -194,10 +212,34 @@ def _requirements(
         tuple(requirement_claim(r.id) for r in bad),
         tuple(suggestions.values())[:10],
         let_off,
-        "",
+        " or ".join(good),
         bool(bad) and all(_tool_only(r.below, views) for r in bad),
         idle=not good,
     )
+
+
+def _weak(
+    requirement: RequirementView,
+    derivations: Sequence[DerivationView],
+    views: Mapping[str, ObligationView],
+    good: Sequence[Status],
+) -> tuple[str, ...]:
+    """What makes a requirement that holds weaker than is asked: all under it that is itself weaker than is asked.
+    Nothing where the requirement is only prose: that no finding beneath it can excuse."""
+    if not (requirement.formula or requirement.temporal) and Status.LINKED not in good:
+        return ()
+    rests = {derivation_claim(d.derivation.name): d.rests_on for d in derivations}
+    found, seen, todo = list[str](), set[str](), list(requirement.rests_on)
+    while todo:
+        name = todo.pop(0)
+        if name in seen:
+            continue
+        seen.add(name)
+        view = views.get(name)
+        todo += view.rests_on if view else rests.get(name, ())
+        if view is not None and view.status not in good:
+            found.append(name)
+    return tuple(found)
 
 
 def _certified(facts: Facts, grade: Grade) -> Iterable[Gate]:
@@ -265,8 +307,22 @@ def suggestion_for(view: ObligationView, facts: Facts, today: date) -> Suggestio
         lacking = shortfall(view, demand, facts.policy, today)
     else:
         demand = None
-        lacking = None if view.status.supports or view.advice else view.status.value
+        good = _asked(view.obligation.kind, facts)
+        enough = view.advice or (view.status.supports and (not good or view.status in good))
+        lacking = None if enough else view.status.value
     return suggest(view, demand, facts) if lacking else None
+
+
+def _asked(kind: Kind, facts: Facts) -> Sequence[Status]:
+    match kind:
+        case Kind.SANITY:
+            return facts.policy.sanity
+        case Kind.COMPOSITION:
+            return facts.policy.composition
+        case Kind.REQUIREMENT:
+            return facts.policy.requirements
+        case _:
+            return ()
 
 
 def _all_excused(below: Sequence[str], excused: set[str]) -> bool:

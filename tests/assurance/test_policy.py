@@ -8,14 +8,15 @@ from typing import Any
 
 import pytest
 
-from assurance.sample import TODAY, case, evidence, guarantee, node_plan, system
+from assurance.sample import SPAN, TODAY, case, evidence, guarantee, node_plan, obligation, system
 from avow.assurance.demand import independent
 from avow.assurance.model import Case
 from avow.assurance.policy import costs, profile, profile_names, read_policy, techniques
 from avow.diagnostics import Rejected, Span
+from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
-from avow.system.plan import Located
+from avow.system.plan import Finding, Located, Requirement
 from avow.verdict import Link, Verdict
 
 
@@ -201,6 +202,77 @@ def test_the_cheapest_step_is_named() -> None:
     )
     assert step(only) == "install what `dafny` needs: apt install dafny"
     assert step(the_case("default", evidence("n.g", Verdict.REFUTED))).startswith("repair")
+
+
+def test_persons_are_dearer_than_machines() -> None:
+    """Measured runs give no more than tests do, but somebody must drive."""
+    tested = the_case(
+        {"guarantees": {"high": {"one_of": ["tested", "proved"], "methods": 2, "independent": True}}}, TEST
+    )
+    suggestion = tested.obligations[0].suggestion
+    assert suggestion is not None
+    assert suggestion.text.startswith("add `ajpf`")
+    assert suggestion.text.endswith("or `hoare` or `experiment`")
+
+
+def environment(*accepted: Finding, policy: Any = "sil3", formal: bool = False) -> Case:
+    """A requirement that rests on a guarantee and on what is assumed of the environment, with a person's reason."""
+    subject = system(
+        {"n": ["g"]},
+        plans=[node_plan("n", "low", "hoare")],
+        policy=policy,
+        accepted=accepted,
+        requirements=[
+            Requirement(
+                "R", "safe", "0 <= r" if formal else None, None, ("n.g", "system/composition/environment.n.r"), SPAN
+            )
+        ],
+    )
+    reason = obligation("system", Kind.COMPOSITION, "environment.n.r", "0 <= r")
+    proof = evidence("n.g", tool="z3")
+    told = evidence(reason, Verdict.JUSTIFIED, "compose", strength=Verdict.PROVED)
+    own = obligation("system", Kind.REQUIREMENT, "R", "R follows")
+    listed = [guarantee("n", "g"), reason, *([own] if formal else [])]
+    return case(subject, listed, [proof, told, *([evidence(own, method="compose")] if formal else [])])
+
+
+def risk(**more: str) -> Finding:
+    terms = {"reason": "data sheet", "who": "R. A.", "date": "2026-10-01", "expires": "2026-12-01", **more}
+    return Finding("system/composition/environment.*", "justified", **terms)
+
+
+def test_what_is_weaker_than_asked_is_told_with_what_is_asked() -> None:
+    found = environment()
+    passed, reason = gate(found, "composition")
+    assert not passed
+    assert "justified, but proved or checked or reviewed is asked" in reason
+    told = next(g for g in found.gates if g.id == "composition").suggestions
+    assert "accepted" in told[0].text
+
+
+def test_a_risk_that_is_taken_excuses_what_rests_on_it_until_its_day() -> None:
+    strict = {"requirements": ["proved"], "composition": ["proved"]}
+    for policy in ("sil3", strict):
+        good = environment(risk(), policy=policy)
+        assert gate(good, "composition")[0], gate(good, "composition")
+        assert good.obligations[1].status is Status.JUSTIFIED  # it makes no claim true
+        late = environment(risk(expires="2026-11-20"), policy=policy)
+        assert not gate(late, "accepted")[0]
+        assert not gate(late, "composition")[0]
+        assert late.exit_code == 1
+    assert gate(environment(risk(), policy=strict, formal=True), "requirements")[0]
+    passed, reason = gate(environment(risk(expires="2026-11-20"), policy=strict, formal=True), "requirements")
+    assert not passed
+    assert "R is justified, but proved is asked: it rests on system/composition/environment.n.r" in reason
+    assert environment(risk(expires="2026-11-21")).exit_code == environment(risk()).exit_code  # its last day counts
+
+
+def test_a_requirement_in_prose_is_excused_by_no_risk() -> None:
+    found = environment(risk(), policy={"requirements": ["proved"], "composition": ["proved"]})
+    passed, reason = gate(found, "requirements")
+    assert not passed
+    assert "linked, but proved is asked" in reason
+    assert "formula" in next(g for g in found.gates if g.id == "requirements").suggestions[0].text
 
 
 def test_reproduction_asks_nothing_of_guarantees() -> None:
