@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from datetime import date
 
 from avow.assurance.facts import Facts
-from avow.assurance.model import Currency, MethodInfo, ObligationView, Suggestion
+from avow.assurance.model import Currency, EvidenceView, MethodInfo, ObligationView, Suggestion
 from avow.assurance.policy import Demand, Policy, costs
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
@@ -121,13 +121,17 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         case Status.ERROR:
             again = f"`avow verify {facts.system}`"
             return Suggestion(f"find out why the tool failed (its message and log are with the evidence), then {again}")
+        case Status.VACUOUS if hollow := [v.entry.evidence.method for v in view.counting if _is_score(v)]:
+            return Suggestion(
+                f"find out what `{hollow[0]}` looks at: it says the same of every mutant of the claim", cost=50
+            )
         case Status.VACUOUS:
             return Suggestion("give a scenario in which the claim's trigger is met", cost=50)
         case Status.STALE if expired := _expired(view):
             return Suggestion(
                 f"renew the {' and the '.join(expired)}: what was given was valid until a day that is past", cost=30
             )
-        case Status.STALE:
+        case Status.STALE if view.planned:
             return Suggestion(
                 f"run `avow verify {facts.system}`: the plan's methods have not answered the claim as it is now"
             )
@@ -155,6 +159,10 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             "narrow the question (a scenario in the plan), raise the time limit, or accept it with a reason", cost=20
         )
     return _new_method(view, demand, used, facts)
+
+
+def _is_score(item: EvidenceView) -> bool:
+    return item.entry.evidence.vacuous and "mutation" in item.entry.evidence.details
 
 
 def _expired(view: ObligationView) -> tuple[str, ...]:

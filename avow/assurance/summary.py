@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from avow.assurance.facts import Facts
-from avow.assurance.model import DerivationView, Handled, ObligationView, OpenItem, RequirementView
+from avow.assurance.model import Currency, DerivationView, Handled, ObligationView, OpenItem, RequirementView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
@@ -40,6 +40,7 @@ def open_items(
     for status in _WORST_FIRST:
         items += [_open(view, said) for view in views if view.status is status and not view.advice]
     items += [_vacuous(view) for view in views if view.status is not Status.VACUOUS and _has_vacuous(view)]
+    items += [item for view in views if view.status.supports for item in _given_up(view)]
     for d in derivations:
         if not d.status.supports and not d.below:
             text = f"the derivation is {d.status}: a premise or a side condition stands for nothing"
@@ -69,6 +70,19 @@ def open_items(
         if view.advice and view.status is Status.REFUTED
     ]
     return tuple(items)
+
+
+def _given_up(view: ObligationView) -> Iterable[OpenItem]:
+    """A refutation of the claim as it is now, by a method that the plan no longer uses for it: that does not refute the
+    refutation."""
+    for item in view.evidence:
+        record = item.entry.evidence
+        same = record.obligation_digest == view.obligation.digest
+        if item.currency is Currency.WITHDRAWN and same and weigh(record).refuted:
+            text = (
+                f"{record.method} refuted it on {record.started[:10]}; the plan no longer uses {record.method} for it"
+            )
+            yield OpenItem("withdrawn", view.id, text, title=view.obligation.claim)
 
 
 def _open(view: ObligationView, said: Mapping[str, str]) -> OpenItem:

@@ -275,6 +275,24 @@ def test_a_requirement_in_prose_is_excused_by_no_risk() -> None:
     assert "formula" in next(g for g in found.gates if g.id == "requirements").suggestions[0].text
 
 
+def test_where_the_plan_gave_up_every_method_another_is_named() -> None:
+    subject = system({"n": ["g"]}, plans=[node_plan("n", "high")])
+    suggestion = case(subject, [guarantee("n", "g")], [PROOF], keys={}).obligations[0].suggestion
+    assert suggestion is not None
+    assert suggestion.text.startswith("add `ajpf`")  # and not: run the plan's methods again
+
+
+def test_who_gives_up_the_method_that_refutes_is_told_of() -> None:
+    subject = system({"n": ["g"]}, plans=[node_plan("n", "low", "hypothesis")])
+    refuted = evidence("n.g", Verdict.REFUTED)
+    found = case(subject, [guarantee("n", "g")], [refuted, TEST], keys={(TEST.obligation, "hypothesis"): TEST.key})
+    assert found.obligations[0].status is Status.TESTED
+    assert any(i.kind == "withdrawn" and "hoare refuted it on" in i.text and not i.advice for i in found.open_items)
+    other = replace(refuted, obligation_digest="of another meaning")
+    found = case(subject, [guarantee("n", "g")], [other, TEST], keys={(TEST.obligation, "hypothesis"): TEST.key})
+    assert not any(i.kind == "withdrawn" for i in found.open_items)
+
+
 def test_reproduction_asks_nothing_of_guarantees() -> None:
     assert the_case("reproduction").exit_code == 0
     assert the_case("default").exit_code == 1
