@@ -140,7 +140,7 @@ def test_it_answers_from_a_session_of_its_own(odd: Path, way: str, monkeypatch: 
     ("does", "why"),
     [("exits", "ended with code 3"), ("aborts", f"ended with code -{int(signal.SIGABRT)}"), ("raises", "of its own")],
 )
-def test_a_crash_is_a_verdict_and_takes_nothing_with_it(odd: Path, way: str, does: str, why: str) -> None:
+def test_a_crash_is_a_verdict_and_takes_nothing_with_it(odd: Path, does: str, why: str) -> None:
     outcome, report = settle(odd, does)
     assert outcome.verdict is Verdict.ERROR
     assert why in outcome.summary
