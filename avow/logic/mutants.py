@@ -106,6 +106,8 @@ def _here(term: Term) -> Iterator[tuple[str, Term]]:
                 )
         case Not(body=body):
             yield "a negation is dropped", body
+        case Implies(right=right):  # notices a conclusion that a table maps to what always holds
+            yield "a condition is dropped", right
         case _:
             return
 
