@@ -47,7 +47,7 @@ class DafnyBackend:
 
     name = "dafny"
     title = "a Dafny implementation, verified against the contract"
-    version = "1"
+    version = "2"
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False

@@ -15,7 +15,7 @@ from avow.backend import Limits
 from avow.backends.dafny.answer import Member
 from avow.backends.dafny.candidate import candidates
 from avow.backends.dafny.modules import Generated
-from avow.backends.dafny.runner import Run, audit, verify
+from avow.backends.dafny.runner import Audit, Run, audit, verify
 from avow.backends.dafny.scanner import Scan
 from avow.language.contract import Node
 from avow.verdict import Verdict
@@ -124,17 +124,15 @@ def _broken(run: Run, scanned: Scan, generated: Generated, shown_name: str) -> S
     return Settled(Verdict.ERROR, "; ".join([summary, *problems[:_SHOWN]]), (), details)
 
 
-def _taken_for_granted(run: Run, scanned: Scan, generated: Generated, shown_name: str) -> tuple[str, ...] | None:
+def _taken_for_granted(audited: Audit, scanned: Scan, generated: Generated, shown_name: str) -> tuple[str, ...] | None:
     """What the implementation assumes, by our scan and by Dafny's own account; None where Dafny gave none."""
-    if run.timed_out or run.code not in (0, 3) or _FINISHED.search(run.output) is None:
-        return None
-    if run.code == 3 and not any(c.message.startswith("Error") for c in run.complaints):
+    if audited.complaints is None:
         return None
     found = [f"{shown_name}:{line}: {what}" for line, what in scanned.hypotheses]
     # The generated types leave the partial operations open on purpose (see `modules`); nothing else may be open.
     found += [
         f"{_name(c.file, generated, shown_name)}:{c.line}: {c.message}"
-        for c in run.complaints
+        for c in audited.complaints
         if c.file != generated.types_file
     ]
     return tuple(dict.fromkeys(found))
@@ -167,7 +165,7 @@ def _unproved(run: Run) -> tuple[str, ...]:
     clean = printed is not None and int(printed[2]) == 0 and not printed[3].strip() and int(printed[1]) > 0
     if not found and not (clean and run.code == 0):
         found.append(f"dafny says: {printed[0] if printed else 'nothing'} (code {run.code})")
-    return tuple(found)
+    return tuple(dict.fromkeys(found))
 
 
 def _spared(run: Run, generated: Generated) -> tuple[str, ...]:

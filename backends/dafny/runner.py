@@ -1,7 +1,11 @@
-"""Bounded runs of Dafny: what was verified, and what Dafny itself finds left without a body or assumed."""
+"""Bounded runs of Dafny: what was verified, and what Dafny itself finds left without a body or assumed.
+
+Up to version 3 it is asked with the options of 2.3, from version 4 on with its commands (`modern`).
+"""
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,6 +13,7 @@ from pathlib import Path
 
 from avow import process
 from avow.backend import Limits, Tool
+from avow.backends.dafny import modern
 from avow.backends.dafny.answer import Complaint, Member, complaints, counted, quiet, read_members
 from avow.tools import find_tool
 
@@ -17,12 +22,22 @@ INSTALL = "apt-get install dafny"
 _ANSWER = "answer.xml"
 _MODEL = "model.txt"
 _MAX_MODEL = 4_000_000
+_FINISHED = re.compile(r"Dafny program verifier finished with \d+ verified, \d+ errors?")
 
 
 def dafny() -> Tool:
     """Dafny as found now. Never raises."""
     # Any run prints its version in the XML only; without a file it says it in a usage line.
-    return find_tool("dafny", ("/version",), install=INSTALL, pattern=r"\d+\.\d+\.\d+(\.\d+)?")
+    found = find_tool("dafny", ("/version",), install=INSTALL, pattern=r"\d+\.\d+\.\d+(\.\d+)?")
+    if found.version == "unknown":
+        return find_tool("dafny", ("--version",), install=INSTALL, pattern=r"\d+\.\d+\.\d+(\.\d+)?")
+    return found
+
+
+def has_commands(version: str | None) -> bool:
+    """Whether this version is asked by commands. One that does not tell its version is asked as 2.3 is."""
+    major = re.match(r"\d+", version or "")
+    return major is not None and int(major[0]) >= 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,32 +58,71 @@ class Run:
         return self.code is None
 
 
+@dataclass(frozen=True, slots=True)
+class Audit:
+    """What Dafny complains of besides. `complaints` is None where it has not said all."""
+
+    complaints: tuple[Complaint, ...] | None
+    output: str
+
+
 def verify(files: Mapping[str, str], limits: Limits) -> Run:
     """Verify all files together. Raises ToolMissing."""
     each = max(1, min(30, int(limits.seconds / 2)))
-    flags = ("/nologo", "/compile:0", f"/timeLimit:{each}", "/errorLimit:20", f"/xml:{_ANSWER}", f"/mv:{_MODEL}")
-    return _run(flags, files, limits, answer=True)
+    if not has_commands(dafny().version):
+        flags = ("/nologo", "/compile:0", f"/timeLimit:{each}", "/errorLimit:20", f"/xml:{_ANSWER}", f"/mv:{_MODEL}")
+        done = _run(flags, files, limits)
+        return _answer(done, read_members(done.answers[_ANSWER]) if done.answers[_ANSWER] else None)
+    done = _run(modern.verify_arguments(each, lenient=True), files, limits)
+    if modern.is_unknown_option(done.output):
+        done = _run(modern.verify_arguments(each, lenient=False), files, limits)
+    log = done.answers[modern.LOG]
+    return _answer(done, modern.read_log(log, done.output) if log else None)
 
 
-def audit(files: Mapping[str, str], limits: Limits) -> Run:
-    """Have Dafny translate the files without verifying them: it then complains of every missing body and assumption.
-    Nothing is compiled or executed. Raises ToolMissing."""
-    return _run(("/nologo", "/compile:0", "/noVerify", "/spillTargetCode:3"), files, limits, answer=False)
+def audit(files: Mapping[str, str], limits: Limits) -> Audit:
+    """Have Dafny say what it takes for granted, without verifying; nothing is compiled or executed. Raises ToolMissing.
+
+    2.3 complains of every missing body and assumption when it translates the files; 4 has a command for it."""
+    if has_commands(dafny().version):
+        done = _run(("audit",), files, limits)
+        return Audit(None if done.code is None else modern.read_audit(done.output), done.output)
+    done = _run(("/nologo", "/compile:0", "/noVerify", "/spillTargetCode:3"), files, limits)
+    found = complaints(done.output)
+    said = done.code in (0, 3) and _FINISHED.search(done.output) is not None
+    if not said or (done.code == 3 and not any(c.message.startswith("Error") for c in found)):
+        return Audit(None, done.output)
+    return Audit(found, done.output)
 
 
-def _run(flags: Sequence[str], files: Mapping[str, str], limits: Limits, *, answer: bool) -> Run:
-    # The names are ours (derived by `file_stem`): none can be taken for an option or lead elsewhere.
-    command = ("dafny", *flags, *files)
+@dataclass(frozen=True, slots=True)
+class _Done:
+    command: tuple[str, ...]
+    code: int | None
+    output: str
+    answers: Mapping[str, str]
+
+
+def _answer(done: _Done, members: tuple[Member, ...] | None) -> Run:
+    said, model = complaints(done.output), done.answers[_MODEL][:_MAX_MODEL]
+    return Run(done.command, done.code, members, said, counted(done.output), done.output, model)
+
+
+def _run(first: Sequence[str], files: Mapping[str, str], limits: Limits) -> _Done:
+    megabytes: int | None = limits.megabytes
+    env: dict[str, str] = {}
+    if has_commands(dafny().version):
+        # .NET reserves far more addresses than it uses: a bound on addresses would keep it from starting at all.
+        env, megabytes = {"DOTNET_GCHeapHardLimit": f"{limits.megabytes * 2**20:x}"}, None
+    # The files' names are ours (derived by `file_stem`): none can be taken for an option or lead elsewhere.
+    command = ("dafny", *first, *files)
     with tempfile.TemporaryDirectory(prefix="avow-dafny-") as name:
         folder = Path(name)
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
-        done = process.run(command, cwd=folder, seconds=limits.seconds, megabytes=limits.megabytes)
-        xml = _read(folder / _ANSWER) if answer else ""
-        model = _read(folder / _MODEL)[:_MAX_MODEL] if answer else ""
-    output = quiet(done.stdout + done.stderr)
-    members = read_members(xml) if xml else None
-    return Run(command, done.code, members, complaints(output), counted(output), output, model)
+        done = process.run(command, cwd=folder, seconds=limits.seconds, megabytes=megabytes, env=env)
+        answers = {each: _read(folder / each) for each in (_ANSWER, _MODEL, modern.LOG)}
+    return _Done(command, done.code, quiet(done.stdout + done.stderr), answers)
 
 
 def _read(path: Path) -> str:
