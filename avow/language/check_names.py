@@ -173,4 +173,8 @@ _FOREIGN_NAMES = {
     "false": "write `FALSE`",
     "False": "write `FALSE`",
     "EmptySet": "the empty set is written `{}`",
+    **dict.fromkeys(
+        ("always", "globally", "eventually", "finally", "next", "until", "once", "historically", "previously", "since"),
+        "a contract speaks of one step; properties of whole runs stand in the plan",
+    ),
 }

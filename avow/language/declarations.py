@@ -239,7 +239,7 @@ class Declarations:
         else:
             near = _FOREIGN_TYPES.get(name.casefold())
             hint = f"did you mean `{near}`?" if near else did_you_mean(name, (*self.declared, *BUILTINS))
-            hint = hint or f"declare it in the context: `{name} : …;` (`{{}}` where nothing is known of it)"
+            hint = hint or f"declare it in the context: `{name} : …;`, or check this file with the one that declares it"
             reports.error("RCL208", f"the type `{name}` is not declared", tree.start, tree.end, hint=hint)
         return None
 

@@ -64,11 +64,35 @@ def _hint(start: str, tokens: Sequence[Token], found: Token, expected: frozenset
     if start == "topics":
         if found.type == "SEMICOLON":
             return "separate topics by commas"
+        if found.type in ("DOT", "COLON") and before is not None:
+            return f"write the type with slashes: `{before.text}/…`"
+        if found.type in ("NAME", "IN", "OUT") and found.text.startswith("match"):
+            return "did you mean `matches`?"
+        if (
+            found.type == "MATCHES"
+            and len(tokens) > 2
+            and any(t.type == "SLASH" for t in tokens[max(0, position - 4) : position])
+        ):
+            return "between type and name stands no slash: write `package/Type name matches(in.v)`"
         return "a topic is `package/Type name` with, if it carries a variable, `matches(in.v)` or `matches(out.v)`"
     if start == "ports" and found.type in ("NAME", "BUILTIN") and expected == {"COLON"}:
         return "write `name : type`"
     if start == "ports" and "COMMA" in expected and found.type in ("NAME", "SEMICOLON"):
         return "separate them by commas: `a : REAL, b : BOOL`"
+    if start == "ports" and found.type == "COMMA" and expected == {"COLON"}:
+        return "each has a type of its own: `a : REAL, b : REAL`"
+    if start == "declaration" and found.text == ":=":
+        return "a constant is declared with `=`, a type with `:`"
+    if (
+        start == "declaration"
+        and found.type in ("NUMBER", "STRING", "MINUS", "TRUE", "FALSE")
+        and _is_type(tokens, before)
+    ):
+        return "a constant is declared with `=`: `Name = value;`"
+    if start in ("declaration", "ports") and (
+        found.type == "STAR" or (before is not None and before.text in _SEQUENCES)
+    ):
+        return "a type of sequences is written `<REAL>`"
     if start == "declaration" and before is not None and before.type == "EQUALS":
         return "equality is written `==`; a constant is `Name = value;`"
     if found.type == "EQUALS":
@@ -78,6 +102,10 @@ def _hint(start: str, tokens: Sequence[Token], found: Token, expected: frozenset
     if found.type in ("BAR", "IMPLIES", "COMMA") and expected & {"ARROW", "$END"}:
         return "write a function as `A x B --> C`, and a choice of values as `{a, b}`"
     return keyword
+
+
+def _is_type(tokens: Sequence[Token], before: Token | None) -> bool:
+    return len(tokens) > 1 and before is not None and before is tokens[1] and before.type == "COLON"
 
 
 def _in_formula(
@@ -96,6 +124,9 @@ def _in_formula(
         return "the variables stand without parentheses: `exists_unique(x, y in REAL | …)`"
     if found.text == "x" and quantified and "BAR" in expected:
         return "a variable ranges over one type: write `x, y in REAL`, not `(x, y) in REAL x REAL`"
+    if found.type in ("BAR", "IN") and any(t.text.casefold().replace("_", "") in _QUANTIFIER_LIKE for t in earlier):
+        like = next(t for t in earlier if t.text.casefold().replace("_", "") in _QUANTIFIER_LIKE)
+        return f"write `{_QUANTIFIER_LIKE[like.text.casefold().replace('_', '')]}(x in S | …)`, not `{like.text}`"
     if found.type == "COLON" and quantified:
         return "a bar stands between the variables and the formula: `forall(x in REAL | …)`"
     if found.type == "EMPTY_SEQUENCE" and "NE" in expected:
@@ -131,6 +162,12 @@ def _about_keyword(found: Token) -> str | None:
 
 _QUANTIFIERS = frozenset(("FORALL", "EXISTS", "UNIQUE"))
 _RELATIONS = frozenset(("EQ", "NE", "LE", "GE", "LT", "GT", "LPAR", "DOT", "PLUS", "MINUS"))
+_SEQUENCES = frozenset(("seq", "sequence", "list", "List", "Seq", "Sequence", "array"))
+_QUANTIFIER_LIKE = {
+    **dict.fromkeys(("exists1", "existsone", "existsunique", "existsexactlyone", "unique"), "exists_unique"),
+    **dict.fromkeys(("all", "every", "foreach", "forevery"), "forall"),
+    **dict.fromkeys(("exist", "some", "forsome", "any"), "exists"),
+}
 _ALIASES = {
     "true": "TRUE",
     "false": "FALSE",

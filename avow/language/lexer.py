@@ -69,7 +69,7 @@ FOREIGN = {
     "||": "write `or`",
     "!": "write `not`",
     "~": "write `not`",
-    ":=": "write `==` for equality",
+    ":=": "write `==` for equality, `=` for a constant",
     "/=": "write `!=`",
     "=/=": "write `!=`",
     "=<": "write `<=`",
@@ -77,6 +77,12 @@ FOREIGN = {
     "..": "write a range as `<a upto b>`",
     "[": "write sets as `{a, b}` and sequences as `<a, b>`",
     "]": "write sets as `{a, b}` and sequences as `<a, b>`",
+    "/\\": "write `and`",
+    "\\/": "write `or`",
+    "\\": "write operators as words: `in`, `and`, `or`, `not`, `forall`, `exists`",
+    "∃!": "write `exists_unique(x in S | …)`",
+    "exists!": "write `exists_unique(x in S | …)`",
+    "#": "a comment begins with `//`",
     "^": "RCL has no powers: write `x * x`",
     "%": "RCL has no remainder",
     "'": 'write texts as `"…"`, and the elements of types without quotation marks',
@@ -113,6 +119,7 @@ _FOREIGN = "|".join(re.escape(s) for s in sorted(FOREIGN, key=len, reverse=True)
 _SYMBOLS = "|".join(re.escape(s) for s in sorted(SYMBOLS, key=len, reverse=True))
 _PATTERN = re.compile(
     r"(?P<space>[ \t\r\n\f]+)"
+    r"|(?P<unique>exists!(?!=))"
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_']*)"
     r"|(?P<comment>//[^\n]*|/\*[^*]*\*+(?:[^/*][^*]*\*+)*/)"
     r"|(?P<open_comment>/\*)"
@@ -169,7 +176,7 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
         elif kind == "string":
             _check_escapes(reports, piece, start)
             append(Token("STRING", piece, start, at))
-        elif kind == "foreign":
+        elif kind in ("foreign", "unique"):
             reports.error("RCL101", f"`{piece}` is not RCL", start, at, hint=FOREIGN[piece])
             stand_in = _STAND_IN.get(piece)
             if stand_in is not None:
@@ -197,8 +204,9 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
 _STAND_IN = {
     **dict.fromkeys(("<->", "↔", "⇔"), "IFF"),
     **dict.fromkeys(("=>", "==>", "→", "⇒"), "IMPLIES"),
-    **dict.fromkeys(("&&", "&", "∧"), "AND"),
-    **dict.fromkeys(("||", "∨"), "OR"),
+    **dict.fromkeys(("&&", "&", "∧", "/\\"), "AND"),
+    **dict.fromkeys(("||", "∨", "\\/"), "OR"),
+    **dict.fromkeys(("∃!", "exists!"), "UNIQUE"),
     **dict.fromkeys(("!", "~", "¬"), "NOT"),
     **dict.fromkeys(("/=", "=/=", "≠"), "NE"),
     **dict.fromkeys(("=<", "≤"), "LE"),

@@ -159,7 +159,19 @@ class _Reader:
         if self.kind() == "LBRACE":
             self.at += 1
             return self.tokens[self.at - 1]
-        self.complain("RCL113", f"expected `{{` after {what} and not %", self.at)
+        words, _, _ = self.found(self.at)
+        hint = (
+            "names are made of letters, digits and `_`"
+            if words in ("`-`", "`.`", "`/`")
+            else f"write `{{` after {what}"
+        )
+        self.complain("RCL113", f"expected `{{` after {what} and not %", self.at, hint)
+        for ahead in range(1, 5):  # what is left of a name that is none
+            if self.kind(ahead) in _SECTIONS or (self.kind(ahead) in _TOP and self.kind(ahead - 1) != "MINUS"):
+                break
+            if self.kind(ahead) == "LBRACE":
+                self.at += ahead + 1
+                return self.tokens[self.at - 1]
         return None
 
     # --- context -----------------------------------------------------------------------------------------------------
@@ -210,7 +222,7 @@ class _Reader:
             self.at += 1
             self.skip_to_top()
             return
-        part = self.tokens[first : self.at]
+        part = [t._replace(type="EQUALS") if t.text == ":=" else t for t in self.tokens[first : self.at]]
         tree = parse("declaration", part, self.reports, part[-1].end)
         self.out.parts.append((part[0].start, part[-1].end))
         if tree is not None:
@@ -233,7 +245,8 @@ class _Reader:
             node = NodeSyntax(self.tokens[self.at], start)
             self.at += 1
         else:
-            self.complain("RCL113", "expected the node's name and not %", self.at)
+            hint = "a name stands without quotation marks" if self.kind() == "STRING" else "write `node NAME {`"
+            self.complain("RCL113", "expected the node's name and not %", self.at, hint)
             node = NodeSyntax(Token("NAME", "", start, start), start)
             if self.kind() not in ("LBRACE", "$END") and self.kind() not in _TOP:
                 self.at += 1
@@ -244,7 +257,7 @@ class _Reader:
             if self.kind() == "RBRACE":
                 self.at += 1
                 break
-            section = self.section()
+            section = self.section() or self.meant_section()
             if section is None:
                 self.not_a_section()
                 continue
@@ -295,14 +308,24 @@ class _Reader:
             return "ASSUME" if self.tokens[self.at].text == "A" else "GUARANTEE"
         return None
 
+    def meant_section(self) -> str | None:
+        """The section that a word not quite right begins: said once, and read as that, so that nothing else is said."""
+        if self.kind() != "NAME" or self.kind(1) not in ("LPAR", "NAME", "STRING"):
+            return None
+        word = self.tokens[self.at].text
+        numbered = word[0] in "AG" and word[1:].isdigit() and self.kind(1) == "LPAR"
+        meant = ("assume" if word[0] == "A" else "guarantee") if numbered else _NEAR.get(word.lower(), word.lower())
+        if meant.upper() not in _SECTIONS:
+            return None
+        hint = f"a clause with a name is written `{meant} {word}( … )`" if numbered else f"write `{meant}`"
+        self.complain("RCL113", "% begins no part of a node", self.at, hint)
+        return meant.upper()
+
     def not_a_section(self) -> None:
         token = self.tokens[self.at]
         hint: str | None = "a node has inputs, outputs, topics, assumptions and guarantees, each with parentheses"
         message = "expected `inputs`, `outputs`, `topics`, `assume`, `guarantee` or `}` and not %"
-        near = _NEAR.get(token.text.lower())
-        if near is not None:
-            hint = f"did you mean `{near}`?"
-        elif token.type == "RPAR":
+        if token.type == "RPAR":
             message, hint = "this `)` closes nothing", "remove it, or find where a `(` is missing"
         elif token.type in ("SEMICOLON", "COMMA", "DOT"):
             hint = "no sign stands between the parts of a node: remove it"
@@ -351,6 +374,8 @@ class _Reader:
         if self.kind() != "LPAR":
             hint = f"write `{keyword.text}( … )`"
             self.complain("RCL113", f"expected `(` after `{(name or keyword).text}` and not %", self.at, hint)
+            if self.kind() == "LBRACE":
+                self.balanced()
             if section not in ("ASSUME", "GUARANTEE"):
                 node.broken.add("*")
             while self.at < len(self.tokens) and self.kind() not in _TOP and self.kind() != "RBRACE":
