@@ -34,8 +34,9 @@ def command(system: str, method: str | None, node: str | None, limit: int, jobs:
         if name is not None and name not in known:
             raise click.UsageError(f"no {what} of the plan is called '{name}'; known: {', '.join(sorted(known))}")
     works = tuple(w for w in every if method in (None, w.method) and node in (None, w.node))
-    scores = hunt(place, works, this_run(), limit, jobs)
-    for score in scores:
+    scores = []
+    for score in hunt(place, works, this_run(), limit, jobs):  # minutes may lie between two of them
+        scores.append(score)
         lost = f"   survives: {'; '.join(score.survivors)}" if score.survivors else ""
         lost += f"   not judged: {'; '.join(score.unjudged)}" if score.unjudged else ""
         click.echo(f"{score.obligation.partition('/')[2]:<44} {score.method:<14} {score.killed}/{score.mutants}{lost}")

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -52,11 +53,12 @@ class Score:
         return self.mutants > 0 and self.killed == 0
 
 
-def hunt(workspace: Workspace, works: tuple[Work, ...], run: Run, limit: int, jobs: int) -> tuple[Score, ...]:
-    """Score every piece of current, supporting evidence of these works, `jobs` mutants at once."""
+def hunt(workspace: Workspace, works: tuple[Work, ...], run: Run, limit: int, jobs: int) -> Iterator[Score]:
+    """Score every piece of current, supporting evidence of these works, `jobs` mutants at once; each score comes as
+    soon as it, and those before it, are there."""
     tasks = [task for work in works if _reads_formulas(work) for task in _tasks(workspace, work)]
     with ThreadPoolExecutor(jobs) as pool:
-        return tuple(pool.map(lambda task: _score(workspace, task, run, limit), tasks))
+        yield from pool.map(lambda task: _score(workspace, task, run, limit), tasks)
 
 
 def _reads_formulas(work: Work) -> bool:
