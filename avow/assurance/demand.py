@@ -20,8 +20,11 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
         return None
     evidence = [v.entry.evidence for v in view.counting]
     kept, dropped = [], []
+    persons = _persons(evidence, demand, policy, today)
     for item in evidence:
         reason = _disregarded(item, demand, policy, today)
+        if reason is None and effective(item) is Verdict.REVIEWED and len(persons) < demand.reviewers > 1:
+            reason = f"reviewed by {len(persons)}, {demand.reviewers} reviewers are asked"
         if reason is None:
             kept.append(item)
         elif weigh(item).support is not None:
@@ -72,6 +75,16 @@ def reviewers(evidence: Evidence) -> tuple[str, ...]:
     return ()
 
 
+def _persons(evidence: Iterable[Evidence], demand: Demand, policy: Policy, today: date) -> set[str]:
+    """Whoever reviewed the claim, in one record or in several that each count; a name is one however it is spelled."""
+    return {
+        " ".join(name.casefold().replace(".", " ").split())
+        for item in evidence
+        if weigh(item).support is Status.REVIEWED and _disregarded(item, demand, policy, today) is None
+        for name in reviewers(item)
+    }
+
+
 def age_days(evidence: Evidence, today: date) -> int | None:
     """Days since the evidence came about: a person's date where the details give one, else the attempt's start."""
     for text in (evidence.details.get("date"), evidence.started):
@@ -100,8 +113,6 @@ def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) ->
         strangers = people - set(policy.reviewers) if policy.reviewers else set()
         if strangers:
             return f"{', '.join(sorted(strangers))} may not review under this policy"
-        if len(people) < demand.reviewers and demand.reviewers > 1:
-            return f"reviewed by {len(people)}, {demand.reviewers} reviewers are asked"
     elif demand.links and support is not Status.JUSTIFIED and item.link not in demand.links:
         return f"the link is {item.link}, {' or '.join(demand.links)} is asked"
     if demand.unconditional and item.hypotheses:

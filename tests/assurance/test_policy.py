@@ -186,6 +186,23 @@ def test_what_is_given_until_a_day_ends_with_it(until: str, good: bool) -> None:
     assert the_case("sil1", rejected).obligations[0].status is Status.REFUTED
 
 
+def test_two_reviewers_are_two_persons_in_one_record_or_in_two() -> None:
+    asked = {"guarantees": {"high": {"one_of": ["reviewed"], "reviewers": 2, "max_age_days": 30}}}
+
+    def review(*names: str, method: str = "review", date: str = "2026-11-01") -> Evidence:
+        return replace(REVIEW, method=method, key=method, details={"reviewers": list(names), "date": date})
+
+    def passes(*records: Evidence) -> bool:
+        subject = system({"n": ["g"]}, plans=[node_plan("n", "high", "review", "review-2")], policy=asked)
+        return gate(case(subject, [guarantee("n", "g")], list(records)))[0]
+
+    assert passes(review("A. Person", "B. Person"))
+    assert passes(review("A. Person"), review("B. Person", method="review-2"))
+    assert not passes(review("A. Person"), review("A. Person", method="review-2"))
+    assert not passes(review("A. Person", "a person "))
+    assert not passes(review("A. Person"), review("B. Person", method="review-2", date="2026-09-01"))
+
+
 def test_the_cheapest_step_is_named() -> None:
     def step(found: Case) -> str:
         suggestion = found.obligations[0].suggestion
