@@ -106,7 +106,7 @@ def judge(world: World, formula: Term, *, finite: bool = False, doubts: Doubts |
     return holds
 
 
-def possible(world: World, node: str, port: Port, doubts: Doubts) -> Choices:
+def possible(world: World, node: str, port: Port) -> Choices:
     """What an output that is no relation may be."""
     sort = port.sort
     try:
@@ -115,10 +115,9 @@ def possible(world: World, node: str, port: Port, doubts: Doubts) -> Choices:
                 return Choices(world.results(node, port), "", (FunctionValue({}, ANY),))
             case SequenceSort(item=item) if world.domain(("out", node), port) is None and sort not in world.domains:
                 shells: tuple[Value, ...] = tuple(SequenceValue((ANY,) * n) for n in range(MAX_LENGTH + 1))
-                doubts.incomplete.add(
-                    f"sequences of more than {MAX_LENGTH} elements are not tried for {node}.{port.name}"
-                )
-                return Choices(world.plain_values(item), f"the elements of {node}.{port.name} are not known", shells)
+                unknown = f"the elements of {node}.{port.name} are not known"
+                short = f"sequences of more than {MAX_LENGTH} elements are not tried for {node}.{port.name}"
+                return Choices(world.plain_values(item), unknown, shells, short)
             case _:
                 return Choices(world.candidates(node, port))
     except CannotRun as reason:
@@ -145,7 +144,7 @@ class Answerer:
                 holds = judge(world, body, doubts=doubts, about=f"{node.name}.{port.name}")
                 self.defined.append((port, points, tuple(v.name for v in variables), holds))
         self.others = {f"out.{p.name}": p for p in node.outputs if p not in relations}
-        self.choices = {name: possible(world, node.name, port, doubts) for name, port in self.others.items()}
+        self.choices = {name: possible(world, node.name, port) for name, port in self.others.items()}
         self.assumptions = tuple((c.name, self._judge(c)) for c in node.assumptions)
         guarantees = tuple((self._spoken(c), self._judge(c)) for c in node.guarantees)
         self.narrowing = Narrowing(self.choices, guarantees, forcings(node.guarantees), doubts.incomplete)

@@ -53,6 +53,10 @@ class Undecided(Exception):  # noqa: N818 - it names a state
         return f"{self.wanted[0][0]} is open"
 
 
+MAX_TRIED_AGAIN = 2_000
+"""The same, once a search was cut short: nothing will be exhaustive any more, and there are other inputs to try."""
+
+
 # -- open values -------------------------------------------------------------------------------------------------------
 
 
@@ -241,11 +245,14 @@ class Forcing:
     value: Evaluator
     lazy: Lazy
 
-    def forced(self, found: Mapping[str, Value], point: Point | None) -> tuple[Value, ...] | None:
-        """The only value that is possible, if this equation says so of this port (at this point)."""
+    def forced(
+        self, found: Mapping[str, Value], point: Point | None, wanted: list[tuple[str, Point]]
+    ) -> tuple[Value, ...] | None:
+        """The only value that is possible, if this equation says so of this port (at this point). `wanted` gets what it
+        would have to know first."""
         if (point is None) is not (self.arguments is None):
             return None
-        values, _ = opened(found, self.lazy)
+        values, asked = opened(found, self.lazy)
         try:
             if self.arguments is not None and tuple(a(values) for a in self.arguments) != point:
                 return None
@@ -253,6 +260,7 @@ class Forcing:
                 return None
             value = self.value(values)
         except NotEvaluable:
+            wanted += asked
             return None
         # An open sequence is not copied: what is decided of the copy later would not be decided of it.
         return None if _asking(value) else (value,)
@@ -335,6 +343,8 @@ class Narrowing:
     incomplete: set[str] = field(default_factory=set)
     """Why a search that came to its end still is not exhaustive."""
 
+    most: int = MAX_TRIED
+
     def answers(self, inputs: Mapping[str, Value], limit: int, *, free: bool = False) -> tuple[list[Values], bool]:
         """Every output that meets the guarantees (with `free`, every output at all), each open where that does not
         matter; and whether these are all. Raises Undecided where an open input has to be known first, and Unknown."""
@@ -345,18 +355,20 @@ class Narrowing:
         while stack:
             outputs, pending = stack.pop()
             tried += 1
-            if tried > MAX_TRIED or len(found) > limit:
+            if tried > self.most or len(found) > limit:
+                self.most = min(self.most, MAX_TRIED_AGAIN)
                 return found[:limit], False
             judged = self._judge({**inputs, **outputs}, outputs, pending)
             if judged is None:
                 continue
             pending, wanted = judged
             missing = [name for name in self.choices if name not in outputs]
-            if missing:
-                name, values = self._next(missing, {**inputs, **outputs}, free)
+            following = self._next(missing, {**inputs, **outputs}, free, wanted) if missing else None
+            if following is not None:
+                name, values = following
                 stack += [({**outputs, name: value}, pending) for value in reversed(values)]
             elif wanted:
-                own = next(((name, point) for name, point in wanted if name in self.choices), None)
+                own = next(((name, point) for name, point in wanted if name in outputs), None)
                 if own is None:
                     raise Undecided(wanted)
                 name, point = own
@@ -386,36 +398,46 @@ class Narrowing:
                 wanted += undecided.wanted
         return tuple(left), wanted
 
-    def _next(self, missing: Sequence[str], valuation: Values, free: bool) -> tuple[str, tuple[Value, ...]]:
-        """The output to choose next, and what it may be: one that an equation gives, else the one with least choice."""
+    def _next(
+        self, missing: Sequence[str], valuation: Values, free: bool, wanted: list[tuple[str, Point]]
+    ) -> tuple[str, tuple[Value, ...]] | None:
+        """The output to choose next, and what it may be: one that an equation gives, else the one with least choice.
+        None where a point has to be decided before: it is added to `wanted`. Raises Unknown."""
         best: tuple[str, tuple[Value, ...]] | None = None
         for name in missing:
             begin = self.choices[name].begin()
-            forced = None if free else self._forced(name, None, valuation)
+            forced = None if free else self._forced(name, None, valuation, wanted)
             if forced is not None:
                 allowed = self.choices[name].values if self.choices[name].shells is None else None
                 return name, tuple(value for value in forced if allowed is None or value in allowed)
             if begin is not None and (best is None or len(begin) < len(best[1])):
                 best = name, begin
-        if best is None:
-            raise Unknown(self.choices[missing[0]].why)
-        if self.choices[best[0]].short:
-            self.incomplete.add(self.choices[best[0]].short)
-        return best
+        if best is not None:
+            if self.choices[best[0]].short:
+                self.incomplete.add(self.choices[best[0]].short)
+            return best
+        if wanted:
+            return None
+        raise Unknown(self.choices[missing[0]].why)
 
     def _possible(self, name: str, point: Point, valuation: Values, free: bool) -> tuple[Value, ...]:
         values = self.choices[name].values
-        forced = None if free else self._forced(name, point, valuation)
+        wanted: list[tuple[str, Point]] = []
+        forced = None if free else self._forced(name, point, valuation, wanted)
         if forced is not None:
             return tuple(value for value in forced if values is None or value in values)
+        if values is None and (foreign := [(n, p) for n, p in wanted if n not in self.choices]):
+            raise Undecided(foreign)
         if values is None:
             raise Unknown(self.choices[name].why)
         return values
 
-    def _forced(self, name: str, point: Point | None, valuation: Values) -> tuple[Value, ...] | None:
+    def _forced(
+        self, name: str, point: Point | None, valuation: Values, wanted: list[tuple[str, Point]]
+    ) -> tuple[Value, ...] | None:
         for forcing in self.forcings:
             if forcing.name == name:
-                found = forcing.forced(valuation, point)
+                found = forcing.forced(valuation, point, wanted)
                 if found is not None:
                     return found
         return None

@@ -17,7 +17,7 @@ from avow.calculus.choices import Values, by_variable, search
 from avow.calculus.narrowing import Holds, Narrowing, Undecided, Unknown, decided, forcings, is_open
 from avow.calculus.scenario import CannotRun, World, key
 from avow.language.contract import Clause, ClauseKind, Port
-from avow.language.sorts import BOOL, FunctionSort
+from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
 from avow.language.terms import Role, Term
 from avow.logic.formula import free_variables
 from avow.logic.smt import replay
@@ -68,6 +68,7 @@ class Machine:
             for name in self.order
         }
         """What each node's inputs read."""
+        self.incomplete.update(self._unspecified())
         self.constants: list[str] = []
         self.environment = self._environment()
         self.memory = tuple(dict.fromkeys(edge.source for edge in self.graph.edges if edge.delayed))
@@ -87,6 +88,15 @@ class Machine:
         """Why what holds of every step found may not hold of every step that the scenario allows."""
         inexact = [f"{name} could be judged over the scenario's values only" for name in sorted(self.doubts.inexact)]
         return [*sorted(self.incomplete), *inexact]
+
+    def _unspecified(self) -> Iterator[str]:
+        """Of a type of which nothing is known one value is tried: all there is to it where no clause looks at it."""
+        for name in self.order:
+            node = self.frame.node(name)
+            spoken = {v for clause in node.clauses for v in ports_of(clause.formula)}
+            for port in (*node.inputs, *node.outputs):
+                if isinstance(port.sort, OpaqueSort) and port.variable in spoken:
+                    yield f"one value of the unspecified type of {name}.{port.name} is tried"
 
     # -- set-up --------------------------------------------------------------------------------------------------------
 
@@ -165,9 +175,9 @@ class Machine:
         else:
             clauses = [] if condition is None else [Clause(ClauseKind.GUARANTEE, "initial", 1, condition)]
             guarantees = [(frozenset({name}), judge(self.world, c.formula, doubts=self.doubts)) for c in clauses]
-            outputs = {name: possible(self.world, endpoint.node, port, self.doubts)}
+            outputs = {name: possible(self.world, endpoint.node, port)}
             try:
-                narrowed, complete = Narrowing(outputs, tuple(guarantees), forcings(clauses)).answers(
+                narrowed, complete = Narrowing(outputs, tuple(guarantees), forcings(clauses), self.incomplete).answers(
                     given, MAX_ANSWERS
                 )
             except Unknown as unknown:

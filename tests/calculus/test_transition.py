@@ -138,3 +138,130 @@ def test_the_same_seed_gives_the_same_run(tmp_path: Path) -> None:
     runs = [[step.values["a.x"] for step in machine(system).walk(Random(seed), 12).steps] for seed in (1, 1, 2)]
     assert runs[0] == runs[1] != runs[2]
     assert len(runs[0]) == 12
+
+
+# -- functions and sequences that nodes put out ------------------------------------------------------------------------
+
+TYPES = """context {
+  Plan : NATURAL --> NATURAL;
+  Price : NATURAL --> REAL;
+  Row : <NATURAL>;
+  Thing : {};
+}
+"""
+READS = "forall(i in NATURAL | i < in.far -> out.p(i + 1) == out.p(i) + 1)"
+PLANNER = node("a", "far : NATURAL", "p : Plan", "G: out.p(0) == 1 and " + READS)
+READER = node("b", "p : Plan, far : NATURAL", "x : NATURAL", "G: out.x == in.p(in.far)")
+PRICES = node("a", "k : NATURAL", "p : Price", "G: out.p(in.k) == in.k / 3")
+
+
+def plan_of(property_: str, domains: str = "NATURAL: 0..5") -> str:
+    return f"scenario: {{domains: {{{domains}}}}}\n" + requirement(property_)
+
+
+@pytest.mark.parametrize(
+    ("text", "property_", "domains", "verdict", "words"),
+    [
+        (PLANNER + READER, "always b.x == a.far + 1", "NATURAL: 0..5, in.far: [0, 2, 4]", Verdict.CHECKED, ""),
+        (PLANNER + READER, "always b.x <= 4", "NATURAL: 0..5, in.far: [0, 2, 4]", Verdict.REFUTED, "is false"),
+        # what the guarantees leave open, any reader may find there
+        (PLANNER + READER.replace("(in.far)", "(in.far + 1)"), "always b.x != 3", "NATURAL: 0..4", Verdict.REFUTED, ""),
+        (PLANNER, "always forall(i in NATURAL | i <= a.far -> a.p(i) > 0)", "NATURAL: 0..4", Verdict.CHECKED, ""),
+        (PLANNER, "always forall(i in NATURAL | a.p(i) > 0)", "NATURAL: 0..3", Verdict.REFUTED, "is false"),
+        # beyond the scenario's range the plan would have to go on
+        (PLANNER, "always a.p(0) == 1", "NATURAL: 0..5, in.far: [9]", Verdict.CHECKED, ""),
+        (PLANNER, "eventually a.p(0) == 1", "NATURAL: 0..5, in.far: [9]", Verdict.UNKNOWN, "no value of the scenario"),
+        (
+            node("a", "k : NATURAL", "p : Plan", "G: forall(i in NATURAL | out.p(i) != in.k)"),
+            "always a.p(0) != 0",
+            "NATURAL: 0..2, in.k: [0]",
+            Verdict.TESTED,
+            "over the scenario's values only",
+        ),
+        # an equation needs no range
+        (
+            PRICES + node("b", "p : Price, k : NATURAL", "x : REAL", "G: out.x == 2 * in.p(in.k)"),
+            "always b.x <= 4",
+            "NATURAL: 0..5",
+            Verdict.CHECKED,
+            "",
+        ),
+        (
+            PRICES + node("b", "p : Price, k : NATURAL", "x : REAL", "G: out.x == 2 * in.p(in.k + 1)"),
+            "always b.x <= 4",
+            "NATURAL: 0..5",
+            Verdict.UNKNOWN,
+            "out.p",
+        ),
+        (
+            node("a", "k : NATURAL", "s : Row", "G: out.s == <in.k, 0>"),
+            "always a.s(1) == 0",
+            "NATURAL: 0..5",
+            Verdict.CHECKED,
+            "",
+        ),
+        (
+            node("a", "k : NATURAL", "s : Row", "G: in.k in out.s"),
+            "always length(a.s) > 0",
+            "NATURAL: 0..2",
+            Verdict.TESTED,
+            "sequences of more than 4 elements",
+        ),
+        (
+            node("a", "k : NATURAL", "s : Row", "G: in.k in out.s"),
+            "always a.s(0) == a.k",
+            "NATURAL: 0..2",
+            Verdict.REFUTED,
+            "",
+        ),
+        (
+            node("a", "k : NATURAL", "s : Row", "G: in.k in out.s"),
+            "always length(a.s) > 1",
+            'NATURAL: 0..2, out.s: ["<0, 1, 2>", "<>"]',
+            Verdict.CHECKED,
+            "",
+        ),
+        (
+            node("a", "o : Thing, q : Thing", "x : BOOL", "G: out.x <=> in.o == in.q"),
+            "always a.x",
+            "NATURAL: 0..2",
+            Verdict.TESTED,
+            "unspecified type",
+        ),
+    ],
+)
+def test_functions_and_sequences(
+    tmp_path: Path, text: str, property_: str, domains: str, verdict: Verdict, words: str
+) -> None:
+    found = outcomes(make(tmp_path, TYPES + text, plan_of(property_, domains)))["R"]
+    assert found.verdict is verdict, found.summary
+    assert words in found.summary
+
+
+def test_what_nobody_looks_at_stays_open(tmp_path: Path) -> None:
+    system = make(tmp_path, TYPES + PLANNER, plan_of("always a.far < 9", "NATURAL: 0..5, in.far: [2]"))
+    runs = machine(system)
+    (memory,) = runs.initial()
+    (step,) = runs.steps(memory)
+    assert show(step.values["a.p"]) == "{0: 1, 1: 2, 2: 3, else: any}", "one step stands for all plans that begin so"
+
+
+def test_functions_over_delayed_edges(tmp_path: Path) -> None:
+    """What the step before left open is decided by who reads it now."""
+    text = TYPES + node("a", "q : Plan", "p : Plan", "G: out.p(0) == in.q(0) + 1 or out.p(0) == 0")
+    wires = "connections: [{from: a.p, to: a.q, delayed: true, initial: 'out.p(0) == 0'}]\n"
+    found = outcomes(make(tmp_path / "a", text, wires + plan_of("always a.p(0) < 3")))["R"]
+    assert found.verdict is Verdict.REFUTED
+    assert found.counterexample is not None
+    assert dict(found.counterexample.values)["a.p"] == "{0: 3, else: any}"
+    other = text.replace("in.q(0) + 1", "in.q(1)")
+    found = outcomes(make(tmp_path / "b", other, wires + plan_of("always a.p(0) < 3")))["R"]
+    assert found.verdict is Verdict.REFUTED, "q(1) may be anything at first"
+    assert outcomes(make(tmp_path / "c", text, wires + plan_of("always a.p(0) <= 5")))["R"].verdict is Verdict.CHECKED
+
+
+def test_a_search_that_would_take_for_ever_ends(tmp_path: Path) -> None:
+    text = TYPES + node("a", "k : NATURAL", "p : Plan", "G: exists(i in NATURAL | i <= 9 and out.p(i) == in.k)")
+    found = outcomes(make(tmp_path, text, plan_of("always a.k < 20", "NATURAL: 0..9")))["R"]
+    assert found.verdict is Verdict.TESTED
+    assert "more than 4000 answers" in found.summary
