@@ -51,11 +51,12 @@ class _Fork:
 
 
 def serve(control: socket.socket) -> int:
-    """Until `control` is closed and every fork has ended; the exit code."""
+    """Until `control` is closed and every fork has ended; the exit code. Raises OSError where it cannot serve."""
     for name in PRELOADED:
         importlib.import_module(name)
     if len(list(Path("/proc/self/task").iterdir())) != 1:
         return 1  # a lock that another thread holds would stay locked in every fork
+    os.close(os.pidfd_open(os.getpid()))  # where that is forbidden, better now than with a fork under way
     gc.collect()
     gc.freeze()  # what is shared with the forks stays shared: the collector does not write to it
     control.send(b"ready")

@@ -44,6 +44,9 @@ _lock = threading.Lock()
 _servers: list[_Server] = []
 """The one in use; none before the first work."""
 
+_ending: list[subprocess.Popen[bytes]] = []
+"""Those that still had a fork to wait for: kept, so that `kill_all` never finds a number that has become another's."""
+
 
 def run(arguments: Sequence[str], *, cwd: Path, seconds: float) -> Completed:
     """Run the worker on these arguments, in a process of its own; what it prints on standard output is not kept."""
@@ -159,7 +162,9 @@ class _Server:
         self._control.close()
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(1)
-        if self._process.poll() is not None:
+        if self._process.poll() is None:
+            _ending.append(self._process)
+        else:
             process.unwatch(self._process.pid)
 
 
