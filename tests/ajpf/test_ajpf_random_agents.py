@@ -1,0 +1,112 @@
+"""Avow's own checker and Spin on random small agents and random properties: two opinions, one truth.
+
+Spin gets the graph before it is reduced and translates the properties by itself; where the two differ, the outcome is
+an error.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from pathlib import Path
+
+import pytest
+import yaml
+
+from avow.backend import Limits
+from avow.backends.ajpf import BACKEND
+from avow.pipeline.work import method_job
+from avow.system.load import load_system
+from avow.verdict import Verdict
+
+RCL = """
+node ag {
+  inputs( p : BOOL, q : BOOL ) outputs( o : {one, two} ) topics()
+  guarantee first ( in.p -> out.o == one )
+  guarantee second ( (in.q and not in.p) -> out.o == two )
+}
+"""
+TABLE = {"in.p": "B(ag, p)", "in.q": "B(ag, q)", "out.o == one": "D(ag, one)", "out.o == two": "D(ag, two)"}
+
+
+def program(rng: random.Random) -> str:
+    def guard() -> str:
+        wanted = rng.sample(("B a", "~B a", "B b", "~B b", "~B p", "B q"), rng.randint(0, 2))
+        return ", ".join(wanted) or "True"
+
+    def deeds(trigger: str) -> str:
+        known = ["one", "two", "+a", "-a", "+b", "-b"]
+        if trigger in ("+p", "+q", "-q"):  # a goal that sets itself again, or is set by what it believes, never ends
+            known.append("+!g [perform]")
+        return ", ".join(rng.choice(known) for _ in range(rng.randint(1, 3)))
+
+    triggers = ("+p", "+q", "-q", "+a", "+!g [perform]")
+    plans = "\n".join(
+        f"{trigger} : {{ {guard()} }} <- {deeds(trigger)};" for trigger in rng.choices(triggers, k=rng.randint(2, 4))
+    )
+    goals = "g [perform]" if rng.random() < 0.5 else ""
+    return f"GWENDOLEN\n\n:name: ag\n\n:Initial Beliefs:\n\nready\n\n:Initial Goals:\n\n{goals}\n\n:Plans:\n\n{plans}\n"
+
+
+def environment(rng: random.Random) -> str:
+    draws = rng.choice(("once", "repeatedly", "never"))
+    groups = rng.choice(("{x: [p, nothing], y: [q, nothing]}", "{x: [p, q, nothing]}", "{x: [p, q]}"))
+    return f"about: anything\ndraws: {{at_start: true, at_quiescence: {draws}}}\npercepts: {groups}\n"
+
+
+def formula(rng: random.Random, depth: int) -> str:
+    if depth == 0:
+        atom = rng.choice(("B(ag, a)", "B(ag, b)", "B(ag, p)", "B(ag, q)", "D(ag, one)", "D(ag, two)"))
+        return f"(~{atom})" if rng.random() < 0.3 else atom
+    one, other = formula(rng, depth - 1), formula(rng, depth - 1)
+    return rng.choice(
+        (
+            f"([] {one})",
+            f"(<> {one})",
+            f"({one} U {other})",
+            f"({one} R {other})",
+            f"({one} -> {other})",
+            f"({one} & {other})",
+        )
+    )
+
+
+@pytest.mark.needs_spin
+@pytest.mark.parametrize("seed", range(3))
+def test_spin_agrees_on_random_agents(tmp_path: Path, seed: int) -> None:
+    rng = random.Random(seed)
+    (tmp_path / "system.rcl").write_text(RCL)
+    (tmp_path / "ag.gwen").write_text(program(rng))
+    (tmp_path / "env.yaml").write_text(environment(rng))
+    options = {
+        "program": "ag.gwen",
+        "environment": "env.yaml",
+        "agent": "ag",
+        "engine": "spin",
+        "states": 4000,
+        "predicates": TABLE,
+        "semantics": rng.choice(("mcapl", "edge")),
+        "properties": {f"f{k}": formula(rng, rng.choice((1, 2, 2))) for k in range(4)},
+    }
+    plan = {"system": "s", "title": "S", "contract": "system.rcl", "nodes": {"ag": {"methods": [{"ajpf": options}]}}}
+    (tmp_path / "plan.yaml").write_text(yaml.safe_dump(plan, sort_keys=False))
+    system = load_system(tmp_path)
+    job = method_job(system, system.contract.node("ag"), system.plan.node("ag").methods[0])
+    assert not [d for d in BACKEND.check(job) if d.is_error], (BACKEND.check(job), (tmp_path / "ag.gwen").read_text())
+    report = BACKEND.discharge(job, tmp_path, Limits(seconds=240))
+    told = Counter()
+    for outcome in report.outcomes:
+        assert outcome.verdict in (Verdict.CHECKED, Verdict.REFUTED), (
+            outcome.summary,
+            (tmp_path / "ag.gwen").read_text(),
+        )
+        entries = [
+            *outcome.details["properties"],
+            *(p for e in outcome.details["further_properties"] for p in e["properties"]),
+        ]
+        for entry in entries:
+            (opinion,) = entry["second_opinions"].values()
+            assert opinion == {"checked": "holds", "refuted": "violated"}[entry["verdict"]], entry
+            told[entry["verdict"]] += 1
+    assert told["refuted"] > 0
+    assert sum(told.values()) >= 6
