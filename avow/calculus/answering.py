@@ -10,18 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from avow.calculus.choices import MAX_FOUND, Values, by_variable, definition, search
-from avow.calculus.narrowing import (
-    ANY,
-    Choices,
-    Holds,
-    Narrowing,
-    Undecided,
-    Unknown,
-    forcings,
-    is_open,
-    lazy_names,
-    opened,
-)
+from avow.calculus.narrowing import Choices, Narrowing, Unknown, forcings
+from avow.calculus.open_values import ANY, Holds, Undecided, is_open, lazy_names, opened
 from avow.calculus.scenario import CannotRun, Point, World, key
 from avow.language.contract import Clause, Node, Port
 from avow.language.sorts import BOOL, FunctionSort, SequenceSort

@@ -17,7 +17,7 @@ from avow.calculus.answering import judge as judge_formula
 from avow.calculus.answers import Answer
 from avow.calculus.discharge import Bounds
 from avow.calculus.ltl import Lasso, demands_progress, violation
-from avow.calculus.narrowing import Holds
+from avow.calculus.open_values import Holds
 from avow.calculus.scenario import CannotRun, world
 from avow.calculus.transition import Machine, Step, Walk
 from avow.calculus.variables import Frame

@@ -14,7 +14,8 @@ from random import Random
 
 from avow.calculus.answering import MAX_ANSWERS, Answerer, Doubts, Stuck, judge, possible
 from avow.calculus.choices import Values, by_variable, search
-from avow.calculus.narrowing import Holds, Narrowing, Undecided, Unknown, decided, forcings, is_open
+from avow.calculus.narrowing import Narrowing, Unknown, forcings
+from avow.calculus.open_values import Holds, Undecided, decided, is_open
 from avow.calculus.scenario import CannotRun, World, key
 from avow.language.contract import Clause, ClauseKind, Port
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
