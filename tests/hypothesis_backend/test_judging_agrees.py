@@ -1,0 +1,86 @@
+"""The judge of generated cases against a brute-force reading of the formula, and against Z3, on random formulas.
+
+What the judging process gets is the formula as JSON: so the way there and back is on trial as well.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from rosmonitoring.conftest import make_system
+from rosmonitoring.test_agreement import MAPPING, NATURALS, RCL, REALS, formula, truth
+
+from avow.backends.hypothesis import wire
+from avow.backends.hypothesis.judging import judged
+from avow.language.sorts import BOOL, REAL, DataSort, EnumSort, FunctionSort
+from avow.language.terms import Variable
+from avow.logic.formula import free_variables
+from avow.logic.smt import replay
+from avow.logic.values import Data, Element, FunctionValue, Value
+from avow.system.plan import System
+
+__all__ = ["make_system"]
+
+NUMBERS = (Fraction(0), Fraction(1), Fraction(5, 2), Fraction(-3, 2), Fraction(7))
+
+
+def value(rng: random.Random, variable: Variable) -> Value:
+    match variable.sort:
+        case EnumSort(members=members):
+            return Element(rng.choice(members))
+        case DataSort(constructors=constructors):
+            made = rng.choice(constructors)
+            return Data(made.name, tuple(value(rng, Variable(variable.role, "x", s)) for s in made.parameters))
+        case FunctionSort(parameters=parameters):
+            points = {
+                tuple(value(rng, Variable(variable.role, "x", s)) for s in parameters) for _ in range(rng.randint(0, 2))
+            }
+            return FunctionValue(dict.fromkeys(points, True), False)
+        case sort if sort == BOOL:
+            return rng.random() < 0.5
+        case sort if sort == REAL:
+            return rng.choice(NUMBERS)
+    return rng.choice((0, 1, 2))
+
+
+def plain(found: Value) -> Any:
+    """As the brute force has values: elements as strings, commands as tuples, relations as sets of tuples."""
+    match found:
+        case Element(name=name):
+            return name
+        case Data(constructor=name, arguments=arguments):
+            return (name, *map(plain, arguments))
+        case FunctionValue(table=table):
+            return {tuple(map(plain, key)) for key in table}
+        case bool():
+            return found
+        case _:
+            return Fraction(found)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_three_judges_agree(seed: int, make_system: Callable[..., System]) -> None:
+    rng = random.Random(seed)
+    held = broken = asked = 0
+    for _ in range(12):
+        system = make_system(RCL.format(formula=formula(rng, rng.choice((1, 2, 3)))), MAPPING)
+        clause = system.contract.node("n").guarantees[0]
+        sent = json.loads(json.dumps(wire.encode(clause.formula)))
+        judge = judged({"name": clause.name, "formula": sent, "text": clause.text})
+        assert wire.decode(sent) == clause.formula
+        for _ in range(4):
+            values = {v: value(rng, v) for v in sorted(free_variables(clause.formula), key=lambda v: v.qualified)}
+            snapshot = {v.qualified: plain(found) for v, found in values.items()}
+            expected = truth(clause.formula, snapshot, {}, REALS, NATURALS)
+            assert judge.holds({v.qualified: found for v, found in values.items()}) is expected, (clause.text, values)
+            if rng.random() < 0.3:
+                by_z3 = replay([clause.formula], values, timeout_ms=3000)
+                assert by_z3 in (None, expected), (clause.text, values)
+                asked += by_z3 is not None
+            held, broken = held + expected, broken + (not expected)
+    assert min(held, broken, asked) > 5
