@@ -57,7 +57,12 @@ def _integrity(facts: Facts) -> Gate:
     if not serious:
         return Gate("integrity", title, True, "every digest was computed again and agrees")
     reason = f"{_count(len(serious), 'discrepancy', 'discrepancies')}; first: {serious[0].text}"
-    return Gate("integrity", title, False, reason, tuple(d.subject for d in serious))
+    anew = Suggestion(
+        f"find out who changed it; what cannot be restored is computed again once artifacts/ledger/{facts.system}.jsonl* "
+        "is deleted (the loss is told from then on)",
+        cost=50,
+    )
+    return Gate("integrity", title, False, reason, tuple(d.subject for d in serious), (anew,))
 
 
 def _findings(facts: Facts, findings: Sequence[Handled], obligations: Sequence[ObligationView]) -> Iterable[Gate]:
