@@ -16,16 +16,12 @@ from itertools import pairwise
 from typing import Any
 
 from avow.language.sorts import (
-    DataSort,
-    FunctionSort,
     IntegerSort,
     NaturalSort,
     RealSort,
-    SequenceSort,
-    SetSort,
     Sort,
     StringSort,
-    TupleSort,
+    components,
 )
 from avow.language.terms import (
     Apply,
@@ -220,26 +216,7 @@ def _carrier(sort: Sort) -> str | None:
 
 
 def _contains(sort: Sort, carrier: str) -> bool:
-    stack: list[Sort] = [sort]
-    seen: set[Sort] = set()
-    while stack:
-        sort = stack.pop()
-        if sort in seen:
-            continue
-        seen.add(sort)
-        match sort:
-            case DataSort(constructors=constructors):
-                stack.extend(p for c in constructors for p in c.parameters)
-            case TupleSort(items=items):
-                stack.extend(items)
-            case SequenceSort(item=item) | SetSort(item=item):
-                stack.append(item)
-            case FunctionSort(parameters=parameters, result=result):
-                stack.extend((*parameters, result))
-            case _:
-                if _carrier(sort) == carrier:
-                    return True
-    return False
+    return any(_carrier(part) == carrier for part in components(sort))
 
 
 def _collect(value: Any, carrier: str, found: set[Any]) -> None:

@@ -15,7 +15,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 
-from avow.language.sorts import BOOL, DataSort, FunctionSort, OpaqueSort, SequenceSort, SetSort, Sort, TupleSort
+from avow.language.sorts import (
+    BOOL,
+    FunctionSort,
+    OpaqueSort,
+    SequenceSort,
+    Sort,
+    components,
+)
 from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
 from avow.logic.checking import DEFAULT_TIMEOUT_MS, Answer, Engine, Status, check, z3_version
 from avow.logic.clock import now
@@ -200,25 +207,12 @@ def _replay(
 
 def _opaque_sorts(formula: Term) -> set[OpaqueSort]:
     """The unspecified sorts that a formula's terms and bound variables have, or have as parts."""
-    stack: list[Sort] = []
+    sorts: dict[Sort, None] = {}
     for part in subterms(formula):
-        stack.append(part.sort)
+        sorts[part.sort] = None
         if isinstance(part, Quantified):
-            stack.extend(variable.sort for variable in part.variables)
-    found: set[OpaqueSort] = set()
-    while stack:
-        match stack.pop():
-            case OpaqueSort() as sort:
-                found.add(sort)
-            case FunctionSort(parameters=parameters, result=result):
-                stack.extend((*parameters, result))
-            case TupleSort(items=items):
-                stack.extend(items)
-            case SequenceSort(item=item) | SetSort(item=item):
-                stack.append(item)
-            case DataSort(constructors=constructors):
-                stack.extend(p for c in constructors for p in c.parameters)
-    return found
+            sorts.update((variable.sort, None) for variable in part.variables)
+    return {sort for sort in components(*sorts) if isinstance(sort, OpaqueSort)}
 
 
 _ROUNDS = ((0.025, 0.1), (0.1, 0.2), (0.275, 0.3))
