@@ -58,8 +58,8 @@ def _integrity(facts: Facts) -> Gate:
         return Gate("integrity", title, True, "every digest was computed again and agrees")
     reason = f"{_count(len(serious), 'discrepancy', 'discrepancies')}; first: {serious[0].text}"
     anew = Suggestion(
-        f"find out who changed it; what cannot be restored is computed again once artifacts/ledger/{facts.system}.jsonl* "
-        "is deleted (the loss is told from then on)",
+        "find out who changed it; what cannot be restored is computed again once "
+        f"artifacts/ledger/{facts.system}.jsonl* is deleted (the loss is told from then on)",
         cost=50,
     )
     return Gate("integrity", title, False, reason, tuple(d.subject for d in serious), (anew,))
