@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,8 @@ def test_every_property_has_its_words_in_the_schema(root: Path) -> None:
     described = schema["$defs"]["result"]["properties"]["property"]
     assert set(described["enum"]) == {str(p) for p in Property}
     assert all(f"{p}:" in described["description"] for p in Property)
+    page = (root / "docs/sanity.md").read_text()
+    assert all(re.search(rf"`{p}[-`]", page) for p in Property)
 
 
 @pytest.mark.parametrize(
