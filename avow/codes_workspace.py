@@ -154,7 +154,6 @@ WORKSPACE_CODES = register(
     ),
     declare("CLI002", "no such system", "The workspace has no system of that name.", "Use a name from the hint."),
     declare("CLI003", "no such node", "The contract has no node of that name.", "Use a name from the hint."),
-    declare("CLI004", "wrong number", "The number that an option was given is outside its range.", "Correct it."),
     declare("CLI005", "no such derivation", "The plan has no derivation of that name.", "Use a name from the hint."),
     declare(
         "CLI006",

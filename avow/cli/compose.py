@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from avow.cli.paths import PathArgument
+from avow.cli.solver_options import seconds_option, seed_option
 
 if TYPE_CHECKING:
     from avow.calculus.composition import Composition
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 @click.option("--latex", "as_latex", is_flag=True, help="The derivations as LaTeX, nothing else.")
 @click.option("--rcl", "as_rcl", is_flag=True, help="The derived system-level contract as RCL, nothing else.")
 @click.option("--graph", "as_graph", is_flag=True, help="The dataflow graph as text, nothing else.")
-@click.option("--seconds", default=10.0, show_default=True, help="Time for one question to the solver.")
-@click.option("--seed", default=0, show_default=True, help="The solver's seed.")
+@seconds_option(10.0)
+@seed_option()
 def command(
     path: Path,
     goals: tuple[str, ...],
@@ -48,8 +49,6 @@ def command(
     from avow.system.load import load_path
     from avow.verdict import Verdict
 
-    if seconds <= 0:
-        raise Rejected(Diagnostic("CLI004", f"--seconds {seconds}: a time above 0 is wanted"))
     system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
     composition = compose(system)
     errors = [finding for finding in composition.frame.graph.findings if finding.is_error]

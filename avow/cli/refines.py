@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from avow.cli.paths import PathArgument
+from avow.cli.solver_options import milliseconds, seconds_option, seed_option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from avow.language.contract import Node
     from avow.verdict import Verdict
 
-MAX_SECONDS = 86_400
-
 
 @click.command()
 @click.argument("concrete", type=PathArgument())
@@ -28,8 +26,8 @@ MAX_SECONDS = 86_400
 @click.option("--node", metavar="NAME", help="Only this node, or NEW=OLD; by default every node of ABSTRACT.")
 @click.option("--rename", "renames", multiple=True, metavar="NEW=OLD", help="CONCRETE's port NEW is ABSTRACT's OLD.")
 @click.option("--json", "as_json", is_flag=True, help="For machines.")
-@click.option("--seconds", default=10.0, show_default=True, help="Time for one question to the solver.")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0, 2**31 - 1), help="The solver's seed.")
+@seconds_option(10.0)
+@seed_option()
 def command(
     concrete: Path,
     abstract: Path,
@@ -49,12 +47,9 @@ def command(
     """
     from avow.calculus.discharge import Bounds
     from avow.calculus.refinement import refines
-    from avow.diagnostics import Diagnostic, Rejected
     from avow.verdict import Verdict
 
-    if not (0 < seconds <= MAX_SECONDS) or math.isnan(seconds):
-        raise Rejected(Diagnostic("CLI004", f"--seconds {seconds}: a time above 0 is wanted, of at most a day"))
-    bounds = Bounds(max(1, int(seconds * 1000)), seed)
+    bounds = Bounds(milliseconds(seconds), seed)
     new, stands = _nodes(concrete, bounds)
     old, _ = _nodes(abstract, bounds)
     pairs, missing = _pairs(new, old, node, concrete, abstract)

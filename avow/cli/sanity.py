@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from avow.cli.paths import PathArgument
+from avow.cli.solver_options import milliseconds, seconds_option, seed_option
 
 if TYPE_CHECKING:
     from avow.language.contract import Node
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 @click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
 @click.option("--json", "as_json", is_flag=True, help="For machines: see docs/schemas/sanity.schema.json.")
 @click.option("--all", "everything", is_flag=True, help="List also what is as it should be.")
-@click.option("--seconds", default=5.0, show_default=True, help="Time for one question to the solver.")
-@click.option("--seed", default=0, show_default=True, help="The solver's seed.")
+@seconds_option(5.0)
+@seed_option()
 def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool, seconds: float, seed: int) -> int:
     """Ask of every node whether its contract is worth verifying: can its assumptions hold, do its guarantees agree, is
     there an output for every input that it allows, does every clause say something?
@@ -42,9 +43,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     known = [node.name for node in system.contract.nodes]
     if unknown := [name for name in nodes if name not in known]:
         raise Rejected(Diagnostic("CLI003", f"there is no node '{unknown[0]}'", hint=f"known: {', '.join(known)}"))
-    if seconds <= 0:
-        raise Rejected(Diagnostic("CLI004", f"--seconds {seconds}: a time above 0 is wanted"))
-    bounds = Bounds(max(1, int(seconds * 1000)), seed)
+    bounds = Bounds(milliseconds(seconds), seed)
 
     def settle(node: Node) -> tuple[SanityResult, ...]:
         scenario = interpretation(node, system.plan.scenario)
