@@ -10,7 +10,7 @@ import click
 
 @click.command()
 @click.argument("system")
-@click.option("--seed", type=int, default=0, show_default=True, help="Another seed, another run; the same seed, the same run.")
+@click.option("--seed", default=0, show_default=True, help="Another seed, another run; the same seed, the same run.")
 @click.option("--steps", type=click.IntRange(1, 100_000), help="How many steps; by default the plan's, or 20.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a step (JSON lines).")
 @click.option("--all", "everything", is_flag=True, help="Show also inputs that never change.")

@@ -9,7 +9,15 @@ from click.testing import CliRunner
 
 from avow.cli import compose, refines, sanity
 
-NODE = "node n { inputs ( r : REAL ) outputs ( x : REAL ) topics ( REAL t matches : x ) assume ( in.r >= 0 ) guarantee ( out.x == in.r ) }"
+NODE = """
+node n {
+  inputs ( r : REAL )
+  outputs ( x : REAL )
+  topics ( REAL t matches : x )
+  assume ( in.r >= 0 )
+  guarantee ( out.x == in.r )
+}
+"""
 
 
 @pytest.mark.parametrize("seconds", ["nan", "inf", "-inf", "0", "-1", "1e9", "soon", ""])
