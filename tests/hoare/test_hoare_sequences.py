@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import random
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 from avow.backend import Limits
 from avow.backends.hoare import BACKEND
+from avow.backends.hoare.backend import load
+from avow.backends.hoare.interpreter import Machine
+from avow.logic.evaluate import NotEvaluable, evaluate
+from avow.logic.models import default_value
+from avow.logic.values import Element, Sequence
 from avow.verdict import Outcome, Verdict
 from hoare.systems import make_job
 
@@ -145,3 +152,105 @@ def test_also_runs_of_which_a_guarantee_asks_nothing_have_an_output(
     """The node promises an output for every input that its assumptions allow; this guarantee only speaks of k > 0."""
     outcome = settle(tmp_path, program + "\n", "k > 0 -> total == 1")
     assert outcome.verdict is verdict, outcome.summary
+
+
+# -- random programs: what is proved survives every run ----------------------------------------------------------------
+
+
+def number(rng: random.Random) -> str:
+    return rng.choice(
+        ("0", "1", "k", "loads(0)", "loads(1)", "loads(k)", "total", "length(loads)", "loads(length(loads) - 1)")
+    )
+
+
+def test_of(rng: random.Random) -> str:
+    compare = f"{number(rng)} {rng.choice(('<', '<=', '==', '!='))} {number(rng)}"
+    return rng.choice(
+        (
+            compare,
+            compare,
+            "length(loads) > 1",
+            "k in [0, 1]",
+            "mode in Moving",
+            "0 <= k and k < length(loads)",
+            "1 in loads",
+        )
+    )
+
+
+def block(rng: random.Random, depth: int, indent: str) -> str:
+    lines = []
+    for _ in range(rng.randint(1, 2)):
+        if depth and rng.random() < 0.6:
+            lines.append(f"{indent}IF {test_of(rng)} THEN\n{block(rng, depth - 1, indent + '   ')}")
+            lines.append(f"{indent}ELSE\n{block(rng, depth - 1, indent + '   ')}")
+        else:
+            lines.append(
+                indent
+                + rng.choice(
+                    (
+                        f"total := {number(rng)}",
+                        f"loads := [{number(rng)}, {number(rng)}]",
+                        f"path := [{number(rng)}, {number(rng)}]",
+                        "path := loads",
+                        f"pair := (mode, {number(rng)})",
+                        f"seen := {test_of(rng)}",
+                        "many := [k]",
+                    )
+                )
+            )
+    return "\n".join(lines)
+
+
+CLAIMS = (
+    "length(path) == length(in.loads) or length(path) == 2",
+    "pair == (in.mode, total)",
+    "seen <=> in.mode in Moving",
+    "seen -> total >= 0",
+    "length(many) <= 1",
+    "length(in.loads) == 2 -> path == in.loads",
+    "total == in.loads(0) or total == 0 or total == in.k",
+)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_proved_survives_random_runs(tmp_path: Path, seed: int) -> None:
+    rng = random.Random(seed)
+    start = "total := 0\npath := loads\npair := (mode, 0)\nseen := FALSE\nmany := []\n"
+    proved = refuted = 0
+    for at in range(8):
+        assume = rng.choice(("", "length(loads) == 2 and 0 <= k and k < 2", "length(loads) > 0"))
+        program = start + block(rng, 2, "") + "\n"
+        contract = CONTRACT.format(formula=rng.choice(CLAIMS), assume=f"assume( {assume} )" if assume else "")
+        job = make_job(tmp_path / str(at), contract, "n", {"program": "n.imp"}, {"n.imp": program}, "hoare")
+        assert not [d for d in BACKEND.check(job) if d.is_error], BACKEND.check(job)
+        outcome = BACKEND.discharge(job, tmp_path, Limits(seconds=20)).outcomes[0]
+        refuted += outcome.verdict is Verdict.REFUTED
+        if outcome.verdict is not Verdict.PROVED:
+            continue
+        proved += 1
+        checked = load(job).checked.program
+        for _ in range(60):
+            inputs = {
+                "loads": Sequence(
+                    tuple(Fraction(rng.choice((-1, 0, 1, 2))) for _ in range(rng.choice((0, 1, 2, 2, 3))))
+                ),
+                "counts": Sequence(()),
+                "mode": Element(rng.choice(("off", "slow", "fast"))),
+                "k": rng.choice((-1, 0, 1, 2)),
+            }
+            values = {f"in.{name}": v for name, v in inputs.items()}
+            try:
+                if not all(evaluate(a.formula, values) for a in job.node.assumptions):
+                    continue
+            except NotEvaluable:
+                continue
+            state = {v.name: inputs.get(v.name, default_value(v.sort)) for v in checked.state}
+            end = Machine().run(checked.body, {**state, **{g.name: state[v.name] for v, g in checked.ghosts.items()}})
+            values |= {f"out.{p.name}": end.get(p.name, default_value(p.sort)) for p in job.node.outputs}
+            try:
+                assert evaluate(job.node.guarantees[0].formula, values) is True, (program, inputs)
+            except NotEvaluable:
+                continue
+    assert proved > 0
+    assert refuted > 0
