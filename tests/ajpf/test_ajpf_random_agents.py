@@ -105,6 +105,9 @@ def test_spin_agrees_on_random_agents(tmp_path: Path, seed: int) -> None:
             *(p for e in outcome.details["further_properties"] for p in e["properties"]),
         ]
         for entry in entries:
+            if "second_opinions" not in entry:  # Spin is only asked of a graph that was explored to its end
+                assert outcome.bound["states"] >= options["states"], outcome.bound
+                continue
             (opinion,) = entry["second_opinions"].values()
             assert opinion == {"checked": "holds", "refuted": "violated"}[entry["verdict"]], entry
             told[entry["verdict"]] += 1
