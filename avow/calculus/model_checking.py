@@ -20,7 +20,7 @@ from avow.calculus.ltl import Lasso, demands_progress, violation
 from avow.calculus.open_values import Holds
 from avow.calculus.scenario import CannotRun, world
 from avow.calculus.transition import Machine, Step, Walk
-from avow.calculus.variables import Frame
+from avow.calculus.variables import Frame, system_term
 from avow.language.terms import Term
 from avow.logic.clock import now
 from avow.logic.formula import free_variables
@@ -209,8 +209,6 @@ def _breaks(steps: Sequence[Step], back: int, formula: Property, judges: dict[St
 
 
 def _judges(machine: Machine, frame: Frame, formula: Property) -> dict[State, Holds]:
-    from avow.calculus.requirements import system_term
-
     return {state: machine.judge(system_term(frame, state.term)) for state in states_of(formula)}
 
 
@@ -319,8 +317,6 @@ def _false_at(machine: Machine, frame: Frame, formula: Property, steps: Sequence
 
 def _interesting(machine: Machine, frame: Frame, formula: Property) -> list[str]:
     """The variables worth showing: what the environment chose, the outputs, and what the property speaks of."""
-    from avow.calculus.requirements import system_term
-
     about = [
         variable.qualified
         for state in states_of(formula)

@@ -17,14 +17,15 @@ from avow.calculus.discharge import DEEPER_SECONDS, Bounds
 from avow.calculus.entailment import QUICK_MS, implied
 from avow.calculus.hierarchy import innermost
 from avow.calculus.induction import deeper, steps
+from avow.calculus.model_checking import judge, refuting_run
 from avow.calculus.repair import environment, initial_values, offers, providers
-from avow.calculus.variables import Frame
+from avow.calculus.variables import Frame, system_term
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.files import digest as sha256
 from avow.language.contract import ClauseKind
 from avow.language.printer import show_term
-from avow.language.terms import Role, Term, Variable
-from avow.logic.formula import digest, free_variables, substitute
+from avow.language.terms import Term
+from avow.logic.formula import digest, free_variables
 from avow.logic.smt import Entailment
 from avow.system.plan import Requirement
 from avow.system.temporal import Property, State, Temporal, parse_property, parse_state, show_property
@@ -61,7 +62,6 @@ class FormulaQuestion:
     def broken_by_a_run(self, composition: Composition, bounds: Bounds) -> tuple[Answer | None, str]:
         """A run of the composed contracts over the plan's scenario, at one of whose steps the formula is false; else
         how far it was looked for."""
-        from avow.calculus.model_checking import refuting_run
         from avow.calculus.scenario import CannotRun
 
         if composition.frame.system.plan.scenario is None:
@@ -207,7 +207,6 @@ class TemporalQuestion:
     digest: str
 
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
-        from avow.calculus.model_checking import judge
         from avow.calculus.scenario import CannotRun
 
         try:
@@ -235,16 +234,6 @@ def requirement_question(frame: Frame, requirement: Requirement) -> FormulaQuest
         formula = parse_property(requirement.temporal, contract, requirement.formula_span)
         return TemporalQuestion(requirement.id, formula, show_property(formula), sha256(_meaning(formula)))
     return None
-
-
-def system_term(frame: Frame, formula: Term, earlier: int = 0) -> Term:
-    """A formula over ``node.port`` in system-level variables."""
-    mapping: dict[Variable, Term] = {}
-    for variable in free_variables(formula):
-        node, _, port = variable.name.partition(".")
-        find = frame.input if variable.role is Role.INPUT else frame.output
-        mapping[variable] = find(node, port, earlier)
-    return substitute(formula, mapping)
 
 
 def rests_on(composition: Composition, labels: tuple[str, ...], bounds: Bounds) -> tuple[str, ...]:

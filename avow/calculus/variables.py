@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from avow.language.contract import Node
 from avow.language.sorts import Sort
 from avow.language.terms import Role, Term, Variable
-from avow.logic.formula import substitute
+from avow.logic.formula import free_variables, substitute
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition
 from avow.system.graph import Edge, Graph, dataflow
 from avow.system.hierarchy import apart
@@ -129,3 +129,13 @@ def frame(system: System) -> Frame:
 def system_variable(name: str, sort: Sort, earlier: int = 0) -> Variable:
     """A variable of the whole system; its name holds a dot, so that no bound variable can bear it."""
     return Variable(Role.BOUND, name + SUFFIXES[earlier], sort)
+
+
+def system_term(frame: Frame, formula: Term, earlier: int = 0) -> Term:
+    """A formula over ``node.port`` in system-level variables."""
+    mapping: dict[Variable, Term] = {}
+    for variable in free_variables(formula):
+        node, _, port = variable.name.partition(".")
+        find = frame.input if variable.role is Role.INPUT else frame.output
+        mapping[variable] = find(node, port, earlier)
+    return substitute(formula, mapping)
