@@ -55,7 +55,7 @@ def conflicts(
     learn(first)
     labels = tuple(group.guarantees)
     # Two guarantees against each other are what people want to see first, and what happens most.
-    for size, patience in ((2, 600), (1, 300), (3, 300)):
+    for size, patience in ((2, 1_000), (1, 400), (3, 400)):
         for chosen in combinations(labels, size):
             left = int((deadline - now()) * 1000)
             if frozenset(chosen) in found or left <= 0:

@@ -30,6 +30,9 @@ from avow.verdict import Verdict
 _PATIENT_MS = 300
 """From this much time on for one attempt, all that is known of the chosen constants is told."""
 
+_TRIES = 6
+"""So many inputs for which there is an output after all, one after the other, and something else is tried."""
+
 Formulas = Mapping[str, Term]
 Given = Mapping[Variable, Value]
 
@@ -304,13 +307,14 @@ class Search:
 
     def _refute(self, limit: int) -> Realizability | None:
         # The first candidate is the likeliest: inputs that defeat it mostly defeat all, and are much easier to find.
-        return self.refute((), limit, 1) or self.refute((), limit)
+        return self.refute((), limit // 2, 1) or self.refute((), limit // 3)
 
     def refute(self, possible: Sequence[Formulas], limit: int, few: int | None = None) -> Realizability | None:
         """Inputs without an output, at which each of the `possible` sets of guarantees could be met by itself; None
         if none are found in `limit` ms. `few`: only so many witnesses are to be defeated from the start."""
         end = now() + limit / 1000
-        while now() < end:
+        known = len(self.witnesses)
+        while now() < end and (few is None or len(self.witnesses) < known + _TRIES):
             inputs = self._defeat(self.group.guarantees, possible, int((end - now()) * 1000), few)
             if inputs is None:
                 return None
