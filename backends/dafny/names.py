@@ -14,13 +14,13 @@ RESERVED = frozenset(
     re.findall(
         r"\w+",
         """
-    abstract allocated array arrow as assert assume bool bv break by calc case char class codatatype colemma
-    const constructor continue copredicate datatype decreases default downto else ensures exists expect export extends
-    fallible false feature forall fresh function ghost greatest hints if imap import in include inductive int invariant
-    is iset iterator label labeled least lemma level map match method modifies modify module multiset nameonly
-    new newtype nat null object old older opaque opened ORDINAL or predicate print protected provides reads real refines
-    requires return returns reveal reveals seq set static string then this to trait true twostate type
-    unchanged using var where while witness yield yields
+    abstract allocated array arrow as assert assume bool bv break by calc case char class codatatype colemma const
+    constructor continue copredicate datatype decreases default downto else ensures exists expect export extends
+    fallible false feature for forall free fresh function ghost greatest hide hints if imap import in include
+    inductive int invariant is iset iterator label labeled least lemma level map match method modifies modify module
+    multiset nameonly new newtype nat null object old older opaque opened ORDINAL or predicate print protected
+    provides reads real refines requires return returns reveal reveals seq set static string then this to trait true
+    twostate type unchanged using var where while witness yield yields
     array0 array1 array2 array3 array4 Main Env EnvNotEmpty Step Types Contract Base Upto Divide DivideByZero Nth Beyond
         """,
     )

@@ -153,6 +153,34 @@ def test_hostile_names_still_make_valid_dafny() -> None:
     assert len(made.ensures) == 3
 
 
+WORDS = """
+    abstract and array as assert assume axiom bool break by calc case catch char class const continue def default do
+    else elif ensures enum exists expect export extends extern false final float for forall foreach free fresh from
+    function ghost global goto hide if import in include int interface invariant is iterator label lambda least lemma
+    length let limit lt map match method modifies modify module multiset namespace nat new nil none not null object of
+    old opaque open operator or override package predicate print private proctype protected public pure raise reads
+    real requires return returns reveal reveals self seq set some static string struct super switch then this throw to
+    total trait true try type union unit until use using val var when where while with witness yield yields None Some
+    True False Map Set Seq String Int Real Bool Type System M Impl Spec Check a b x y r
+"""
+
+
+@pytest.mark.needs_dafny
+def test_any_word_may_be_the_name_of_a_clause_a_port_a_type_or_an_element() -> None:
+    """The words that some language or other keeps for itself; one run for all of them."""
+    words = WORDS.split()
+    variables = [Port(Role.INPUT, word, EnumSort(word, (word, f"{word}x")), "T") for word in words]
+    claims = tuple(
+        Clause(ClauseKind.GUARANTEE, port.name, at, Compare("==", port.variable, port.variable))
+        for at, port in enumerate(variables, start=1)
+    )
+    made = everything(Node("free", tuple(variables), (), (), (), claims))
+    run = verify({made.types_file: made.types, made.contract_file: made.contract}, Limits(seconds=120))
+    assert run.code == 0, run.output
+    assert run.members is not None
+    assert len(made.ensures) == len(words)
+
+
 @pytest.mark.needs_dafny
 @pytest.mark.slow
 def test_all_that_is_generated_for_the_case_studies_is_well_formed() -> None:
