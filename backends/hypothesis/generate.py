@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 from avow.backends.hypothesis.pools import Pools, runs, scenario_runs
 from avow.language.sorts import (
+    STRING,
     BoolSort,
     DataSort,
     EnumSort,
@@ -115,13 +116,25 @@ class Generator:
 
     def edges(self, failing: Failing) -> Iterator[Inputs]:
         """Each number and string from the pools in its turn for each input that is one, all else as simple as can be,
-        and once more all else by chance: that no threshold is left to luck."""
+        and once more all else by chance: that no threshold is left to luck. Of a function it is the value everywhere,
+        of a sequence that of its last element."""
         chance = random.Random(0)
         for name, sort in self.ports.items():
-            for value in self.pools.edges.get(sort, ()):
+            for value in self._at_edges(sort):
                 for data in (b"", chance.randbytes(BYTES)):
                     inputs = {**self.case(Source(data), failing), name: value}
                     yield inputs
+
+    def _at_edges(self, sort: Sort) -> Iterator[Value]:
+        match sort:
+            case FunctionSort(result=result):
+                yield from (FunctionValue({}, value) for value in self.pools.edges.get(result, ()))
+            case SequenceSort(item=item):
+                for value in self.pools.edges.get(item, ()):
+                    simple = self._number(Source(b""), item, False) if item != STRING else value
+                    yield from (Sequence((value,)), Sequence((simple, value)))
+            case _:
+                yield from self.pools.edges.get(sort, ())
 
     def _towards(self, source: Source, inputs: Inputs, near: dict[Any, Any], failing: Failing) -> None:
         """Draw inputs again that are to blame, until none is or the attempts are used up."""

@@ -1,0 +1,51 @@
+"""Faults at thresholds that are calculated, or that lie in functions, sequences and beside relations: each is found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hoare.systems import make_job
+
+from avow.backend import Limits
+from avow.backends.hypothesis import BACKEND
+from avow.verdict import Verdict
+
+CONTRACT = """
+context {{ Joint = {{shoulder, elbow, wrist}}; Force : Joint --> REAL; Order : {{ spray(NATURAL), rest }};
+          Flow = 0.5; Limit = 500.4; Rows : <NATURAL>; Loads : <REAL>; }}
+node n {{
+  inputs( force : Force, before : REAL, loads : Loads, row : NATURAL, todo : Rows, safe : BOOL )
+  outputs( y : BOOL, z : REAL )
+  topics()
+  {assume}
+  guarantee g ( {formula} )
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("formula", "assume", "subject"),
+    [
+        ("y <=> before < 4 * Flow", "", "before <= 2"),
+        ("y <=> (forall(j in Joint | force(j) <= 8))", "", "max(force(j) for j in J) < 8"),
+        ("y <=> loads(0) + loads(1) > Limit", "length(loads) == 2", "sum(loads) > 500.5"),
+        ("not safe -> y", "row in todo", "not safe and row != 2"),
+        ("y <=> length(loads) < 3", "", "len(loads) < 4"),
+        ("before - Flow >= 10 -> y", "", "before > 10.5"),
+    ],
+)
+def test_is_refuted(tmp_path: Path, formula: str, assume: str, subject: str) -> None:
+    program = (
+        "J = ('shoulder', 'elbow', 'wrist')\n"
+        f"def f(force, before, loads, row, todo, safe):\n    return {{'y': bool({subject}), 'z': 0}}\n"
+    )
+    contract = CONTRACT.format(formula=formula, assume=f"assume( {assume} )" if assume else "")
+    job = make_job(tmp_path, contract, "n", {"subject": "n.py:f", "cases": 300}, {"n.py": program}, "hypothesis")
+    assert not [d for d in BACKEND.check(job) if d.is_error], BACKEND.check(job)
+    folder = tmp_path / "made"
+    for name, text in BACKEND.export(job).items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    (outcome,) = BACKEND.discharge(job, folder, Limits(seconds=60)).outcomes
+    assert outcome.verdict is Verdict.REFUTED, outcome.summary
