@@ -171,7 +171,7 @@ def defined(term: Term, sequences: Collection[Variable] | None = None) -> Term:
         case Or(items=items):
             return _in_turn(items, tuple(map(negation, items)), sequences)
         case Implies(left=left, right=right):
-            return _in_turn((left, right), (left, right), sequences)
+            return _in_turn((left, right), (left, negation(right)), sequences)
         case Iff(left=left, right=right):
             return conjunction((defined(left, sequences), defined(right, sequences)))
         case Quantified(variables=variables, body=body):

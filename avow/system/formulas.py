@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from avow.diagnostics import Diagnostic, Rejected, Span
@@ -10,8 +9,8 @@ from avow.language.contract import Node
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Term, Variable, children
 from avow.system.graph import Edge, Graph
-from avow.system.hierarchy import leaves
-from avow.system.plan import Endpoint, EnvironmentInput, System
+from avow.system.hierarchy import holders
+from avow.system.plan import Endpoint, System
 from avow.system.temporal import parse_property, parse_state
 
 
@@ -76,11 +75,12 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
     found: list[Assumed] = []
     faults: list[Diagnostic] = []
     for entry in system.plan.environment:
-        holders = endpoints(system, entry)
-        outside = [e for e in holders if e in graph.environment]
+        about = holders(system, entry)
+        outside = [e for e in about if e in graph.environment]
         if not outside:
-            providers = [str(graph.by_target[e].source) for e in holders if e in graph.by_target]
-            message = f"environment: {entry.port} is no environment input: {', '.join(providers)} provides it"
+            providers = [str(graph.by_target[e].source) for e in about if e in graph.by_target]
+            what = f"{', '.join(providers)} provides it" if providers else "all that read it are named apart"
+            message = f"environment: {entry.port} is no environment input: {what}"
             faults.append(Diagnostic("PLAN113", message, entry.span))
             continue
         if entry.assume is None:
@@ -149,17 +149,6 @@ def ports_of(term: Term) -> tuple[Variable, ...]:
             found[current] = None
         stack.extend(children(current))
     return tuple(found)
-
-
-def endpoints(system: System, entry: EnvironmentInput) -> Sequence[Endpoint]:
-    """The inputs that an entry of the plan's environment is about."""
-    owner, _, port = entry.port.partition(".")
-    inside = leaves(system.plan).get(owner, (owner,))
-    return [
-        Endpoint(node.name, port)
-        for node in system.contract.nodes
-        if (owner == "in" or node.name in inside) and port in [p.name for p in node.inputs]
-    ]
 
 
 def _parse(system: System, text: str, node: str, span: Span | None) -> Term:

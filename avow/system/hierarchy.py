@@ -14,7 +14,7 @@ from avow.diagnostics import Diagnostic, Severity
 from avow.language.contract import Node, Port
 from avow.language.terms import Role
 from avow.system.graph import Edge, Graph, components, wired
-from avow.system.plan import Endpoint, Plan, System
+from avow.system.plan import Endpoint, EnvironmentInput, Plan, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,18 +74,47 @@ def outermost(system: System) -> tuple[str, ...]:
 def apart(plan: Plan, nodes: Iterable[Node]) -> dict[str, str]:
     """Inputs (``camera.raw``) that the plan sets apart from inputs of that name elsewhere, and as whose: the node's own
     (``camera.raw``), or a subsystem's (``perception.raw``, one for all nodes inside)."""
-    inside = leaves(plan)
+    inside, joined = leaves(plan), _joined(plan)
     known = {node.name: node for node in nodes}
-    shared = {entry.port for entry in plan.environment if entry.port.startswith("in.")}
     found: dict[str, str] = {}
     for entry in sorted(plan.environment, key=lambda e: -len(inside.get(e.port.partition(".")[0], ()))):
         owner, _, port = entry.port.partition(".")
-        if owner == "in" or (entry.taken_in and f"in.{port}" in shared):
+        if owner == "in" or (entry.taken_in and entry.port in joined):
             continue
         for leaf in inside.get(owner, (owner,)):
             if leaf in known and any(p.name == port for p in known[leaf].inputs):
                 found[f"{leaf}.{port}"] = entry.port  # the innermost entry wins
     return found
+
+
+def holders(system: System, entry: EnvironmentInput) -> tuple[Endpoint, ...]:
+    """The inputs that an entry of the plan's environment is about: those of its name that no other entry sets apart."""
+    owner, _, port = entry.port.partition(".")
+    inside = leaves(system.plan).get(owner, (owner,))
+    nodes = [node for node in system.contract.nodes if owner == "in" or node.name in inside]
+    at = [Endpoint(node.name, port) for node in nodes if any(p.name == port for p in node.inputs)]
+    names = {entry.port}
+    if entry.taken_in and entry.port in _joined(system.plan):
+        names |= {f"{name}.{port}" for name in ("in", *_around(parents(system.plan), owner))}
+    alone = apart(system.plan, nodes)
+    return tuple(e for e in at if alone.get(str(e), f"in.{port}") in names)
+
+
+def _joined(plan: Plan) -> frozenset[str]:
+    """Inputs of folders that were taken in (``left.raw``) that are, the plan says, what others read (``in.raw``).
+    What a folder's own plan sets apart for a node (``left_reader.raw``) stays apart."""
+    folders = [subsystem.name for subsystem in plan.subsystems if subsystem.folder is not None]
+    shared = [entry.port.partition(".")[2] for entry in plan.environment if entry.port.startswith("in.")]
+    return frozenset(f"{name}.{port}" for name in folders for port in shared)
+
+
+def _around(parents_of: Mapping[str, str], name: str) -> tuple[str, ...]:
+    """The subsystems around a node or subsystem, the nearest first."""
+    found: list[str] = []
+    while name in parents_of:
+        name = parents_of[name]
+        found.append(name)
+    return tuple(found)
 
 
 def face(system: System, graph: Graph, name: str, inside: Iterable[str]) -> Face:

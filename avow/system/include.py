@@ -14,9 +14,8 @@ from pathlib import Path
 
 from avow.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Contract
-from avow.system.formulas import endpoints
 from avow.system.graph import Graph, dataflow
-from avow.system.hierarchy import outermost
+from avow.system.hierarchy import holders, outermost
 from avow.system.plan import Connection, Endpoint, EnvironmentInput, Plan, Subsystem, System
 
 Load = Callable[[Path], System]
@@ -56,7 +55,7 @@ def still_open(system: System, graph: Graph) -> System:
     kept = tuple(
         entry
         for entry in system.plan.environment
-        if not entry.taken_in or any(endpoint in graph.environment for endpoint in endpoints(system, entry))
+        if not entry.taken_in or any(endpoint in graph.environment for endpoint in holders(system, entry))
     )
     return replace(system, plan=replace(system.plan, environment=kept))
 

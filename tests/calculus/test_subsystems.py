@@ -464,3 +464,33 @@ def test_two_of_two_of_two_is_soon_refused(tmp_path: Path) -> None:
     with pytest.raises(Rejected) as rejected:
         load_system(tmp_path / "s15")
     assert any("nodes in all" in d.message for d in rejected.value.diagnostics)
+
+
+def test_what_is_assumed_of_a_shared_input_is_not_assumed_of_one_that_is_set_apart(tmp_path: Path) -> None:
+    """`in.x` is what the nodes read that no other entry sets apart, even if such a node comes first."""
+    text = node("a", "x : INTEGER", "y : INTEGER", "G: out.y == in.x") + node("b", "x : INTEGER", "", "A q: in.x > 0")
+    plan = "environment: {in.x: {assume: in.x > 0, because: t}, a.x: {because: another}}\n"
+    plan += "requirements: {R: {text: t, formula: a.y > 0}}"
+    found = outcomes(make(tmp_path / "nodes", text, plan))
+    assert found["whole.b.q"].verdict is Verdict.PROVED
+    assert found["R"].verdict is Verdict.REFUTED
+    inside = plan.replace("a.x:", "s.x:") + "\nsubsystems: {s: {nodes: [a]}}"
+    found = outcomes(make(tmp_path / "inside", text, inside))
+    assert found["whole.b.q"].verdict is Verdict.PROVED
+    assert found["R"].verdict is Verdict.REFUTED
+    with pytest.raises(Rejected, match="named apart"):
+        make(tmp_path / "none", text.split("node b")[0], plan)
+
+
+def test_what_a_folder_sets_apart_stays_apart_where_it_is_taken_in(tmp_path: Path) -> None:
+    text = node("a", "x : INTEGER", "y : INTEGER", "G: out.y == in.x") + node("b", "x : INTEGER", "", "A q: in.x > 0")
+    own = "environment: {in.x: {assume: in.x > 0, because: t}, a.x: {assume: in.x < 0, because: another}}"
+    folder_of(tmp_path, "part", text, own)
+    for name, more in (("apart", ""), ("wired", "environment: {in.x: {because: one wire}}\n")):
+        plan = f"{more}subsystems: {{s: {{system: ../part}}}}\n"
+        plan += "requirements: {R: {text: t, formula: s_a.y > 0}, S: {text: t, formula: s_a.y < 0}}"
+        sink = node("sink", "x : INTEGER", "", "A q: in.x > 0")
+        found = outcomes(load_system(folder_of(tmp_path, name, sink, plan)))
+        assert found["R"].verdict is Verdict.REFUTED
+        assert found["S"].verdict is Verdict.PROVED
+        assert found["s.s_b.q"].verdict is Verdict.PROVED

@@ -1,0 +1,55 @@
+"""What lies outside a sequence settles nothing: no claim may rest on a value that was made up for it."""
+
+from __future__ import annotations
+
+import pytest
+
+from avow.logic.evaluate import NotEvaluable, compile_term
+from avow.logic.sanity import Bounds, analyse
+from avow.logic.sequences import defined
+from avow.logic.values import Sequence
+from avow.verdict import Verdict
+
+from .contracts import formula, node
+
+SHORT = node("inputs() outputs( s : <INTEGER>, b : BOOL ) | guarantee( length(out.s) < 3 ) guarantee( out.b )")
+
+
+@pytest.mark.parametrize(
+    "clause",
+    [
+        "out.s(5) == 0 -> length(out.s) > 10",
+        "not (out.s(5) == 0) or length(out.s) > 10",
+        "not (out.s(5) == 0 and length(out.s) < 10)",
+    ],
+)
+def test_an_output_that_hinges_on_an_element_outside_is_no_answer(clause: str) -> None:
+    own = node(f"inputs() outputs( s : <INTEGER> ) | guarantee( length(out.s) < 3 ) guarantee( {clause} )")
+    (result,) = analyse(own, bounds=Bounds(100), wanted=["realizable"])
+    assert result.verdict is Verdict.UNKNOWN
+
+
+@pytest.mark.parametrize(
+    ("text", "short", "at_one"),
+    [
+        ("s(1) == 0 -> b", False, True),
+        ("b -> s(1) == 0", False, True),
+        ("length(s) > 1 -> s(1) == 0", True, True),
+        ("s(1) == 0 -> length(s) > 1", False, True),
+        ("s(1) == 0 and length(s) > 1", True, True),
+        ("s(1) == 0 or length(s) < 2", True, True),
+        ("s(1) == 0 <=> length(s) > 1", False, True),
+        ("forall(i in NATURAL | i < length(s) -> s(i) == 0)", True, True),
+        ("forall(i in NATURAL | s(i) == 0 -> i < length(s))", False, False),
+    ],
+)
+def test_the_condition_says_when_nothing_outside_matters(text: str, short: bool, at_one: bool) -> None:
+    """For `b` that does not settle the formula by itself: sequences of one element, and of two."""
+    condition = defined(formula(text, SHORT))
+    for items, expected in (((0,), short), ((0, 0), at_one)):
+        for b in (False, True) if expected else ("b -> s" in text,):
+            try:
+                holds = bool(compile_term(condition)({"out.s": Sequence(items), "out.b": b}))
+            except NotEvaluable:
+                holds = False
+            assert holds is expected
