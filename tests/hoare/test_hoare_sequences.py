@@ -163,7 +163,7 @@ def number(rng: random.Random) -> str:
     )
 
 
-def test_of(rng: random.Random) -> str:
+def condition(rng: random.Random) -> str:
     compare = f"{number(rng)} {rng.choice(('<', '<=', '==', '!='))} {number(rng)}"
     return rng.choice(
         (
@@ -182,7 +182,7 @@ def block(rng: random.Random, depth: int, indent: str) -> str:
     lines = []
     for _ in range(rng.randint(1, 2)):
         if depth and rng.random() < 0.6:
-            lines.append(f"{indent}IF {test_of(rng)} THEN\n{block(rng, depth - 1, indent + '   ')}")
+            lines.append(f"{indent}IF {condition(rng)} THEN\n{block(rng, depth - 1, indent + '   ')}")
             lines.append(f"{indent}ELSE\n{block(rng, depth - 1, indent + '   ')}")
         else:
             lines.append(
@@ -194,7 +194,7 @@ def block(rng: random.Random, depth: int, indent: str) -> str:
                         f"path := [{number(rng)}, {number(rng)}]",
                         "path := loads",
                         f"pair := (mode, {number(rng)})",
-                        f"seen := {test_of(rng)}",
+                        f"seen := {condition(rng)}",
                         "many := [k]",
                     )
                 )
@@ -213,12 +213,12 @@ CLAIMS = (
 )
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, 1])
 def test_what_is_proved_survives_random_runs(tmp_path: Path, seed: int) -> None:
     rng = random.Random(seed)
     start = "total := 0\npath := loads\npair := (mode, 0)\nseen := FALSE\nmany := []\n"
     proved = refuted = 0
-    for at in range(8):
+    for at in range(14):
         assume = rng.choice(("", "length(loads) == 2 and 0 <= k and k < 2", "length(loads) > 0"))
         program = start + block(rng, 2, "") + "\n"
         contract = CONTRACT.format(formula=rng.choice(CLAIMS), assume=f"assume( {assume} )" if assume else "")
