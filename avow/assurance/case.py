@@ -53,7 +53,8 @@ from avow.assurance.model import (
     ToolInfo,
 )
 from avow.assurance.naming import derivation_claim, requirement_claim, short
-from avow.assurance.summary import limits, not_shown, open_items
+from avow.assurance.remarks import remarks
+from avow.assurance.summary import limits, not_shown, open_items, worst_first
 from avow.assurance.support import (
     Names,
     criticality,
@@ -158,7 +159,7 @@ def conclude(facts: Facts) -> Case:
         ledger_head=facts.ledger_head,
         digests=facts.digests,
         requirements=requirements,
-        open_items=open_items(facts, views, requirements, derived, findings),
+        open_items=(*open_items(facts, views, requirements, derived, findings), *remarks(facts.sources, views)),
         nodes=facts.nodes,
         obligations=views,
         derivations=derived,
@@ -323,7 +324,7 @@ def _requirement(
         status=standing.status,
         weakest=weakest,
         weakest_status=weakest_status,
-        below=standing.below,
+        below=worst_first(standing.below, statuses),
         hypotheses=standing.hypotheses,
         link=standing.link,
         obligations=tuple(names.own.get(requirement.id, ())),
@@ -354,7 +355,8 @@ def _answer(
         where = ", ".join(short(name) for name in own or standing.below) or "its evidence"
         return f"{standing.status.value.capitalize()}: see {where}."
     if standing.below:
-        causes = [f"{short(name)} is {statuses.get(name, 'not shown')}" for name in standing.below]
+        below = worst_first(standing.below, statuses)
+        causes = [f"{short(name)} is {statuses.get(name, 'not shown')}" for name in below]
         more = f" and {len(causes) - 3} more" if len(causes) > 3 else ""
         return f"Not shown: {', '.join(causes[:3])}{more}."
     if not standing.direct:

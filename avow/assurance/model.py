@@ -354,7 +354,7 @@ class Case:
     """The dataflow picture; shown as an image, never as markup."""
     maps: tuple[MapView, ...] = ()
     sources: tuple[SourceView, ...] = ()
-    """Contracts first, then the plan. What is shown of them is text: nothing is concluded from it."""
+    """Contracts first, then the plan. No verdict is concluded from them; the remarks on how they are written are."""
 
     def obligation(self, name: str) -> ObligationView:
         """The obligation of that id. Raises KeyError."""

@@ -39,6 +39,8 @@ def open_items(
     items = [OpenItem("discrepancy", d.subject, d.text, advice=not d.serious) for d in facts.discrepancies or ()]
     for status in _WORST_FIRST:
         items += [_open(view, said) for view in views if view.status is status and not view.advice]
+        if status is Status.ERROR:
+            items += _failed_attempts(views)
     items += [_vacuous(view) for view in views if view.status is not Status.VACUOUS and _has_vacuous(view)]
     items += [item for view in views if view.status.supports for item in _given_up(view)]
     for d in derivations:
@@ -70,6 +72,35 @@ def open_items(
         if view.advice and view.status is Status.REFUTED
     ]
     return tuple(items)
+
+
+def _failed_attempts(views: Sequence[ObligationView]) -> Iterable[OpenItem]:
+    """A planned method that failed where another one decides the status: without this the claim's own line would hide
+    that one of two methods never gave an answer. Told once for each failure, whatever the number of claims."""
+    told: dict[tuple[str, str], list[ObligationView]] = {}
+    for view in views:
+        if view.status is not Status.ERROR and not view.advice:
+            for item in view.counting:
+                record = item.entry.evidence
+                if weigh(record).status is Status.ERROR:
+                    told.setdefault((record.method, record.summary), []).append(view)
+    for (method, summary), failed in told.items():
+        first, *others = failed
+        stands = f"{short(first.id)} is {first.status} by other evidence alone"
+        same = f"; the same for {_list([short(view.id) for view in others])}" if others else ""
+        title = f"{method} gives no answer: {first.obligation.claim}"
+        yield OpenItem(Status.ERROR.value, first.id, f"{method}: {summary} ({stands}{same})", title=title)
+
+
+def worst_first(names: Iterable[str], statuses: Mapping[str, Status]) -> tuple[str, ...]:
+    """The causes of a failure in the order in which a reader should meet them: what has no status of its own last, and
+    of two alike the contract's fault first, as nothing follows from a contract that cannot be met."""
+    rank = {status: at for at, status in enumerate(_WORST_FIRST)}
+
+    def key(name: str) -> tuple[int, bool]:
+        return rank.get(statuses[name], 98) if name in statuses else 99, "/sanity/" not in name
+
+    return tuple(sorted(names, key=key))
 
 
 def _given_up(view: ObligationView) -> Iterable[OpenItem]:
@@ -132,18 +163,21 @@ def _vacuous(view: ObligationView) -> OpenItem:
 
 def limits(facts: Facts, views: Sequence[ObligationView]) -> tuple[tuple[str, str], ...]:
     """What bounds the answers: for reproduction, and for judging what a bounded answer is worth."""
-    found = list(facts.run.limits.items())
+    bounds: dict[tuple[str, str, str], list[str]] = {}
     for view in views:
         for v in view.counting:
             record = v.entry.evidence
             if record.bound:
                 text = ", ".join(f"{name} = {_short(value)}" for name, value in record.bound.items())
-                found.append((f"{view.obligation.node}: {record.method}", text))
-    return tuple(dict.fromkeys(found))
+                bounds.setdefault((view.obligation.node, record.method, text), []).append(view.obligation.name)
+    found = [(f"{node}: {method} ({_list(names)})", text) for (node, method, text), names in bounds.items()]
+    return (*facts.run.limits.items(), *found)
 
 
 def _short(value: object) -> str:
     """A mapping by its keys (files and their digests stand with the evidence)."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     return ", ".join(map(str, value)) if isinstance(value, dict | list | tuple) else str(value)
 
 

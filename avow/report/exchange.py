@@ -16,7 +16,7 @@ from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.files import digest
 from avow.report.layout import json_text, yaml_text
-from avow.report.wording import MEANINGS, clean, tone
+from avow.report.wording import MEANINGS, banner_tone, clean, tone
 
 
 def render_json(case: Case) -> str:
@@ -198,7 +198,10 @@ def _sarif_level(view: ObligationView) -> tuple[str, str]:
 
 def render_attestation(case: Case) -> str:
     """in-toto statements (v1) with test-result predicates (v0.1): one for the system, then one for each node."""
-    every = [_statement(case, "", list(case.obligations), "PASSED" if case.good else "FAILED")]
+    # known-bad material that is as bad as expected passes its gates, and supports nothing: whoever asks for PASSED
+    # must not get it for that
+    whole = "FAILED" if not case.good else "WARNED" if banner_tone(case) == "open" else "PASSED"
+    every = [_statement(case, "", list(case.obligations), whole)]
     nodes = dict.fromkeys(view.obligation.node for view in case.obligations)
     for node in nodes:
         views = [view for view in case.obligations if view.obligation.node == node and not view.advice]

@@ -9,7 +9,7 @@ from avow.assurance.model import Case, DerivationView, ObligationView, SourceVie
 from avow.assurance.naming import short
 from avow.report.exchange import headline
 from avow.report.source import plain_lines
-from avow.report.wording import clean, verdict_line
+from avow.report.wording import clean, verdict_line, worth
 
 
 def _read(table: str) -> dict[str, str]:
@@ -137,7 +137,7 @@ def _latex_obligation(view: ObligationView) -> Iterable[str]:
     for item in view.counting:
         record = item.entry.evidence
         tool = latex(f"{record.tool} {record.tool_version}")
-        yield rf"{latex(record.method)}: \textit{{{record.verdict}}}, {tool}. {latex(record.summary)}."
+        yield rf"{latex(record.method)}: \textit{{{worth(record)}}}, {tool}. {latex(record.summary)}."
         if record.counterexample:
             yield rf"Counterexample: {latex(record.counterexample.text())}."
     if not view.counting:

@@ -7,16 +7,22 @@ from collections.abc import Iterable, Sequence
 
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
+from avow.assurance.remarks import REMARK
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
+from avow.evidence.status import Status
 from avow.report.source import plain_lines
-from avow.report.wording import clean, mutation, verdict_line, where
+from avow.report.wording import bound_text, clean, mutation, open_line, verdict_line, where, worth
 
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
 _LONG = 200
 """Rows of a table in the summary; all of them are in report.json."""
 _MOST_SOURCE = 40_000
 """Characters of contracts in the summary: code hosts cut a comment at some 65,000."""
+
+
+_BOUNDED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
+"""What these say is worth as much as their bounds."""
 
 
 def render_markdown(case: Case) -> str:
@@ -48,19 +54,31 @@ def render_markdown(case: Case) -> str:
                 if not i.advice
             ),
         ),
+        _md(open_line(case)),
+        *_remarks(case),
         "## Guarantees",
         _table(("guarantee", "criticality", "status", "evidence", "at"), (_row(view) for view in _guarantees(case))),
         "## Hypotheses and environment",
         "\n".join(f"- {_md(h.text)} ({_md(', '.join(map(short, h.claims[:6])))})" for h in case.hypotheses) or "None.",
         _table(
             ("environment input", "assumed", "because"),
-            ((_md(e.port), _md(e.assume), _md(e.because)) for e in case.environment),
-        ),
+            ((_md(e.port), _md(e.assume) or "nothing", _md(e.because)) for e in case.environment),
+        )
+        if case.environment
+        else "The plan assumes nothing of the environment's inputs.",
         "## What is not shown",
         "\n".join(f"- {_md(line)}" for line in case.not_shown),
         *_contracts(case),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _remarks(case: Case) -> Iterable[str]:
+    """How the contracts are written, brackets first: what a verdict is about depends on how a formula is read."""
+    found = [item for item in case.open_items if item.kind == REMARK]
+    if found:
+        yield "## Remarks on the contracts' text"
+        yield "\n".join(f"- {_md(item.title)} ({_md(item.text)})" for item in found[:_LONG])
 
 
 def _contracts(case: Case) -> Iterable[str]:
@@ -94,8 +112,10 @@ def _row(view: ObligationView) -> tuple[str, ...]:
 
 
 def _answer(evidence: Evidence) -> str:
-    score = mutation(evidence)
-    return f"{evidence.method} {evidence.verdict}{f' ({score})' if score else ''}"
+    status = worth(evidence)
+    bound = bound_text(evidence.bound) if status in _BOUNDED else ""
+    remarks = "; ".join(part for part in (bound, mutation(evidence)) if part)
+    return f"{evidence.method} {status}{f' ({remarks})' if remarks else ''}"
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

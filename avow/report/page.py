@@ -16,8 +16,9 @@ from markupsafe import Markup, escape
 
 from avow.assurance.argument import Argument, Element, build_argument
 from avow.assurance.model import Case, ObligationView
-from avow.assurance.naming import short
+from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.assurance.policy import techniques
+from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
 from avow.assurance.trend import trend
 from avow.evidence.obligation import Kind
@@ -36,6 +37,9 @@ _ROWS = 600
 """So many guarantees have a row of their own in the summary; beyond that a node has one."""
 _A_LINE = 240
 """Characters of a finding in the answer; all of it stands with the obligation."""
+_MOST_STEPS = 2_000_000
+_ON_PAPER = 900
+"""Pixels: a taller picture would be too small to read on a sheet; on paper a sentence says where it is."""
 _DRAWN = 2500
 """So many elements of the argument are drawn on one page; the other pictures are in gsn.svg and gsn.yaml."""
 
@@ -76,6 +80,8 @@ def environment() -> Environment:
         "outline": wording.outline,
         "rerun": wording.rerun,
         "short": short,
+        "within": wording.within,
+        "worth": wording.worth,
         "tone": wording.tone,
         "tool_command": wording.tool_command,
         "weigh": weigh,
@@ -103,6 +109,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
             arrows=Markup(picture.ARROWS),
             views=views,
             known=known,
+            on_paper=_ON_PAPER,
             counts=_counts(case.obligations),
             matrix=matrix if rows <= _ROWS else [],
             condensed=_condensed(matrix) if rows > _ROWS else [],
@@ -112,10 +119,13 @@ def render_page(case: Case, json_digest: str = "") -> str:
             places=places,
             failed=[gate for gate in case.gates if not gate.passed],
             open_items=listed,
+            resting=_resting(case),
+            open_line=wording.open_line(case),
             open_kinds=list(Counter(item.kind for item in listed).items()),
             do_first=None if case.good else next((i for i in listed if i.suggestion and not i.handled), None),
             findings={view.id: _found(view) for view in case.obligations},
-            advice=[item for item in case.open_items if item.advice],
+            advice=[item for item in case.open_items if item.advice and item.kind != REMARK],
+            remarks=[item for item in case.open_items if item.kind == REMARK],
             single=[view for view in case.obligations if view.id in single],
             justified=_justified(case),
             nodes=list(dict.fromkeys(view.obligation.node for view in views)),
@@ -251,7 +261,7 @@ def _brief(view: ObligationView, places: Mapping[str, tuple[int, int]]) -> Marku
     methods = escape(" ".join(method for method, _ in view.planned))
     marks = f'data-node="{escape(o.node)}" data-kind="{o.kind}" data-status="{status}" data-methods="{methods}"'
     said = "".join(
-        f"<li><b>{escape(e.method)}</b> {e.verdict}: {escape(e.summary)}"
+        f"<li><b>{escape(e.method)}</b> {wording.worth(e)}: {escape(e.summary)}"
         f"{f' <span class=quiet>({escape(wording.bound_text(e.bound))})</span>' if e.bound else ''}</li>"
         for e in (item.entry.evidence for item in view.counting)
     )
@@ -269,6 +279,29 @@ def _found(view: ObligationView) -> str:
     shown = next((e.counterexample for e in (v.entry.evidence for v in view.counting) if e.counterexample), None)
     text = shown.text() if shown is not None and not view.status.supports else ""
     return text if len(text) <= _A_LINE else text[: _A_LINE - 1] + "…"
+
+
+def _resting(case: Case) -> dict[str, list[tuple[Status, int]]]:
+    """How many claims of which status each supported requirement rests on, through derivations and all: one word for
+    the weakest of them does not tell that five others were only tested. Empty where that would take too long."""
+    if len(case.requirements) * len(case.obligations) > _MOST_STEPS:
+        return {}
+    below = {view.id: view.rests_on for view in case.obligations}
+    below |= {derivation_claim(d.derivation.name): d.rests_on for d in case.derivations}
+    below |= {requirement_claim(r.id): (*r.rests_on, *r.obligations) for r in case.requirements}
+    statuses = {view.id: view.status for view in case.obligations}
+    told = {}
+    for requirement in case.requirements:
+        seen: set[str] = set()
+        stack = [requirement_claim(requirement.id)]
+        while stack:
+            name = stack.pop()
+            if name not in seen:
+                seen.add(name)
+                stack += below.get(name, ())
+        found = Counter(statuses[name] for name in seen if name in statuses)
+        told[requirement.id] = [(status, found[status]) for status in Status if found[status]]
+    return told
 
 
 def _counts(views: Sequence[ObligationView]) -> list[tuple[str, list[tuple[Status, int]], int]]:
@@ -327,18 +360,25 @@ def _cell(view: ObligationView, method: str) -> Status | None:
     return roll_up((item.entry.evidence for item in mine if item.counts), outdated=bool(mine))
 
 
-def _pictures(case: Case, argument: Argument) -> list[tuple[str, Markup]]:
+_HEIGHT = re.compile(r'height="(\d+)')
+
+
+def _pictures(case: Case, argument: Argument) -> list[tuple[str, tuple[Markup, int]]]:
+    """Each requirement's picture with its height in pixels."""
+
     def link(element: Element) -> str | None:
         return f"#{wording.anchor(element.claim)}" if element.claim else None
 
-    drawn: list[tuple[str, Markup]] = []
+    drawn: list[tuple[str, tuple[Markup, int]]] = []
     room = _DRAWN
     for requirement, start in argument.goals:
         room -= min(picture.LIMIT, len(argument.below(start)))
         if room < 0:
             break
         label = f"Argument for {requirement}, as a goal structure; the same as a list follows"
-        drawn.append((requirement, Markup(picture.draw(argument, start, link, label))))  # escaped in picture.py
+        svg = picture.draw(argument, start, link, label)
+        tall = _HEIGHT.search(svg)
+        drawn.append((requirement, (Markup(svg), int(tall[1]) if tall else 0)))  # escaped in picture.py
     return drawn
 
 

@@ -9,12 +9,13 @@ from typing import Any
 from avow.assurance.argument import build_argument
 from avow.assurance.model import Case, ObligationView, SourceView
 from avow.assurance.naming import short
+from avow.assurance.remarks import REMARK
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report import example, picture
 from avow.report.maps import map_picture
 from avow.report.source import plain_lines
-from avow.report.wording import MARKS, banner_tone, bound_text, clean, in_lines, tone, verdict_line
+from avow.report.wording import MARKS, banner_tone, bound_text, clean, in_lines, tone, verdict_line, worth
 from avow.verdict import Counterexample
 
 _MOST = 500
@@ -88,6 +89,7 @@ def _data(case: Case) -> dict[str, Any]:
             for i in case.open_items[:_MOST]
             if not i.advice
         ],
+        "remarks": [f"{i.title} ({i.text})" for i in case.open_items if i.kind == REMARK][:_MOST],
         "matrix": [
             {
                 "name": node,
@@ -153,7 +155,7 @@ def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
         "status": _chip(view.standing),
         "evidence": [
             {
-                "status": _chip(Status(e.verdict)),
+                "status": _chip(worth(e)),
                 "method": e.method,
                 "tool": f"{e.tool} {e.tool_version}",
                 "summary": e.summary,
@@ -187,8 +189,8 @@ def _counter(case: Case, shown: Counterexample) -> dict[str, Any]:
 def _row(view: ObligationView) -> dict[str, Any]:
     methods = [
         {
-            "word": f"{i.entry.evidence.method}: {i.entry.evidence.verdict}",
-            "tone": tone(Status(i.entry.evidence.verdict)),
+            "word": f"{i.entry.evidence.method}: {worth(i.entry.evidence)}",
+            "tone": tone(worth(i.entry.evidence)),
         }
         for i in view.counting
     ]

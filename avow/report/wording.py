@@ -11,7 +11,7 @@ from urllib.parse import quote
 from avow.assurance.model import Case, EvidenceView, ObligationView
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.record import Evidence
-from avow.evidence.status import Status
+from avow.evidence.status import Status, weigh
 
 MARKS = {
     Status.PROVED: "✔",
@@ -93,6 +93,19 @@ def tool_command(evidence: Evidence) -> str:
     return shlex.join(evidence.command)
 
 
+def worth(evidence: Evidence) -> Status:
+    """What a record counts as: a pass whose trigger was never met is vacuous, whatever verdict the tool gave."""
+    return weigh(evidence).status
+
+
+def within(view: ObligationView, status: Status, most: int = 160) -> str:
+    """The bounds of the evidence that gives a claim this status: "tested" says nothing without its number of cases."""
+    records = [item.entry.evidence for item in view.counting]
+    texts = [bound_text(e.bound) for e in records if e.bound and worth(e) is status]
+    text = "; ".join(dict.fromkeys(texts))
+    return text if len(text) <= most else text[: most - 1] + "…"
+
+
 def where(view: ObligationView) -> str:
     span = view.obligation.span
     return f"{span.file}:{span.line}" if span else ""
@@ -117,6 +130,16 @@ def verdict_line(case: Case) -> str:
     if not failed:
         return f"All {len(case.gates)} gates of the policy pass."
     return f"{failed} of {len(case.gates)} gates of the policy fail{'s' if failed == 1 else ''}."
+
+
+def open_line(case: Case) -> str:
+    """How the open items and the plan's expected findings add up; empty where the plan speaks of none of them."""
+    said = {advice: sum(i.advice is advice and bool(i.handled) for i in case.open_items) for advice in (False, True)}
+    if not any(said.values()):
+        return ""
+    rest = sum(not i.advice and not i.handled for i in case.open_items)
+    advice = f", as it does of {count(said[True], 'item')} of advice" if said[True] else ""
+    return f"The plan speaks of {said[False]} of them{advice}; of {rest or 'none'} it does not."
 
 
 def banner_tone(case: Case) -> str:

@@ -1,0 +1,67 @@
+"""What the language checker remarks about the contracts' text: formulas that another bracketing would change, names
+that nothing uses, topics that name no port. Nothing fails for them, but a claim about a formula that was read otherwise
+than it was meant is a claim about something else: so a report that keeps silent on them would mislead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+from avow.assurance.model import ObligationView, OpenItem, SourceView
+from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.evidence.obligation import Kind
+from avow.language.load import check_sources
+from avow.language.source import Source
+from avow.system.strict_yaml import read_yaml
+
+REMARK = "remark"
+"""The kind of these open items; all of them are advice."""
+_FIRST = "RCL401"
+"""Another bracketing means something else: the one remark that changes what every verdict is about."""
+
+
+def remarks(sources: Sequence[SourceView], views: Sequence[ObligationView]) -> tuple[OpenItem, ...]:
+    """An advice for each lint of the contracts, brackets first, each with the guarantee or assumption it stands in."""
+    contracts = tuple((s.path, s.text) for s in sources if s.is_contract)
+    found = [d for d in _lints(contracts, _switched_off(sources)) if d.span]
+    found.sort(key=lambda d: d.code != _FIRST)
+    return tuple(_item(d, d.span, views) for d in found if d.span)
+
+
+@lru_cache(maxsize=64)
+def _lints(contracts: tuple[tuple[str, str], ...], off: frozenset[str]) -> tuple[Diagnostic, ...]:
+    if not contracts:
+        return ()
+    _, found = check_sources([Source(path, text) for path, text in contracts], off=off)
+    return tuple(d for d in found if d.severity is Severity.WARNING)
+
+
+def _switched_off(sources: Sequence[SourceView]) -> frozenset[str]:
+    """The plan's `lints_off`, read from its text: the report is concluded from what it holds, on any machine."""
+    names: set[str] = set()
+    for source in sources:
+        if source.path.rpartition("/")[2] == "plan.yaml":
+            try:
+                root, _ = read_yaml(source.text.encode("utf-8", "replace"), source.path)
+            except Rejected:
+                continue  # somebody edited the text that a report holds; `avow report --check` tells
+            listed = root.at("lints_off")
+            names |= {piece.text for piece in (listed.items or [listed])} if listed else set()
+    return frozenset(names)
+
+
+def _item(found: Diagnostic, span: Span, views: Sequence[ObligationView]) -> OpenItem:
+    claim = next((v.id for v in views if v.obligation.kind is Kind.GUARANTEE and _within(span, v.obligation.span)), "")
+    hint = f": {found.hint}" if found.hint else ""
+    return OpenItem(
+        REMARK,
+        claim or f"{span.file}:{span.line}",
+        f"{found.code}, {span.file}:{span.line}{hint}",
+        advice=True,
+        title=found.message,
+    )
+
+
+def _within(inner: Span, outer: Span | None) -> bool:
+    return outer is not None and inner.file == outer.file and outer.line <= inner.line <= outer.end_line
