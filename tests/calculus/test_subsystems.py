@@ -493,4 +493,3 @@ def test_what_a_folder_sets_apart_stays_apart_where_it_is_taken_in(tmp_path: Pat
         found = outcomes(load_system(folder_of(tmp_path, name, sink, plan)))
         assert found["R"].verdict is Verdict.REFUTED
         assert found["S"].verdict is Verdict.PROVED
-        assert found["s.s_b.q"].verdict is Verdict.PROVED
