@@ -22,7 +22,7 @@ class AjpfBackend:
 
     name = "ajpf"
     title = "agent programs (Gwendolen), model-checked against properties instantiated from the contract"
-    version = "2"
+    version = "3"
     strength = Verdict.CHECKED
     uses_wiring = False
     link = Link.MAPPED

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from avow.backends.ajpf.automaton import Automaton, build, compiled
 from avow.backends.ajpf.explore import Graph
 from avow.backends.ajpf.interpreter import NONE, Agent, Frame, State
-from avow.backends.ajpf.psl import Atom, Formula, Modality, Not, atoms, conjunction
+from avow.backends.ajpf.psl import Always, Atom, Eventually, Formula, Implies, Modality, Not, atoms, conjunction
 from avow.backends.ajpf.structure import Fair, Kripke, Lasso, find_lasso, reduce
 from avow.backends.ajpf.syntax import DeedKind, Sign, Struct, Term, Var, unify
+from avow.backends.ajpf.tautology import is_valid
 
 
 class OutOfTime(Exception):  # noqa: N818 - it names a state, not a fault
@@ -30,6 +31,15 @@ class Property:
     """What must follow the trigger, without its "eventually"."""
     about: str = ""
     """The instance in words: ``i = 3``."""
+    forbidden: Formula | None = None
+    """What must not come once the trigger is met, of ``[] (trigger -> [] ~forbidden)``."""
+
+    @property
+    def contrary(self) -> Formula | None:
+        """That what is forbidden does come, whenever the trigger is met."""
+        if self.forbidden is None or self.trigger is None:
+            return None
+        return Always(Implies(self.trigger, Eventually(self.forbidden)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +50,10 @@ class Result:
     """The trigger is never met."""
     immediate: bool
     """Wherever the trigger is met, so is the goal, at once: nothing had to happen."""
+    valid: bool = False
+    """It holds of every agent: what the table made of the claim is a tautology."""
+    contrary: bool = False
+    """What it forbids comes in every run, whenever the trigger is met."""
 
 
 @dataclass(slots=True)
@@ -55,7 +69,13 @@ class Checker:
     reduced: Kripke = field(init=False)
 
     def __post_init__(self) -> None:
-        found = {atom: None for p in self.properties for f in (p.formula, p.trigger, p.goal) if f for atom in atoms(f)}
+        found = {
+            atom: None
+            for p in self.properties
+            for f in (p.formula, p.trigger, p.goal, p.forbidden)
+            if f
+            for atom in atoms(f)
+        }
         self.atoms = tuple(found)
         self.places = {atom: at for at, atom in enumerate(self.atoms)}
         self.labels = label_states(self.graph.agent, self.graph.states, self.atoms)
@@ -75,6 +95,7 @@ class Checker:
         automaton, fair, labels = self._projected(wanted, self.reduced.labels)
         small = reduce(Kripke(self.reduced.initial, self.reduced.successors, labels))
         holds = find_lasso(small, automaton, fair) is None
+        valid = holds and is_valid(wanted.formula)
         vacuous = immediate = False
         if wanted.trigger is not None:
             met = self._where(wanted.trigger)
@@ -82,7 +103,10 @@ class Checker:
             if wanted.goal is not None and met:
                 unmet = conjunction((wanted.trigger, Not(wanted.goal)))
                 immediate = not self._where(unmet)
-        return Result(wanted.key, holds, vacuous, immediate)
+        contrary = False
+        if not holds and wanted.contrary is not None and self.graph.unfinished is None:
+            contrary = self.check(Property(wanted.key, wanted.contrary), deadline).holds
+        return Result(wanted.key, holds, vacuous, immediate and not valid, valid, contrary)
 
     def lasso(self, refuted: Property) -> Lasso | None:
         """A run of the agent itself on which the property fails."""

@@ -73,6 +73,8 @@ def _claims(job: Job, setup: Setup, made: Instantiation) -> str:
                 "properties": {p.key: entry(p) for p in claim.properties},
                 **({"not covered": claim.not_covered} if claim.not_covered else {}),
                 **({"settled by the scenario": list(claim.settled)} if claim.settled else {}),
+                **({"taken for granted": list(claim.granted)} if claim.granted else {}),
+                **({"left to": {left.forbidden: left.extra for left in claim.left}} if claim.left else {}),
             }
             for claim in made.claims
         },

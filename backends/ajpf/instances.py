@@ -1,8 +1,5 @@
-"""A guarantee as properties: one instance for each value of its index variables, ``[] (H -> <> C)`` each.
-
-H and C are the guarantee's antecedent and consequent, mapped. Where the consequent speaks of inputs too, these belong
-to the moment of the trigger and move to H. Alternatives in H give a property each, each with a vacuity of its own.
-"""
+"""A guarantee as properties: one instance for each value of its index variables, read as `avow.backends.ajpf.reading`
+says."""
 
 from __future__ import annotations
 
@@ -14,19 +11,19 @@ from itertools import product
 from avow.backend import Job
 from avow.backends.ajpf import psl
 from avow.backends.ajpf.checker import Property
-from avow.backends.ajpf.mapping import Mapped, Mapper, NotCovered, Unit, clauses, substituted, to_formula
+from avow.backends.ajpf.mapping import Mapper, NotCovered, substituted
 from avow.backends.ajpf.options import Extra, Setup, is_index
 from avow.backends.ajpf.psl import Always, Eventually, Formula, Implies
 from avow.backends.ajpf.psl_parser import instantiate
+from avow.backends.ajpf.reading import Left, read_properties
 from avow.backends.ajpf.scenario import Decider, range_of
-from avow.backends.ajpf.shape import MAX_DEPTH, TooComplex, free, shape
+from avow.backends.ajpf.shape import MAX_DEPTH, TooComplex, free
 from avow.diagnostics import Diagnostic, Severity, Span
 from avow.language.contract import Clause
-from avow.language.terms import FALSE, TRUE, And, Quantified, Quantifier, Term, Variable
+from avow.language.terms import TRUE, And, Quantified, Quantifier, Term, Variable
 from avow.language.terms import Implies as RclImplies
 from avow.logic.traversal import depth
 
-MAX_ALTERNATIVES = 8
 MAX_PROPERTIES = 5_000
 
 
@@ -41,7 +38,11 @@ class Claim:
     indices: tuple[str, ...] = ()
     """Index variables with their ranges, in words."""
     settled: tuple[str, ...] = ()
-    """Instances that the scenario alone settles, in words."""
+    """Instances that the scenario and the table alone settle, in words."""
+    granted: tuple[str, ...] = ()
+    """Rows that are true, or false, of every agent."""
+    left: tuple[Left, ...] = ()
+    """What it forbids, where a property of the plan stands for that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,21 +90,24 @@ def diagnose(setup: Setup, made: Instantiation) -> Iterator[Diagnostic]:
 
 def _claim(clause: Clause, mapper: Mapper, setup: Setup, keys: set[str]) -> Claim:
     try:
-        return _instantiate(clause, mapper, keys)
+        stand_ins = [e for e in setup.extras if e.guarantee == clause.name and e.counts and e.forbids is not None]
+        return _instantiate(clause, mapper, stand_ins, keys)
     except NotCovered as error:
         return Claim(clause.name, not_covered=error.reason, span=error.span or clause.span)
     except (TooComplex, RecursionError):
         return Claim(clause.name, not_covered="the formula is too complex to map", span=clause.span)
 
 
-def _instantiate(clause: Clause, mapper: Mapper, keys: set[str]) -> Claim:
+def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], keys: set[str]) -> Claim:
     if depth(clause.formula) > MAX_DEPTH:
         raise TooComplex
     found: dict[Formula, Property] = {}
     about: dict[Formula, list[str]] = {}
     ranges: dict[str, str] = {}
     settled: list[str] = []
+    left: dict[Left, None] = {}
     mapper.expanded.clear()
+    mapper.granted.clear()
     for variables, antecedent, consequent in _implications(clause.formula):
         used = [v for v in variables if is_index(v.sort) and v.name in free(antecedent) | free(consequent)]
         others = tuple(v for v in variables if not is_index(v.sort))
@@ -118,31 +122,34 @@ def _instantiate(clause: Clause, mapper: Mapper, keys: set[str]) -> Claim:
             values_now = dict(zip(used, choice, strict=True))
             said = ", ".join(f"{v.name} = {n}" for v, n in values_now.items())
             made = list(
-                _properties(substituted(antecedent, values_now), substituted(consequent, values_now), others, mapper)
-            )
-            for trigger, goal in made:
-                if trigger == psl.FALSE:
-                    settled.append(f"{said or 'the guarantee'}: the scenario rules the trigger out")
-                    continue
-                formula = (
-                    Always(Implies(trigger, Eventually(goal))) if goal != psl.FALSE else Always(psl.negation(trigger))
+                read_properties(
+                    substituted(antecedent, values_now), substituted(consequent, values_now), others, mapper, stand_ins
                 )
-                if formula not in found:
-                    found[formula] = Property("", formula, trigger, goal if goal != psl.FALSE else None)
-                    about[formula] = []
+            )
+            for item in made:
+                if isinstance(item, Left):
+                    left[item] = None
+                    continue
+                if item.trigger == psl.FALSE:
+                    settled.append(f"{said or 'the guarantee'}: the scenario and the table rule the trigger out")
+                    continue
+                formula = item.formula
+                found.setdefault(formula, item)
+                about.setdefault(formula, [])
                 if said and said not in about[formula]:
                     about[formula].append(said)
                 if len(found) > MAX_PROPERTIES:
                     raise NotCovered(f"more than {MAX_PROPERTIES} instances", clause.span)
             if not made:
-                settled.append(f"{said or 'the guarantee'}: the scenario alone makes it true")
+                settled.append(f"{said or 'the guarantee'}: the scenario and the table alone make it true")
     properties = tuple(
         replace(p, key=_key(clause.name, about[f], keys), about=_merged(about[f])) for f, p in found.items()
     )
     for name, numbers in mapper.expanded.items():
         ranges.setdefault(name, _span(numbers))
     indices = tuple(f"{name} in {values}" for name, values in ranges.items())
-    return Claim(clause.name, properties, None, clause.span, indices, tuple(settled))
+    granted = tuple(sorted(mapper.granted))
+    return Claim(clause.name, properties, None, clause.span, indices, tuple(settled), granted, tuple(left))
 
 
 def _implications(term: Term) -> Iterator[tuple[tuple[Variable, ...], Term, Term]]:
@@ -159,62 +166,6 @@ def _implications(term: Term) -> Iterator[tuple[tuple[Variable, ...], Term, Term
                 yield variables, left if more == TRUE else And((left, more)), final
         case _:
             yield (), TRUE, term
-
-
-def _properties(
-    antecedent: Term, consequent: Term, others: tuple[Variable, ...], mapper: Mapper
-) -> Iterator[tuple[Formula, Formula]]:
-    """Trigger and goal of each property; nothing where the consequent is true anyway."""
-    left, right = shape(antecedent), shape(consequent)
-    if left == FALSE:
-        yield psl.FALSE, psl.TRUE
-        return
-    shared = sorted({v.name for v in others} & free(right))
-    if shared:
-        raise NotCovered(f"{shared[0]} joins what triggers the guarantee and what it demands", consequent.span)
-    bound = tuple(v for v in others if v.name in free(left))
-    trigger = mapper.map(shape(Quantified(Quantifier.EXISTS, bound, left)) if bound else left)
-    for inputs, outputs in _parted(mapper.map(right)):
-        condition = psl.conjunction([to_formula(trigger), *(psl.negation(u.formula) for u in inputs)])
-        for alternative in _alternatives(condition):
-            yield alternative, outputs
-
-
-def _parted(goal: Mapped) -> list[tuple[tuple[Unit, ...], Formula]]:
-    """Clauses of the consequent, grouped by the input parts that they offer as a way out."""
-    if not any(not unit.output for unit in _units(goal)):
-        formula = to_formula(goal)
-        return [] if formula == psl.TRUE else [((), formula)]
-    groups: dict[tuple[Unit, ...], list[Formula]] = {}
-    for clause in clauses(goal):
-        inputs = tuple(u for u in clause if not u.output)
-        outputs = psl.disjunction([u.formula for u in clause if u.output])
-        if outputs != psl.TRUE:
-            groups.setdefault(inputs, []).append(outputs)
-    return [(inputs, psl.conjunction(outputs)) for inputs, outputs in groups.items()]
-
-
-def _units(mapped: Mapped) -> Iterator[Unit]:
-    if isinstance(mapped, Unit):
-        yield mapped
-    else:
-        for item in mapped.items:
-            yield from _units(item)
-
-
-def _alternatives(trigger: Formula) -> Sequence[Formula]:
-    """The disjuncts of a trigger, unless they are many."""
-    if isinstance(trigger, psl.Or):
-        return trigger.items if len(trigger.items) <= MAX_ALTERNATIVES else [trigger]
-    if not isinstance(trigger, psl.And):
-        return [trigger]
-    rows: list[list[Formula]] = [[]]
-    for item in trigger.items:
-        choices = item.items if isinstance(item, psl.Or) else (item,)
-        rows = [[*row, choice] for row in rows for choice in choices]
-        if len(rows) > MAX_ALTERNATIVES:
-            return [trigger]
-    return [psl.conjunction(row) for row in rows]
 
 
 def _extra(extra: Extra, keys: set[str]) -> tuple[Property, ...]:

@@ -7,17 +7,18 @@ what the scenario does not decide, is reported, never dropped.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from avow.backends.ajpf import psl
 from avow.backends.ajpf.matching import Binding, choose, match
 from avow.backends.ajpf.psl import Formula
 from avow.backends.ajpf.psl_parser import Malformed, instantiate
 from avow.backends.ajpf.shape import conjunction, conjuncts, disjunction, free, shape
+from avow.backends.ajpf.tautology import constant
 from avow.diagnostics import Span
 from avow.language.printer import show_term
 from avow.language.sorts import IntegerSort, NaturalSort
-from avow.language.terms import And, Literal, Not, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import TRUE, And, Literal, Not, Or, Quantified, Quantifier, Role, Term, Variable
 from avow.logic.formula import substitute
 from avow.logic.traversal import subterms
 
@@ -53,6 +54,10 @@ class Unit:
 
     formula: Formula
     output: bool
+    forbids: bool = False
+    """It says only what an output must *not* be: "eventually not" would be met by an agent that does just that."""
+    term: Term = field(default=TRUE, compare=False)
+    """What was covered, without its negation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +89,9 @@ class Mapper:
     """The texts of the rows that covered something."""
     expanded: dict[str, tuple[int, ...]] = field(default_factory=dict)
     """Index variables quantified within formulas, and the finite ranges that they were given."""
+    granted: set[str] = field(default_factory=set)
+    """Rows that covered something with a formula that is true (or false) of every agent."""
+    constants: dict[Formula, bool | None] = field(default_factory=dict)
     words: dict[Formula, str] = field(default_factory=dict)
     """Formula of the agent → what it stands for, as covered in the contract: for counterexamples."""
 
@@ -116,7 +124,8 @@ class Mapper:
                     break
                 binding, places = taken
                 covered = tuple(rest[p] for p in places)
-                found.append((self._unit(row, binding, covered), covered))
+                whole = conjunction(list(covered)) if is_and else disjunction(list(covered))
+                found.append((self._unit(row, binding, whole), covered))
                 rest = [t for p, t in enumerate(rest) if p not in places]
         return found + [(self.map(item), (item,)) for item in rest]
 
@@ -132,7 +141,7 @@ class Mapper:
         for row in self.rows:
             binding = next(match(row.pattern, term, row.variables, {}), None)
             if binding is not None:
-                return self._unit(row, binding, (term,))
+                return self._unit(row, binding, term)
         return None
 
     def _at_once(self, term: Term) -> Mapped | None:
@@ -196,7 +205,7 @@ class Mapper:
                 )
         return _join(True, [m for m, _ in made])
 
-    def _unit(self, row: Row, binding: Binding, covered: tuple[Term, ...]) -> Mapped:
+    def _unit(self, row: Row, binding: Binding, term: Term) -> Mapped:
         self.used.add(row.text)
         values = {
             name: value.value
@@ -207,12 +216,20 @@ class Mapper:
             formula = instantiate(row.formula, values)
         except Malformed as error:
             raise NotCovered(f"the row “{row.text}” cannot be used here: {error.reason}", row.span) from None
-        if isinstance(formula, psl.Truth):
-            return YES if formula.value else NO
+        truth = self._constant(formula)
+        if truth is not None:
+            self.granted.add(row.text)
+            return YES if truth else NO
         said = row.say(values)
         if self.words.setdefault(formula, said) != said:  # the row forgets an index: one formula for several
             self.words[formula] = row.say({})
-        return Unit(formula, any(_has_output(c) for c in covered))
+        body = term.body if isinstance(term, Not) else term
+        return Unit(formula, _has_output(term), _only_forbids(term), body)
+
+    def _constant(self, formula: Formula) -> bool | None:
+        if formula not in self.constants:
+            self.constants[formula] = None if psl.is_temporal(formula) else constant(formula)
+        return self.constants[formula]
 
 
 def _used(term: Quantified, items: Sequence[Term]) -> tuple[Variable, ...]:
@@ -226,6 +243,19 @@ def _items(pattern: Term) -> tuple[Term, ...]:
 
 def _has_output(term: Term) -> bool:
     return any(isinstance(t, Variable) and t.role is Role.OUTPUT for t in subterms(term))
+
+
+def _only_forbids(term: Term) -> bool:
+    """Of a formula in normal form: whether all that it says of outputs is what they are not."""
+    match term:
+        case Not(body=body):
+            return _has_output(body)
+        case And(items=items) | Or(items=items):
+            return _has_output(term) and all(_only_forbids(item) for item in items if _has_output(item))
+        case Quantified(body=body):
+            return _only_forbids(body)
+        case _:
+            return False
 
 
 def _first_span(term: Term) -> Span | None:
@@ -247,7 +277,7 @@ def _join(all_: bool, items: Sequence[Mapped]) -> Mapped:
 
 def _negated(mapped: Mapped) -> Mapped:
     if isinstance(mapped, Unit):
-        return Unit(psl.negation(mapped.formula), mapped.output)
+        return replace(mapped, formula=psl.negation(mapped.formula), forbids=mapped.output and not mapped.forbids)
     return _join(not mapped.all, [_negated(item) for item in mapped.items])
 
 

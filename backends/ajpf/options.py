@@ -24,7 +24,7 @@ from avow.backends.ajpf.syntax import Program
 from avow.diagnostics import Diagnostic, Rejected, Span
 from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
-from avow.language.terms import Quantified
+from avow.language.terms import Not, Quantified, Term
 from avow.logic.traversal import subterms
 from avow.system.paths import inside
 
@@ -51,6 +51,8 @@ class Extra:
     indices: Mapping[str, tuple[int, ...]]
     """Index variables that it is instantiated over, with their ranges."""
     span: Span
+    forbids: Term | None = None
+    """It stands for what the guarantee forbids by this formula (in normal form), which "eventually" cannot say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +224,7 @@ class _Reader:
         rows = []
         for text, target in self.options.get("predicates", {}).items():
             span = self.job.method.options.at("predicates", text)
-            pattern = self.pattern(text, span, sorts)
+            pattern = self.pattern(text, sorts, "predicates", text)
             formula = self.psl(target, program, "predicates", text)
             if pattern is None or formula is None:
                 continue
@@ -235,7 +237,8 @@ class _Reader:
             rows.append(Row(text, made, names, formula, span))
         return tuple(rows)
 
-    def pattern(self, text: str, span: Span, sorts: Mapping[str, Sort]) -> Any:
+    def pattern(self, text: str, sorts: Mapping[str, Sort], *path: str) -> tuple[Term, frozenset[str]] | None:
+        span = self.job.method.options.at(*path)
         bound = {name for binder in _BINDER.findall(text) for name in _NAME.findall(binder)}
         free_sorts = {name: sort for name, sort in sorts.items() if name not in bound}
         try:
@@ -244,7 +247,7 @@ class _Reader:
             self.faults.extend(error.diagnostics)
             return None
         except TooComplex:
-            self.fault("AJPF123", "the pattern is too complex", "predicates", text)
+            self.fault("AJPF123", "the pattern is too complex", *path)
             return None
         return term, free(term)
 
@@ -287,7 +290,16 @@ class _Reader:
                 continue
             span = self.job.method.options.at("properties", name)
             counts = guarantee is not None and data.get("counts", True)
-            found.append(Extra(name, formula, guarantee, counts, data.get("because", ""), indices, span))
+            forbids = None
+            if "forbids" in data:
+                if not counts:
+                    message = f"properties.{name}: what says what a guarantee forbids must count for one"
+                    self.fault("AJPF125", message, "properties", name, "forbids")
+                pattern = self.pattern(data["forbids"], self.sorts(), "properties", name, "forbids")
+                if pattern is None:
+                    continue
+                forbids = pattern[0].body if isinstance(pattern[0], Not) else pattern[0]
+            found.append(Extra(name, formula, guarantee, counts, data.get("because", ""), indices, span, forbids))
         return tuple(found)
 
 

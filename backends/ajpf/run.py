@@ -63,6 +63,7 @@ class _Run:
     def __init__(self, setup: Setup, made: Instantiation, folder: Path, limits: Limits) -> None:
         self.setup = setup
         self.made = made
+        self.wording = Wording(setup.rows, made.words, setup.instances)
         self.folder = folder
         self.limits = limits
         self.deadline = time.monotonic() + limits.seconds
@@ -123,12 +124,26 @@ class _Run:
         unfinished = checker.graph.unfinished
         if result.holds and unfinished is not None:
             return Settled(Verdict.UNKNOWN, f"not refuted, but the state space is unfinished: {unfinished}")
-        verdict = Verdict.CHECKED if result.holds else Verdict.REFUTED
-        return Settled(verdict, "", result.vacuous, result.immediate)
+        refutes = p.forbidden is None or result.contrary
+        answer = Verdict.CHECKED if result.holds else Verdict.REFUTED
+        verdict, reason = self.judged(p, answer, refutes)
+        return Settled(verdict, reason, answer, result.vacuous, result.immediate, result.valid, refutes)
+
+    def judged(self, p: Property, verdict: Verdict, refutes: bool) -> tuple[Verdict, str]:
+        """What an answer for a property says of its guarantee. What is forbidden after the trigger may come in some
+        runs for another, later reason: only if it comes in every run, as if demanded, is it the answer to the trigger.
+        """
+        if verdict is not Verdict.REFUTED or refutes or p.forbidden is None:
+            return verdict, ""
+        banned = self.wording.say(p.forbidden)
+        reason = (
+            f"what is forbidden ({banned}) comes later in some runs, and may then have another reason: "
+            "say when it must not come by a property of the plan that `forbids` it"
+        )
+        return Verdict.UNKNOWN, reason
 
     def explain(self, checker: Checker) -> None:
         """A run for the first refuted property of each guarantee, and of each further property."""
-        wording = Wording(self.setup.rows, self.made.words, self.setup.instances)
         groups = [claim.properties for claim in self.made.claims] + [ps for _, ps in self.made.extras]
         for group in groups:
             refuted = next((p for p in group if self.results[p.key].verdict is Verdict.REFUTED), None)
@@ -138,7 +153,7 @@ class _Run:
             if lasso is None:  # the reduced and the whole graph disagree: never to happen, never to be passed over
                 self.results[refuted.key] = Settled(Verdict.ERROR, "the checker contradicts itself")
                 continue
-            found = explain(checker.graph, lasso, refuted, wording)
+            found = explain(checker.graph, lasso, refuted, self.wording)
             self.counterexamples[refuted.key] = found
             self.logs[f"{refuted.key}.trace.txt"] = _trace(found)
 
@@ -166,10 +181,10 @@ class _Run:
         """Note another engine's answer; a contradiction is an error, never a vote."""
         result = self.results[key]
         opinions = {**result.opinions, name: str(said)}
-        other = _SAID[said]
+        own, other = result.answer, _SAID[said]
         decided = (Verdict.CHECKED, Verdict.REFUTED)
-        if result.verdict in decided and other in decided and result.verdict is not other:
-            reason = f"{ENGINE} says {result.verdict}, {name} says {said}"
+        if own in decided and other in decided and own is not other:
+            reason = f"{ENGINE} says {own}, {name} says {said}"
             self.results[key] = replace(result, verdict=Verdict.ERROR, reason=reason, opinions=opinions)
         else:
             self.results[key] = replace(result, opinions=opinions)
@@ -197,9 +212,10 @@ class _Run:
                 self.logs[f"{p.key}.ajpf.txt"] = answer.log
             if instead:
                 own = self.results[p.key]
-                self.results[p.key] = Settled(_SAID[answer.said], answer.reason, own.vacuous, own.immediate)
-                if own.verdict in (Verdict.CHECKED, Verdict.REFUTED):
-                    self.results[p.key] = replace(self.results[p.key], opinions={ENGINE: str(own.verdict)})
+                verdict, reason = self.judged(p, _SAID[answer.said], own.refutes and own.answer is not None)
+                opinions = {} if own.answer is None else {ENGINE: str(own.answer)}
+                result = replace(own, verdict=verdict, reason=reason or answer.reason, opinions=opinions)
+                self.results[p.key] = result
             else:
                 self.second(p.key, "AJPF", answer.said)
 

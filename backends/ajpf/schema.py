@@ -50,6 +50,10 @@ SCHEMA: dict[str, Any] = {
                             "guarantee": {**_TEXT, "description": "whose verdict it belongs to"},
                             "counts": {"type": "boolean", "description": "false: listed only; default true"},
                             "instances": {**_RANGES, "description": "narrower ranges than the method's"},
+                            "forbids": {
+                                **_TEXT,
+                                "description": "RCL pattern: what the guarantee forbids; this says when",
+                            },
                             "because": _TEXT,
                         },
                         "required": ["psl"],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from avow.backends.ajpf import psl
@@ -19,8 +19,14 @@ class Settled:
 
     verdict: Verdict
     reason: str = ""
+    answer: Verdict | None = None
+    """Whether the property as written holds (checked) or fails (refuted) of the agent, where that is known."""
     vacuous: bool = False
     immediate: bool = False
+    valid: bool = False
+    """True of every agent, through the table alone."""
+    refutes: bool = True
+    """Whether a run on which the property fails refutes the guarantee: where it does not, that makes an unknown."""
     opinions: Mapping[str, str] = field(default_factory=dict)
     """Other engines' answers: ``{"Spin 6.5.2": "holds"}``."""
 
@@ -52,9 +58,14 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
         return Outcome(obligation.id, Verdict.UNKNOWN, summary, details=details, link=Link.MAPPED)
     counted = [*claim.properties, *(p for e, ps in attached if e.counts for p in ps)]
     verdict = _worst(frame.results[p.key].verdict for p in counted)
-    own = [p for p in claim.properties if p.trigger is not None]
-    vacuous = [p for p in own if frame.results[p.key].vacuous]
+    stand_ins = [p for e, ps in attached for p in ps if e.name in [left.extra for left in claim.left]]
+    own = [*claim.properties, *stand_ins]
+    hollow = [p for p in own if frame.results[p.key].vacuous or frame.results[p.key].valid]
     details["properties"] = [_entry(p, frame.results[p.key]) for p in claim.properties]
+    if claim.granted:
+        details["taken_for_granted"] = list(claim.granted)
+    if claim.left:
+        details["left_to_properties"] = {left.forbidden: left.extra for left in claim.left}
     if claim.settled:
         details["settled_by_the_scenario"] = list(claim.settled)
     if attached:
@@ -70,13 +81,13 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
     return Outcome(
         obligation.id,
         verdict,
-        _summary(claim, counted, vacuous, attached, verdict, frame),
+        _summary(claim, counted, own, attached, verdict, frame),
         counterexample,
         hypotheses,
         {**frame.bound, "properties": len(counted), "indices": list(claim.indices)},
         details,
         Link.MAPPED,
-        vacuous=verdict is Verdict.CHECKED and len(vacuous) == len(own),
+        vacuous=verdict is Verdict.CHECKED and len(hollow) == len(own),
     )
 
 
@@ -91,7 +102,7 @@ def _worst(verdicts: Iterable[Verdict]) -> Verdict:
 def _summary(
     claim: Claim,
     counted: Sequence[Property],
-    vacuous: Sequence[Property],
+    own: Sequence[Property],
     attached: Sequence[tuple[Extra, Sequence[Property]]],
     verdict: Verdict,
     frame: Frame,
@@ -100,7 +111,8 @@ def _summary(
     by_verdict = {v: [p for p in counted if results[p.key].verdict is v] for v in (*_ORDER, Verdict.CHECKED)}
     parts = []
     if not counted:
-        parts.append("nothing to check: the plan's scenario alone settles every instance")
+        who = "the scenario and the table settle" if claim.granted else "the plan's scenario alone settles"
+        parts.append(f"nothing to check: {who} every instance")
     elif verdict is Verdict.CHECKED:
         parts.append(f"{_count(counted)} {'holds' if len(counted) == 1 else 'hold'} in every reachable state")
     elif verdict is Verdict.REFUTED:
@@ -109,12 +121,13 @@ def _summary(
     else:
         failing = by_verdict[verdict]
         parts.append(f"{_some(failing, counted)}: {verdict}: {results[failing[0].key].reason}")
-    if vacuous:
-        every = len(vacuous) == len([p for p in claim.properties if p.trigger is not None])
-        if every:
-            parts.append("but no trigger is ever met, so that nothing is shown")
-        else:
-            parts.append(f"the trigger{_which(vacuous)} is never met, so that nothing is shown there")
+    parts += _nothing_shown(own, results)
+    for name in dict.fromkeys(left.extra for left in claim.left):
+        forbidden = [left.forbidden for left in claim.left if left.extra == name]
+        shown = f"{'; '.join(forbidden[:2])}{' …' if len(forbidden) > 2 else ''}"
+        parts.append(f"when {shown} must not be is left to '{name}'")
+    if claim.granted:
+        parts.append(f"the table takes for granted: {', '.join(f'“{text}”' for text in claim.granted)}")
     at_once = [p for p in claim.properties if results[p.key].immediate and results[p.key].verdict is Verdict.CHECKED]
     if at_once:
         parts.append(f"{len(at_once)} hold{'s' if len(at_once) == 1 else ''} at once, the goal coming with the trigger")
@@ -129,6 +142,21 @@ def _summary(
     if isinstance(states, int):
         parts[-1] += f", {states} states"
     return "; ".join(parts)
+
+
+def _nothing_shown(own: Sequence[Property], results: Mapping[str, Settled]) -> Iterator[str]:
+    """Triggers that are never met, and tautologies."""
+    valid = [p for p in own if results[p.key].valid]
+    unmet = [p for p in own if results[p.key].vacuous and not results[p.key].valid]
+    every = len(valid) + len(unmet) == len(own)
+    if unmet and every and not valid:
+        yield "but no trigger is ever met, so that nothing is shown"
+    elif unmet:
+        yield f"the trigger{_which(unmet)} is never met, so that nothing is shown there"
+    if valid and every:
+        yield "but the table makes it a tautology, true of every agent, so that nothing is shown"
+    elif valid:
+        yield f"the table makes a tautology of the property{_which(valid)}, so that nothing is shown there"
 
 
 def _count(properties: Sequence[Property]) -> str:
@@ -174,6 +202,8 @@ def _entry(p: Property, result: Settled) -> dict[str, object]:
         entry["vacuous"] = result.vacuous
     if result.immediate:
         entry["immediate"] = True
+    if result.valid:
+        entry["tautology"] = True
     if result.reason:
         entry["reason"] = result.reason
     if result.opinions:

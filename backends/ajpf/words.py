@@ -100,6 +100,10 @@ def _because(graph: Graph, visited: Sequence[State], places: Sequence[int], refu
     trigger, goal = refuted.trigger, refuted.goal
     if trigger is None:
         return "the property fails on this run"
+    if refuted.forbidden is not None:
+        at, came = _banned(graph, visited, places, trigger, refuted.forbidden)
+        when = "demanded whatever happens" if trigger == psl.TRUE else f"in step {at}: {wording.say(trigger)}"
+        return f"{when}; what is then forbidden comes in step {came}: {wording.say(refuted.forbidden)}"
     if goal is None:
         return f"in step {_first(graph, visited, places, trigger, None)}: {wording.say(trigger)}; this must never be"
     if trigger == psl.TRUE:
@@ -120,6 +124,19 @@ def _first(
     last = max((at for at, label in enumerate(labels) if reached is not None and reached(label)), default=-1)
     found = next((at for at, label in enumerate(labels) if at > last and meant(label)), None)
     return "?" if found is None else str(places[found])
+
+
+def _banned(
+    graph: Graph, visited: Sequence[State], places: Sequence[int], trigger: Formula, forbidden: Formula
+) -> tuple[str, str]:
+    """The first step in which the trigger holds, and the first from there on in which what is forbidden comes."""
+    atoms = tuple(dict.fromkeys((*psl.atoms(trigger), *psl.atoms(forbidden))))
+    numbers = {atom: at for at, atom in enumerate(atoms)}
+    labels = label_states(graph.agent, visited, atoms)
+    meant, banned = compiled(trigger, numbers), compiled(forbidden, numbers)
+    first = next((at for at, label in enumerate(labels) if meant(label)), None)
+    came = next((at for at, label in enumerate(labels) if first is not None and at >= first and banned(label)), None)
+    return ("?" if first is None else str(places[first])), ("?" if came is None else str(places[came]))
 
 
 def _contract_cells(graph: Graph, visited: Sequence[State], wording: Wording) -> list[Step]:

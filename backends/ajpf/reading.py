@@ -1,0 +1,133 @@
+"""How an implication of the contract is read in time: what is demanded as ``[] (H -> <> C)``, what is forbidden as
+``[] (H -> [] ~C)``.
+
+H and C are the antecedent and the consequent, mapped. Where the consequent speaks of inputs too, these belong
+to the moment of the trigger and move to H. Alternatives in H give a property each, each with a vacuity of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from avow.backends.ajpf import psl
+from avow.backends.ajpf.checker import Property
+from avow.backends.ajpf.mapping import Mapped, Mapper, NotCovered, Unit, clauses, to_formula
+from avow.backends.ajpf.matching import match
+from avow.backends.ajpf.options import Extra
+from avow.backends.ajpf.psl import Always, Eventually, Formula, Implies
+from avow.backends.ajpf.shape import free, shape
+from avow.language.printer import show_term
+from avow.language.terms import FALSE, Quantified, Quantifier, Term, Variable
+
+MAX_ALTERNATIVES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """What the guarantee forbids, in the contract's words, and the plan's property that stands for it."""
+
+    forbidden: str
+    extra: str
+
+
+def read_properties(
+    antecedent: Term, consequent: Term, others: tuple[Variable, ...], mapper: Mapper, stand_ins: Sequence[Extra]
+) -> Iterator[Property | Left]:
+    """The properties, without keys; nothing where the consequent is true anyway."""
+    left, right = shape(antecedent), shape(consequent)
+    if left == FALSE:
+        yield _eventually(psl.FALSE, psl.TRUE)
+        return
+    shared = sorted({v.name for v in others} & free(right))
+    if shared:
+        raise NotCovered(f"{shared[0]} joins what triggers the guarantee and what it demands", consequent.span)
+    bound = tuple(v for v in others if v.name in free(left))
+    trigger = mapper.map(shape(Quantified(Quantifier.EXISTS, bound, left)) if bound else left)
+    demands, bans = _parted(mapper.map(right))
+    condition = to_formula(trigger)
+    for inputs, demanded in demands:
+        for alternative in _alternatives(_when(condition, inputs)):
+            yield _eventually(alternative, demanded)
+    for inputs, units in bans:
+        kept = psl.disjunction([u.formula for u in units])
+        if kept == psl.TRUE:
+            continue
+        stand_in = _stand_in(units, stand_ins)
+        if stand_in is not None:
+            yield stand_in
+            continue
+        for alternative in _alternatives(_when(condition, inputs)):
+            yield _never(alternative, kept)
+
+
+def _when(condition: Formula, inputs: Sequence[Unit]) -> Formula:
+    return psl.conjunction([condition, *(psl.negation(u.formula) for u in inputs)])
+
+
+def _eventually(trigger: Formula, goal: Formula) -> Property:
+    if goal == psl.FALSE:
+        return Property("", Always(psl.negation(trigger)), trigger)
+    return Property("", Always(Implies(trigger, Eventually(goal))), trigger, goal)
+
+
+def _never(trigger: Formula, kept: Formula) -> Property:
+    """What a guarantee forbids must not come from the trigger on. ("Eventually not" would ask next to nothing: the
+    agent could do what is forbidden, and something else before or afterwards.)"""
+    return Property("", Always(Implies(trigger, Always(kept))), trigger, forbidden=psl.negation(kept))
+
+
+def _stand_in(units: Sequence[Unit], extras: Sequence[Extra]) -> Left | None:
+    """The property of the plan that says when all that the clause forbids must not be."""
+    banned = [u.term for u in units if u.forbids]
+    for extra in extras:
+        assert extra.forbids is not None
+        pattern, names = extra.forbids, free(extra.forbids)
+        if len(banned) == len(units) and all(any(True for _ in match(pattern, t, names, {})) for t in banned):
+            return Left(" and ".join(map(show_term, banned)), extra.name)
+    return None
+
+
+_Clause = tuple[Unit, ...]
+
+
+def _parted(goal: Mapped) -> tuple[list[tuple[_Clause, Formula]], list[tuple[_Clause, _Clause]]]:
+    """What the consequent demands, grouped by the input parts that it offers as a way out; and what it forbids: clauses
+    with such ways out, and what must be kept."""
+    if all(unit.output and not unit.forbids for unit in _units(goal)):
+        formula = to_formula(goal)
+        return ([] if formula == psl.TRUE else [((), formula)]), []
+    demands: dict[_Clause, list[Formula]] = {}
+    bans: dict[tuple[_Clause, _Clause], None] = {}
+    for clause in clauses(goal):
+        inputs = tuple(u for u in clause if not u.output)
+        outputs = tuple(u for u in clause if u.output)
+        formula = psl.disjunction([u.formula for u in outputs])
+        if any(u.forbids for u in outputs):
+            bans[inputs, outputs] = None
+        elif formula != psl.TRUE:
+            demands.setdefault(inputs, []).append(formula)
+    return [(inputs, psl.conjunction(outputs)) for inputs, outputs in demands.items()], list(bans)
+
+
+def _units(mapped: Mapped) -> Iterator[Unit]:
+    if isinstance(mapped, Unit):
+        yield mapped
+    else:
+        for item in mapped.items:
+            yield from _units(item)
+
+
+def _alternatives(trigger: Formula) -> Sequence[Formula]:
+    """The disjuncts of a trigger, unless they are many."""
+    if isinstance(trigger, psl.Or):
+        return trigger.items if len(trigger.items) <= MAX_ALTERNATIVES else [trigger]
+    if not isinstance(trigger, psl.And):
+        return [trigger]
+    rows: list[list[Formula]] = [[]]
+    for item in trigger.items:
+        choices = item.items if isinstance(item, psl.Or) else (item,)
+        rows = [[*row, choice] for row in rows for choice in choices]
+        if len(rows) > MAX_ALTERNATIVES:
+            return [trigger]
+    return [psl.conjunction(row) for row in rows]
