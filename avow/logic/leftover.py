@@ -40,7 +40,8 @@ from avow.language.terms import (
 )
 from avow.logic import values
 from avow.logic.clausal import Part
-from avow.logic.evaluate import Code, Compiler, Env, NotEvaluable
+from avow.logic.compiler import Code, Compiler, Env, NotEvaluable
+from avow.logic.linear_search import linear_step
 from avow.logic.values import Data, FunctionValue
 
 _LIMIT = 2_000
@@ -51,8 +52,6 @@ def leftover_steps(
     compiler: Compiler, parts: Sequence[Part], variables: Sequence[Variable], *, unique: bool
 ) -> list[Callable[[Env], Iterable[object]]]:
     """A step for each variable; one that cannot be treated raises NotEvaluable when (and if) it is reached."""
-    from avow.logic.linear_search import linear_step  # inner quantifiers are searches again
-
     steps: list[Callable[[Env], Iterable[object]]] = []
     names = {v.name for v in variables}
     for variable in variables:

@@ -26,7 +26,7 @@ from avow.language.terms import (
     Variable,
 )
 from avow.logic.clausal import Part, conjunction
-from avow.logic.evaluate import Code, Compiler, Env, NotEvaluable
+from avow.logic.compiler import Code, Compiler, Env, NotEvaluable
 from avow.logic.linear import Constraint, Linear, TooMany, satisfy
 from avow.logic.renaming import bound_names, has_variables
 
@@ -86,8 +86,6 @@ def _formula(compiler: Compiler, term: Term, positive: bool, unknown: frozenset[
 
 def _for_all(compiler: Compiler, term: Quantified, positive: bool, unknown: frozenset[str]) -> Alternatives | None:
     """No assignment makes the body `positive`: the parts without unknowns say which assignments could."""
-    from avow.logic.saferange import Plan
-
     parts, inner = conjunction(term.body, positive)
     variables = (*term.variables, *inner)
     for variable in variables:
@@ -97,7 +95,7 @@ def _for_all(compiler: Compiler, term: Quantified, positive: bool, unknown: froz
     denial = _any(open_parts)
     if denial is None:
         return None
-    plan = Plan(compiler, known, variables, frozenset(), complete=False)
+    plan = compiler.quantifiers.candidates(compiler, known, variables)
     if any(v.name in p.names and v.name not in plan.bound for v in variables for p in parts):
         return None
 

@@ -18,7 +18,7 @@ from avow.language.terms import (
     Widen,
 )
 from avow.logic import values
-from avow.logic.evaluate import Compiler, Env, NotEvaluable, member_of
+from avow.logic.compiler import Compiler, Env, NotEvaluable, member_of
 from avow.logic.renaming import bound_names
 from avow.logic.values import Data
 

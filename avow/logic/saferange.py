@@ -30,7 +30,7 @@ from avow.language.terms import (
     Widen,
 )
 from avow.logic.clausal import Part, alternatives, branches, conjunction, occurring, relations
-from avow.logic.evaluate import (
+from avow.logic.compiler import (
     ENUMERATION_LIMIT,
     Code,
     Compiler,
@@ -38,6 +38,7 @@ from avow.logic.evaluate import (
     NotEvaluable,
     finite_values,
 )
+from avow.logic.leftover import leftover_steps
 from avow.logic.patterns import pattern, patterns
 from avow.logic.renaming import bound_names
 
@@ -240,8 +241,6 @@ class Plan:
         return min(found, key=lambda s: s.rank, default=None)
 
     def _leftover(self, pending: Sequence[Part], variables: list[Variable], unique: bool) -> None:
-        from avow.logic.leftover import leftover_steps  # it compiles formulas, hence searches, in its turn
-
         truths = [_truth(self._compiler, p) for p in pending]
         for step in leftover_steps(self._compiler, pending, variables, unique=unique):
             self._steps.append(step)
