@@ -219,7 +219,8 @@ def _by_claim(rows: Sequence[Row]) -> list[tuple[Row, list[Row]]]:
 
 def render_index(cases: Sequence[Case]) -> str:
     """The page over all systems."""
-    rows = [(case, wording.verdict_line(case), _tones(case), trend(case)) for case in cases]
+    ranked = sorted(cases, key=lambda case: case.good)  # who opens the index wants to know what fails
+    rows = [(case, wording.verdict_line(case), _tones(case), trend(case)) for case in ranked]
     return (
         environment()
         .get_template("index.html.j2")

@@ -1,0 +1,227 @@
+"""What an assessor asks of a report: is anything said more strongly than it is, does anything keep silent, and do the
+formats count alike? Each of these was wrong once."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections import Counter
+from xml.etree import ElementTree
+
+import pytest
+from assurance.sample import case, evidence, guarantee, node_plan, obligation, rover_case, system
+
+from avow.assurance.argument import build_argument
+from avow.assurance.model import Case
+from avow.assurance.remarks import REMARK
+from avow.evidence.obligation import Kind
+from avow.report import formats, picture, wording
+from avow.report.page import asset, render_index
+from avow.report.pdf import _data as pdf_data
+from avow.system.plan import Finding, Requirement
+from avow.verdict import Verdict
+
+G1, G2 = guarantee("agent", "g1"), guarantee("agent", "g2", line=12)
+SUBJECT = system(
+    {"agent": ["g1", "g2"]},
+    plans=[node_plan("agent", "high", "ajpf", "dafny")],
+    requirements=[Requirement("R", "It is safe.", None, None, ("agent.g1", "agent.g2"))],
+)
+
+
+def texts(found: Case) -> dict[str, str]:
+    """The formats that are text, but the PDF's data in place of the PDF."""
+    made = {name: content for name, content in formats(found) if isinstance(content, str)}
+    return made | {"pdf": json.dumps(pdf_data(found))}
+
+
+def test_a_vacuous_pass_is_called_so_in_every_format() -> None:
+    found = case(SUBJECT, [G1, G2], [evidence(G1, method="hoare", vacuous=True), evidence(G2, method="ajpf")])
+    made = texts(found)
+    assert "hoare vacuous" in made["report.md"]
+    assert "hoare proved" not in made["report.md"]
+    assert [row["verdict"] for row in csv.DictReader(io.StringIO(made["traceability.csv"])) if row["method"]] == [
+        "vacuous",
+        "checked",
+    ]
+    assert "hoare: vacuous" in made["pdf"]
+    assert '"hoare: proved"' not in made["pdf"]
+    assert r"hoare: \textit{vacuous}" in made["report.tex"]
+    assert not re.search(r'class="(chip|mini) good"[^>]*>(<span[^>]*>✔</span>)? *proved', made["traceability.html"])
+    body = made["index.html"].split('id="list"')[1].split("</section>")[0]
+    assert "the tool said: proved" in body
+    assert 'class="chip good" title="for all behaviours' not in body
+
+
+def test_a_record_that_claims_more_than_its_method_can_is_told_at_its_worth() -> None:
+    found = case(SUBJECT, [G1, G2], [evidence(G1, Verdict.PROVED, "hypothesis"), evidence(G2, method="ajpf")])
+    made = texts(found)
+    assert "hypothesis tested" in made["report.md"]
+    assert "hypothesis: tested" in made["pdf"]
+    assert "hypothesis: proved" not in made["pdf"]
+
+
+def test_a_method_that_failed_is_an_open_item_though_another_decides() -> None:
+    crash = {"summary": "it does not compile"}
+    records = [
+        evidence(G1, method="ajpf"),
+        evidence(G1, Verdict.ERROR, "dafny", **crash),
+        evidence(G2, Verdict.REFUTED, "ajpf"),
+        evidence(G2, Verdict.ERROR, "dafny", **crash),
+    ]
+    found = case(SUBJECT, [G1, G2], records)
+    (item,) = [i for i in found.open_items if i.kind == "error"]
+    assert not item.advice
+    assert "it does not compile" in item.text
+    assert "agent.g1 is checked by other evidence alone; the same for agent.g2" in item.text
+    kinds = [i.kind for i in found.open_items]
+    assert kinds.index("refuted") < kinds.index("error")
+    assert "it does not compile" in texts(found)["report.md"]
+
+
+def test_causes_stand_worst_first_and_the_contracts_fault_before_the_programs() -> None:
+    contract = obligation("agent", Kind.SANITY, "realizable")
+    records = [
+        evidence(G1, method="ajpf", vacuous=True),
+        evidence(G2, Verdict.REFUTED, "ajpf"),
+        evidence(contract, Verdict.REFUTED, "sanity"),
+    ]
+    found = case(SUBJECT, [G1, G2, contract], records)
+    (told,) = found.requirements
+    assert told.below == (contract.id, G2.id, G1.id)
+    assert told.answer.startswith("Not shown: agent/sanity/realizable is refuted, agent.g2 is refuted")
+
+
+def test_known_bad_material_is_never_attested_as_passed() -> None:
+    """Whoever asks the attestation for PASSED must not get it for a system that is as bad as expected."""
+    expected = Finding("agent/guarantee/g1", "refuted", "known")
+    wanted = SUBJECT.plan.requirements
+    subject = system({"agent": ["g1", "g2"]}, requirements=wanted, expected=[expected], policy="reproduction")
+    found = case(subject, [G1, G2], [evidence(G1, Verdict.REFUTED, "ajpf"), evidence(G2, method="ajpf")])
+    assert found.good
+    assert attested(found) == "WARNED"
+    worse = case(subject, [G1, G2], [evidence(G1, Verdict.REFUTED, "ajpf"), evidence(G2, Verdict.REFUTED, "ajpf")])
+    assert attested(worse) == "FAILED"
+    good = system({"agent": ["g1", "g2"]}, requirements=wanted, policy="reproduction")
+    assert attested(case(good, [G1, G2], [evidence(G1, method="hoare"), evidence(G2, method="hoare")])) == "PASSED"
+
+
+def attested(found: Case) -> str:
+    result = json.loads(texts(found)["attestation.jsonl"].splitlines()[0])["predicate"]["result"]
+    assert isinstance(result, str)
+    return result
+
+
+CONTRACT = """\
+context{ Colour : {red, green}; }
+
+node agent{
+inputs( r : REAL, unused : REAL )
+outputs( c : Colour )
+topics( a/B r matches(in.r), a/B c matches(out.c), a/B unused matches(in.unused) )
+assume( TRUE )
+
+guarantee g1( 0 <= in.r and in.r < 9
+  -> out.c == green )
+}
+"""
+PATH = "contracts/rover/system.rcl"
+
+
+def remarked(plan: str = "system: rover\n") -> Case:
+    target = guarantee("agent", "g1", line=9)
+    return case(
+        SUBJECT, [target], [evidence(target)], sources={PATH: CONTRACT, "contracts/rover/plan.yaml": plan}, digests={}
+    )
+
+
+def test_what_the_language_checker_remarks_is_in_the_report_brackets_first() -> None:
+    found = remarked()
+    told = [i for i in found.open_items if i.kind == REMARK]
+    assert told
+    assert all(i.advice for i in told)
+    assert "another bracketing means something else" in told[0].title
+    assert told[0].claim == "rover/agent/guarantee/g1"
+    assert f"RCL401, {PATH}:9" in told[0].text
+    assert any("unused" in i.title for i in told)
+    made = texts(found)
+    for name in ("report.md", "index.html", "pdf"):
+        assert "another bracketing means something else" in made[name], name
+    assert found.exit_code == remarked("lints_off: [RCL401, RCL402]\n").exit_code  # nothing fails for them
+
+
+def test_what_the_plan_switches_off_is_not_remarked_and_a_broken_plan_hides_nothing() -> None:
+    silent = remarked("system: rover\nlints_off: [RCL401]\n")
+    assert not any("RCL401" in i.text for i in silent.open_items)
+    broken = remarked("lints_off: [RCL401\n\t{")
+    assert any("RCL401" in i.text for i in broken.open_items)
+
+
+def test_tested_says_on_how_many_cases_at_first_sight() -> None:
+    bound = {"cases": 271, "seed": 0}
+    records = [evidence(G1, method="hoare"), evidence(G2, Verdict.TESTED, "hypothesis", bound=bound)]
+    made = texts(case(SUBJECT, [G1, G2], records))
+    answer = made["index.html"].split('id="answer"')[1].split("How to read this")[0]
+    assert "cases 271" in answer
+    assert "It rests on 1 proved, 1 tested." in answer
+    assert "hypothesis tested (cases 271, seed 0)" in made["report.md"]
+
+
+def test_open_items_and_expected_findings_add_up() -> None:
+    found = rover_case()
+    items = [i for i in found.open_items if not i.advice]
+    told = [int(n) for n in re.findall(r"\d+", wording.open_line(found).split(", as it does")[0])]
+    assert told[0] == sum(bool(i.handled) for i in items)
+    assert f"of {len(items) - told[0]} it does not" in wording.open_line(found)
+    assert wording.open_line(case(SUBJECT, [G1], [evidence(G1)])) == ""
+
+
+def test_nothing_that_paper_hides_is_part_of_a_picture() -> None:
+    """Once a rule for the middle of long runs emptied the evidence's circles."""
+    style = asset("style.css").split("@media print{")[1]
+    hidden = {
+        name
+        for selectors in re.findall(r"([^{}]+)\{display:none", style)
+        for selector in selectors.split(",")
+        for name in re.findall(r"^\.([\w-]+)$", selector.strip())
+    }
+    assert hidden  # the rule for filters and the like is there
+    argument = build_argument(rover_case())
+    drawn = picture.draw(argument, argument.root, lambda _: None, "all")
+    assert not hidden & {name for names in re.findall(r'class="([^"]*)"', drawn) for name in names.split()}
+
+
+def test_what_fails_comes_first_in_the_index() -> None:
+    good = case(system({"n": []}, name="aaa", title="Sound"), [], [])
+    bad = rover_case()
+    assert good.good
+    assert not bad.good
+    page = render_index([good, bad])
+    assert page.index(bad.title) < page.index("Sound")
+
+
+@pytest.mark.parametrize("found", [rover_case()], ids=["rover"])
+def test_all_formats_count_alike(found: Case) -> None:
+    made = texts(found)
+    standing = Counter(v.standing.value for v in found.obligations)
+    data = json.loads(made["report.json"])
+    assert Counter(v["standing"] for v in data["obligations"]) == standing
+    assert Counter(re.findall(r'class="ob"[^>]*data-status="([^"]+)"', made["index.html"])) == standing
+    results = json.loads(made["report.sarif"])["runs"][0]["results"]
+    assert Counter(r["properties"]["standing"] for r in results) == standing
+    holding = sum(v.standing.supports for v in found.obligations)
+    assert len(json.loads(made["findings.sarif"])["runs"][0]["results"]) == len(found.obligations) - holding
+    first = json.loads(made["attestation.jsonl"].splitlines()[0])["predicate"]
+    assert len(first["passedTests"]) == holding
+    cases = [
+        t for t in ElementTree.fromstring(made["junit.xml"]).iter("testcase") if ".gates" not in t.attrib["classname"]
+    ]
+    assert len(cases) == len(found.obligations)
+    assert sum(not len(t) for t in cases) == holding
+    items = sum(not i.advice for i in found.open_items)
+    assert f'Open items <span class="n">{items}</span>' in made["index.html"]
+    rows = made["report.md"].split("## Open items")[1].split("\n## ")[0]
+    assert len(re.findall(r"^\| ", rows, re.MULTILINE)) == items + 2  # the head and its line
+    assert len(json.loads(made["pdf"])["open"]) == items
