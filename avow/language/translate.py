@@ -28,14 +28,18 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.styles import StyleName
-from avow.language.terms import Term
+from avow.language.terms import Construct, EnumValue, Term, children
 
 
 def to_rcl(contract: Contract) -> str:
     """The contract as an RCL file, which reads back as the equal contract. Constants are expanded in formulas.
 
-    Raises `Rejected` where a formula so written would be nested too deeply to be read.
+    Raises `Rejected` where a formula so written would be nested too deeply to be read, or where a constant stands for
+    an element whose name is that of a port of the node.
     """
+    hidden = tuple(fault for node in contract.nodes for fault in _hidden_elements(node))
+    if hidden:
+        raise Rejected(*hidden)
     out: list[str] = []
     declarations = list(_declarations(contract))
     if declarations:
@@ -59,6 +63,22 @@ def to_rcl(contract: Contract) -> str:
         message = "with its constants and the sets of its quantifiers written out, the contract is nested too deeply"
         place = contract.nodes[0].span if contract.nodes else None
         raise Rejected(Diagnostic("RCL110", message, place, hint="split the deepest clause")) from rejected
+
+
+def _hidden_elements(node: Node) -> Iterator[Diagnostic]:
+    """Elements that the node's formulas speak of by way of constants only: their own names mean a port here."""
+    ports = {port.name: port for port in (*node.inputs, *node.outputs)}
+    for clause in node.clauses:
+        stack = [clause.formula]
+        while stack:
+            term = stack.pop()
+            stack.extend(children(term))
+            name = term.name if isinstance(term, EnumValue) else term.constructor if isinstance(term, Construct) else ""
+            if name in ports and not (isinstance(term, Construct) and term.arguments):
+                what = f"a constant in `{clause.name}` stands for the element `{name}`"
+                message = f"{what}, whose name is an {ports[name].role}put here: that cannot be written without it"
+                yield Diagnostic("RCL202", message, clause.span, hint="rename one of the two")
+                break
 
 
 def _declarations(contract: Contract) -> Iterator[str]:

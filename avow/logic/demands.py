@@ -78,6 +78,9 @@ class Candidates:
     blocks: list[tuple[Term, ...]] = field(default_factory=list)
     """The same, in the groups in which they were chosen."""
     pool: dict[Sort, list[Term]] = field(default_factory=dict)
+    effort: int = 200_000
+    """What is left of it, in visits times conditions. `<=>` is read four ways, so a chain of them would double the work
+    with every link; and what is not read is not suggested, which is sound."""
 
     def mentions(self, term: Term) -> bool:
         return any(part in self.outputs for part in subterms(term) if isinstance(part, Variable))
@@ -109,6 +112,9 @@ def _visit(
 
     `known` maps the bound variables on the way to their constants; `conditions` are in the term's own variables.
     """
+    found.effort -= 1 + len(conditions)
+    if found.effort <= 0:
+        return
     if not found.mentions(term):
         if isinstance(term, Quantified) and term.quantifier is not Quantifier.FORALL:
             inner = _choose(found, term.variables, [term.body], known)
@@ -128,6 +134,8 @@ def _visit(
             for item in free:
                 _remember(found, item, known)
             for item in bound:
+                if found.effort <= 0:
+                    break
                 others = tuple(negation(o) for o in bound if o is not item)
                 _visit(found, item, known, (*conditions, *map(negation, free), *others), open_variables)
         case Implies(left=left, right=right):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from avow.diagnostics import Rejected
 from avow.language.contract import Contract
 from avow.language.load import check_text, load_contract
 from avow.language.translate import FORMATS
@@ -112,3 +113,21 @@ def test_smtlib_is_accepted_by_cvc5(root: Path) -> None:
             if not str(command).startswith("(check-sat"):
                 assert "error" not in command.invoke(solver, parser.getSymbolManager())
         assert count > 10
+
+
+def test_an_element_that_a_port_hides_is_an_error_of_the_translation() -> None:
+    """Only a constant can name it there, and constants are written out: what reads back would be another contract."""
+    text = (
+        "context { S : {red, green}; D = {red}; C : {go(REAL), halt}; H = halt; }\n"
+        "node n { inputs( %s : BOOL, s : S, c : C ) outputs( o : BOOL ) topics() "
+        "guarantee( o <=> in.s in D and c %s H ) }"
+    )
+    for name, sign, sound in (("red", "==", False), ("halt", "!=", False), ("blue", "==", True)):
+        contract = check_text(text % (name, sign), "f")[0]
+        assert contract is not None
+        if sound:
+            assert check_text(FORMATS["rcl"](contract), "f")[0] == contract
+            continue
+        with pytest.raises(Rejected) as refused:
+            FORMATS["rcl"](contract)
+        assert [d.code for d in refused.value.diagnostics] == ["RCL202"]
