@@ -378,8 +378,11 @@ def _derivation(
 def _assumed(views: Sequence[ObligationView], derived: Sequence[DerivationView]) -> tuple[HypothesisView, ...]:
     found: dict[str, list[str]] = {}
     for view in views:
+        # a claim of this case that a record names is no hypothesis: the claim rests on it, and falls with it
+        claims = {f"{view.obligation.system}/": view.rests_on, "": view.rests_on}
         for text in dict.fromkeys(h for v in view.counting for h in v.entry.evidence.hypotheses):
-            found.setdefault(text, []).append(view.id)
+            if not any(f"{prefix}{text}" in rests for prefix, rests in claims.items()):
+                found.setdefault(text, []).append(view.id)
     for d in derived:
         for text in d.conditional:
             found.setdefault(text, []).append(derivation_claim(d.derivation.name))

@@ -192,18 +192,18 @@ def not_shown(
             f"{_list(prose)}: stated in prose. That the guarantees named amount to the requirement is a person's "
             "judgement; no tool has checked it."
         )
-    bounded = [short(v.id) for v in views if v.obligation.kind is Kind.GUARANTEE and v.status is Status.CHECKED]
+    told = (Kind.GUARANTEE, Kind.REQUIREMENT)
+    bounded = [short(v.id) for v in views if v.obligation.kind in told and v.status is Status.CHECKED]
     if bounded:
         lines.append(
             f"{_list(bounded)}: checked exhaustively, but only within the finite scenario; nothing is said outside it."
         )
     sampled = [
-        short(v.id)
-        for v in views
-        if v.obligation.kind is Kind.GUARANTEE and v.status in (Status.TESTED, Status.MONITORED)
+        short(v.id) for v in views if v.obligation.kind in told and v.status in (Status.TESTED, Status.MONITORED)
     ]
     if sampled:
         lines.append(f"{_list(sampled)}: observed on samples; other inputs and other runs may behave otherwise.")
+    lines += _protocols(views)
     person = [
         short(v.id)
         for v in views
@@ -239,6 +239,18 @@ def not_shown(
         "That the contracts say what was meant, and that the requirements are the right ones, is for people to judge."
     )
     return tuple(lines)
+
+
+def _protocols(views: Sequence[ObligationView]) -> Iterable[str]:
+    """How measured runs were made, in the plan's words: 47 of 47 in a simulation is not 47 of 47 on the robot."""
+    found: dict[str, list[str]] = {}
+    for view in views:
+        for v in view.counting:
+            match v.entry.evidence.details.get("protocol"):
+                case str(text) if text.strip():
+                    found.setdefault(" ".join(text.split()).rstrip("."), []).append(short(view.id))
+    for text, names in found.items():
+        yield f"{_list(names)}: measured under this protocol, and not beyond it: {text}."
 
 
 def _used(backend: str, views: Sequence[ObligationView]) -> bool:

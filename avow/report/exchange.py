@@ -154,7 +154,7 @@ def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any
         "ruleIndex": rules.index(_rule(view)),
         "kind": kind,
         "level": level,
-        "message": {"text": f"{short(o.id)} is {view.standing}. {o.claim}. {headline(view)}"},
+        "message": {"text": f"{short(o.id)} is {view.standing}. {o.claim.rstrip('.')}. {headline(view)}"},
         "partialFingerprints": {"avowObligation/v1": digest(o.id)},
         "properties": {
             "obligation": o.id,

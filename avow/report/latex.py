@@ -131,7 +131,7 @@ def _latex_derivation(view: DerivationView) -> Iterable[str]:
 
 def _latex_obligation(view: ObligationView) -> Iterable[str]:
     o = view.obligation
-    yield rf"\paragraph{{{latex(short(o.id))}}} \textit{{{view.standing}}}. {latex(o.claim)}."
+    yield rf"\paragraph{{{latex(short(o.id))}}} \textit{{{view.standing}}}. {latex(o.claim.rstrip('.'))}."
     if o.formula:
         yield r"\begin{quote}" + latex(o.formula) + r"\end{quote}"
     for item in view.counting:

@@ -38,7 +38,7 @@ _ROWS = 600
 _A_LINE = 240
 """Characters of a finding in the answer; all of it stands with the obligation."""
 _MOST_STEPS = 2_000_000
-_ON_PAPER = 900
+_ON_PAPER = 1600
 """Pixels: a taller picture would be too small to read on a sheet; on paper a sentence says where it is."""
 _DRAWN = 2500
 """So many elements of the argument are drawn on one page; the other pictures are in gsn.svg and gsn.yaml."""
@@ -78,6 +78,7 @@ def environment() -> Environment:
         "mutation": wording.mutation,
         "details_text": wording.details_text,
         "outline": wording.outline,
+        "protocol": wording.protocol,
         "rerun": wording.rerun,
         "short": short,
         "within": wording.within,

@@ -15,7 +15,7 @@ from avow.evidence.status import Status
 from avow.report import example, picture
 from avow.report.maps import map_picture
 from avow.report.source import plain_lines
-from avow.report.wording import MARKS, banner_tone, bound_text, clean, in_lines, tone, verdict_line, worth
+from avow.report.wording import MARKS, banner_tone, bound_text, clean, in_lines, protocol, tone, verdict_line, worth
 from avow.verdict import Counterexample
 
 _MOST = 500
@@ -158,7 +158,7 @@ def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
                 "status": _chip(worth(e)),
                 "method": e.method,
                 "tool": f"{e.tool} {e.tool_version}",
-                "summary": e.summary,
+                "summary": f"{e.summary}. How it was measured: {protocol(e)}" if protocol(e) else e.summary,
                 "bound": bound_text(e.bound),
                 "counter": _counter(case, e.counterexample) if e.counterexample else None,
             }

@@ -54,6 +54,7 @@ MEANINGS = {
     Status.CONTRADICTORY: "one tool proves it, another refutes it: one of them is wrong",
 }
 
+_DIGEST = re.compile(r"[0-9a-f]{64}\Z")
 _MOST_DETAILS = 6000
 _GOOD = frozenset({Status.PROVED, Status.CHECKED})
 _BAD = frozenset({Status.REFUTED, Status.CONTRADICTORY, Status.CIRCULAR})
@@ -104,6 +105,14 @@ def within(view: ObligationView, status: Status, most: int = 160) -> str:
     texts = [bound_text(e.bound) for e in records if e.bound and worth(e) is status]
     text = "; ".join(dict.fromkeys(texts))
     return text if len(text) <= most else text[: most - 1] + "…"
+
+
+def protocol(evidence: Evidence) -> str:
+    """How measured runs were made, in the plan's words; empty where nothing was measured."""
+    match evidence.details.get("protocol"):
+        case str(text):
+            return " ".join(text.split())
+    return ""
 
 
 def where(view: ObligationView) -> str:
@@ -252,7 +261,7 @@ def outline(evidence: Evidence) -> str:
 
 def details_text(evidence: Evidence) -> str:
     """Whatever else a method left in its details, as indented text."""
-    shown = {"outline", "proof_outline", "triples", "mutation", "retry"}
+    shown = {"outline", "proof_outline", "triples", "mutation", "retry", "protocol"}
     rest = {
         key: value for key, value in evidence.details.items() if key not in shown and value not in ("", [], {}, None)
     }
@@ -302,5 +311,7 @@ def _plain(value: object) -> str:
             return ", ".join(map(str, value))
         case list() | tuple():
             return ", ".join(map(_plain, value))
+        case str() if _DIGEST.match(value):
+            return value[:12]
         case _:
             return str(value)

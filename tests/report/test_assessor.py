@@ -169,6 +169,44 @@ def test_tested_says_on_how_many_cases_at_first_sight() -> None:
     assert "hypothesis tested (cases 271, seed 0)" in made["report.md"]
 
 
+def test_a_requirement_that_was_only_checked_says_within_what() -> None:
+    formal = system(
+        {"agent": ["g1"]}, requirements=[Requirement("R", "It ends.", None, "eventually done", ("agent.g1",))]
+    )
+    own = obligation("system", Kind.REQUIREMENT, "R")
+    bound = {"depth": 28, "scenario": "a1" * 32}
+    away = obligation("system", Kind.COMPOSITION, "environment.in.away")
+    records = [
+        evidence(G1, Verdict.JUSTIFIED, "review", strength=Verdict.JUSTIFIED),
+        evidence(own, Verdict.CHECKED, "ajpf", bound=bound, hypotheses=("agent/guarantee/g1", "the wind is weak")),
+        evidence(away, Verdict.JUSTIFIED, "compose", strength=Verdict.JUSTIFIED),
+    ]
+    found = case(formal, [G1, own, away], records)
+    made = texts(found)
+    assert any("system/requirement/R: checked exhaustively, but only" in line for line in found.not_shown)
+    answer = made["index.html"].split('id="answer"')[1].split("How to read this")[0]
+    assert "depth 28, scenario a1a1a1a1a1a1" in answer
+    assert "a1" * 32 not in answer
+    # what the record names and the claim rests on is a claim with a status of its own, no hypothesis
+    assert [h.text for h in found.hypotheses] == ["the wind is weak"]
+
+
+def test_measured_runs_say_how_they_were_made() -> None:
+    """47 of 47 in a simulation is not 47 of 47 on the robot."""
+    records = [evidence(G1, Verdict.TESTED, "experiment", details={"protocol": "47 runs in a simulation."})]
+    found = case(SUBJECT, [G1, G2], records)
+    assert "agent.g1: measured under this protocol, and not beyond it: 47 runs in a simulation." in found.not_shown
+    made = texts(found)
+    assert "how it was measured: 47 runs in a simulation." in made["index.html"]
+    assert "How it was measured: 47 runs in a simulation." in made["pdf"]
+
+
+def test_sentences_end_once() -> None:
+    found = case(SUBJECT, [guarantee("agent", "g1", "It stops.")], [])
+    made = texts(found)
+    assert "It stops.." not in made["report.tex"] + made["report.sarif"]
+
+
 def test_open_items_and_expected_findings_add_up() -> None:
     found = rover_case()
     items = [i for i in found.open_items if not i.advice]
