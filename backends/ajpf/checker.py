@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from avow.backends.ajpf.automaton import Automaton, build, compiled
 from avow.backends.ajpf.explore import Graph
 from avow.backends.ajpf.interpreter import NONE, Agent, Frame, State
-from avow.backends.ajpf.psl import Always, Atom, Eventually, Formula, Implies, Modality, Not, atoms, conjunction
-from avow.backends.ajpf.structure import Fair, Kripke, Lasso, find_lasso, reduce
+from avow.backends.ajpf.psl import Atom, Formula, Modality, Not, atoms, conjunction
+from avow.backends.ajpf.structure import Fair, Kripke, Lasso, components, find_lasso, reduce
 from avow.backends.ajpf.syntax import DeedKind, Sign, Struct, Term, Var, unify
 from avow.backends.ajpf.tautology import is_valid
 
@@ -34,13 +34,6 @@ class Property:
     forbidden: Formula | None = None
     """What must not come once the trigger is met, of ``[] (trigger -> [] ~forbidden)``."""
 
-    @property
-    def contrary(self) -> Formula | None:
-        """That what is forbidden does come, whenever the trigger is met."""
-        if self.forbidden is None or self.trigger is None:
-            return None
-        return Always(Implies(self.trigger, Eventually(self.forbidden)))
-
 
 @dataclass(frozen=True, slots=True)
 class Result:
@@ -52,8 +45,8 @@ class Result:
     """Wherever the trigger is met, so is the goal, at once: nothing had to happen."""
     valid: bool = False
     """It holds of every agent: what the table made of the claim is a tautology."""
-    contrary: bool = False
-    """What it forbids comes in every run, whenever the trigger is met."""
+    answered: bool = False
+    """What is forbidden is the agent's answer to the trigger (`Checker._answered`)."""
 
 
 @dataclass(slots=True)
@@ -103,10 +96,40 @@ class Checker:
             if wanted.goal is not None and met:
                 unmet = conjunction((wanted.trigger, Not(wanted.goal)))
                 immediate = not self._where(unmet)
-        contrary = False
-        if not holds and wanted.contrary is not None and self.graph.unfinished is None:
-            contrary = self.check(Property(wanted.key, wanted.contrary), deadline).holds
-        return Result(wanted.key, holds, vacuous, immediate and not valid, valid, contrary)
+        answered = not holds and self._answered(wanted)
+        return Result(wanted.key, holds, vacuous, immediate and not valid, valid, answered)
+
+    def _answered(self, wanted: Property) -> bool:
+        """Whether there is an occasion (the trigger is met, and was not just before) to which what is forbidden is the
+        answer: on every way, it is so when the agent acts next or the environment has its say. An action done before
+        the occasion is no answer to it, and what was so before may stay so only until then."""
+        if wanted.trigger is None or wanted.forbidden is None or self.graph.unfinished is not None:
+            return False
+        graph, labels, states = self.graph, self.labels, self.graph.states
+        meant, banned = compiled(wanted.trigger, self.places), compiled(wanted.forbidden, self.places)
+        needs_act = any(atom.modality is Modality.DID for atom in atoms(wanted.forbidden))
+
+        def targets(state: int) -> Sequence[int]:
+            return graph.targets[graph.offsets[state] : graph.offsets[state + 1]]
+
+        def acted(state: int, target: int) -> bool:
+            return states[target].last != states[state].last
+
+        def waiting(state: int) -> list[int]:
+            return [t for t in targets(state) if not acted(state, t) and not states[t].drawn]
+
+        triggered = [meant(label) for label in labels]
+        occasions = {s for s in graph.initial if triggered[s]}
+        occasions.update(t for s in range(len(graph)) if not triggered[s] for t in targets(s) if triggered[t])
+        good: set[int] = set()
+        for component in components(occasions, waiting):
+            state = component[0]
+            still = set(waiting(state))
+            if len(component) == 1 and state not in still and still <= good and targets(state):
+                ends = [t for t in targets(state) if t not in still]
+                if all(banned(labels[t]) and (acted(state, t) or not needs_act) for t in ends):
+                    good.add(state)
+        return not good.isdisjoint(occasions)
 
     def lasso(self, refuted: Property) -> Lasso | None:
         """A run of the agent itself on which the property fails."""

@@ -100,8 +100,15 @@ CODES = register(
     declare(
         "AJPF131",
         "row without use",
-        "No part of any guarantee matches the row.",
+        "No part of any guarantee matches the row, or nothing that a guarantee forbids the `forbids` of a property.",
         "Correct its pattern, or delete it.",
+        warning=True,
+    ),
+    declare(
+        "AJPF132",
+        "row that says nothing",
+        "The row's formula is true (or false) of every agent, so that what it covers is taken for granted.",
+        "Correct the formula. What you want to give up, map to `T`, in the open.",
         warning=True,
     ),
 )

@@ -82,6 +82,18 @@ def diagnose(setup: Setup, made: Instantiation) -> Iterator[Diagnostic]:
                 Severity.WARNING,
                 hint="add a row to the method's predicates, or leave the guarantee to other methods (guarantees: …)",
             )
+    granted = {text for claim in made.claims for text in claim.granted}
+    for row in setup.rows:
+        if row.text in granted and not isinstance(row.formula, psl.Truth):
+            message = f"the row “{row.text}” says nothing: its formula is true, or false, of every agent"
+            yield Diagnostic("AJPF132", message, row.span, Severity.WARNING)
+    for claim in made.claims:
+        used = {left.extra for left in claim.left}
+        for extra in setup.extras:
+            ours = extra.guarantee == claim.guarantee and claim.not_covered is None
+            if extra.forbids is not None and ours and extra.name not in used:
+                message = f"'{extra.guarantee}' forbids nothing that '{extra.name}' would stand for"
+                yield Diagnostic("AJPF131", message, extra.span, Severity.WARNING)
     if all(claim.not_covered is None for claim in made.claims):
         for row in setup.rows:
             if row.text in made.unused:

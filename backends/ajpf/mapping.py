@@ -162,6 +162,9 @@ class Mapper:
         if term.quantifier is Quantifier.UNIQUE:
             return self._fail(term)
         exists = term.quantifier is Quantifier.EXISTS
+        denied = self._whole(shape(Not(term)))
+        if denied is not None:  # a row for ``exists x: P`` covers ``forall x: not P`` too
+            return _negated(denied)
         for variable in term.variables:
             if isinstance(variable.sort, IntegerSort | NaturalSort):
                 return self._expanded(term, variable, exists)

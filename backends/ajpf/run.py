@@ -124,20 +124,19 @@ class _Run:
         unfinished = checker.graph.unfinished
         if result.holds and unfinished is not None:
             return Settled(Verdict.UNKNOWN, f"not refuted, but the state space is unfinished: {unfinished}")
-        refutes = p.forbidden is None or result.contrary
+        refutes = p.forbidden is None or result.answered
         answer = Verdict.CHECKED if result.holds else Verdict.REFUTED
         verdict, reason = self.judged(p, answer, refutes)
         return Settled(verdict, reason, answer, result.vacuous, result.immediate, result.valid, refutes)
 
     def judged(self, p: Property, verdict: Verdict, refutes: bool) -> tuple[Verdict, str]:
-        """What an answer for a property says of its guarantee. What is forbidden after the trigger may come in some
-        runs for another, later reason: only if it comes in every run, as if demanded, is it the answer to the trigger.
-        """
+        """What an answer for a property says of its guarantee. What is forbidden after the trigger may come much later,
+        for another reason: a refutation it is only where it is the answer to the trigger (`Result.answered`)."""
         if verdict is not Verdict.REFUTED or refutes or p.forbidden is None:
             return verdict, ""
         banned = self.wording.say(p.forbidden)
         reason = (
-            f"what is forbidden ({banned}) comes later in some runs, and may then have another reason: "
+            f"what is forbidden ({banned}) comes in some runs, and may have another reason than the trigger: "
             "say when it must not come by a property of the plan that `forbids` it"
         )
         return Verdict.UNKNOWN, reason

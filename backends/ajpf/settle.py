@@ -204,6 +204,8 @@ def _entry(p: Property, result: Settled) -> dict[str, object]:
         entry["immediate"] = True
     if result.valid:
         entry["tautology"] = True
+    if result.answer not in (None, result.verdict):
+        entry["answer"] = str(result.answer)
     if result.reason:
         entry["reason"] = result.reason
     if result.opinions:

@@ -1,0 +1,236 @@
+"""Evidence that would be green for nothing: tautologies of the table, "eventually not", near misses of a guarantee."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from test_ajpf_ltl import FORMULAS, oracle
+from test_ajpf_ltl import Kripke as Graph
+from test_ajpf_ltl import Not as Negation
+
+from avow.backend import Limits
+from avow.backends.ajpf import BACKEND
+from avow.backends.ajpf.psl_parser import parse_psl
+from avow.backends.ajpf.tautology import MAX_STEPS, Steps, constant, is_satisfiable, is_valid
+from avow.logic.mutants import mutants
+from avow.verdict import Verdict
+
+
+def settle(job, tmp_path):
+    report = BACKEND.discharge(job, tmp_path, Limits(seconds=60))
+    return {outcome.obligation.rpartition("/")[2]: outcome for outcome in report.outcomes}
+
+
+# Tautologies
+
+ALL_WORDS = Graph((0, 1, 2, 3), [(0, 1, 2, 3)] * 4, [0, 1, 2, 3])
+
+
+@settings(max_examples=120, deadline=None, suppress_health_check=list(HealthCheck))
+@given(FORMULAS)
+def test_valid_is_what_the_oracle_cannot_refute_on_any_word(formula):
+    assert is_valid(formula) is not oracle(ALL_WORDS, Negation(formula), False)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[] (B(a, p) -> (<> (B(a, q) || ~B(a, q))))", True),
+        ("[] (B(a, p) -> (<> B(a, p)))", True),
+        ("[] (B(a, p) -> (<> B(a, q)))", False),
+        ("[] ((B(a, p) & B(a, q)) -> (<> (B(a, q) || D(a, go(1)))))", True),
+        ("[] (D(a, go(1)) -> (<> D(a, go(_))))", True),
+        ("[] (D(a, go(_)) -> (<> D(a, go(1))))", False),
+        ("[] (D(a, go(_, 1)) -> (<> D(a, go(2, _))))", False),
+        ("[] (D(a, go(1)) -> (<> (~D(a, go(2)))))", True),
+        ("[] (D(a, go(_)) -> (<> (~D(a, go(2)))))", False),
+        ("[] (D(a, go(1)) -> (<> (~D(b, go(2)))))", False),
+        ("[] (I(a, f(1)) -> (<> G(a, f(1))))", True),
+        ("[] (G(a, f(1)) -> (<> I(a, f(1))))", False),
+        ("[] (P(f(1)) -> (<> P(f(_))))", True),
+        ("[] (B(a, f(1)) -> (<> B(a, f(_))))", False),  # with `f(X) :- ~g(X)`, what covers f(1) need not be derivable
+        ("([] B(a, p)) -> (<> B(a, p))", True),
+        ("B(a, p) U (B(a, q) || ~B(a, q))", True),
+    ],
+)
+def test_what_is_true_of_every_agent(text, expected):
+    assert is_valid(parse_psl(text)) is expected
+
+
+def test_constants():
+    assert constant(parse_psl("B(a, p) || ~B(a, p)")) is True
+    assert constant(parse_psl("D(a, go(1)) & D(a, go(2))")) is False
+    assert constant(parse_psl("D(a, go(1)) & D(a, go(_))")) is None
+
+
+def test_what_takes_too_long_is_no_tautology():
+    """An unsatisfiable conjunct behind as many cases as fourteen beliefs have."""
+    names = [f"B(a, p{k})" for k in range(14)]
+    steps = Steps()
+    formula = parse_psl(f"({' & '.join(f'({n} || ~{n})' for n in names)}) & (B(a, q) & ~B(a, q))")
+    assert is_satisfiable(formula, steps)
+    assert steps.left < 0 < MAX_STEPS
+
+
+def test_a_row_that_is_a_tautology_shows_nothing(lift, tmp_path):
+    rows = {**lift().options["predicates"], "out.motion == go(f)": "B(cabin, x) || ~B(cabin, x)"}
+    job = lift({"predicates": rows})
+    (warning,) = [d for d in BACKEND.check(job) if d.code == "AJPF132"]
+    assert not warning.is_error
+    assert "out.motion == go(f)" in warning.message
+    outcomes = settle(job, tmp_path)
+    assert outcomes["answers"].vacuous
+    assert "the table takes for granted: “out.motion == go(f)”" in outcomes["answers"].summary
+    assert not outcomes["halts"].vacuous
+
+
+def test_what_is_given_up_in_the_open_is_told(lift, tmp_path):
+    job = lift({"predicates": {**lift().options["predicates"], "out.motion == go(f)": "T"}})
+    assert not [d for d in BACKEND.check(job) if d.code == "AJPF132"]
+    outcome = settle(job, tmp_path)["answers"]
+    assert outcome.vacuous
+    assert outcome.details["taken_for_granted"] == ["out.motion == go(f)"]
+
+
+def test_a_goal_that_is_its_own_trigger_shows_nothing(lift, tmp_path):
+    rows = {**lift().options["predicates"], "out.motion == go(f)": "B(cabin, call(_)) || B(cabin, call(f))"}
+    outcome = settle(lift({"predicates": rows}), tmp_path)["answers"]
+    assert outcome.verdict is Verdict.CHECKED
+    assert outcome.vacuous
+    assert "the table makes it a tautology" in outcome.summary
+    assert all(entry["tautology"] for entry in outcome.details["properties"])
+
+
+# What a guarantee forbids
+
+STAYS = """
+  guarantee stays "With the door open the cabin does not move"
+    ( in.door == open -> not exists(n in NATURAL | out.motion == go(n)) )
+}
+"""
+TABLE = {
+    "in.call(f)": "B(cabin, call(f))",
+    "in.door == shut": "B(cabin, shut)",
+    "in.door == open": "B(cabin, open)",
+    "out.motion == go(f)": "D(cabin, go(f))",
+    "exists(n in NATURAL | out.motion == go(n))": "D(cabin, go(_))",
+    "exists(n in NATURAL | out.motion == halt(n))": "D(cabin, halt(_))",
+}
+ONE_AT_A_TIME = """
+draws: {at_quiescence: repeatedly}
+percepts: {panel: [open, call(1), call(2), nothing]}
+after: {go: {panel: [nothing]}, halt: {panel: [nothing]}}
+"""
+PROGRAM = (
+    "GWENDOLEN\n:name: cabin\n:Initial Beliefs:\nfloor(1)\nfloor(2)\n:Reasoning Rules:\nshut :- ~open;\n"
+    ":Initial Goals:\n:Plans:\n"
+)
+
+
+@pytest.fixture
+def stays(lift, tmp_path):
+    """The outcome for a guarantee that forbids, of a cabin with these plans."""
+
+    def outcome(plans, rows=TABLE, properties=None):
+        contract = (lift().root / "system.rcl").read_text()
+        contract = contract[: contract.rindex("}")] + STAYS
+        files = {"system.rcl": contract, "cabin.gwen": PROGRAM + plans, "cabin.yaml": ONE_AT_A_TIME}
+        job = lift({"predicates": dict(rows), "properties": properties, "states": 3000}, files)
+        assert not [d for d in BACKEND.check(job) if d.is_error]
+        return settle(job, tmp_path)["stays"]
+
+    return outcome
+
+
+def test_what_never_comes_is_forbidden_well(stays):
+    outcome = stays("+open : { True } <- halt(0);\n")
+    assert outcome.verdict is Verdict.CHECKED
+    assert not outcome.vacuous
+    (entry,) = outcome.details["properties"]
+    assert entry["property"] == "[] (B(cabin, open) -> ([] (~D(cabin, go(_)))))"
+
+
+def test_the_answer_to_the_trigger_refutes(stays):
+    """Seeded fault: it moves whenever the door opens. Afterwards it halts, so that "eventually it does not
+    move" would hold."""
+    outcome = stays("+open : { True } <- go(1), halt(0);\n")
+    assert outcome.verdict is Verdict.REFUTED
+    assert "what is then forbidden comes in step" in outcome.counterexample.text()
+
+
+def test_what_comes_later_for_another_reason_does_not_refute(stays):
+    outcome = stays("+call(F) : { B shut, B floor(F) } <- go(F);\n+open : { True } <- halt(0);\n")
+    assert outcome.verdict is Verdict.UNKNOWN
+    assert "may have another reason than the trigger" in outcome.summary
+    assert outcome.counterexample is None
+    assert outcome.details["properties"][0]["answer"] == "refuted"
+
+
+WHILE_OPEN = "[] ((B(cabin, open) & D(cabin, halt(_))) -> (B(cabin, shut) R (~(B(cabin, open) & D(cabin, go(_))))))"
+FORBIDS = "exists(n in NATURAL | out.motion == go(n))"
+
+
+def test_a_property_of_the_plan_says_when_it_must_not_come(stays):
+    mover = "+call(F) : { B shut, B floor(F) } <- go(F);\n+open : { True } <- halt(0);\n"
+    extra = {"psl": WHILE_OPEN, "guarantee": "stays", "forbids": FORBIDS}
+    outcome = stays(mover, properties={"while_open": extra})
+    assert outcome.verdict is Verdict.CHECKED
+    assert not outcome.vacuous
+    assert "is left to 'while_open'" in outcome.summary
+    assert outcome.details["properties"] == []
+    never_opens = {**extra, "psl": "[] (B(cabin, never) -> (<> D(cabin, halt(_))))"}
+    assert stays(mover, properties={"while_open": never_opens}).vacuous
+    valid = {**extra, "psl": "[] (B(cabin, open) -> (<> B(cabin, open)))"}
+    assert stays(mover, properties={"while_open": valid}).vacuous
+    refuting = {**extra, "psl": "[] (B(cabin, open) -> ([] (~D(cabin, go(_)))))"}
+    assert stays(mover, properties={"while_open": refuting}).verdict is Verdict.REFUTED
+
+
+def test_a_row_for_the_negation_does_not_make_it_a_demand(stays):
+    rows = {key: value for key, value in TABLE.items() if key != FORBIDS}
+    rows[f"not {FORBIDS}"] = "~D(cabin, go(_))"
+    assert stays("+open : { True } <- go(1), halt(0);\n", rows).verdict is Verdict.REFUTED
+
+
+def test_what_stands_for_a_ban_must_count_and_must_be_needed(lift):
+    extra = {"psl": "T", "guarantee": "halts", "forbids": FORBIDS}
+    (unused,) = [d for d in BACKEND.check(lift({"properties": {"p": extra}})) if d.code == "AJPF131"]
+    assert "forbids nothing" in unused.message
+    for wrong in ({**extra, "counts": False}, {"psl": "T", "forbids": FORBIDS}):
+        (error,) = [d for d in BACKEND.check(lift({"properties": {"p": wrong}})) if d.is_error]
+        assert error.code == "AJPF125"
+    (error,) = [
+        d for d in BACKEND.check(lift({"properties": {"p": {**extra, "forbids": "out.nowhere"}}})) if d.is_error
+    ]
+    assert error.span is not None
+
+
+# Near misses
+
+
+def altered(job, name, formula):
+    node = job.node
+    guarantees = tuple(replace(c, formula=formula) if c.name == name else c for c in node.guarantees)
+    return replace(
+        job,
+        node=replace(node, guarantees=guarantees),
+        obligations=tuple(o for o in job.obligations if o.name == name),
+    )
+
+
+@pytest.mark.parametrize("name", ["answers", "halts"])
+def test_no_negated_guarantee_of_the_lift_is_supported(lift, tmp_path, name):
+    job = lift()
+    (negated,) = [m for m in mutants(job.node.clause(name).formula) if m.change == "the whole is negated"]
+    assert settle(job, tmp_path)[name].verdict is Verdict.CHECKED
+    assert settle(altered(job, name, negated.formula), tmp_path)[name].verdict is not Verdict.CHECKED
+
+
+@pytest.mark.parametrize("name", ["next_waypoint", "inspect_here", "exit_on_danger", "abandon", "end_of_mission"])
+def test_no_negated_guarantee_of_the_rover_is_supported(rover, tmp_path, name):
+    job = rover("remote_inspection", "repaired_method.yaml", {"instances": {"i": "1..3"}})
+    (negated,) = [m for m in mutants(job.node.clause(name).formula) if m.change == "the whole is negated"]
+    outcome = settle(altered(job, name, negated.formula), tmp_path)[name]
+    assert outcome.verdict is Verdict.REFUTED, outcome.summary
