@@ -81,7 +81,7 @@ CODES = register(
     declare(
         "AJPF125",
         "no such guarantee",
-        "A property of the plan is said to be for a guarantee that the node does not have.",
+        "A property of the plan is for a guarantee that the node does not have, or `forbids` without counting for one.",
         "Correct the guarantee's name.",
     ),
     declare(
