@@ -57,9 +57,9 @@ LONG_FORMULAS = {
     "==": chain(" == ", ("r", "i", "k")),
     "set": f"i in {{{', '.join(map(str, range(MANY)))}}}",
     "sequence": f"i in <{', '.join(map(str, range(MANY)))}>",
-    "and ->": chain(" and ") + " -> " + chain(" -> ") + " or " + chain(" or "),
-    "forall": "forall(" + ", ".join(f"x{i}" for i in range(MANY)) + " in REAL | x1 > x2 or o)",
-    "not (…)": " and ".join(["not (a or b -> o)"] * MANY),
+    "and ->": " -> ".join([" and ".join(["a", "b"] * 400), *["a"] * 400, " or ".join(["o"] * 400)]),
+    "forall": "forall(" + ", ".join(f"x{i}" for i in range(1000)) + " in REAL | x1 > x2 or o)",
+    "not (…)": " and ".join(["not (a or b -> o)"] * 800),
 }
 
 
@@ -77,7 +77,7 @@ def test_a_chain_is_accepted_laid_out_and_translated(name: str) -> None:
     back = check_text(FORMATS["rcl"](contract), "f")[0]
     assert back == contract
     for style in ("text", "unicode", "latex", "json"):
-        assert len(FORMATS[style](contract)) > MANY
+        assert len(FORMATS[style](contract)) > 1000
     assert time.process_time() - began < 10
 
 
@@ -219,11 +219,11 @@ def test_growth_is_linear() -> None:
     def seconds(sign: str, count: int) -> float:
         text = FRAME.format(names="red", formula=f" {sign} ".join(["a"] * count))
         best = 1e9
-        for _ in range(3):
+        for _ in range(2):
             began = time.process_time()
             assert check_text(text, "f")[0] is not None
             best = min(best, time.process_time() - began)
         return best
 
     for sign in ("and", "->"):
-        assert seconds(sign, 20_000) < 12 * seconds(sign, 4_000), sign
+        assert seconds(sign, 8_000) < 12 * seconds(sign, 1_600), sign
