@@ -15,8 +15,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from avow.assurance.argument import Argument, Element, build_argument
-from avow.assurance.model import Case, ObligationView
-from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.assurance.model import Case, ObligationView, OpenItem
+from avow.assurance.naming import short
 from avow.assurance.policy import techniques
 from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
@@ -25,6 +25,7 @@ from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.report import example, picture, source, wording
 from avow.report.maps import draw_map
+from avow.report.resting import resting
 from avow.report.wording import history
 
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.WELL_FORMED)
@@ -37,7 +38,6 @@ _ROWS = 600
 """So many guarantees have a row of their own in the summary; beyond that a node has one."""
 _A_LINE = 240
 """Characters of a finding in the answer; all of it stands with the obligation."""
-_MOST_STEPS = 2_000_000
 _ON_PAPER = 1600
 """Pixels: a taller picture would be too small to read on a sheet; on paper a sentence says where it is."""
 _DRAWN = 2500
@@ -99,6 +99,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
     rows = sum(len(found) for _, _, found in matrix)
     listed = [item for item in case.open_items if not item.advice]
     views = sorted(case.obligations, key=_reading_order(case))
+    remarks = [item for item in case.open_items if item.kind == REMARK]
     return (
         environment()
         .get_template("report.html.j2")
@@ -120,13 +121,14 @@ def render_page(case: Case, json_digest: str = "") -> str:
             places=places,
             failed=[gate for gate in case.gates if not gate.passed],
             open_items=listed,
-            resting=_resting(case),
+            resting=resting(case),
             open_line=wording.open_line(case),
             open_kinds=list(Counter(item.kind for item in listed).items()),
             do_first=None if case.good else next((i for i in listed if i.suggestion and not i.handled), None),
             findings={view.id: _found(view) for view in case.obligations},
             advice=[item for item in case.open_items if item.advice and item.kind != REMARK],
-            remarks=[item for item in case.open_items if item.kind == REMARK],
+            remarks=remarks,
+            remarked=_by_item(remarks),
             single=[view for view in case.obligations if view.id in single],
             justified=_justified(case),
             nodes=list(dict.fromkeys(view.obligation.node for view in views)),
@@ -283,27 +285,11 @@ def _found(view: ObligationView) -> str:
     return text if len(text) <= _A_LINE else text[: _A_LINE - 1] + "…"
 
 
-def _resting(case: Case) -> dict[str, list[tuple[Status, int]]]:
-    """How many claims of which status each supported requirement rests on, through derivations and all: one word for
-    the weakest of them does not tell that five others were only tested. Empty where that would take too long."""
-    if len(case.requirements) * len(case.obligations) > _MOST_STEPS:
-        return {}
-    below = {view.id: view.rests_on for view in case.obligations}
-    below |= {derivation_claim(d.derivation.name): d.rests_on for d in case.derivations}
-    below |= {requirement_claim(r.id): (*r.rests_on, *r.obligations) for r in case.requirements}
-    statuses = {view.id: view.status for view in case.obligations}
-    told = {}
-    for requirement in case.requirements:
-        seen: set[str] = set()
-        stack = [requirement_claim(requirement.id)]
-        while stack:
-            name = stack.pop()
-            if name not in seen:
-                seen.add(name)
-                stack += below.get(name, ())
-        found = Counter(statuses[name] for name in seen if name in statuses)
-        told[requirement.id] = [(status, found[status]) for status in Status if found[status]]
-    return told
+def _by_item(items: Sequence[OpenItem]) -> dict[str, list[OpenItem]]:
+    found: dict[str, list[OpenItem]] = {}
+    for item in items:
+        found.setdefault(item.claim, []).append(item)
+    return found
 
 
 def _counts(views: Sequence[ObligationView]) -> list[tuple[str, list[tuple[Status, int]], int]]:

@@ -133,7 +133,7 @@ def verdict_line(case: Case) -> str:
     failed = sum(not gate.passed for gate in case.gates)
     if not failed and case.strict:
         answered = sum(r.status.supports for r in case.requirements)
-        asked = f"; {answered} of {len(case.requirements)} requirements are answered" if case.requirements else ""
+        asked = f"; {answered} of {len(case.requirements)} requirements are shown to hold" if case.requirements else ""
         found = count(sum(f.how == "expected" for f in case.findings), "expected finding")
         return f"Examined, not relied upon: there are exactly the {found}, and no others{asked}."
     if not failed:

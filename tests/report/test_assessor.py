@@ -149,6 +149,7 @@ def test_what_the_language_checker_remarks_is_in_the_report_brackets_first() -> 
     made = texts(found)
     for name in ("report.md", "index.html", "pdf"):
         assert "another bracketing means something else" in made[name], name
+    assert "<b>Remark:</b>" in made["index.html"].split('id="list"')[1]  # and beside the claim itself
     assert found.exit_code == remarked("lints_off: [RCL401, RCL402]\n").exit_code  # nothing fails for them
 
 
