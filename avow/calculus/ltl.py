@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
+from avow.logic.clock import now
 from avow.system.graph import components
 from avow.system.temporal import Operator, Property, State
 
@@ -123,13 +124,21 @@ _Node = tuple[int, Obligations]
 _Edge = tuple[_Node, frozenset[Until]]
 
 
+class TooLong(Exception):  # noqa: N818 - it names what happened
+    """No answer within the time for it."""
+
+
 def violation(
     formula: Property,
     initial: Iterable[int],
     successors: Callable[[int], Sequence[int]],
     holds: Callable[[int, State], bool],
+    deadline: float | None = None,
 ) -> Lasso | None:
-    """A run of the graph that breaks the property, or None. Every step must have a successor for a run to count."""
+    """A run of the graph that breaks the property, or None. Every step must have a successor for a run to count.
+
+    `deadline` is in seconds of `avow.logic.clock.now`; raises TooLong after it.
+    """
     negated = normal(formula, positive=False)
 
     @cache
@@ -145,6 +154,8 @@ def violation(
             origin[node] = None
             queue.append(node)
     while queue:
+        if deadline is not None and len(edges) % 500 == 0 and now() > deadline:
+            raise TooLong
         node = queue.popleft()
         step, obligations = node
         following: list[_Edge] = []

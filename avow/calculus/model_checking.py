@@ -16,7 +16,7 @@ from avow.calculus.answering import Doubts, Stuck
 from avow.calculus.answering import judge as judge_formula
 from avow.calculus.answers import Answer
 from avow.calculus.discharge import Bounds
-from avow.calculus.ltl import Lasso, demands_progress, violation
+from avow.calculus.ltl import Lasso, TooLong, demands_progress, violation
 from avow.calculus.open_values import Holds
 from avow.calculus.scenario import CannotRun, world
 from avow.calculus.transition import Machine, Step, Walk
@@ -250,14 +250,23 @@ def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | b
         stuck = len(explored.machine.stuck)
         if len(explored.steps) >= next_look or stuck > stuck_seen:
             next_look, stuck_seen = 2 * len(explored.steps), stuck if stuck > stuck_seen else stuck_seen
-            found = _violation(explored, formula)
+            try:
+                found = _violation(explored, formula, deadline)
+            except TooLong:
+                cut = True
+                break
             if found is not None:
                 return found
-    return _violation(explored, formula) or not cut
+    try:
+        return _violation(explored, formula, max(deadline, now()) + bounds.milliseconds / 4000) or not cut
+    except TooLong:
+        return False
 
 
-def _violation(explored: Explored, formula: Property) -> Lasso | None:
-    return violation(formula, explored.initial, explored.successors, lambda k, state: explored.truth[k][state])
+def _violation(explored: Explored, formula: Property, deadline: float) -> Lasso | None:
+    """What was explored so far is held against the property. Raises TooLong."""
+    truth = explored.truth
+    return violation(formula, explored.initial, explored.successors, lambda k, state: truth[k][state], deadline)
 
 
 def _broken(explored: Explored, name: str, formula: Property, lasso: Lasso) -> Answer:

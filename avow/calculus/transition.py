@@ -77,6 +77,7 @@ class Machine:
         self.memories: dict[tuple[object, ...], Values] = {}
         self.stuck: dict[tuple[object, ...], Stuck] = {}
         self._first: tuple[tuple[object, ...], ...] | None = None
+        self._given_first: dict[tuple[object, ...], tuple[Values, ...]] = {}
         self._steps: dict[tuple[object, ...], tuple[Step, ...]] = {}
 
     @property
@@ -143,29 +144,40 @@ class Machine:
 
     def _initial(self) -> Iterator[tuple[object, ...]]:
         names = [str(endpoint) for endpoint in self.memory]
+        conditions = {endpoint: self._initially(endpoint) for endpoint in self.memory}
+        changing = [n for _, read in conditions.values() for n in read.values() if n not in self.constants]
         for choices in self.environment.values():
-            constants = {name: choices[0][name] for name in self.constants}
-            ranges = [tuple({key(v): v for v in self._initially(e, choices)}.values()) for e in self.memory]
-            for values in product(*ranges):
-                yield self._remember({**constants, **dict(zip(names, values, strict=True))})
+            together: dict[tuple[object, ...], list[Values]] = {}
+            for given in choices:
+                together.setdefault(tuple(key(given[name]) for name in changing), []).append(given)
+            for place, some in together.items():
+                ranges = []
+                for endpoint, (condition, read) in conditions.items():
+                    known = {own: some[0][name] for own, name in read.items()}
+                    ranges.append(self._initial_values(endpoint, condition, known))
+                constants = {name: some[0][name] for name in self.constants}
+                for values in product(*ranges):
+                    memory = self._remember({**constants, **dict(zip(names, values, strict=True))})
+                    yield self._before_the_first(memory, place, some) if changing else memory
 
-    def _initially(self, endpoint: Endpoint, choices: Sequence[Values]) -> Iterator[Value]:
-        """The initial values of an output, for whatever its node's environment inputs may be at first."""
+    def _before_the_first(
+        self, memory: tuple[object, ...], place: tuple[object, ...], given: Sequence[Values]
+    ) -> tuple[object, ...]:
+        """The memory, for a first step at which the environment gives what the initial values were chosen for."""
+        first = (*memory, ("first", *place))
+        self.memories[first] = self.memories[memory]
+        self._given_first[first] = tuple(given)
+        return first
+
+    def _initially(self, endpoint: Endpoint) -> tuple[Term | None, dict[str, str]]:
+        """What holds of an output before the first step, and what its node's inputs that this speaks of read."""
         edge = next(e for e in self.graph.edges if e.delayed and e.source == endpoint)
         condition = initial_condition(self.frame.system, edge)
-        port = self.frame.node(endpoint.node).output(endpoint.port)
         inputs = sorted({v.name for v in ports_of(condition) if v.role is Role.INPUT}) if condition is not None else []
-        names = {f"in.{name}": self.frame.input(endpoint.node, name).qualified for name in inputs}
-        given = {tuple(key(values[name]) for name in names.values()): values for values in choices}
-        if len(given) > 1:
-            self.incomplete.add(f"the initial value of {endpoint} depends on inputs that change")
-        for values in given.values():
-            known = {own: values[name] for own, name in names.items()}
-            yield from self._initial_values(endpoint, port, condition, known)
+        return condition, {f"in.{name}": self.frame.input(endpoint.node, name).qualified for name in inputs}
 
-    def _initial_values(
-        self, endpoint: Endpoint, port: Port, condition: Term | None, given: Values
-    ) -> tuple[Value, ...]:
+    def _initial_values(self, endpoint: Endpoint, condition: Term | None, given: Values) -> tuple[Value, ...]:
+        port = self.frame.node(endpoint.node).output(endpoint.port)
         name = f"out.{port.name}"
         if isinstance(port.sort, FunctionSort) and port.sort.result == BOOL:
             points = self.world.points(endpoint.node, port)
@@ -204,7 +216,7 @@ class Machine:
 
     def _given(self, memory: tuple[object, ...]) -> tuple[Values, ...]:
         """What the environment may give after a memory."""
-        return self.environment[memory[: len(self.constants)]]
+        return self._given_first.get(memory) or self.environment[memory[: len(self.constants)]]
 
     def judge(self, formula: Term) -> Holds:
         """Whether a formula holds of a step, with quantifiers over the scenario's values. It raises Undecided."""

@@ -236,9 +236,9 @@ def components(nodes: Iterable[N], arcs: Iterable[tuple[N, N]]) -> tuple[tuple[N
             work.pop()
             low[name] = min([low[name], *(low[s] for s in successors[name] if s in on_stack)])
             if low[name] == index[name]:
-                at = stack.index(name)
-                members = stack[at:]
-                del stack[at:]
+                members = [stack.pop()]
+                while members[-1] != name:
+                    members.append(stack.pop())
                 on_stack.difference_update(members)
                 found.append(tuple(sorted(members, key=position.__getitem__)))
     return tuple(reversed(found))

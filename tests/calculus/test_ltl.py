@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import random
+import time
 from itertools import product
 
 import pytest
 
-from avow.calculus.ltl import demands_progress, violation
+from avow.calculus.ltl import TooLong, demands_progress, violation
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Variable
+from avow.logic.clock import now
+from avow.system.graph import components
 from avow.system.temporal import Operator, Property, State, Temporal
 
 P, Q = (State(Variable(Role.OUTPUT, name, BOOL), name) for name in "pq")
@@ -113,3 +116,15 @@ def test_every_operator_was_tried() -> None:
                 seen.add(formula.operator)
                 stack += formula.parts
     assert seen == set(Operator)
+
+
+def test_long_runs_are_held_against_a_property_in_time_that_grows_with_them() -> None:
+    length = 40_000
+    start = time.thread_time()
+    assert len(components(range(length), [(k, k + 1) for k in range(length - 1)])) == length
+    assert time.thread_time() - start < 5
+
+
+def test_a_search_for_a_violation_ends_at_its_deadline() -> None:
+    with pytest.raises(TooLong):
+        violation(Temporal(Operator.ALWAYS, (P,)), [0], lambda step: (step + 1,), lambda step, state: True, now() - 1)

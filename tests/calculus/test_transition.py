@@ -265,3 +265,17 @@ def test_a_search_that_would_take_for_ever_ends(tmp_path: Path) -> None:
     found = outcomes(make(tmp_path, text, plan_of("always a.k < 20", "NATURAL: 0..9")))["R"]
     assert found.verdict is Verdict.TESTED
     assert "more than 4000 answers" in found.summary
+
+
+def test_initial_values_are_those_of_what_the_environment_gives_at_first(tmp_path: Path) -> None:
+    """`out.x <=> in.e` before the first step is about the first step's `in.e`, which may change later."""
+    text = node("a", "m : BOOL, e : BOOL", "x : BOOL, y : BOOL", "G: out.y <=> in.m", "G: out.x")
+    plan = """
+connections: [{from: a.x, to: a.m, delayed: true, initial: "out.x <=> in.e"}]
+requirements:
+  SAME: {text: t, temporal: "a.y <=> a.e"}
+  ALWAYS: {text: t, temporal: "always (a.y <=> a.e)"}
+"""
+    found = outcomes(make(tmp_path, text, plan))
+    assert found["SAME"].verdict is Verdict.CHECKED
+    assert found["ALWAYS"].verdict is Verdict.REFUTED
