@@ -188,7 +188,7 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
         ports = [v.name for v in ports_of(clause.formula)]
         if not ports or any(Endpoint(name.node, port) in frame.graph.by_target for port in ports):
             continue
-        given = [reasons.get(f"{name.node}.{port}") or reasons.get(f"in.{port}") or "" for port in ports]
+        given = [reasons.get(frame.entry(name.node, port)) or "" for port in ports]
         because = "; ".join(dict.fromkeys(given)) if all(given) else ""
         yield Task(
             _obligation(

@@ -17,7 +17,7 @@ from avow.calculus.choices import Values, by_variable, search
 from avow.calculus.narrowing import Narrowing, Unknown, forcings
 from avow.calculus.open_values import Holds, Undecided, decided, is_open
 from avow.calculus.scenario import CannotRun, World, key
-from avow.language.contract import Clause, ClauseKind, Port
+from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
 from avow.language.terms import Role, Term
 from avow.logic.formula import free_variables

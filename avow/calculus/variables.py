@@ -15,7 +15,7 @@ from avow.language.terms import Role, Term, Variable
 from avow.logic.formula import free_variables, substitute
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition
 from avow.system.graph import Edge, Graph, dataflow
-from avow.system.hierarchy import apart
+from avow.system.hierarchy import own_inputs
 from avow.system.plan import Endpoint, System
 
 SUFFIXES = ("", "@before", "@before@before")
@@ -120,7 +120,7 @@ class Frame:
 def frame(system: System) -> Frame:
     """Raises Rejected where the plan's formulas are wrong."""
     graph = dataflow(system)
-    own = apart(system.plan, system.contract.nodes)
+    own = own_inputs(system, graph)
     nodes = {node.name: node for node in system.contract.nodes}
     constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
     return Frame(system, graph, environment_assumptions(system, graph), own, constants, nodes)

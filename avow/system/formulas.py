@@ -75,7 +75,7 @@ def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]
     found: list[Assumed] = []
     faults: list[Diagnostic] = []
     for entry in system.plan.environment:
-        about = holders(system, entry)
+        about = holders(system, graph, entry)
         outside = [e for e in about if e in graph.environment]
         if not outside:
             providers = [str(graph.by_target[e].source) for e in about if e in graph.by_target]

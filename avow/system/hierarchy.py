@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from avow.diagnostics import Diagnostic, Severity
 from avow.language.contract import Node, Port
+from avow.language.sorts import Sort
 from avow.language.terms import Role
 from avow.system.graph import Edge, Graph, components, wired
 from avow.system.plan import Endpoint, EnvironmentInput, Plan, System
@@ -87,7 +88,21 @@ def apart(plan: Plan, nodes: Iterable[Node]) -> dict[str, str]:
     return found
 
 
-def holders(system: System, entry: EnvironmentInput) -> tuple[Endpoint, ...]:
+def own_inputs(system: System, graph: Graph) -> dict[str, str]:
+    """The same; and inputs from the environment that have one name, but different types, are different inputs: the
+    first node's type has the name, another is called after the first node that reads it."""
+    found = apart(system.plan, system.contract.nodes)
+    sorts: dict[str, Sort] = {}
+    others: dict[tuple[str, Sort], str] = {}
+    for at in graph.environment:
+        name = found.get(str(at), f"in.{at.port}")
+        sort = system.contract.node(at.node).input(at.port).sort
+        if sorts.setdefault(name, sort) != sort:
+            found[str(at)] = others.setdefault((name, sort), str(at))
+    return found
+
+
+def holders(system: System, graph: Graph, entry: EnvironmentInput) -> tuple[Endpoint, ...]:
     """The inputs that an entry of the plan's environment is about: those of its name that no other entry sets apart."""
     owner, _, port = entry.port.partition(".")
     inside = leaves(system.plan).get(owner, (owner,))
@@ -96,7 +111,7 @@ def holders(system: System, entry: EnvironmentInput) -> tuple[Endpoint, ...]:
     names = {entry.port}
     if entry.taken_in and entry.port in _joined(system.plan):
         names |= {f"{name}.{port}" for name in ("in", *_around(parents(system.plan), owner))}
-    alone = apart(system.plan, nodes)
+    alone = own_inputs(system, graph)
     return tuple(e for e in at if alone.get(str(e), f"in.{port}") in names)
 
 

@@ -55,7 +55,7 @@ def still_open(system: System, graph: Graph) -> System:
     kept = tuple(
         entry
         for entry in system.plan.environment
-        if not entry.taken_in or any(endpoint in graph.environment for endpoint in holders(system, entry))
+        if not entry.taken_in or any(endpoint in graph.environment for endpoint in holders(system, graph, entry))
     )
     return replace(system, plan=replace(system.plan, environment=kept))
 

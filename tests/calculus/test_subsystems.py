@@ -493,3 +493,19 @@ def test_what_a_folder_sets_apart_stays_apart_where_it_is_taken_in(tmp_path: Pat
         found = outcomes(load_system(folder_of(tmp_path, name, sink, plan)))
         assert found["R"].verdict is Verdict.REFUTED
         assert found["S"].verdict is Verdict.PROVED
+
+
+def test_inputs_of_one_name_and_different_types_are_different_inputs(tmp_path: Path) -> None:
+    """A run that gave a node a value of another's type would show nothing."""
+    text = node("a", "x : REAL", "y : REAL", "G: out.y == in.x")
+    text += node("b", "x : INTEGER", "z : INTEGER", "G: out.z == in.x") + node("c", "x : INTEGER", "", "A q: in.x < 3")
+    plan = "environment: {in.x: {assume: in.x < 1, because: t}}\n"
+    plan += "scenario: {domains: {REAL: [0.5], INTEGER: 0..1}}\nrequirements:\n"
+    plan += '  T: {text: t, temporal: "always (a.y == 0.5 and (b.z == 0))"}\n'
+    plan += '  U: {text: t, temporal: "always (a.y == 0.5 and b.z <= 1 and b.z == b.x)"}\n'
+    plan += '  V: {text: t, formula: "b.z == c.x"}'
+    found = outcomes(make(tmp_path, text, plan))
+    assert found["T"].verdict is Verdict.REFUTED
+    assert found["U"].verdict is Verdict.CHECKED
+    assert found["V"].verdict is Verdict.PROVED
+    assert found["environment.c.q"].verdict is Verdict.UNKNOWN  # the plan's reason is one for another input
