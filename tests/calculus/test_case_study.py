@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from avow.calculus.composition import compose
 from avow.calculus.derivation import LoopForm, Rule
 from avow.calculus.notation import write_goal
@@ -56,6 +58,7 @@ def test_the_published_loops_never_start_and_are_degenerate(tmp_path: Path) -> N
     assert found["environment.radiationSensor.A1"].verdict is Verdict.UNKNOWN, "nobody says why 0 <= r"
 
 
+@pytest.mark.slow
 def test_the_repaired_loop_stands_by_its_initial_values(tmp_path: Path) -> None:
     _, answers = settled(case_study(tmp_path, "remote_inspection", REPAIRED))
     assert answers.verdict is Verdict.PROVED
