@@ -122,8 +122,8 @@ _SYNTAX = (
     Code(
         "RCL110",
         "nested too deeply",
-        "Formulas and types are nested 150 levels deep at most, and no constant or type has more than 20,000 parts when "
-        "all that it names is written out. Chains (`a and b and …`, `1 + 2 + …`) are not nested, however long.",
+        "Formulas and types are nested 150 levels deep at most, and no constant or type has more than 20,000 parts "
+        "when all that it names is written out. Chains (`a and b and …`, `1 + 2 + …`) are not nested, however long.",
         "guarantee(" + "(" * 200 + "TRUE" + ")" * 200 + ")",
     ),
     Code(

@@ -1,4 +1,4 @@
-"""How long a case and its reports take (processor time) for ten thousand obligations: ``python benchmarks/report_10000.py``."""
+"""Processor time of a case of ten thousand obligations and its reports: ``python benchmarks/report_10000.py``."""
 
 from __future__ import annotations
 
