@@ -23,7 +23,11 @@ from pathlib import Path
 KEEP = 4_000_000
 """Characters of output kept: a tool that prints without end must not fill the memory."""
 
+_FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -signal.SIGTERM})
+"""How a tool ends that somebody ended: a person, or a system out of memory. A crash of its own is none of them."""
+
 _running: set[int] = set()
+_ended_by_others: list[str] = []
 _lock = threading.Lock()
 
 
@@ -81,7 +85,14 @@ def run(
             kill_tree(process.pid)
             process.wait()
             unwatch(process.pid)
+        if code in _FROM_OUTSIDE:
+            _ended_by_others.append(command[0])
         return Completed(tuple(command), code, _read(out), _read(err), time.monotonic() - start)
+
+
+def ended_by_others() -> bool:
+    """Was a tool that this process ran ended by somebody else? Then its failure says nothing of what it was given."""
+    return bool(_ended_by_others)
 
 
 def watch(pid: int) -> None:

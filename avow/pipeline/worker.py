@@ -15,7 +15,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from avow import __version__
+from avow import __version__, process
 from avow.backend import Limits, Report
 from avow.diagnostics import Rejected
 from avow.evidence.encoding import Unreadable
@@ -125,8 +125,17 @@ def _main(arguments: Sequence[str]) -> None:
     request = json.loads(Path(arguments[0]).read_text())
     system, work = _asked(request)
     report = _execute(request, system, work)
+    if process.ended_by_others():
+        report = replace(report, outcomes=tuple(map(_asked_again, report.outcomes)))
     _asked(request)  # tools read the plan's files by themselves, at any time until now
     write(Path(arguments[1]), json.dumps(report_to_json(report), default=str))
+
+
+def _asked_again(outcome: Outcome) -> Outcome:
+    """What is open after a tool was killed from outside is for the next run to ask again."""
+    if outcome.verdict not in (Verdict.ERROR, Verdict.UNKNOWN):
+        return outcome
+    return replace(outcome, details={**outcome.details, "retry": True})
 
 
 def _asked(request: dict[str, Any]) -> tuple[System, Work]:

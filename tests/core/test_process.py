@@ -79,3 +79,18 @@ def test_standard_input_is_closed_unless_given() -> None:
 def test_environment_is_added_to() -> None:
     done = process.run(["bash", "-c", "echo $AVOW_X$HOME"], env={"AVOW_X": "1"})
     assert done.stdout.strip() == "1" + os.environ.get("HOME", "")
+
+
+@pytest.mark.parametrize(
+    ("signal_name", "by_others"), [("SIGKILL", True), ("SIGTERM", True), ("SIGSEGV", False), ("SIGABRT", False)]
+)
+def test_who_ended_a_tool_is_known(monkeypatch: pytest.MonkeyPatch, signal_name: str, by_others: bool) -> None:
+    monkeypatch.setattr(process, "_ended_by_others", [])
+    process.run([sys.executable, "-c", f"import os, signal; os.kill(os.getpid(), signal.{signal_name})"])
+    assert process.ended_by_others() is by_others
+
+
+def test_what_we_end_ourselves_was_not_ended_by_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process, "_ended_by_others", [])
+    assert process.run([sys.executable, "-c", "import time; time.sleep(60)"], seconds=0.2).timed_out
+    assert not process.ended_by_others()
