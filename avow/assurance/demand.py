@@ -130,7 +130,8 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         case Status.CONTRADICTORY:
             return Suggestion("find out which tool is wrong: one proves the claim and another refutes it", cost=100)
         case Status.ERROR:
-            again = f"`avow verify {facts.system}`"
+            # the same question is not asked twice: it has to change, or be asked afresh
+            again = f"`avow verify --fresh {facts.system}`"
             return Suggestion(f"find out why the tool failed (its message and log are with the evidence), then {again}")
         case Status.VACUOUS if hollow := [v.entry.evidence.method for v in view.counting if _is_score(v)]:
             return Suggestion(
