@@ -15,7 +15,6 @@ somebody who writes ledger, index *and* reports anew is only found out by a sign
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 from collections.abc import Iterable
@@ -24,6 +23,7 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
+from avow.evidence.appending import append, locked
 from avow.evidence.encoding import canonical
 from avow.files import digest, read_regular
 
@@ -99,12 +99,9 @@ def read_index(path: Path) -> Index:
 
 def note(path: Path, event: Event, system: str, records: int = 0, head: str = GENESIS) -> None:
     """Add a line, unless the newest of that system says the same. Raises OSError: then nothing was added."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     if event is not Event.BEGAN and _is_newest(read_index(path), event, system, records, head):
         return
-    file = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX)
+    with locked(path) as file:
         data = read_regular(path)
         whole = data[: data.rfind(b"\n") + 1]
         os.ftruncate(file, len(whole))  # what a killed run left half written
@@ -119,16 +116,7 @@ def note(path: Path, event: Event, system: str, records: int = 0, head: str = GE
             "system": system,
             "time": datetime.now(UTC).isoformat(timespec="seconds"),
         }
-        line = canonical({**body, "hash": digest(canonical(body))}).encode() + b"\n"
-        try:
-            if os.write(file, line) != len(line):
-                raise OSError(28, os.strerror(28), str(path))
-            os.fsync(file)
-        except BaseException:
-            os.ftruncate(file, len(whole))
-            raise
-    finally:
-        os.close(file)
+        append(file, canonical({**body, "hash": digest(canonical(body))}).encode() + b"\n")
 
 
 def _is_newest(index: Index, event: Event, system: str, records: int, head: str) -> bool:
@@ -170,7 +158,8 @@ def stated_heads(path: Path, where: str) -> tuple[Anchor, ...]:
         files = [*path.glob("report.json"), *path.glob("*/report.json"), *path.glob("attestation.jsonl")]
         return tuple(a for file in sorted(files) for a in stated_heads(file, where or file.as_posix()))
     found = []
-    for text in (lambda data: [data] if path.suffix == ".json" else data.splitlines())(read_regular(path)):
+    data = read_regular(path)
+    for text in [data] if path.suffix == ".json" else data.splitlines():
         try:
             found += [Anchor(where or path.as_posix(), *pair) for pair in _heads(json.loads(text))]
         except (ValueError, RecursionError):

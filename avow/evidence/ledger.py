@@ -14,17 +14,14 @@
 
 from __future__ import annotations
 
-import errno
-import fcntl
 import json
 import os
-import stat
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from avow.evidence.appending import append, locked, open_file
 from avow.evidence.encoding import Unreadable, canonical, decode, encode
 from avow.evidence.heads import GENESIS as GENESIS
 from avow.evidence.heads import Event, index_path, note
@@ -107,7 +104,7 @@ class Ledger:
 
     def append_all(self, evidences: Sequence[Evidence]) -> tuple[Entry, ...]:
         """Add records under one lock with one sync. Raises OSError: then none of them was added."""
-        with self._lock, self._locked() as file:
+        with self._lock, locked(self.path) as file:
             self._mend(file)
             self._refresh()
             cut = self._lines > 0 and bool(self._cut_off())
@@ -129,7 +126,7 @@ class Ledger:
             if lines and not self._lines:
                 note(index_path(self.path.parent), Event.BEGAN, self.path.stem)
             if lines:
-                self._write(file, "".join(lines).encode())
+                append(file, "".join(lines).encode())
                 self._refresh()
             if lines and not cut:  # a new head would make the cut unseen; a ledger deleted as a whole begins anew
                 write(self._head_file, canonical({"hash": previous, "records": number}) + "\n")
@@ -150,27 +147,6 @@ class Ledger:
     @property
     def _head_file(self) -> Path:
         return self.path.with_name(self.path.name + ".head")
-
-    @contextmanager
-    def _locked(self) -> Iterator[int]:
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        file = _open_file(str(self.path), os.O_RDWR | os.O_APPEND | os.O_CREAT)
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX)
-            yield file
-        finally:
-            os.close(file)  # releases the lock
-
-    def _write(self, file: int, data: bytes) -> None:
-        size = os.fstat(file).st_size
-        try:
-            done = 0
-            while done < len(data):
-                done += os.write(file, data[done:])
-            os.fsync(file)
-        except BaseException:
-            os.ftruncate(file, size)  # a reader never sees half of it; if even this fails, the next append mends it
-            raise
 
     def _mend(self, file: int) -> None:
         """Put a torn last line (a run was killed while writing it) aside, so that the chain goes on behind it."""
@@ -194,7 +170,7 @@ class Ledger:
     def _refresh(self) -> None:
         """Read what was added since the last look (by this or another process)."""
         try:
-            with open(self.path, "rb", opener=_open_file) as file:
+            with open(self.path, "rb", opener=open_file) as file:
                 size = os.fstat(file.fileno()).st_size
                 if size < self._offset:
                     self._forget()
@@ -264,15 +240,6 @@ def _spell(evidence: str, number: int, previous: str) -> tuple[str, str]:
     tail = f'"n":{number},"prev":{canonical(previous)}}}'
     mark = digest(f'{{"evidence":{evidence},{tail}')
     return mark, f'{{"evidence":{evidence},"hash":"{mark}",{tail}'
-
-
-def _open_file(path: str, flags: int) -> int:
-    """Opens only what is a file: a pipe in its place would keep us waiting for ever."""
-    file = os.open(path, flags | os.O_NONBLOCK, 0o644)
-    if not stat.S_ISREG(os.fstat(file).st_mode):
-        os.close(file)
-        raise OSError(errno.EINVAL, "not a regular file", path)
-    return file
 
 
 def read_line(line: bytes) -> Entry:

@@ -1,0 +1,45 @@
+"""Files that only grow, written by several processes at once: under a lock, a piece whole or not at all, synced."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[int]:
+    """The open file, made where it is not there, for this process alone. Raises OSError."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    file = open_file(str(path), os.O_RDWR | os.O_APPEND | os.O_CREAT)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield file
+    finally:
+        os.close(file)  # releases the lock
+
+
+def open_file(path: str, flags: int) -> int:
+    """Opens only what is a file: a pipe in its place would keep us waiting for ever."""
+    file = os.open(path, flags | os.O_NONBLOCK, 0o644)
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise OSError(errno.EINVAL, "not a regular file", path)
+    return file
+
+
+def append(file: int, data: bytes) -> None:
+    """Add `data` behind all that is there. Raises OSError: then nothing was added."""
+    size = os.fstat(file).st_size
+    try:
+        done = 0
+        while done < len(data):
+            done += os.write(file, data[done:])
+        os.fsync(file)
+    except BaseException:
+        os.ftruncate(file, size)  # a reader never sees half of it; if even this fails, the next append mends it
+        raise
