@@ -27,7 +27,7 @@ _FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -sig
 """How a tool ends that somebody ended: a person, or a system out of memory. A crash of its own is none of them."""
 
 _running: set[int] = set()
-_ended_by_others: list[str] = []
+_ended_by_others = threading.Event()
 _lock = threading.Lock()
 
 
@@ -86,13 +86,13 @@ def run(
             process.wait()
             unwatch(process.pid)
         if code in _FROM_OUTSIDE:
-            _ended_by_others.append(command[0])
+            _ended_by_others.set()
         return Completed(tuple(command), code, _read(out), _read(err), time.monotonic() - start)
 
 
 def ended_by_others() -> bool:
     """Was a tool that this process ran ended by somebody else? Then its failure says nothing of what it was given."""
-    return bool(_ended_by_others)
+    return _ended_by_others.is_set()
 
 
 def watch(pid: int) -> None:
@@ -146,15 +146,20 @@ _PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
 
 
+def die_with(parent: int) -> None:
+    """Said by a new process: it must not outlive `parent`, which started it, however that dies."""
+    if _libc is not None:
+        _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:  # it died before that was said
+            os._exit(1)
+
+
 def _before_exec(megabytes: int | None) -> Callable[[], None]:
     size = megabytes * 1024 * 1024 if megabytes else None
     here = os.getpid()
 
     def apply() -> None:
-        if _libc is not None:  # the tool must not outlive us, however we die
-            _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-            if os.getppid() != here:  # we died before that was said
-                os._exit(1)
+        die_with(here)
         if size is not None:
             resource.setrlimit(resource.RLIMIT_AS, (size, size))
 

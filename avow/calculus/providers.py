@@ -19,7 +19,7 @@ from avow.language.printer import show_term
 from avow.language.terms import TRUE, Term
 from avow.logic.claims import Claim, Property
 from avow.logic.formula import digest
-from avow.logic.sanity import Bounds, SanityResult, as_outcome
+from avow.logic.sanity import Bounds, SanityResult, as_outcome, listing
 from avow.logic.smt import solve
 from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint, System
@@ -108,10 +108,10 @@ def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
             verdict, text = Verdict.PROVED, ""
         case "unsat" if about in answer.core:
             others = [label for label in answer.core if label != about]
-            verdict, text = Verdict.REFUTED, f"no provider can meet it: {_listing(others)} {_exclude(others)} it"
+            verdict, text = Verdict.REFUTED, f"no provider can meet it: {listing(others)} {_exclude(others)} it"
         case "unsat":
             # The providers' own contracts leave no room for anything: a finding of theirs.
-            verdict, text = Verdict.REFUTED, f"{_listing(answer.core)} cannot hold together: no value comes from there"
+            verdict, text = Verdict.REFUTED, f"{listing(answer.core)} cannot hold together: no value comes from there"
             because = f"{_owner(answer.core)}/consistent"
         case _:
             verdict, text = Verdict.UNKNOWN, answer.reason
@@ -139,7 +139,3 @@ def _exclude(labels: Sequence[str]) -> str:
 
 def _owner(labels: Iterable[str]) -> str:
     return next(iter(labels)).partition(".")[0]
-
-
-def _listing(labels: Sequence[str]) -> str:
-    return labels[0] if len(labels) == 1 else f"{', '.join(labels[:-1])} and {labels[-1]}" if labels else "nothing"

@@ -8,6 +8,9 @@ from typing import Any
 
 from avow.verdict import Counterexample, Link, Verdict
 
+RETRY = "retry"
+"""Among the details of an answer that the next run must not be content with: what asked for it was cut short."""
+
 
 @dataclass(frozen=True, slots=True)
 class Evidence:

@@ -9,7 +9,7 @@ tried for these values, and if it holds there it is `checked`, and says that it 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from avow.diagnostics import Severity, Span
@@ -288,7 +288,7 @@ class _Analysis:
         # A conflict between guarantees tells more than one guarantee that cannot be met by itself.
         clauses, shown = next((pair for pair in listed if len(pair[0]) > 1), listed[0])
         because = "consistent" if self._other("consistent").verdict is Verdict.REFUTED else None
-        text = f"for some inputs no output meets {_listing(clauses)}"
+        text = f"for some inputs no output meets {listing(clauses)}"
         return _Finding(Verdict.REFUTED, text, clauses, shown, listed, because, answer.engine)
 
     # -- one clause ----------------------------------------------------------------------------------------------------
@@ -447,7 +447,7 @@ class _Analysis:
                 return _Finding(Verdict.PROVED, engine=answer.engine)
             case "unsat":
                 text = several if len(answer.core) > 1 else one
-                return _Finding(Verdict.REFUTED, text.format(_listing(answer.core)), answer.core, engine=answer.engine)
+                return _Finding(Verdict.REFUTED, text.format(listing(answer.core)), answer.core, engine=answer.engine)
             case _:
                 return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
 
@@ -457,17 +457,18 @@ class _Analysis:
         if finding.verdict is not Verdict.REFUTED:
             return finding
         needed = tuple(label for label in finding.clauses if label)
-        text = implied.format(_listing(needed)) if needed else alone
+        text = implied.format(listing(needed)) if needed else alone
         return replace(finding, explanation=text, clauses=needed)
 
 
-def _listing(labels: tuple[str, ...]) -> str:
+def listing(labels: Sequence[str]) -> str:
+    """``a, b and c``."""
     return labels[0] if len(labels) == 1 else f"{', '.join(labels[:-1])} and {labels[-1]}" if labels else "nothing"
 
 
 def _resting(needed: tuple[str, ...]) -> str:
-    return f"given {_listing(needed)}" if needed else ""
+    return f"given {listing(needed)}" if needed else ""
 
 
 def _given(clauses: tuple[str, ...]) -> str:
-    return f" (given {_listing(clauses)})" if clauses else ""
+    return f" (given {listing(clauses)})" if clauses else ""

@@ -18,9 +18,10 @@ from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
 from avow.diagnostics import Rejected
 from avow.evidence.continuity import continuity
 from avow.evidence.heads import index_path, read_index
+from avow.evidence.record import RETRY
 from avow.files import digest, digest_file, is_intact, write
 from avow.pipeline import check as checking
-from avow.pipeline.discharge import RETRY, ledger_of
+from avow.pipeline.discharge import ledger_of
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
 from avow.pipeline.results import Result, finished, note, read_result
 from avow.pipeline.run_info import EXPLAIN, Run, seconds_so_far

@@ -11,7 +11,7 @@ from avow import __version__
 from avow.backend import Report
 from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import Evidence
+from avow.evidence.record import RETRY, Evidence
 from avow.files import digest, digest_file, is_intact, write
 from avow.pipeline import worker
 from avow.pipeline.export import folder
@@ -19,9 +19,6 @@ from avow.pipeline.run_info import Run
 from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
 from avow.verdict import Link, Outcome, Verdict
 from avow.workspace import Workspace
-
-RETRY = "retry"
-"""Set in the details of a record that a later run must not be content with: the engine itself broke."""
 
 
 @functools.cache

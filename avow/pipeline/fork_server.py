@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import ctypes
 import gc
 import importlib
 import json
 import os
 import selectors
-import signal
 import socket
 import sys
 from collections.abc import Sequence
@@ -24,7 +22,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from avow.pipeline import worker
-from avow.process import kill_tree
+from avow.process import die_with, kill_tree
 
 PRELOADED = (
     "avow.calculus.interpretation",
@@ -39,7 +37,6 @@ PRELOADED = (
 """What nearly every work needs, directly or not."""
 
 _MESSAGE = 1 << 20
-_PR_SET_PDEATHSIG = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,10 +109,7 @@ def _work(arguments: Sequence[str], server: int, errors: int, open_here: Sequenc
     code = 1
     try:
         os.setsid()
-        # as a tool (`avow.process`), it must not outlive what started it, however that dies
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != server:
-            os._exit(1)
+        die_with(server)
         os.dup2(errors, 2)
         for descriptor in {*open_here, errors}:
             with contextlib.suppress(OSError):

@@ -19,10 +19,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import Evidence
+from avow.evidence.record import RETRY, Evidence
 from avow.pipeline import worker
 from avow.pipeline.altered import Altered, chosen
-from avow.pipeline.discharge import RETRY, ledger_of
+from avow.pipeline.discharge import ledger_of
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work, method_backend, planned_method
 from avow.verdict import Link, Outcome, Verdict

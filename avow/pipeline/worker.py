@@ -20,6 +20,7 @@ from avow.backend import Limits, Report
 from avow.diagnostics import Rejected
 from avow.evidence.encoding import Unreadable
 from avow.evidence.obligation import Obligation
+from avow.evidence.record import RETRY
 from avow.files import write
 from avow.pipeline import forks
 from avow.pipeline.altered import Altered, alter
@@ -101,7 +102,7 @@ def _complete(report: Report, obligations: tuple[Obligation, ...]) -> Report:
 def _failed(
     obligations: tuple[Obligation, ...], work: Work, verdict: Verdict, why: str, logs: dict[str, str]
 ) -> Report:
-    outcomes = tuple(Outcome(o.id, verdict, why, details={"retry": True}) for o in obligations)
+    outcomes = tuple(Outcome(o.id, verdict, why, details={RETRY: True}) for o in obligations)
     return Report(outcomes, work.engine, __version__, logs=logs)
 
 
@@ -135,7 +136,7 @@ def _asked_again(outcome: Outcome) -> Outcome:
     """What is open after a tool was killed from outside is for the next run to ask again."""
     if outcome.verdict not in (Verdict.ERROR, Verdict.UNKNOWN):
         return outcome
-    return replace(outcome, details={**outcome.details, "retry": True})
+    return replace(outcome, details={**outcome.details, RETRY: True})
 
 
 def _asked(request: dict[str, Any]) -> tuple[System, Work]:

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from avow.assurance.model import Case, EvidenceView, ObligationView
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
-from avow.evidence.record import Evidence
+from avow.evidence.record import RETRY, Evidence
 from avow.evidence.status import Status, weigh
 
 MARKS = {
@@ -261,7 +261,7 @@ def outline(evidence: Evidence) -> str:
 
 def details_text(evidence: Evidence) -> str:
     """Whatever else a method left in its details, as indented text."""
-    shown = {"outline", "proof_outline", "triples", "mutation", "retry", "protocol"}
+    shown = {"outline", "proof_outline", "triples", "mutation", RETRY, "protocol"}
     rest = {
         key: value for key, value in evidence.details.items() if key not in shown and value not in ("", [], {}, None)
     }
