@@ -9,13 +9,8 @@ from avow.diagnostics import Diagnostic, Rejected
 from avow.workspace import Workspace, find_workspace
 
 
-def find_root(start: Path | None = None) -> Path:
-    """The folder with contracts/ and dodo.py, at or above the current one. Raises Rejected."""
-    return workspace(start).root
-
-
 def workspace(start: Path | None = None) -> Workspace:
-    """As `find_root`, as a `Workspace`. Raises Rejected."""
+    """The folder with contracts/ and dodo.py, at or above the current one. Raises Rejected."""
     place = (start or Path.cwd()).resolve()
     found = find_workspace(place)
     if found is None:

@@ -11,7 +11,7 @@ from enum import StrEnum
 from fractions import Fraction
 
 from avow.diagnostics import Span
-from avow.language.sorts import BOOL, DataSort, EnumSort, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
+from avow.language.sorts import BOOL, DataSort, EnumSort, SequenceSort, SetSort, Sort, TupleSort
 
 
 class Role(StrEnum):
@@ -292,7 +292,3 @@ def children(term: Term) -> tuple[Term, ...]:
             return (item, collection)
         case Not(body=body) | Quantified(body=body):
             return (body,)
-
-
-def is_function(sort: Sort) -> bool:
-    return isinstance(sort, FunctionSort)

@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from avow.assurance.model import Case, EvidenceView, ObligationView
-from avow.evidence.obligation import SYSTEM_LEVEL, Kind
+from avow.evidence.obligation import Kind
 from avow.evidence.record import RETRY, Evidence
 from avow.evidence.status import Status, weigh
 
@@ -289,10 +289,6 @@ def _indented(value: object, margin: str) -> Iterator[str]:
 def history(view: ObligationView) -> tuple[EvidenceView, ...]:
     """Evidence that no longer counts, newest first."""
     return tuple(item for item in reversed(view.evidence) if not item.counts)
-
-
-def is_system_level(node: str) -> bool:
-    return node == SYSTEM_LEVEL
 
 
 def count(number: int, one: str, many: str = "") -> str:

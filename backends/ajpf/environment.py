@@ -14,7 +14,7 @@ drawn for ever, then draws that contain the percept never cease. Nothing is fair
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -218,7 +218,3 @@ def _read(located: Located) -> Environment:
         draws.get("at_quiescence", "once"),
         tuple(fair),
     )
-
-
-def all_percepts(environment: Environment) -> Iterable[Struct]:
-    return (p for _, group in environment.groups for p in group if p is not None)

@@ -123,10 +123,6 @@ def show(term: Term) -> str:
     return f"{term.functor}({', '.join(map(show, term.args))})" if term.args else term.functor
 
 
-def show_goal(goal: Goal) -> str:
-    return f"{show(goal.term)} [{goal.kind}]"
-
-
 def show_event(event: Event) -> str:
     return f"{event.sign}{'!' if event.is_goal else ''}{show(event.term)}{f' [{event.goal}]' if event.goal else ''}"
 

@@ -12,7 +12,7 @@ from avow import process
 from avow.backend import Job, Limits, Report, Tool, Translated
 from avow.backends.dafny.codes import CODES
 from avow.backends.dafny.judge import Settled, settle
-from avow.backends.dafny.modules import Generated, generate, lines_map
+from avow.backends.dafny.modules import Generated, generate, lines_map, one_line
 from avow.backends.dafny.printer import NotExpressible
 from avow.backends.dafny.runner import INSTALL, dafny
 from avow.backends.dafny.scanner import Scan, scan
@@ -102,7 +102,7 @@ class DafnyBackend:
         try:
             generated = _generate(job)
         except NotExpressible as problem:
-            return {"NOT-COVERED.txt": f"{_unprintable(problem.what)}\n"}
+            return {"NOT-COVERED.txt": f"{one_line(problem.what)}\n"}
         return {
             **_specification(generated),
             "guarantees.json": lines_map(generated),
@@ -213,7 +213,3 @@ def _specification(generated: Generated) -> dict[str, str]:
         generated.contract_file: generated.contract,
         generated.spec_file: generated.spec,
     }
-
-
-def _unprintable(text: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in text)

@@ -152,7 +152,7 @@ def _contract(
     ]
     for clause, predicates in clauses:
         lines.append("")
-        lines.append(f"  // {clause.kind} {_comment(clause.name)}" + _sentence(clause))
+        lines.append(f"  // {clause.kind} {one_line(clause.name)}" + _sentence(clause))
         for predicate in predicates:
             lines.append(f"  predicate {predicate.name}({signature(predicate.parameters, words)})")
             lines.append(f"  {{ {predicate.body} }}")
@@ -171,7 +171,7 @@ def _spec(
     outputs = signature([p.variable for p in node.outputs], words)
     env = f"Env({', '.join(words.local(p.variable) for p in node.inputs)})"
     lines = [
-        f"// Generated: what an implementation of node {_comment(node.name)} must do. Do not edit.",
+        f"// Generated: what an implementation of node {one_line(node.name)} must do. Do not edit.",
         f'include "{contract_file}"',
         f"abstract {_MODULE} {spec_module} {{",
         "  import Types",
@@ -229,9 +229,9 @@ def _skeleton(
 
 
 def _sentence(clause: Clause) -> str:
-    return f": {_comment(clause.sentence)}" if clause.sentence else ""
+    return f": {one_line(clause.sentence)}" if clause.sentence else ""
 
 
-def _comment(text: str) -> str:
-    """Text of the contract within a line comment: no line break may end it early."""
+def one_line(text: str) -> str:
+    """Text of the contract within a line, such as a comment: no line break may end it early."""
     return "".join(c if c.isprintable() else " " for c in text)

@@ -14,7 +14,6 @@ from avow.language.sorts import (
     REAL,
     STRING,
     BoolSort,
-    DataSort,
     EnumSort,
     FunctionSort,
     Sort,
@@ -138,8 +137,3 @@ def scenario_runs(
                 found.setdefault(run, {})[row[at : at + len(run)]] = None
                 at += len(run)
     return {run: tuple(parts) for run, parts in found.items()}
-
-
-def is_recursive(sort: DataSort) -> bool:
-    """Whether a value of the sort can hold another of some data type."""
-    return any(isinstance(p, DataSort) for c in sort.constructors for p in c.parameters)

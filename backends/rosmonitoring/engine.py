@@ -8,7 +8,6 @@ environment's door, not the node's.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -116,18 +115,6 @@ class Monitor:
         for clause in node.clauses:
             if clause.kind is ClauseKind.ASSUMPTION or wanted is None or clause.name in wanted:
                 self._watch(clause)
-
-    def restart(self) -> None:
-        """A new run begins: every variable is as at the start. The tallies go on."""
-        self.values.clear()
-        self._seen.clear()
-        self._readers.clear()
-        self._previous.clear()
-        for watched in itertools.chain.from_iterable(self._clauses.values()):
-            watched.fresh.clear()
-        self._observe()
-        for watched in itertools.chain.from_iterable(self._clauses.values()):
-            self._hold(watched)
 
     def _observe(self) -> None:
         for name, rule in self.setup.rules.items():
