@@ -1,4 +1,4 @@
-"""Every diagnostic code of the language and of plans, declared once: what it means, and a text that brings it about.
+"""Every diagnostic code of the language, declared once: what it means, and a text that brings it about.
 
 Numbers: 0xx the file, 1xx the syntax, 2xx names, 3xx sorts, 4xx lints (warnings that can be switched off).
 The tests check every example, and docs/language.md lists every code. The codes of everything else stand in
@@ -345,142 +345,38 @@ _LINTS = (
         "Two topics carry the variable, and a monitor reads it from one of them.",
         _node(topics="bool t matches(out.b), bool u matches(out.b)"),
     ),
+    _lint(
+        "RCL412",
+        "total function looked up by value",
+        "Functions are total: every place has a number. A formula that asks which arguments have a value uses the "
+        "function as a numbering of some of them; that an argument has none, or that one value is had only once, it "
+        "cannot say. A relation (`REAL x REAL x NATURAL --> BOOL`) can.",
+        _node(
+            "wayPoint : REAL x REAL --> NATURAL, i : NATURAL",
+            clauses="guarantee(out.b <=> exists(x, y in REAL | in.wayPoint(x, y) == in.i))",
+        ),
+    ),
+    _lint(
+        "RCL413",
+        "sentence and formula compare otherwise",
+        "The sentence says `less than`, `at most`, `between` … and a number; the formula compares with that number the "
+        "other way, or has other numbers. Units are reckoned with (25 cm is 0.25), and so are conditions, which may be "
+        "turned round.",
+        'assume reading "The level is less than or equal to 0" (0 <= in.level) guarantee(out.status == low)',
+    ),
+    _lint(
+        "RCL414",
+        "one way or both ways",
+        "The sentence says `if …`, the formula `<=>`; or the sentence says `exactly when`, the formula `->`.",
+        'guarantee alarm "If the level is above 3, the status is high" (in.level > 3 <=> out.status == high)',
+    ),
+    _lint(
+        "RCL415",
+        "sentence names what the formula does not",
+        "The sentence has the name of an element, and the formula does not speak of it.",
+        'guarantee halt "At a high level it stops" (in.level > 3 -> out.status == high)',
+    ),
 )
 
 CODES: dict[str, Code] = {c.code: c for c in (*_FILE, *_SYNTAX, *_NAMES, *_SORTS, *_LINTS)}
 """Every code, in order."""
-
-
-# --- plans, systems, the calculus: their examples are plans, and stand in tests/system ------------------------------
-
-PLAN_CODES: dict[str, Code] = {
-    c.code: c
-    for c in (
-        Code(
-            "PLAN100",
-            "no plan",
-            "There is no system here: neither a plan.yaml nor an .rcl file.",
-            remedy="Give the folder that has the `plan.yaml`.",
-        ),
-        Code(
-            "PLAN101",
-            "not YAML",
-            "The file is not one plain YAML document, or too large, too deep, or empty.",
-            remedy="Write one YAML document without anchors, tags or merge keys; `docs/plan.md` has the form.",
-        ),
-        Code(
-            "PLAN102",
-            "a key",
-            "A key is given twice, is a merge key, or is not plain text.",
-            remedy="Give each key once, as plain text.",
-        ),
-        Code(
-            "PLAN103",
-            "unknown key",
-            "The plan has no such key at this place.",
-            remedy="Use one of the keys in the hint.",
-        ),
-        Code(
-            "PLAN104",
-            "missing key",
-            "A key that is needed here is missing.",
-            remedy="Add the key; `docs/plan.md` says what it means.",
-        ),
-        Code(
-            "PLAN105",
-            "wrong value",
-            "The value has the wrong type or form, or is not one of those allowed.",
-            remedy="Write what the message wants.",
-        ),
-        Code(
-            "PLAN106",
-            "unknown name",
-            "The plan names a node, port or guarantee that the contract does not have.",
-            remedy="Correct the name, or declare it in the contract.",
-        ),
-        Code(
-            "PLAN107",
-            "no such file",
-            "The plan names a file that is not there.",
-            remedy="Correct the path, which is relative to the system's folder, or add the file.",
-        ),
-        Code(
-            "PLAN108",
-            "path outside",
-            "A path leads out of the system's folder.",
-            remedy="Move the file into the folder: evidence covers nothing outside it.",
-        ),
-        Code(
-            "PLAN109",
-            "scenario",
-            "A table, an interpretation or a domain of the scenario cannot be used.",
-            remedy="Correct the place in the `scenario` or its table.",
-        ),
-        Code(
-            "PLAN110",
-            "contradiction",
-            "Two things that the plan says do not go together.",
-            remedy="Decide for one of the two.",
-        ),
-        Code(
-            "PLAN112",
-            "initial value",
-            "An initial value is no value of its output and no formula about it.",
-            remedy="Give a value of the output's type, or a formula about that output only.",
-        ),
-        Code(
-            "PLAN113",
-            "environment",
-            "An environment assumption speaks of more than the environment's inputs.",
-            remedy="Speak only of inputs that no node provides.",
-        ),
-        Code(
-            "PLAN114", "temporal property", "The text is no temporal property.", remedy="Write it as in `docs/plan.md`."
-        ),
-        Code(
-            "PLAN121",
-            "types clash",
-            "An output and the input that it would feed have different types.",
-            remedy="Correct one of the types, or connect other ports.",
-        ),
-        Code(
-            "PLAN122",
-            "several providers",
-            "More than one output could feed an input: a connection has to say which.",
-            remedy="Say under `connections` which output it is.",
-        ),
-        Code(
-            "PLAN123",
-            "start-up deadlock",
-            "Nodes in a loop wait for one another, and no delayed edge has an initial value.",
-            severity=Severity.WARNING,
-            remedy="Give one delayed output of the loop an initial value.",
-        ),
-        Code(
-            "PLAN124",
-            "memory",
-            "A node has an input and an output of one name; it feeds itself only by a connection.",
-            severity=Severity.WARNING,
-            remedy="Connect them if memory is meant; otherwise rename one.",
-        ),
-        Code(
-            "PLAN125",
-            "rule does not fit",
-            "The selected nodes are not connected as the rule wants them.",
-            remedy="Use a rule for this shape, or select other nodes.",
-        ),
-        Code(
-            "PLAN126",
-            "ports do not fit",
-            "A node cannot stand in for another that has other inputs or outputs.",
-            remedy="Give both nodes the same ports.",
-        ),
-        Code(
-            "PLAN127",
-            "ROS graph",
-            "The ROS graph and the plan's account of it do not agree.",
-            remedy="Correct the plan's `model`, or record the graph again.",
-        ),
-    )
-}
-"""Every code of plans and systems, in order."""

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from avow.codes import CODES, PLAN_CODES, Code, declare, register
+from avow.codes import CODES, Code, declare, register
+from avow.codes_plan import PLAN_CODES
 
 WORKSPACE_CODES = register(
     declare(

@@ -1,9 +1,10 @@
-"""``avow check``: diagnostics for .rcl files, in milliseconds."""
+"""``avow check``: diagnostics for .rcl files, in milliseconds; for a system's folder, of its plan too."""
 
 from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,7 +35,8 @@ def command(
 ) -> int:
     """Check contracts: syntax, names, types, and lints.
 
-    PATHS are .rcl files or systems' folders. Files of one folder are one contract. Code 2 where anything is an error.
+    PATHS are .rcl files or systems' folders. Files of one folder are one contract. Of a system's folder, the plan is
+    checked too: its names, and what each method's tool says of its options. Code 2 where anything is an error.
     """
     from avow import __version__
     from avow.rendering import render, summary, to_json, to_sarif
@@ -46,6 +48,8 @@ def command(
 
         files += len(group)
         found.extend(check_paths(group, off=group_off | frozenset(off))[1])
+    for folder in dict.fromkeys(path for path in paths if (path / "plan.yaml").is_file()):
+        found.extend(d for d in _of_plan(folder) if d not in found and (d.is_error or d.code not in off))
     if as_json:
         click.echo(json.dumps(to_json(found), indent=1))
     elif sarif:
@@ -104,6 +108,18 @@ def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozense
     if not files:
         found.append(Diagnostic("RCL002", f"{folder} holds neither a plan.yaml nor an .rcl file"))
     return files, frozenset()
+
+
+def _of_plan(folder: Path) -> Iterator[Diagnostic]:
+    """What there is to say of the folder's plan beside its contract files (which are checked already)."""
+    from avow.diagnostics import Rejected
+    from avow.pipeline.check import of_plan
+    from avow.system.load import load_system
+
+    try:
+        yield from of_plan(load_system(folder))
+    except Rejected as rejected:
+        yield from (d for d in rejected.diagnostics if not d.code.startswith("RCL"))
 
 
 def _off(folder: Path) -> frozenset[str]:

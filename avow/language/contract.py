@@ -27,6 +27,7 @@ class Clause:
     text: str = field(default="", compare=False)
     """The formula as written in the file."""
     span: Span | None = field(default=None, compare=False, repr=False)
+    sentence_span: Span | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,11 @@ from avow.diagnostics import Diagnostic, Severity, Span
 from avow.language.bracketing import misreadings
 from avow.language.contract import Contract, Node
 from avow.language.lexer import Token
+from avow.language.lookups import lookups, walk
 from avow.language.outline import FileSyntax
-from avow.language.sorts import EnumSort, NaturalSort
+from avow.language.printer import show_sort, show_term
+from avow.language.sentences import mismatches
+from avow.language.sorts import BOOL, EnumSort, FunctionSort, NaturalSort
 from avow.language.source import Reports
 from avow.language.spelling import similar
 from avow.language.terms import (
@@ -34,7 +37,6 @@ from avow.language.terms import (
     SetTerm,
     Term,
     Variable,
-    children,
 )
 
 _ALLOW = re.compile(r"\bavow:\s*allow\b([^\n*]*)")
@@ -185,22 +187,36 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
         for unused in _unused(clause.formula):
             message = f"`{unused.name}` is quantified and never used"
             yield _warning("RCL407", message, unused.span, "remove it, or tie it to what was meant")
+        for mismatch in mismatches(clause, node):
+            yield _warning(mismatch.code, mismatch.message, clause.sentence_span, mismatch.hint)
+    yield from _looked_up(node)
 
 
-def _walk(term: Term) -> Iterator[Term]:
-    stack = [term]
-    while stack:
-        part = stack.pop()
-        yield part
-        stack.extend(reversed(children(part)))
+def _looked_up(node: Node) -> Iterator[Diagnostic]:
+    """Each total function that the node looks up by its value, once."""
+    found = {look.function: look for clause in reversed(node.clauses) for look in lookups(clause.formula)}
+    for port in (*node.inputs, *node.outputs):
+        look = found.get(port.variable)
+        if look is None or not isinstance(port.sort, FunctionSort):
+            continue
+        relation = FunctionSort((*port.sort.parameters, port.sort.result), BOOL)
+        asked = f"`{show_term(look.place, 'rcl')}` asks which arguments have a value"
+        yield _warning(
+            "RCL412",
+            f"`{port.variable.qualified}` gives a value to all arguments ({show_sort(port.sort)} is a total function), "
+            f"and `{node.name}` looks up arguments by their value",
+            port.span,
+            f"if some arguments have no value, no function can say so, but a relation can: {show_sort(relation)}",
+            (asked, look.place.span),
+        )
 
 
 def _variables(term: Term) -> set[tuple[Role, str]]:
-    return {(t.role, t.name) for t in _walk(term) if isinstance(t, Variable)}
+    return {(t.role, t.name) for t in walk(term) if isinstance(t, Variable)}
 
 
 def _unused(term: Term) -> Iterator[Variable]:
-    for part in _walk(term):
+    for part in walk(term):
         if isinstance(part, Quantified):
             used = {name for role, name in _variables(part.body) if role is Role.BOUND}
             yield from (v for v in part.variables if v.name not in used)

@@ -104,7 +104,8 @@ def _clause(
     text = reports.source.text[slice(*syntax.inside)].strip()
     sentence = unquote(syntax.sentence.text) if syntax.sentence is not None else None
     whole = reports.source.span(syntax.start, syntax.end)
-    return Clause(syntax.kind, name, position, formula, sentence, text, whole)
+    quoted = reports.source.span(syntax.sentence.start, syntax.sentence.end) if syntax.sentence is not None else None
+    return Clause(syntax.kind, name, position, formula, sentence, text, whole, quoted)
 
 
 def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bool:

@@ -39,15 +39,21 @@ def check(workspace: Workspace, surveyed: Survey) -> None:
 
 
 def diagnostics(system: System) -> tuple[Diagnostic, ...]:
-    """Lints of the contract, the plan's account of the ROS graph, and what each backend says of its options."""
+    """Lints of the contract, and what is to be said of the plan; without the warnings that the plan switches off."""
     from avow.language.load import check_paths
 
-    found = list(check_paths(system.plan.contract_files, off=frozenset(system.plan.lints_off))[1])
-    found += _model(system)
+    off = frozenset(system.plan.lints_off)
+    return (*check_paths(system.plan.contract_files, off=off)[1], *of_plan(system))
+
+
+def of_plan(system: System) -> tuple[Diagnostic, ...]:
+    """What is to be said of a plan that can be read: its account of the ROS graph, and what each backend says of its
+    options; without the warnings that the plan switches off."""
+    found = list(_model(system))
     for plan in system.plan.nodes:
         for method in plan.methods:
             found += _method(system, plan.node, method)
-    return tuple(found)
+    return tuple(d for d in found if d.is_error or d.code not in system.plan.lints_off)
 
 
 def _model(system: System) -> tuple[Diagnostic, ...]:

@@ -47,7 +47,7 @@ class AjpfBackend:
             setup = read(job)
         except Rejected as error:
             return error.diagnostics
-        return tuple(diagnose(setup, instances(job, setup)))
+        return tuple(diagnose(job, setup, instances(job, setup)))
 
     def files(self, job: Job) -> tuple[Path, ...]:
         names = [v for key in ("program", "environment") if isinstance(v := job.options.get(key), str)]

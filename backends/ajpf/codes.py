@@ -111,4 +111,11 @@ CODES = register(
         "Correct the formula. What you want to give up, map to `T`, in the open.",
         warning=True,
     ),
+    declare(
+        "AJPF133",
+        "instances left out",
+        "The plan's `instances` lack values of the scenario's domain: the guarantee is not checked for these.",
+        "Leave the variable out of `instances`, or say in the plan why the rest does not matter.",
+        warning=True,
+    ),
 )

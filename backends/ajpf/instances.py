@@ -16,13 +16,13 @@ from avow.backends.ajpf.options import Extra, Setup, is_index
 from avow.backends.ajpf.psl import Always, Eventually, Formula, Implies
 from avow.backends.ajpf.psl_parser import instantiate
 from avow.backends.ajpf.reading import Left, read_properties
-from avow.backends.ajpf.scenario import Decider, range_of
+from avow.backends.ajpf.scenario import Decider, domain_of, range_of
 from avow.backends.ajpf.shape import MAX_DEPTH, TooComplex, free
 from avow.diagnostics import Diagnostic, Severity, Span
 from avow.language.contract import Clause
 from avow.language.terms import TRUE, And, Quantified, Quantifier, Term, Variable
 from avow.language.terms import Implies as RclImplies
-from avow.logic.traversal import depth
+from avow.logic.traversal import depth, subterms
 
 MAX_PROPERTIES = 5_000
 
@@ -71,8 +71,8 @@ def instances(job: Job, setup: Setup) -> Instantiation:
     return Instantiation(claims, extras, unused, dict(mapper.words))
 
 
-def diagnose(setup: Setup, made: Instantiation) -> Iterator[Diagnostic]:
-    """What the table does not cover, and rows without use: warnings, since the other guarantees can be checked."""
+def diagnose(job: Job, setup: Setup, made: Instantiation) -> Iterator[Diagnostic]:
+    """What the table and the instances do not cover, and rows without use: warnings, since the rest can be checked."""
     for claim in made.claims:
         if claim.not_covered is not None:
             yield Diagnostic(
@@ -98,6 +98,31 @@ def diagnose(setup: Setup, made: Instantiation) -> Iterator[Diagnostic]:
         for row in setup.rows:
             if row.text in made.unused:
                 yield Diagnostic("AJPF131", f"the row “{row.text}” covers nothing", row.span, Severity.WARNING)
+
+    yield from _left_out(job, setup)
+
+
+def _left_out(job: Job, setup: Setup) -> Iterator[Diagnostic]:
+    """Instances of the plan's that do not have all of the scenario's domain."""
+    seen = set[str]()
+    for obligation in job.obligations:
+        for term in subterms(job.clause(obligation).formula):
+            for variable in term.variables if isinstance(term, Quantified) else ():
+                name = next((n for n in (variable.name, variable.name.rstrip("'")) if n in setup.instances), None)
+                if name is None or name in seen or not is_index(variable.sort):
+                    continue
+                seen.add(name)
+                domain = domain_of(variable, job.system.plan.scenario) or ()
+                missing = sorted(set(domain) - set(setup.instances[name]))
+                if missing:
+                    shown = ", ".join(map(str, missing[:8])) + (", …" if len(missing) > 8 else "")
+                    yield Diagnostic(
+                        "AJPF133",
+                        f"the instances leave out {name} = {shown}, which the scenario has: nothing is checked there",
+                        job.method.options.at("instances", name),
+                        Severity.WARNING,
+                        hint=f"without `{name}` under `instances`, the scenario's domain is taken",
+                    )
 
 
 def _claim(clause: Clause, mapper: Mapper, setup: Setup, keys: set[str]) -> Claim:

@@ -56,6 +56,11 @@ def range_of(
     for name in (variable.name, plain):
         if name in instances:
             return instances[name]
+    return domain_of(variable, scenario)
+
+
+def domain_of(variable: Variable, scenario: Scenario | None) -> Sequence[int] | None:
+    """The scenario's domain of an index variable's sort."""
     names = ("NATURAL", "INTEGER") if isinstance(variable.sort, NaturalSort) else ("INTEGER",)
     for name in names:
         texts = scenario.domains.get(name) if scenario is not None else None

@@ -15,6 +15,7 @@ from avow.backends.ajpf import BACKEND
 from avow.backends.ajpf.psl_parser import parse_psl
 from avow.backends.ajpf.tautology import MAX_STEPS, Steps, constant, is_satisfiable, is_valid
 from avow.logic.mutants import mutants
+from avow.system.plan import Scenario
 from avow.verdict import Verdict
 
 
@@ -234,3 +235,17 @@ def test_no_negated_guarantee_of_the_rover_is_supported(rover, tmp_path, name):
     (negated,) = [m for m in mutants(job.node.clause(name).formula) if m.change == "the whole is negated"]
     outcome = settle(altered(job, name, negated.formula), tmp_path)[name]
     assert outcome.verdict is Verdict.REFUTED, outcome.summary
+
+
+def test_instances_that_leave_out_what_the_scenario_has(lift, tmp_path):
+    def told(numbers: list[int], domain: list[int] | None) -> list[str]:
+        job = lift({"instances": {"f": numbers}})
+        scenario = None if domain is None else Scenario(domains={"NATURAL": tuple(map(str, domain))})
+        plan = replace(job.system.plan, scenario=scenario)
+        found = BACKEND.check(replace(job, system=replace(job.system, plan=plan)))
+        return [d.message for d in found if d.code == "AJPF133"]
+
+    (message,) = told([1, 2], [0, 1, 2, 3])
+    assert "f = 0, 3" in message
+    assert told([0, 1, 2], [1, 2]) == []
+    assert told([1, 2], None) == []

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from avow.codes import CODES, PLAN_CODES, Code, declare, register
+from avow.codes import CODES, Code, declare, register
+from avow.codes_plan import PLAN_CODES
 from avow.codes_workspace import CORE_CODES, WORKSPACE_CODES, of_backend, page_rows
 from avow.registry import backend, names
 

@@ -97,6 +97,28 @@ def test_check_off_and_folders(files: dict[str, str], tmp_path: Path) -> None:
     assert "Nothing of that name" in invoke("check", "--explain", files["bad"])[1]
 
 
+def test_check_of_a_system_reads_its_plan(tmp_path: Path) -> None:
+    """What the plan says, and what the method's tool says of its options; warnings as the plan has them."""
+    (tmp_path / "system.rcl").write_text(
+        "node n { inputs( r : REAL ) outputs( b : BOOL ) topics() guarantee( b <=> r > 0 ) }\n"
+    )
+    plan = "system: s\ncontract: system.rcl\nnodes:\n  n: {methods: [{hoare: {program: p.imp}}]}\n"
+    (tmp_path / "plan.yaml").write_text(plan)
+    code, output = invoke("check", str(tmp_path))
+    assert code == 2
+    assert "p.imp" in output
+    assert output.count("RCL405") == 1
+    (tmp_path / "p.imp").write_text("IF (r > 0) THEN b := TRUE ELSE b := FALSE ENDIF")
+    code, output = invoke("check", str(tmp_path))
+    assert code == 0, output
+    (tmp_path / "plan.yaml").write_text(plan.replace("n: {", "m: {"))
+    code, output = invoke("check", str(tmp_path))
+    assert code == 2
+    assert "plan.yaml:4:" in output
+    (tmp_path / "plan.yaml").write_text(plan + "lints_off: [RCL405]\n")
+    assert "RCL405" not in invoke("check", str(tmp_path))[1]
+
+
 def test_fmt(tmp_path: Path) -> None:
     path = tmp_path / "f.rcl"
     path.write_text("node n{inputs()outputs(b:BOOL)topics()G(b)}")

@@ -94,11 +94,8 @@ def test_nothing_is_fetched_and_nothing_foreign_runs(found: Case) -> None:
 
 def test_templates_do_not_evaluate_what_they_show() -> None:
     text = render_page(hostile_case())
-    assert "{{ 7*7 }}" in text
-    assert (
-        "49" not in re.sub(r"[0-9a-f]{12,}", "", text.split("<main")[1].split("<script>")[0]).replace("1749", "")
-        or True
-    )
+    plain = re.sub(r"<[^<>]*>", "", text)  # pictures break lines within it, and so does colouring
+    assert len(re.findall(r"\{\{ ?7\*7 \}\}", plain)) == plain.count("{% raw %}") > 0
     assert "alert(1)</script>" not in text
 
 

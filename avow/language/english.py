@@ -1,0 +1,124 @@
+"""What can be read from an English sentence without understanding it: comparisons with numbers, whether it speaks of a
+condition one way or both ways, and which words may stand for a name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+LONGEST = 4_000
+"""So many characters of a sentence are read."""
+
+OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
+
+_LESS = r"(?:less|fewer|smaller|lower|shorter|earlier|sooner)"
+_MORE = r"(?:greater|more|larger|higher|longer|bigger|later)"
+_PHRASES = (
+    ("<=", rf"{_LESS} than or equals? to|no {_MORE} than|at most|not exceed(?:ing|s)?|never exceeds?|<=|≤"),
+    (">=", rf"{_MORE} than or equals? to|no {_LESS} than|at least|>=|≥"),
+    ("<", rf"{_LESS} than|below|under|<"),
+    (">", rf"{_MORE} than|above|exceed(?:s|ing)?|beyond|over|>"),
+    ("up to", r"up to|within"),
+    ("between", r"between"),
+)
+_WORDS = {w: n for n, w in enumerate(("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"))}
+_NUMBER = rf"(?:[-−]?\d+(?:\.\d+)?|(?:{'|'.join(_WORDS)})\b)"
+_UNIT = (
+    r"(?:\s?(?:%|percent|°c?|deg|degrees?|[mcdk]?m|(?:milli|centi|kilo)?met(?:er|re)s?|[µunm]?s|sec|(?:milli|micro)?seconds?"
+    r"|min|minutes?|h|hours?|[kmg]?hz|[mk]?v|volts?|m?a|amps?|[mk]?w|watts?|k?j|[km]?n|newtons?|nm|[km]?pa|m?bar|psi|k|kelvin"
+    r"|celsius|[mk]?g|(?:kilo)?grams?|m?l|lit(?:er|re)s?|m?rad|rpm|[mµ]?sv|m?gy|bq|lux|lx|dbm?|ppm|bytes?|[kmg]b)"
+    r"(?:\s?/\s?(?:min|ms|s|h))?(?![\w%]))?"
+)
+_COMPARISON = re.compile(
+    rf"(?<![\w<>=])(?:{'|'.join(f'(?P<o{i}>{text})' for i, (_, text) in enumerate(_PHRASES))})"
+    rf"\s*(?P<number>{_NUMBER})(?!\d|\.\d)(?P<unit>{_UNIT})(?!\w)(?:\s*and\s+(?P<second>{_NUMBER}))?",
+    re.IGNORECASE,
+)
+_JUST_BEFORE = re.compile(
+    r"(?:\b(?:not|never|cannot)|n't)(?:\s+(?:be|is|go|goes|get|rise|fall|drop|stay|have))?\s*$", re.I
+)
+_NEGATION = re.compile(r"\b(?:not|never|no|cannot|nor|without|unless)\b|n't\b", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """``less than 25 cm``: the signs that it may mean, and the number. A numeral may be a word (``zero``)."""
+
+    text: str
+    signs: frozenset[str]
+    number: Fraction
+    unit: str
+    in_digits: bool
+
+
+def comparisons(sentence: str) -> Iterator[Comparison]:
+    """Every comparison with a number. Near a negation, what is meant may be the opposite; right behind one, it is."""
+    for match in _COMPARISON.finditer(sentence):
+        kind = next(_PHRASES[i][0] for i in range(len(_PHRASES)) if match.group(f"o{i}"))
+        number, unit = _number(match["number"]), match["unit"].strip()
+        in_digits = match["number"].lower() not in _WORDS
+        if kind == "between":
+            if match["second"] is not None:
+                yield Comparison(match[0], frozenset({">", ">="}), number, unit, in_digits)
+                yield Comparison(match[0], frozenset({"<", "<="}), _number(match["second"]), unit, in_digits)
+            continue
+        text = sentence[match.start() : match.end("unit")].strip()
+        signs = frozenset({"<", "<="} if kind == "up to" else {kind})
+        before = re.split(r"[.;:,]", sentence[: match.start()])[-1]
+        if _JUST_BEFORE.search(before):
+            signs = frozenset(OPPOSITE[sign] for sign in signs)
+        elif _NEGATION.search(before):
+            signs |= {OPPOSITE[sign] for sign in signs}
+        yield Comparison(text, signs, number, unit, in_digits)
+
+
+def _number(text: str) -> Fraction:
+    word = text.lower()
+    return Fraction(_WORDS[word]) if word in _WORDS else Fraction(text.replace("−", "-"))
+
+
+# --- conditions ------------------------------------------------------------------------------------------------------
+
+_CONDITION = re.compile(r"\b(?:if|when|whenever|while|once|provided|as (?:soon|long) as|in case)\b", re.IGNORECASE)
+_BOTH = re.compile(r"\b(?:if and only if|iff|(?:exactly|precisely|just) (?:if|when|while|then))\b", re.IGNORECASE)
+_PERHAPS_BOTH = re.compile(
+    r"\b(?:only|exactly|precisely|iff|otherwise|else|unless|equals?|equivalent|same|vice versa|conversely|except"
+    r"|no other|not? (?:\w+ ){0,2}other\w*|until|just)\b",
+    re.IGNORECASE,
+)
+
+
+def is_one_way(sentence: str) -> bool:
+    """Whether it says `if …` (`when …`, `while …`), and nothing that could mean the converse too."""
+    return bool(_CONDITION.search(sentence)) and not _PERHAPS_BOTH.search(sentence)
+
+
+def both_ways(sentence: str) -> str | None:
+    """The words with which it says that the converse holds too (``if and only if``, ``exactly when``), if it does."""
+    match = _BOTH.search(sentence)
+    return match[0] if match else None
+
+
+# --- names -----------------------------------------------------------------------------------------------------------
+
+_COMMON = frozenset(
+    "all and any are can end for has its left may none not off one out say the two was yes".split()  # noqa: SIM905
+)
+"""English words that stand in sentences without naming anything."""
+_EXCEPT = re.compile(r"\b(?:not|neither|nor|never|no longer|other than|unless|except|without|instead)\b|n't\b", re.I)
+
+
+def mention(sentence: str, name: str) -> str | None:
+    """The word with which the sentence speaks of `name` (``stop``, ``stops``, ``stopped``, ``stopping``), as something
+    that is; None where it does not, or names it as an exception (``neither low nor high`` is normal)."""
+    stem = name.lower()
+    if len(stem) < 3 or stem in _COMMON:
+        return None
+    forms = {stem, *(stem + ending for ending in ("s", "es", "d", "ed", "ing")), stem.removesuffix("e") + "ing"}
+    forms |= {stem + stem[-1] + "ed", stem + stem[-1] + "ing"}
+    for word in re.finditer(r"[A-Za-z_][\w']*", sentence):
+        if word[0].lower() in forms and not _EXCEPT.search(re.split(r"[.;:]", sentence[: word.start()])[-1]):
+            return word[0]
+    return None

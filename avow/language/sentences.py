@@ -1,0 +1,233 @@
+"""English sentences beside formulas that say something else.
+
+A reader trusts the sentence, the tools the formula. Nobody can prove that the two agree, but three ways in which they
+often do not can be seen: a comparison the other way round (or with another number), a sentence that goes one way beside
+a formula that goes both (or the reverse), and an element that the sentence names and the formula does not.
+Each is a hint, with a code of its own; what cannot be seen to differ is left alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+from avow.language.contract import Clause, Node
+from avow.language.english import LONGEST, OPPOSITE, Comparison, both_ways, comparisons, is_one_way, mention
+from avow.language.lookups import walk
+from avow.language.printer import show_number, show_term
+from avow.language.sorts import BOOL, DataSort, EnumSort, components
+from avow.language.terms import (
+    Arithmetic,
+    Compare,
+    Construct,
+    EnumValue,
+    Iff,
+    Implies,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    Term,
+    Variable,
+    Widen,
+    children,
+)
+
+_SHOWN = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Mismatch:
+    """One difference between a clause's sentence and its formula."""
+
+    code: str
+    message: str
+    hint: str
+
+
+def mismatches(clause: Clause, node: Node) -> Iterator[Mismatch]:
+    """What the clause's sentence is seen to say otherwise than its formula."""
+    if clause.sentence is None:
+        return
+    sentence = clause.sentence[:LONGEST]
+    yield from _comparisons(sentence, clause.formula)
+    yield from _directions(sentence, clause.formula)
+    yield from _elements(sentence, clause.formula, node)
+
+
+# --- comparisons -----------------------------------------------------------------------------------------------------
+
+_FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+_IN_WORDS = {"<": "less than", "<=": "less than or equal to", ">": "greater than", ">=": "greater than or equal to"}
+_SCALES = tuple(Fraction(10) ** k for k in range(-9, 10)) + tuple(
+    scale for k in (60, 3600) for scale in (Fraction(k), Fraction(1, k))
+)
+"""Between a unit of the sentence and that of the contract: powers of ten, minutes, hours."""
+_EITHER = "write the one as the other, whichever is meant"
+
+
+@dataclass(frozen=True, slots=True)
+class _Bound:
+    """A comparison with a constant, read with the constant on the right. Where it is a condition, or stands under `not`
+    or `or`, a sentence may put it the other way (`turned`): ``if less than 3 …`` beside ``… or 3 <= in.r``."""
+
+    term: Compare
+    sign: str
+    number: Fraction
+    turned: bool
+
+    def may_mean(self, signs: frozenset[str]) -> bool:
+        return self.sign in signs or (self.turned and OPPOSITE[self.sign] in signs)
+
+
+def _comparisons(sentence: str, formula: Term) -> Iterator[Mismatch]:
+    said = list(comparisons(sentence))
+    if not said:
+        return
+    bounds = list(_bounds(formula))
+    numbers = sorted({n for t in walk(formula) if (n := _constant(t)) is not None})
+    for what in said:
+        about = [b for b in bounds if _same(what, b.number)]
+        if any(b.may_mean(what.signs) for b in about):
+            continue
+        if about:
+            shown, meaning = (
+                _short(show_term(about[0].term, "rcl")),
+                f"{_IN_WORDS[about[0].sign]} {_plain(about[0].number)}",
+            )
+            message = f"the sentence says “{what.text}”, the formula `{shown}`, that is, {meaning}"
+            yield Mismatch("RCL413", message, _EITHER)
+        elif what.in_digits and what.number not in (0, 1) and not any(_same(what, n) for n in numbers):
+            has = ", ".join(f"`{_plain(n)}`" for n in numbers[:6]) or "no number"
+            yield Mismatch("RCL413", f"the sentence says “{what.text}”, and the formula has {has}", _EITHER)
+
+
+def _same(what: Comparison, number: Fraction) -> bool:
+    if what.number == number:
+        return True
+    part = what.number / 100
+    if what.unit == "%" and number in (part, 1 - part, 1 + part):
+        return True
+    return bool(what.unit) and any(what.number * scale == number for scale in _SCALES)
+
+
+def _bounds(formula: Term) -> Iterator[_Bound]:
+    stack = [(formula, False)]
+    while stack:
+        term, turned = stack.pop()
+        match term:
+            case Compare(operator=sign, left=left, right=right) if sign in _FLIPPED:
+                if (number := _constant(right)) is not None:
+                    yield _Bound(term, sign, number, turned)
+                elif (number := _constant(left)) is not None:
+                    yield _Bound(term, _FLIPPED[sign], number, turned)
+            case Implies(left=left, right=right):
+                stack += [(right, turned), (left, True)]
+            case Iff() | Or() | Not():
+                stack += [(part, True) for part in reversed(children(term))]
+            case _:
+                stack += [(part, turned) for part in reversed(children(term))]
+
+
+def _constant(term: Term) -> Fraction | None:
+    """The number that a term without variables is."""
+    match term:
+        case Literal(value=bool() | str()):
+            return None
+        case Literal(value=value):
+            return Fraction(value)
+        case Widen(term=inner):
+            return _constant(inner)
+        case Negative(term=inner):
+            number = _constant(inner)
+            return None if number is None else -number
+        case Arithmetic(operator=operator, left=left, right=right):
+            first = _constant(left)
+            second = _constant(right) if first is not None else None
+            if first is None or second is None or (operator == "/" and second == 0):
+                return None
+            match operator:
+                case "+":
+                    return first + second
+                case "-":
+                    return first - second
+                case "*":
+                    return first * second
+                case _:
+                    return first / second
+    return None
+
+
+def _plain(number: Fraction) -> str:
+    return show_number(number)[0]
+
+
+def _short(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 1]}…"
+
+
+# --- one way or both -------------------------------------------------------------------------------------------------
+
+
+def _directions(sentence: str, formula: Term) -> Iterator[Mismatch]:
+    core = formula
+    while isinstance(core, Quantified) and core.quantifier is Quantifier.FORALL:
+        core = core.body
+    if isinstance(core, Iff) and is_one_way(sentence):
+        yield Mismatch(
+            "RCL414",
+            "the sentence goes one way (if …, then …), the formula both ways (`<=>`)",
+            "write `->`, or say in the sentence that it is so exactly then",
+        )
+    words = both_ways(sentence)
+    if words and isinstance(core, Implies) and not any(map(_is_both_ways, walk(core))):
+        yield Mismatch(
+            "RCL414",
+            f"the sentence goes both ways (“{words}”), the formula one way (`->`)",
+            f"write `<=>`, or leave “{words}” out of the sentence",
+        )
+
+
+def _is_both_ways(term: Term) -> bool:
+    match term:
+        case Iff() | Quantified(quantifier=Quantifier.UNIQUE):
+            return True
+        case Compare(operator="==" | "!=", left=left, right=right):  # ``done == TRUE`` is another way to write `done`
+            return left.sort == BOOL and not isinstance(left, Literal) and not isinstance(right, Literal)
+    return False
+
+
+# --- elements --------------------------------------------------------------------------------------------------------
+
+
+def _elements(sentence: str, formula: Term, node: Node) -> Iterator[Mismatch]:
+    spoken = [name.lower() for name in _names_in(formula) if len(name) > 2]
+    for name in dict.fromkeys(_elements_of(node)):
+        said = mention(sentence, name)
+        if said is None or any(o.startswith(name.lower()) or said.lower().startswith(o) for o in spoken):
+            continue
+        yield Mismatch(
+            "RCL415",
+            f"the sentence says “{said}”, and the formula does not speak of `{name}`",
+            "say it in the formula too, or leave it out of the sentence",
+        )
+
+
+def _elements_of(node: Node) -> Iterator[str]:
+    for sort in components(*(port.sort for port in (*node.inputs, *node.outputs))):
+        match sort:
+            case EnumSort(members=members):
+                yield from members
+            case DataSort(constructors=constructors):
+                yield from (c.name for c in constructors)
+
+
+def _names_in(formula: Term) -> Iterator[str]:
+    for part in walk(formula):
+        match part:
+            case EnumValue(name=name) | Variable(name=name) | Construct(constructor=name):
+                yield name
