@@ -40,6 +40,10 @@ def command(system: str, method: str | None, node: str | None, limit: int, jobs:
         lost = f"   survives: {'; '.join(score.survivors)}" if score.survivors else ""
         lost += f"   not judged: {'; '.join(score.unjudged)}" if score.unjudged else ""
         click.echo(f"{score.obligation.partition('/')[2]:<44} {score.method:<14} {score.killed}/{score.mutants}{lost}")
+        for found in score.differences:
+            click.echo(f"    {found.change}: {found.formula}")
+            click.echo(f"      {found.why}.")
+            click.echo(f"      {score.blind(found)}.")
     hollow = [s for s in scores if s.hollow]
     if not scores:
         click.echo("no current evidence to examine: run `doit verify` first")

@@ -38,8 +38,11 @@ def mutants(formula: Term) -> tuple[Mutant, ...]:
     return tuple(found)
 
 
-def telling(formula: Term, assumptions: tuple[Term, ...], limit: int, timeout_ms: int = 2_000) -> tuple[Mutant, ...]:
-    """Up to `limit` mutants that do not follow from the original under the assumptions, spread over the formula."""
+def telling(
+    formula: Term, assumptions: tuple[Term, ...], limit: int, timeout_ms: int = 2_000, others: tuple[Term, ...] = ()
+) -> tuple[Mutant, ...]:
+    """Up to `limit` mutants that do not follow from the original under the assumptions, spread over the formula; nor
+    from it and the `others`, the node's further guarantees: what keeps the contract keeps such a mutant."""
     from avow.logic.smt import entails
     from avow.verdict import Verdict
 
@@ -47,6 +50,10 @@ def telling(formula: Term, assumptions: tuple[Term, ...], limit: int, timeout_ms
         m
         for m in mutants(formula)
         if entails((*assumptions, formula), m.formula, timeout_ms=timeout_ms).verdict is Verdict.REFUTED
+        and not (
+            others
+            and entails((*assumptions, *others, formula), m.formula, timeout_ms=timeout_ms).verdict is Verdict.PROVED
+        )
     ]
     if len(kept) <= limit:
         return tuple(kept)

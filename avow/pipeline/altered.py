@@ -30,4 +30,5 @@ def alter(system: System, node: Node, altered: Altered) -> System:
 
 def chosen(node: Node, clause: Clause, limit: int) -> tuple[Mutant, ...]:
     """The mutants that are tried: the same ones, in the same order, in every process."""
-    return telling(clause.formula, tuple(a.formula for a in node.assumptions), limit)
+    others = tuple(g.formula for g in node.guarantees if g.name != clause.name)
+    return telling(clause.formula, tuple(a.formula for a in node.assumptions), limit, others=others)

@@ -6,6 +6,7 @@ longer proves. A mutant that could not be judged (no row of a table speaks of it
 failed) is neither killed nor a survivor: not to understand a question is not to see through it. Evidence that no judged
 mutant disturbs supports nothing: it is recorded as vacuous. The score is appended to the ledger with the evidence that
 it is about; methods that a person's judgement guides (reviews, measurements) do not read the formula and have no score.
+Of each survivor it is said at which input and answer it differs from the contract (`avow.logic.survivors`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from pathlib import Path
 
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY, Evidence
+from avow.logic.mutants import Mutant
+from avow.logic.survivors import Difference, difference
 from avow.pipeline import worker
 from avow.pipeline.altered import Altered, chosen
 from avow.pipeline.discharge import ledger_of
@@ -41,6 +44,19 @@ class Score:
     killed: int
     survivors: tuple[str, ...]
     unjudged: tuple[str, ...]
+    differences: tuple[Difference, ...] = ()
+    """Of each survivor, in their order."""
+    mapped: bool = False
+    """Whether a person's table stands between the formula and what the method looks at."""
+
+    def blind(self, difference: Difference) -> str:
+        """What the method did not see, and what would show it."""
+        table = ", or what the plan gives it (a table, instances) leaves that out" if self.mapped else ""
+        if difference.forced:
+            return f"`{self.method}` has not looked there{table}; it would notice, given such a case"
+        if not difference.answer:
+            return f"nothing that `{self.method}` looks at tells it from the guarantee{table}"
+        return f"`{self.method}` met no such answer{table}; a program that never gives it does more than it must"
 
     @property
     def mutants(self) -> int:
@@ -82,7 +98,7 @@ def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
     work, obligation, record = task
     node = work.system.contract.node(work.node)
     mutants = chosen(node, node.clause(obligation.name), limit)
-    killed, survivors, unjudged = 0, [], []
+    killed, survivors, unjudged = 0, list[Mutant](), list[str]()
     for number, mutant in enumerate(mutants):
         folder = Path(tempfile.mkdtemp(prefix="avow-mutant-"))
         try:
@@ -93,10 +109,18 @@ def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
             case True:
                 killed += 1
             case False:
-                survivors.append(mutant.change)
+                survivors.append(mutant)
             case None:
                 unjudged.append(mutant.change)
-    score = Score(obligation.id, work.method, killed, tuple(survivors), tuple(unjudged))
+    score = Score(
+        obligation.id,
+        work.method,
+        killed,
+        tuple(mutant.change for mutant in survivors),
+        tuple(unjudged),
+        tuple(difference(node, mutant) for mutant in survivors),
+        record.link is Link.MAPPED,
+    )
     ledger_of(workspace.ledger(work.system.name)).append(_scored(record, score, run))
     return score
 
@@ -114,6 +138,18 @@ def _noticed(outcome: Outcome, record: Evidence) -> bool | None:
 
 def _scored(record: Evidence, score: Score, run: Run) -> Evidence:
     details: dict[str, object] = {"killed": score.killed, "mutants": score.mutants, "survivors": list(score.survivors)}
+    if score.differences:
+        details["differences"] = [
+            {
+                "change": d.change,
+                "mutant": d.formula,
+                "at": [list(pair) for pair in d.at],
+                "answer": [list(pair) for pair in d.answer],
+                "forced": d.forced,
+                "why": f"{d.why}; {score.blind(d)}",
+            }
+            for d in score.differences
+        ]
     if score.unjudged:
         details["unjudged"] = list(score.unjudged)
     return replace(

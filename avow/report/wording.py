@@ -233,6 +233,9 @@ def mutation(evidence: Evidence) -> str:
                 match more.get(key):
                     case [_, *_] as listed:
                         parts.append(f"{words}: {', '.join(map(str, listed))}")
+            match more.get("differences"):
+                case [_, *_] as differences:
+                    parts += [_difference(found) for found in differences if isinstance(found, dict)]
             return "; ".join(parts)
         case {"score": int() | float() as score}:
             return f"mutation score {score:.0%}"
@@ -241,6 +244,10 @@ def mutation(evidence: Evidence) -> str:
         case str(text):
             return text
     return ""
+
+
+def _difference(found: dict[str, Any]) -> str:
+    return f"of “{found.get('mutant')}” {found.get('why')}"
 
 
 def outline(evidence: Evidence) -> str:

@@ -85,6 +85,16 @@ def test_a_method_that_supports_everything_is_found_out(place: Workspace) -> Non
     assert newest["yes"].vacuous
     assert "accepts every mutant" in newest["yes"].summary
     assert newest["lost"].details["mutation"]["unjudged"]
+    # of each mutant that it let pass, where it differs, and whether the method should have seen it
+    told = newest["yes"].details["mutation"]["differences"]
+    assert [d["change"] for d in told] == list(scores["yes"].survivors)
+    negated = next(d for d in told if d["change"] == "the whole is negated")
+    assert negated["forced"]
+    assert negated["mutant"] == "in.r < 18 → ¬out.hot"
+    assert "`yes` has not looked there" in negated["why"]
+    shifted = next(d for d in told if d["change"] == "18 becomes 19")
+    assert not shifted["forced"]
+    assert ["out.hot", "FALSE"] in shifted["answer"]
     assert json.loads(json.dumps(newest["seldom"].details["mutation"]))["killed"] == scores["seldom"].killed
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
+from avow.language.contract import Node
 from avow.language.load import check_text
 from avow.language.terms import Term
 from avow.logic.formula import normalise
-from avow.logic.mutants import mutants, telling
+from avow.logic.mutants import Mutant, mutants, telling
+from avow.logic.survivors import difference
 
 
 def guarantee(formula: str) -> Term:
@@ -55,3 +59,47 @@ def test_the_limit_spreads_over_the_formula() -> None:
     some = telling(formula, (), limit=3)
     assert len(some) == 3
     assert set(some) < set(every)
+
+
+def node_of(*guarantees: str) -> Node:
+    inside = " ".join(f"guarantee g{k} ({text})" for k, text in enumerate(guarantees, start=1))
+    contract, found = check_text(f"node n {{ inputs(r : REAL) outputs(s : {{low, high}}) topics() {inside} }}", "t.rcl")
+    assert contract is not None, found
+    return contract.nodes[0]
+
+
+def test_what_follows_from_the_other_guarantees_is_no_mutant() -> None:
+    node = node_of("in.r < 18 -> out.s == low", "in.r < 20 -> out.s == low")
+    first, second = (g.formula for g in node.guarantees)
+    assert "18 becomes 19" in {m.change for m in telling(first, (), limit=99)}
+    assert "18 becomes 19" not in {m.change for m in telling(first, (), limit=99, others=(second,))}
+
+
+def mutant(node: Node, change: str) -> Mutant:
+    return next(m for m in mutants(node.guarantees[0].formula) if m.change == change)
+
+
+def test_where_every_answer_breaks_the_mutant_the_method_has_not_looked() -> None:
+    node = node_of("in.r < 18 -> out.s == low", "in.r >= 18 -> out.s == high")
+    found = difference(node, mutant(node, "18 becomes 19"))
+    assert found.forced
+    ((name, value),) = found.at
+    assert name == "in.r"
+    assert 18 <= Fraction(value) < 19
+    assert found.answer == (("out.s", "high"),)
+    assert f"at in.r = {value} every answer" in found.why
+
+
+def test_where_the_contract_leaves_a_choice_the_program_may_be_stricter() -> None:
+    node = node_of("in.r < 18 -> out.s == low")
+    found = difference(node, mutant(node, "18 becomes 19"))
+    assert not found.forced
+    assert found.answer == (("out.s", "high"),)
+    assert "others, which do not" in found.why
+
+
+def test_an_unrealizable_contract_shows_no_difference_where_it_has_no_answer() -> None:
+    node = node_of("in.r < 18 -> out.s == low", "in.r < 18 -> out.s == high", "in.r >= 18 -> out.s == high")
+    found = difference(node, mutant(node, "18 becomes 17"))
+    assert not found.forced
+    assert not found.answer
