@@ -1,22 +1,24 @@
 """Refinement: may one node stand in for another? Weaker assumptions, stronger guarantees.
 
 A refines B if whatever B's environment provides is enough for A, and whatever A then guarantees is what B promises:
-assumptions of B imply those of A; these and A's guarantees imply B's guarantees.
+assumptions of B imply those of A; these and A's guarantees imply B's guarantees. Of a contract that nothing can keep
+all this is true and says nothing: whether A has an output for every input that B allows is asked as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
 from avow.diagnostics import Diagnostic
 from avow.language.contract import Clause, Node, Port
 from avow.language.printer import show_type
-from avow.language.sorts import FunctionSort, SequenceSort, Sort, TupleSort
-from avow.language.terms import Quantified, Term
+from avow.language.sorts import INTEGER, NATURAL, FunctionSort, SequenceSort, Sort, TupleSort
+from avow.language.terms import Compare, Literal, Quantified, Term, Variable
+from avow.logic.counterexample import show_values
 from avow.logic.formula import rename, sort_digest, transform
 from avow.system.graph import fits
 from avow.verdict import Counterexample, Verdict
@@ -37,12 +39,18 @@ class Demand:
 
 @dataclass(frozen=True, slots=True)
 class Refinement:
-    """Whether `concrete` refines `abstract`. `faults`: ports that do not fit; then nothing else is asked."""
+    """Whether `concrete` refines `abstract`. `faults`: ports that do not fit; then nothing else is asked.
+
+    `unrealizable`: an input that `abstract` allows, and the guarantees of `concrete` that no output meets there;
+    `doubt`: why it is not known whether there is one.
+    """
 
     concrete: str
     abstract: str
     faults: tuple[Diagnostic, ...]
     demands: tuple[Demand, ...]
+    unrealizable: Counterexample | None = None
+    doubt: str = ""
 
     @property
     def verdict(self) -> Verdict:
@@ -50,6 +58,17 @@ class Refinement:
         if self.faults or Verdict.REFUTED in verdicts:
             return Verdict.REFUTED
         return Verdict.UNKNOWN if verdicts - {Verdict.PROVED} else Verdict.PROVED
+
+    @property
+    def vacuous(self) -> bool:
+        """It is true, but only of a contract that nothing can keep (or of assumptions that nothing meets)."""
+        hollow = self.unrealizable is not None or any(demand.vacuous for demand in self.demands)
+        return self.verdict is Verdict.PROVED and hollow
+
+    @property
+    def holds(self) -> bool:
+        """Whether the one may stand in for the other."""
+        return self.verdict is Verdict.PROVED and not self.vacuous
 
 
 def refines(
@@ -64,6 +83,7 @@ def refines(
         return Refinement(concrete.name, abstract.name, faults, ())
     recast = _recasting(concrete, abstract)
     given = {f"{abstract.name}.{a.name} (assumed)": a.formula for a in abstract.assumptions}
+    given |= _narrower(abstract.inputs, concrete.inputs)
     demands: list[Demand] = []
 
     def ask(node: str, clause: Clause, goal: Term, hypotheses: dict[str, Term]) -> None:
@@ -75,12 +95,51 @@ def refines(
 
     for clause in concrete.assumptions:
         ask(concrete.name, clause, recast(clause.formula), given)
-    offered = dict(given)
+    offered = given | _narrower(concrete.outputs, abstract.outputs)
     offered |= {f"{concrete.name}.{a.name} (assumed)": recast(a.formula) for a in concrete.assumptions}
     offered |= {f"{concrete.name}.{g.name}": recast(g.formula) for g in concrete.guarantees}
     for clause in abstract.guarantees:
         ask(abstract.name, clause, clause.formula, offered)
-    return Refinement(concrete.name, abstract.name, (), tuple(demands))
+    found = Refinement(concrete.name, abstract.name, (), tuple(demands))
+    return _kept_by_something(found, concrete, abstract, recast, bounds) if found.verdict is Verdict.PROVED else found
+
+
+def _kept_by_something(
+    found: Refinement, concrete: Node, abstract: Node, recast: Callable[[Term], Term], bounds: Bounds
+) -> Refinement:
+    from avow.logic.realizability import realizable
+
+    def mine(ports: tuple[Port, ...]) -> tuple[Variable, ...]:
+        return tuple(cast(Variable, recast(port.variable)) for port in ports)
+
+    unread = tuple(port.variable for port in abstract.inputs if port.name not in {p.name for p in concrete.inputs})
+    answer = realizable(
+        (*mine(concrete.inputs), *unread),
+        mine(concrete.outputs),
+        {a.name: a.formula for a in abstract.assumptions} | _narrower(abstract.inputs, concrete.inputs),
+        {g.name: recast(g.formula) for g in concrete.guarantees},
+        timeout_ms=bounds.milliseconds,
+        seed=bounds.seed,
+        doubtful=True,
+    )
+    match answer.verdict:
+        case Verdict.REFUTED:
+            what = f"no output of {concrete.name} meets {', '.join(answer.group)}"
+            return replace(found, unrealizable=Counterexample(show_values(answer.inputs), what))
+        case Verdict.PROVED:
+            return found
+        case _:
+            return replace(found, doubt=answer.reason or "no answer in time")
+
+
+def _narrower(sources: tuple[Port, ...], targets: tuple[Port, ...]) -> dict[str, Term]:
+    """What a value's narrower type says of it where the other node has a wider one: a NATURAL for an INTEGER."""
+    types = {port.name: port.sort for port in sources}
+    return {
+        f"{port.variable.qualified} is a NATURAL": Compare(">=", port.variable, Literal(0, INTEGER))
+        for port in targets
+        if port.sort == INTEGER and types.get(port.name) == NATURAL
+    }
 
 
 def renamed(node: Node, names: Mapping[str, str]) -> Node:

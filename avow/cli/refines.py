@@ -43,7 +43,8 @@ def command(
     derived of all its nodes is compared. Nodes and ports are matched by name (--node, --rename); a single node on
     each side whatever its name.
 
-    Code 1 where it does not, or where the solver gave up; 2 for bad input.
+    Code 1 where it does not, where the solver gave up, or where the answer is vacuous: CONCRETE's guarantees cannot
+    be met at some input, and of such a contract everything follows. 2 for bad input.
     """
     from avow.calculus.discharge import Bounds
     from avow.calculus.refinement import refines
@@ -55,7 +56,7 @@ def command(
     pairs, missing = _pairs(new, old, node, concrete, abstract)
     names = _renamed(renames, [n for n, _ in pairs])
     found = [refines(n, m, bounds, names) for n, m in pairs]
-    good = not missing and stands is Verdict.PROVED and all(result.verdict is Verdict.PROVED for result in found)
+    good = not missing and stands is Verdict.PROVED and all(result.holds for result in found)
     if as_json:
         document = {"refines": good, "missing": missing, "nodes": [_data(result) for result in found]}
         click.echo(json.dumps(document | {"derivation": str(stands)}, indent=1, ensure_ascii=False))
@@ -135,7 +136,9 @@ def _data(result: Refinement) -> dict[str, object]:
     return {
         "concrete": result.concrete,
         "abstract": result.abstract,
-        "verdict": str(result.verdict),
+        "verdict": "vacuous" if result.vacuous else str(result.verdict),
+        "unrealizable": dict(result.unrealizable.values) if result.unrealizable else None,
+        "doubt": result.doubt,
         "ports": [fault.message for fault in result.faults],
         "clauses": [
             {
@@ -152,9 +155,17 @@ def _data(result: Refinement) -> dict[str, object]:
 
 
 def _print(result: Refinement, concrete: str, abstract: str) -> None:
-    click.echo(f"{result.concrete} ({concrete}) refines {result.abstract} ({abstract}): {result.verdict}")
+    answer = "vacuous" if result.vacuous else result.verdict
+    click.echo(f"{result.concrete} ({concrete}) refines {result.abstract} ({abstract}): {answer}")
     for fault in result.faults:
         click.echo(f"  {fault.message}")
+    if result.unrealizable is not None:
+        told = result.unrealizable.text()
+        click.echo(
+            f"  {concrete} is not realizable: {told}. It is true of it, as of everything; `avow sanity` says more"
+        )
+    if result.doubt:
+        click.echo(f"  whether anything can keep {concrete} is not known: {result.doubt}")
     for demand in result.demands:
         told = _told(demand, concrete, abstract)
         if told:

@@ -50,6 +50,43 @@ def test_weaker_assumptions_stronger_guarantees(text: str, verdict: Verdict, cla
     assert all(demand.counterexample is not None for demand in failing)
 
 
+@pytest.mark.parametrize(
+    ("guarantees", "at"),
+    [
+        (("G above: out.x >= in.r", "G least: out.x < 5"), True),
+        (("G above: out.x >= in.r", "G least: out.x < in.r"), True),
+        (("G above: out.x >= in.r", "G least: (in.r > 10 -> out.x < in.r)"), False),  # BASE never gives such an input
+    ],
+)
+def test_of_a_contract_that_nothing_can_keep_it_says_so(guarantees: tuple[str, ...], at: bool, tmp_path: Path) -> None:
+    text = node("n", "r : REAL", "x : REAL", "A some: in.r >= 0", *guarantees)
+    found = refines(only(text), only(BASE))
+    assert found.verdict is Verdict.PROVED
+    assert (found.vacuous, found.holds) == (at, not at)
+    if found.unrealizable is not None:
+        ((name, value),) = found.unrealizable.values
+        assert name == "in.r"
+        assert 0 <= float(value) <= 10
+    (tmp_path / "a.rcl").write_text(text)
+    (tmp_path / "b.rcl").write_text(BASE)
+    code, out = invoke(refines_command, str(tmp_path / "a.rcl"), str(tmp_path / "b.rcl"))
+    assert code == (1 if at else 0)
+    assert (": vacuous" in out) == at
+    assert ("not realizable: in.r = " in out) == at
+
+
+def test_a_natural_where_the_other_has_an_integer() -> None:
+    wide = node("n", "r : INTEGER", "x : NATURAL", "A positive: in.r >= 0", "G same: out.x == in.r")
+    narrow = node("n", "r : NATURAL", "x : INTEGER", "G something: out.x > -1")
+    found = refines(only(wide), only(narrow))
+    assert found.holds, found.demands
+    below = refines(only(wide.replace("in.r >= 0", "in.r >= 1")), only(narrow))
+    assert below.verdict is Verdict.REFUTED
+    # of an input that the narrower type rules out nothing is asked
+    negative = wide.replace("G same: out.x == in.r", "G same: out.x == in.r").replace(" (in.r >= 0)", " (TRUE)")
+    assert refines(only(negative), only(narrow)).holds
+
+
 def test_ports_must_fit() -> None:
     missing = refines(only(node("n", "r : REAL", "z : REAL")), only(BASE))
     assert missing.verdict is Verdict.REFUTED
