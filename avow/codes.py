@@ -352,8 +352,8 @@ _LINTS = (
         "function as a numbering of some of them; that an argument has none, or that one value is had only once, it "
         "cannot say. A relation (`REAL x REAL x NATURAL --> BOOL`) can.",
         _node(
-            "wayPoint : REAL x REAL --> NATURAL, i : NATURAL",
-            clauses="guarantee(out.b <=> exists(x, y in REAL | in.wayPoint(x, y) == in.i))",
+            "number : REAL x REAL --> NATURAL, i : NATURAL",
+            clauses="guarantee(out.b <=> exists(x, y in REAL | in.number(x, y) == in.i))",
         ),
     ),
     _lint(

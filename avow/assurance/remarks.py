@@ -1,16 +1,18 @@
-"""What the language checker remarks about the contracts' text: formulas that another bracketing would change, names
-that nothing uses, topics that name no port. Nothing fails for them, but a claim about a formula that was read otherwise
-than it was meant is a claim about something else: so a report that keeps silent on them would mislead.
+"""What the language checker remarks about the contracts' text (formulas that another bracketing would change, names
+that nothing uses, sentences that say otherwise), and methods about their own input. Nothing fails for them, but a claim
+about a formula that was read otherwise than it was meant is a claim about something else: so a report that keeps silent
+on them would mislead.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from avow.assurance.model import ObligationView, OpenItem, SourceView
 from avow.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.evidence.obligation import Kind
+from avow.evidence.record import REMARKS
 from avow.language.load import check_sources
 from avow.language.source import Source
 from avow.system.strict_yaml import read_yaml
@@ -22,11 +24,30 @@ _FIRST = "RCL401"
 
 
 def remarks(sources: Sequence[SourceView], views: Sequence[ObligationView]) -> tuple[OpenItem, ...]:
-    """An advice for each lint of the contracts, brackets first, each with the guarantee or assumption it stands in."""
+    """An advice for each lint of the contracts, brackets first, each with the guarantee or assumption it stands in;
+    then for each remark of a method."""
     contracts = tuple((s.path, s.text) for s in sources if s.is_contract)
-    found = [d for d in _lints(contracts, _switched_off(sources)) if d.span]
+    off = _switched_off(sources)
+    found = [d for d in _lints(contracts, off) if d.span]
     found.sort(key=lambda d: d.code != _FIRST)
-    return tuple(_item(d, d.span, views) for d in found if d.span)
+    return (*(_item(d, d.span, views) for d in found if d.span), *_of_methods(views, off))
+
+
+def _of_methods(views: Sequence[ObligationView], off: frozenset[str]) -> Iterator[OpenItem]:
+    """What the methods' checks remarked when they gave the answers that count; each once, at the first claim."""
+    seen = set[tuple[str, str, str]]()
+    for view in views:
+        for evidence in view.counting:
+            record = evidence.entry.evidence
+            listed = record.details.get(REMARKS)
+            for told in listed if isinstance(listed, list) else ():
+                match told:
+                    case {"code": str(code), "place": str(place), "message": str(message)}:
+                        if code in off or (record.method, place, message) in seen:
+                            continue
+                        seen.add((record.method, place, message))
+                        where = f"{code}, {place}" if place else code
+                        yield OpenItem(REMARK, view.id, f"{where}; method {record.method}", advice=True, title=message)
 
 
 @lru_cache(maxsize=64)

@@ -11,6 +11,10 @@ from avow.verdict import Counterexample, Link, Verdict
 RETRY = "retry"
 """Among the details of an answer that the next run must not be content with: what asked for it was cut short."""
 
+REMARKS = "remarks"
+"""Among the details: what the method's own check remarks of plan and files, a list of ``{code, place, message}``.
+Nothing fails for it, but who reads the answer should know."""
+
 
 @dataclass(frozen=True, slots=True)
 class Evidence:

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.language.bounds import OPPOSITE
+
 LONGEST = 4_000
 """So many characters of a sentence are read."""
-
-OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 
 _LESS = r"(?:less|fewer|smaller|lower|shorter|earlier|sooner)"
 _MORE = r"(?:greater|more|larger|higher|longer|bigger|later)"

@@ -12,28 +12,23 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.language.bounds import bounds, constant
 from avow.language.contract import Clause, Node
-from avow.language.english import LONGEST, OPPOSITE, Comparison, both_ways, comparisons, is_one_way, mention
+from avow.language.english import LONGEST, Comparison, both_ways, comparisons, is_one_way, mention
 from avow.language.lookups import walk
 from avow.language.printer import show_number, show_term
 from avow.language.sorts import BOOL, DataSort, EnumSort, components
 from avow.language.terms import (
-    Arithmetic,
     Compare,
     Construct,
     EnumValue,
     Iff,
     Implies,
     Literal,
-    Negative,
-    Not,
-    Or,
     Quantified,
     Quantifier,
     Term,
     Variable,
-    Widen,
-    children,
 )
 
 _SHOWN = 60
@@ -60,7 +55,6 @@ def mismatches(clause: Clause, node: Node) -> Iterator[Mismatch]:
 
 # --- comparisons -----------------------------------------------------------------------------------------------------
 
-_FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 _IN_WORDS = {"<": "less than", "<=": "less than or equal to", ">": "greater than", ">=": "greater than or equal to"}
 _SCALES = tuple(Fraction(10) ** k for k in range(-9, 10)) + tuple(
     scale for k in (60, 3600) for scale in (Fraction(k), Fraction(1, k))
@@ -69,28 +63,14 @@ _SCALES = tuple(Fraction(10) ** k for k in range(-9, 10)) + tuple(
 _EITHER = "write the one as the other, whichever is meant"
 
 
-@dataclass(frozen=True, slots=True)
-class _Bound:
-    """A comparison with a constant, read with the constant on the right. Where it is a condition, or stands under `not`
-    or `or`, a sentence may put it the other way (`turned`): ``if less than 3 …`` beside ``… or 3 <= in.r``."""
-
-    term: Compare
-    sign: str
-    number: Fraction
-    turned: bool
-
-    def may_mean(self, signs: frozenset[str]) -> bool:
-        return self.sign in signs or (self.turned and OPPOSITE[self.sign] in signs)
-
-
 def _comparisons(sentence: str, formula: Term) -> Iterator[Mismatch]:
     said = list(comparisons(sentence))
     if not said:
         return
-    bounds = list(_bounds(formula))
-    numbers = sorted({n for t in walk(formula) if (n := _constant(t)) is not None})
+    found = list(bounds(formula))
+    numbers = sorted({n for t in walk(formula) if (n := constant(t)) is not None})
     for what in said:
-        about = [b for b in bounds if _same(what, b.number)]
+        about = [b for b in found if _same(what, b.number)]
         if any(b.may_mean(what.signs) for b in about):
             continue
         if about:
@@ -112,53 +92,6 @@ def _same(what: Comparison, number: Fraction) -> bool:
     if what.unit == "%" and number in (part, 1 - part, 1 + part):
         return True
     return bool(what.unit) and any(what.number * scale == number for scale in _SCALES)
-
-
-def _bounds(formula: Term) -> Iterator[_Bound]:
-    stack = [(formula, False)]
-    while stack:
-        term, turned = stack.pop()
-        match term:
-            case Compare(operator=sign, left=left, right=right) if sign in _FLIPPED:
-                if (number := _constant(right)) is not None:
-                    yield _Bound(term, sign, number, turned)
-                elif (number := _constant(left)) is not None:
-                    yield _Bound(term, _FLIPPED[sign], number, turned)
-            case Implies(left=left, right=right):
-                stack += [(right, turned), (left, True)]
-            case Iff() | Or() | Not():
-                stack += [(part, True) for part in reversed(children(term))]
-            case _:
-                stack += [(part, turned) for part in reversed(children(term))]
-
-
-def _constant(term: Term) -> Fraction | None:
-    """The number that a term without variables is."""
-    match term:
-        case Literal(value=bool() | str()):
-            return None
-        case Literal(value=value):
-            return Fraction(value)
-        case Widen(term=inner):
-            return _constant(inner)
-        case Negative(term=inner):
-            number = _constant(inner)
-            return None if number is None else -number
-        case Arithmetic(operator=operator, left=left, right=right):
-            first = _constant(left)
-            second = _constant(right) if first is not None else None
-            if first is None or second is None or (operator == "/" and second == 0):
-                return None
-            match operator:
-                case "+":
-                    return first + second
-                case "-":
-                    return first - second
-                case "*":
-                    return first * second
-                case _:
-                    return first / second
-    return None
 
 
 def _plain(number: Fraction) -> str:

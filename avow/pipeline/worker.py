@@ -24,6 +24,7 @@ from avow.evidence.record import RETRY
 from avow.files import write
 from avow.pipeline import forks
 from avow.pipeline.altered import Altered, alter
+from avow.pipeline.remarks import remarked
 from avow.pipeline.wire import report_from_json, report_to_json
 from avow.pipeline.work import Work, compose_work, method_backend, method_job, method_work, planned_method, sanity_work
 from avow.system.load import load_system
@@ -195,7 +196,8 @@ def _discharge(request: dict[str, Any], system: System, work: Work, limits: Limi
             write(folder / name, text)
     job = method_job(system, node, method)
     job = replace(job, obligations=tuple(o for o in job.obligations if o.id in request["keys"]))
-    return tool.discharge(job, folder, limits)
+    report = tool.discharge(job, folder, limits)
+    return report if request["altered"] else remarked(report, tool.check(job), job)
 
 
 if __name__ == "__main__":

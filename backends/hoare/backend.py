@@ -10,6 +10,7 @@ from pathlib import Path
 
 from avow.backend import Job, Limits, Report
 from avow.backends.hoare.checker import Checked, check
+from avow.backends.hoare.numbers import other_numbers
 from avow.backends.hoare.outline import outline, show
 from avow.backends.hoare.parser import parse_program
 from avow.backends.hoare.program import While, statements
@@ -103,7 +104,8 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
         _ = work.triples
     except Rejected as rejected:
         return rejected.diagnostics
-    return ()
+    clauses = (*job.node.assumptions, *(job.clause(o) for o in job.obligations))
+    return tuple(other_numbers(work.checked.program, clauses))
 
 
 # -- export ------------------------------------------------------------------------------------------------------------

@@ -37,7 +37,7 @@ def test_values_that_a_reading_leaves_out_are_a_hypothesis(
         program = "GIVEN h : INTEGER;\n" + program
     options = {"program": "n.imp", **({"variables": variables} if variables else {})}
     job = make_job(tmp_path, contract, "n", options, {"n.imp": program}, "hoare")
-    assert BACKEND.check(job) == ()
+    assert not [d for d in BACKEND.check(job) if d.is_error]
     outcome = BACKEND.discharge(job, tmp_path, Limits(seconds=20)).outcomes[0]
     assert outcome.verdict is Verdict.PROVED
     assert [h.split(":")[0] for h in outcome.hypotheses] == ([left_out] if left_out else [])

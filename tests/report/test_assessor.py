@@ -160,6 +160,25 @@ def test_what_the_plan_switches_off_is_not_remarked_and_a_broken_plan_hides_noth
     assert any("RCL401" in i.text for i in broken.open_items)
 
 
+def test_what_a_method_remarks_of_its_input_is_in_the_report_once() -> None:
+    told = [{"code": "HOARE410", "place": "models/p.imp:2", "message": "the program compares with 10"}]
+    odd: list[object] = [*told, {"code": 3}, "words", {"code": "X", "place": "", "message": "<b>bold</b>"}]
+    records = [evidence(G1, details={"remarks": odd}), evidence(G2, details={"remarks": told})]
+    sources = {"contracts/rover/plan.yaml": "system: rover\n"}
+    found = case(SUBJECT, [G1, G2], records, sources=sources, digests={})
+    items = [i for i in found.open_items if i.kind == REMARK]
+    assert [(i.claim, i.title, i.text, i.advice) for i in items] == [
+        (G1.id, "the program compares with 10", "HOARE410, models/p.imp:2; method hoare", True),
+        (G1.id, "<b>bold</b>", "X; method hoare", True),
+    ]
+    assert "<b>bold</b>" not in texts(found)["index.html"]
+    sources = {"contracts/rover/plan.yaml": "system: rover\nlints_off: [HOARE410]\n"}
+    silent = case(SUBJECT, [G1, G2], records, sources=sources, digests={})
+    assert [i.title for i in silent.open_items if i.kind == REMARK] == ["<b>bold</b>"]
+    stale = case(SUBJECT, [G1, G2], records, sources=sources, digests={}, keys={(G1.id, "hoare"): "another"})
+    assert not [i for i in stale.open_items if i.kind == REMARK]  # what does not count remarks nothing
+
+
 def test_tested_says_on_how_many_cases_at_first_sight() -> None:
     bound = {"cases": 271, "seed": 0}
     records = [evidence(G1, method="hoare"), evidence(G2, Verdict.TESTED, "hypothesis", bound=bound)]

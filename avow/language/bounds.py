@@ -1,0 +1,87 @@
+"""The comparisons of a formula with constants: ``in.r < 120``, ``0 <= in.r``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+from avow.language.terms import (
+    Arithmetic,
+    Compare,
+    Iff,
+    Implies,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Term,
+    Widen,
+    children,
+)
+
+OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
+"""What holds where a comparison does not."""
+_FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """A comparison with a constant, read with the constant on the right. Where it is a condition, or stands under `not`
+    or `or`, the same may be said the other way (`turned`): ``if less than 3 …`` beside ``… or 3 <= in.r``."""
+
+    term: Compare
+    sign: str
+    number: Fraction
+    turned: bool
+
+    def may_mean(self, signs: frozenset[str]) -> bool:
+        return self.sign in signs or (self.turned and OPPOSITE[self.sign] in signs)
+
+
+def bounds(formula: Term) -> Iterator[Bound]:
+    """Every comparison of order with a constant, in reading order."""
+    stack = [(formula, False)]
+    while stack:
+        term, turned = stack.pop()
+        match term:
+            case Compare(operator=sign, left=left, right=right) if sign in _FLIPPED:
+                if (number := constant(right)) is not None:
+                    yield Bound(term, sign, number, turned)
+                elif (number := constant(left)) is not None:
+                    yield Bound(term, _FLIPPED[sign], number, turned)
+            case Implies(left=left, right=right):
+                stack += [(right, turned), (left, True)]
+            case Iff() | Or() | Not():
+                stack += [(part, True) for part in reversed(children(term))]
+            case _:
+                stack += [(part, turned) for part in reversed(children(term))]
+
+
+def constant(term: Term) -> Fraction | None:
+    """The number that a term without variables is; None for every other term."""
+    match term:
+        case Literal(value=bool() | str()):
+            return None
+        case Literal(value=value):
+            return Fraction(value)
+        case Widen(term=inner):
+            return constant(inner)
+        case Negative(term=inner):
+            number = constant(inner)
+            return None if number is None else -number
+        case Arithmetic(operator=operator, left=left, right=right):
+            first = constant(left)
+            second = constant(right) if first is not None else None
+            if first is None or second is None or (operator == "/" and second == 0):
+                return None
+            match operator:
+                case "+":
+                    return first + second
+                case "-":
+                    return first - second
+                case "*":
+                    return first * second
+                case _:
+                    return first / second
+    return None

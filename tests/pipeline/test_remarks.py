@@ -1,0 +1,39 @@
+"""What a method's check remarks of its input stands beside its answers, unless the plan switches it off."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.backend import Report
+from avow.diagnostics import Diagnostic, Severity, Span
+from avow.pipeline.remarks import remarked
+from avow.pipeline.work import method_job
+from avow.system.load import load_system
+from avow.verdict import Outcome, Verdict
+
+CONTRACT = "node n { inputs( r : REAL ) outputs( b : BOOL ) topics() guarantee( b <=> r > 0 ) }\n"
+PLAN = "system: s\ncontract: system.rcl\nnodes:\n  n: {methods: [{hoare: {program: p.imp}}]}\n"
+ANSWER = Report((Outcome("s/n/guarantee/G1", Verdict.PROVED, "proved", details={"outline": "…"}),), "z3", "5", ())
+
+
+@pytest.mark.parametrize("off", ["", "lints_off: [HOARE410]\n"])
+def test_warnings_stand_beside_the_answer(tmp_path: Path, off: str) -> None:
+    (tmp_path / "system.rcl").write_text(CONTRACT)
+    (tmp_path / "plan.yaml").write_text(PLAN + off)
+    system = load_system(tmp_path)
+    job = method_job(system, system.contract.nodes[0], system.plan.nodes[0].methods[0])
+    place = Span(str(tmp_path / "p.imp"), 2, 1, 2, 5)
+    warning = Diagnostic("HOARE410", "the program compares with 10", place, Severity.WARNING)
+    note = Diagnostic("X1", "a note", None, Severity.NOTE)
+    elsewhere = Diagnostic("X2", "elsewhere", Span("/elsewhere/q.imp", 3, 1, 3, 2), Severity.WARNING)
+    found = remarked(ANSWER, [warning, note, warning, elsewhere], job)
+    told = [
+        {"code": "HOARE410", "place": "p.imp:2", "message": "the program compares with 10"},
+        {"code": "X2", "place": "q.imp:3", "message": "elsewhere"},
+    ]
+    (outcome,) = found.outcomes
+    assert outcome.details == {"outline": "…", "remarks": told[1:] if off else told}
+    assert outcome.verdict is Verdict.PROVED
+    assert remarked(ANSWER, [note], job) == ANSWER
