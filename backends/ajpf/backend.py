@@ -22,7 +22,7 @@ class AjpfBackend:
 
     name = "ajpf"
     title = "agent programs (Gwendolen), model-checked against properties instantiated from the contract"
-    version = "3"
+    version = "4"
     strength = Verdict.CHECKED
     uses_wiring = False
     link = Link.MAPPED

@@ -29,6 +29,8 @@ class Left:
 
     forbidden: str
     extra: str
+    ban: Formula
+    """That it must not be at the moment of the trigger: the least that the guarantee asks."""
 
 
 def read_properties(
@@ -53,7 +55,8 @@ def read_properties(
         kept = psl.disjunction([u.formula for u in units])
         if kept == psl.TRUE:
             continue
-        stand_in = _stand_in(units, stand_ins)
+        least = Always(Implies(_when(condition, inputs), kept))
+        stand_in = _stand_in(units, least, stand_ins)
         if stand_in is not None:
             yield stand_in
             continue
@@ -77,14 +80,14 @@ def _never(trigger: Formula, kept: Formula) -> Property:
     return Property("", Always(Implies(trigger, Always(kept))), trigger, forbidden=psl.negation(kept))
 
 
-def _stand_in(units: Sequence[Unit], extras: Sequence[Extra]) -> Left | None:
+def _stand_in(units: Sequence[Unit], least: Formula, extras: Sequence[Extra]) -> Left | None:
     """The property of the plan that says when all that the clause forbids must not be."""
     banned = [u.term for u in units if u.forbids]
     for extra in extras:
         assert extra.forbids is not None
         pattern, names = extra.forbids, free(extra.forbids)
         if len(banned) == len(units) and all(any(True for _ in match(pattern, t, names, {})) for t in banned):
-            return Left(" and ".join(map(show_term, banned)), extra.name)
+            return Left(" and ".join(map(show_term, banned)), extra.name, least)
     return None
 
 

@@ -6,9 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from avow.backends.ajpf import psl
+from avow.backends.ajpf.automaton import TooLarge
 from avow.backends.ajpf.checker import Property
 from avow.backends.ajpf.instances import Claim, Instantiation
 from avow.backends.ajpf.options import Extra, Setup
+from avow.backends.ajpf.tautology import is_valid
 from avow.evidence.obligation import Obligation
 from avow.verdict import Counterexample, Link, Outcome, Verdict
 
@@ -46,12 +48,13 @@ class Frame:
 
 def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
     """The verdict is checked only if every property of the guarantee is."""
+    attached = [(e, ps) for e, ps in frame.made.extras if e.guarantee in (claim.guarantee, None)]
     hypotheses = (
+        *_left_to_a_person(claim, attached),
         "the plan's table says truly which agent formulas stand for which contract formulas",
         *frame.setup.environment.describe(),
         f"percepts become events as in '{frame.setup.semantics}' percept semantics, in the order of their groups",
     )
-    attached = [(e, ps) for e, ps in frame.made.extras if e.guarantee in (claim.guarantee, None)]
     details: dict[str, object] = {"engine": frame.engine, "percept_semantics": str(frame.setup.semantics)}
     if claim.not_covered is not None:
         summary = f"not covered: {claim.not_covered}"
@@ -89,6 +92,27 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
         Link.MAPPED,
         vacuous=verdict is Verdict.CHECKED and len(hollow) == len(own),
     )
+
+
+def _left_to_a_person(claim: Claim, attached: Sequence[tuple[Extra, Sequence[Property]]]) -> Iterator[str]:
+    """A property of the plan stands for what the guarantee forbids, whatever the property's trigger is: that it is
+    the guarantee's is said to be assumed. What can be decided of it without the agent is."""
+    for name in dict.fromkeys(left.extra for left in claim.left):
+        bans = list(dict.fromkeys(left.ban for left in claim.left if left.extra == name))
+        said = psl.conjunction([p.formula for e, ps in attached for p in ps if e.name == name])
+        forbidden = "; ".join(dict.fromkeys(left.forbidden for left in claim.left if left.extra == name))
+        if all(_rules_out(said, ban) for ban in bans):
+            found = "it rules out, of every agent, that this comes while the guarantee's condition holds"
+        else:
+            found = "that it forbids no less than the guarantee does, under the guarantee's condition, was not shown"
+        yield f"the plan's property '{name}' says rightly when {forbidden} must not be: {found}"
+
+
+def _rules_out(said: psl.Formula, ban: psl.Formula) -> bool:
+    try:
+        return is_valid(psl.Implies(said, ban))
+    except TooLarge:
+        return False
 
 
 _ORDER = (Verdict.REFUTED, Verdict.ERROR, Verdict.NOT_RUN, Verdict.UNKNOWN)
