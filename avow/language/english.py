@@ -59,7 +59,7 @@ def comparisons(sentence: str) -> Iterator[Comparison]:
         kind = next(_PHRASES[i][0] for i in range(len(_PHRASES)) if match.group(f"o{i}"))
         number, unit = _number(match["number"]), match["unit"].strip()
         in_digits = match["number"].lower() not in _WORDS
-        if kind == "between":
+        if kind == "between" or (kind == "up to" and match["second"] is not None):  # “within 3 and 5”
             if match["second"] is not None:
                 yield Comparison(match[0], frozenset({">", ">="}), number, unit, in_digits)
                 yield Comparison(match[0], frozenset({"<", "<="}), _number(match["second"]), unit, in_digits)

@@ -55,6 +55,7 @@ AGREE = [
     ("Between 120 and 250", "120 <= in.r < 250"),
     ("Between 120 and 250", "120 < in.r and in.r <= 250"),
     ("Within 25 cm", "in.r <= 0.25"),
+    ("Within -20 °C and 60 °C", "-20 <= in.r <= 60"),
     ("Within 25 cm", "-0.25 < in.r and in.r < 0.25"),
     ("At most 2 minutes", "in.r <= 120"),
     ("Below 5 %", "in.r < 0.05"),
