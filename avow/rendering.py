@@ -57,7 +57,7 @@ class _Lines:
                     text = _read(Path(file))
                 except (OSError, ValueError):
                     text = ""
-            self._split[file] = text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
+            self._split[file] = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
         lines = self._split[file]
         return lines[line - 1] if 0 < line <= len(lines) and any(lines) else None
 

@@ -49,7 +49,8 @@ class Applications(Names):
                     return self.length(tree, arguments)
                 if name not in self.scope.nodes:
                     self.undeclared(name, head, "function or constructor")
-                    self.terms(arguments)
+                    if name.casefold() not in ("forall", "exists", "exist"):  # whose variables are unknown
+                        self.terms(arguments)
                     return None
             shadowed = name in self.scope.bound or name in self.scope.inputs or name in self.scope.outputs
             if name in self.scope.environment.elements and not shadowed:
@@ -65,9 +66,13 @@ class Applications(Names):
             case SequenceSort(item=item):
                 return self.index(tree, function, arguments, item)
         self.terms(arguments)
+        if self.reports.source.text[tree.parts[0].end : tree.parts[0].end + 1] == "[":
+            return None  # reported by the lexer
         message = f"`{self.text(head)}` is of type {show_sort(function.sort)}: it is no function and takes no arguments"
         hint = None
-        if len(arguments) == 1:
+        if isinstance(function.sort, TupleSort):
+            hint = f"take a tuple apart by its items: `exists(a, b in REAL | {self.text(head)} == (a, b) and …)`"
+        elif len(arguments) == 1:
             hint = f"compare it: `{self.text(head)} == {self.text(arguments[0])}`"
         self.error("RCL304", message, tree, hint=hint)
         return None
@@ -206,7 +211,12 @@ class Applications(Names):
         if made is None or isinstance(made.sort, SetSort | SequenceSort):
             return made
         message = f"`in` wants a set or a sequence, and this is of type {show_sort(made.sort)}"
-        self.error("RCL307", message, tree, hint="write a set as `{a, b}`, a sequence as `<a, b>`")
+        hint = "write a set as `{a, b}`, a sequence as `<a, b>`"
+        if isinstance(made.sort, TupleSort):
+            hint += ", an interval as `low < x < high`"
+        elif isinstance(made.sort, EnumSort):
+            hint = f"this is one value of type {made.sort.name}; all of them are `{made.sort.name}`"
+        self.error("RCL307", message, tree, hint=hint)
         return None
 
     def not_a_set(self, tree: Tree, shown: str) -> None:

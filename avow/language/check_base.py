@@ -36,12 +36,22 @@ class Base:
         term = self.term(tree, BOOL)
         if term is None or term.sort == BOOL:
             return term
+        if self._at_least(tree):
+            return None
         shown = show_sort(term.sort)
         hint = "compare it with something: `… == …`"
         if isinstance(term.sort, FunctionSort) and term.sort.result == BOOL:
             hint = f"apply it to its {len(term.sort.parameters)} argument(s)"
         self.error("RCL301", f"this must be true or false, and it is of type {shown}", tree, hint=hint)
         return None
+
+    def _at_least(self, tree: Tree) -> bool:
+        """Whether a term stands beside `=>`, which has been reported: it may have been meant for at least."""
+        text = self.reports.source.text
+        return bool(self.reports.odd) and (
+            text[tree.end : tree.end + 20].lstrip().startswith("=>")
+            or text[max(tree.start - 20, 0) : tree.start].rstrip().endswith("=>")
+        )
 
     def term(self, tree: Tree, expected: Sort | None = None) -> Term | None:
         """A term of any sort; `expected` helps only where the text leaves the sort open (``<>``)."""

@@ -5,8 +5,10 @@ from __future__ import annotations
 from fractions import Fraction
 
 from avow.language.check_base import Base, count
+from avow.language.contract import Port
 from avow.language.environment import did_you_mean
-from avow.language.lexer import unquote
+from avow.language.foreign import FIELDS, FOREIGN_NAMES
+from avow.language.lexer import KEYWORDS, unquote
 from avow.language.printer import show_sort
 from avow.language.sorts import (
     BOOL,
@@ -16,6 +18,7 @@ from avow.language.sorts import (
     STRING,
     EnumSort,
     Sort,
+    TupleSort,
 )
 from avow.language.syntax import Tree
 from avow.language.terms import (
@@ -42,7 +45,9 @@ class Names(Base):
         value = sign * int(text)
         return Literal(value, NATURAL if value >= 0 else INTEGER, self.span(tree))
 
-    def _string(self, tree: Tree, expected: Sort | None) -> Term:
+    def _string(self, tree: Tree, expected: Sort | None) -> Term | None:
+        if not tree.parts[0].endswith('"') or tree.start in self.reports.odd:
+            return None  # quotation marks of another kind, or none at the end: reported by the lexer
         return Literal(unquote(tree.parts[0]), STRING, self.span(tree))
 
     def _truth(self, tree: Tree, expected: Sort | None) -> Term:
@@ -86,13 +91,22 @@ class Names(Base):
             hint = f"name one of its inputs or outputs: `{name}.…`"
             self.error("RCL204", f"`{name}` is a node, not a value", tree, hint=hint)
         else:
-            self.undeclared(name, tree)
+            self.undeclared(name, tree, text=expected == STRING)
         return None
 
-    def undeclared(self, name: str, tree: Tree, what: str = "name") -> None:
-        if self.scope.is_broken(name):
+    def undeclared(self, name: str, tree: Tree, what: str = "name", *, text: bool = False) -> None:
+        """Reports a name that nothing has; `text` where a text is wanted."""
+        if self.scope.is_broken(name) or tree.start in self.reports.odd:  # the latter is reported by the lexer
             return
-        hint = did_you_mean(name, self.scope.known()) or _FOREIGN_NAMES.get(name)
+        hint = FOREIGN_NAMES.get(name) or did_you_mean(name, self.scope.known())
+        if text and hint is None:
+            hint = f'write texts in quotation marks: `"{name}"`'
+        if hint is None and self.scope.node is None and not self.scope.nodes and what == "name":
+            hint = f"`Name = {{{name}, …}};` declares it as an element"
+        if hint is None and name.endswith("'") and self.scope.taken(name.rstrip("'")) is not None:
+            hint = f"`{name}` is a name of its own: there is no value of `{name.rstrip(chr(39))}` at another step"
+        if hint is None and self.scope.node is not None and what == "name":
+            hint = "declare it in the context, among the inputs or outputs, or in a quantifier: `exists(x in REAL | …)`"
         self.error("RCL201", f"the {what} `{name}` is not declared", tree, hint=hint)
 
     def element(self, name: str, tree: Tree) -> Term | None:
@@ -116,7 +130,7 @@ class Names(Base):
 
     def no_port(self, role: Role, name: str, tree: Tree) -> None:
         scope = self.scope
-        if scope.is_broken(name):
+        if scope.is_broken(name) or name in KEYWORDS:  # the latter is reported by the lexer
             return
         words = {Role.INPUT: "input", Role.OUTPUT: "output"}
         other = Role.OUTPUT if role is Role.INPUT else Role.INPUT
@@ -141,12 +155,36 @@ class Names(Base):
         role, name = tree.parts
         return self.port(Role(role), name, tree)
 
+    def elsewhere(self, before: str, name: str, tree: Tree) -> None:
+        """Reports `before.name` inside a node: a role spelled otherwise, a field, or another node's variable."""
+        scope = self.scope
+        own = [f"{r}.{name}" for r in (Role.INPUT, Role.OUTPUT) if name in scope.ports(r)]
+        word = {"in": "in", "input": "in", "out": "out", "output": "out"}.get(before.casefold())
+        message = f"`{before}.{name}` has no meaning inside a node"
+        if word is not None:
+            hint = f"write `{word}.{name}`"
+        elif scope.taken(before) is not None:
+            message = f"RCL has no fields, and no `{before}.{name}`"
+            hint = FIELDS
+            if name in scope.environment.elements or name in scope.environment.constants:
+                hint = f"write `{name}` alone"
+            elif name in ("length", "size", "len", "count"):
+                hint = f"write `length({before})`"
+            elif before in scope.bound or any(isinstance(p.sort, TupleSort) for p in self.ports_named(before)):
+                hint = f"take a tuple apart by its items: `exists(a, b in REAL | {before} == (a, b) and …)`"
+        else:
+            hint = f"write {' or '.join(f'`{o}`' for o in own) or f'`in.{name}` or `out.{name}`'}"
+            hint += ": a contract speaks of its own inputs and outputs only"
+        self.error("RCL205", message, tree, hint=hint)
+
+    def ports_named(self, name: str) -> list[Port]:
+        return [self.scope.ports(r)[name] for r in (Role.INPUT, Role.OUTPUT) if name in self.scope.ports(r)]
+
     def _node_port(self, tree: Tree, expected: Sort | None) -> Term | None:
         node_name, role_text, name = tree.parts
         scope = self.scope
         if not scope.nodes:
-            hint = f"write `in.{name}` or `out.{name}`: a contract speaks of its own inputs and outputs only"
-            self.error("RCL205", f"`{node_name}.{name}` has no meaning inside a node", tree, hint=hint)
+            self.elsewhere(node_name, name, tree)
             return None
         node = scope.nodes.get(node_name)
         if node is None:
@@ -165,16 +203,3 @@ class Names(Base):
             self.error("RCL202", f"`{name}` is both an input and an output of node `{node_name}`", tree, hint=hint)
             return None
         return Variable(ports[0].role, f"{node_name}.{name}", ports[0].sort, self.span(tree))
-
-
-_FOREIGN_NAMES = {
-    "true": "write `TRUE`",
-    "True": "write `TRUE`",
-    "false": "write `FALSE`",
-    "False": "write `FALSE`",
-    "EmptySet": "the empty set is written `{}`",
-    **dict.fromkeys(
-        ("always", "globally", "eventually", "finally", "next", "until", "once", "historically", "previously", "since"),
-        "a contract speaks of one step; properties of whole runs stand in the plan",
-    ),
-}

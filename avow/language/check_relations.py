@@ -114,13 +114,13 @@ class Relations(Applications):
         return links[0] if len(links) == 1 else And(tuple(links), self.span(tree))
 
     def check_chain(self, relations: Sequence[Token]) -> bool:
-        texts = {r.text for r in relations if r.text != "=="}
+        texts = {_OPERATORS.get(r.type, "") for r in relations if r.type != "EQ"}
         if len(relations) == 1:
             return True
         for relation in relations:
             if relation.type in ("IN", "NOT_IN", "NE"):
                 message = f"`{relation.text}` cannot be part of a chain of comparisons"
-                self.error("RCL121", message, relation, hint="join comparisons by `and`")
+                self.error("RCL121", message, relation, hint="join comparisons by `and`, or put one in parentheses")
                 return False
         if texts <= {"<", "<="} or texts <= {">", ">="}:
             return True
@@ -146,12 +146,15 @@ class Relations(Applications):
         if pair is None:
             shown = f"{show_sort(left.sort)} and {show_sort(right.sort)}"
             message = f"`{operator}` between different types: {shown}"
-            self.error("RCL302", message, tree, hint=self.mismatch_hint(left_tree, left, right_tree, right))
+            hint = self.mismatch_hint(left_tree, left, right_tree, right)
+            if len(tree.parts) > 3:
+                hint = hint or "`a < b == c` says `a < b and b == c`; put parentheses if it should not"
+            self.error("RCL302", message, tree, hint=hint)
             return None
         if len(tree.parts) > 3 and left.sort == BOOL:
-            self.error(
-                "RCL121", "truth values are not chained", relation, hint="join comparisons by `and`, or use `<=>`"
-            )
+            if relation is tree.parts[1]:
+                hint = "join comparisons by `and`, or use `<=>`"
+                self.error("RCL121", "truth values are not chained", relation, hint=hint)
             return None
         span = self.span(tree) if len(tree.parts) == 3 else self.reports.source.span(left_tree.start, right_tree.end)
         return Compare(operator, pair[0], pair[1], span)

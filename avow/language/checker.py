@@ -14,6 +14,7 @@ from avow.language.chains import equivalence, implication
 from avow.language.check_names import BUILTINS
 from avow.language.check_relations import Relations
 from avow.language.environment import did_you_mean
+from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.sorts import (
     REAL,
@@ -137,7 +138,8 @@ class Checker(Relations):
             if not self.scope.is_broken(name):
                 environment = self.scope.environment
                 known = (*environment.types, *environment.constants, *BUILTINS)
-                hint = did_you_mean(name, known) or _FOREIGN_TYPES.get(name.casefold())
+                near = FOREIGN_TYPES.get(name.casefold())
+                hint = f"did you mean `{near}`?" if near else did_you_mean(name, known)
                 self.error("RCL208", f"the type or set `{name}` is not declared", tree, hint=hint)
             return None
         if tree.kind == "port_name" and self.scope.environment.sort(tree.parts[1]) is not None:
@@ -168,12 +170,3 @@ class Checker(Relations):
                 item = self.type_in_term(tree.parts[0])
                 return None if item is None else SequenceSort(item)
         return None
-
-
-_FOREIGN_TYPES = {
-    **dict.fromkeys(("string", "str"), "did you mean `STRING`?"),
-    **dict.fromkeys(("bool", "boolean"), "did you mean `BOOL`?"),
-    **dict.fromkeys(("int", "integer", "ints", "z"), "did you mean `INTEGER`?"),
-    **dict.fromkeys(("nat", "natural", "unsigned", "uint", "n"), "did you mean `NATURAL`?"),
-    **dict.fromkeys(("float", "double", "real", "number", "decimal", "r"), "did you mean `REAL`?"),
-}

@@ -13,6 +13,7 @@ from avow.diagnostics import Span
 from avow.language.check_names import BUILTINS
 from avow.language.checker import Checker
 from avow.language.environment import Environment, did_you_mean
+from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.limits import MAX_DECLARED, MAX_REFERENCES, sort_extent, term_extent
 from avow.language.parser import MAX_DEPTH
@@ -31,14 +32,6 @@ from avow.language.sorts import (
 from avow.language.source import Reports
 from avow.language.syntax import Tree
 from avow.language.terms import EnumValue, Quantified, SetTerm, Term, children
-
-_FOREIGN_TYPES = {
-    **dict.fromkeys(("string", "str"), "STRING"),
-    **dict.fromkeys(("bool", "boolean"), "BOOL"),
-    **dict.fromkeys(("int", "integer", "int8", "int16", "int32", "int64"), "INTEGER"),
-    **dict.fromkeys(("nat", "natural", "uint", "uint8", "uint16", "uint32", "uint64"), "NATURAL"),
-    **dict.fromkeys(("float", "double", "real", "float32", "float64"), "REAL"),
-}
 
 
 @dataclass(slots=True)
@@ -160,6 +153,8 @@ class Declarations:
             span = declared.reports.source.span(value.start, value.end)
             environment.constants[name] = SetTerm(tuple(EnumValue(m, sort) for m in sort.members), SetSort(sort), span)
             return
+        if value.kind == "set":
+            self.half_known(value, declared.reports)
         term = Checker(Scope(environment), declared.reports).term(value)
         if term is not None and not self.is_small(name, term_extent(term), declared.name, declared.reports):
             return
@@ -171,6 +166,17 @@ class Declarations:
             environment.broken.add(name)
         else:
             environment.constants[name] = term
+
+    def half_known(self, value: Tree, reports: Reports) -> None:
+        """Reports the new names of a set that has known ones too: a set declares its elements, or collects them."""
+        known = [t for t in value.parts if not self.is_fresh(t)]
+        for tree in value.parts if known else ():
+            if self.is_fresh(tree):
+                first = " ".join(reports.source.text[known[0].start : known[0].end].split())[:40]
+                message = f"the name `{tree.parts[0]}` is not declared"
+                hint = f"a set of new names declares them; with `{first}` in it, it is a set of known values"
+                reports.error("RCL201", message, tree.start, tree.end, hint=hint)
+                self.environment.broken.add(tree.parts[0])
 
     def is_fresh(self, tree: Tree) -> bool:
         if tree.kind != "name":
@@ -237,23 +243,26 @@ class Declarations:
             message = f"`{name}` is an element of {environment.elements[name].name}, not a type"
             reports.error("RCL208", message, tree.start, tree.end)
         else:
-            near = _FOREIGN_TYPES.get(name.casefold())
+            near = FOREIGN_TYPES.get(name.casefold())
             hint = f"did you mean `{near}`?" if near else did_you_mean(name, (*self.declared, *BUILTINS))
             hint = hint or f"declare it in the context: `{name} : …;`, or check this file with the one that declares it"
             reports.error("RCL208", f"the type `{name}` is not declared", tree.start, tree.end, hint=hint)
         return None
 
     def factors(self, tree: Tree, reports: Reports, name: str) -> list[Sort | None]:
+        """The sorts of a product, or of a function's parameters."""
         if tree.kind != "product_type":
             return [self.type_of(tree, reports, name)]
         sound = True
         for sign in tree.parts[1::2]:
             if sign.text != "x":
                 message = f"expected `x` between two types and not `{sign.text}`"
-                reports.error("RCL120", message, sign.start, sign.end, hint="write `A x B --> C`")
+                hint = "a function is written `A x B --> C`, a type of sequences `<A>`; there is no type of sets"
+                reports.error("RCL120", message, sign.start, sign.end, hint=hint)
                 sound = False
-        made = [self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(tree.parts[::2])]
-        return made if sound else [None]
+        if not sound:
+            return [None]
+        return [self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(tree.parts[::2])]
 
     def function(self, tree: Tree, reports: Reports, name: str) -> Sort | None:
         left, right = tree.parts

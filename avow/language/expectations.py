@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from avow.language.expectations_types import in_topics, in_types
+from avow.language.foreign import FIELDS, OPERATORS
 from avow.language.lexer import SYMBOLS, Token
 from avow.language.source import Reports
 
@@ -23,9 +25,11 @@ _WORDS = {
 _TERM = frozenset(("NAME", "NUMBER", "LBRACE", "LPAR"))
 
 
-def explain(start: str, tokens: Sequence[Token], found: Token, expected: frozenset[str], reports: Reports) -> None:
-    """Report the token `found`, where one of `expected` (terminals) should stand."""
-    hint = _hint(start, tokens, found, expected)
+def explain(
+    start: str, tokens: Sequence[Token], at: int, found: Token, expected: frozenset[str], reports: Reports
+) -> None:
+    """Report the token `found`, which is at that position and where one of `expected` (terminals) should stand."""
+    hint = _hint(start, tokens, at, found, expected)
     if found.type == "$END" and tokens:
         last = tokens[-1]
         message = f"{_expected(start, expected)} is missing after `{last.text[:40]}`"
@@ -42,8 +46,10 @@ def _expected(start: str, expected: frozenset[str]) -> str:
         return "a type"
     end = {"declaration": "`;`"}.get(start, "`)`")
     ending = {end} if "$END" in expected else set()
-    if {"AND", "OR", "IMPLIES"} & expected:
-        closing = ending | {_WORDS[k] for k in expected & {"COMMA", "RPAR", "BAR", "RBRACE"}}
+    if {"AND", "OR", "IMPLIES", "PLUS"} & expected:
+        closing = ending | {_WORDS[k] for k in expected & {"COMMA", "RPAR", "BAR", "RBRACE", "UPTO"}}
+        if "GT" in expected and "EQ" not in expected:
+            closing.add("`>`")
         return " or ".join(["an operator", *sorted(closing)])
     words = {kind: _WORDS.get(kind, f"`{kind.lower()}`") for kind in expected - {"$END"}}
     if "ARROW" in expected and "NAME" in words:
@@ -54,132 +60,158 @@ def _expected(start: str, expected: frozenset[str]) -> str:
     return ", ".join(named[:-1]) + (" or " if len(named) > 1 else "") + named[-1] if named else "nothing more"
 
 
-def _hint(start: str, tokens: Sequence[Token], found: Token, expected: frozenset[str]) -> str | None:
-    position = next((i for i, t in enumerate(tokens) if t is found), len(tokens))
-    before = tokens[position - 1] if position else None
-    after = tokens[position + 1] if position + 1 < len(tokens) else None
-    keyword = _about_keyword(found)
+def _hint(start: str, tokens: Sequence[Token], at: int, found: Token, expected: frozenset[str]) -> str | None:
+    before = tokens[at - 1] if at else None
+    after = tokens[at + 1] if at + 1 < len(tokens) else None
     if start == "formula":
-        return _in_formula(tokens[:position], before, found, after, expected) or keyword
-    if start == "topics":
-        if found.type == "SEMICOLON":
-            return "separate topics by commas"
-        if found.type in ("DOT", "COLON") and before is not None:
-            return f"write the type with slashes: `{before.text}/…`"
-        if found.type in ("NAME", "IN", "OUT") and found.text.startswith("match"):
-            return "did you mean `matches`?"
-        if (
-            found.type == "MATCHES"
-            and len(tokens) > 2
-            and any(t.type == "SLASH" for t in tokens[max(0, position - 4) : position])
-        ):
-            return "between type and name stands no slash: write `package/Type name matches(in.v)`"
-        return "a topic is `package/Type name` with, if it carries a variable, `matches(in.v)` or `matches(out.v)`"
-    if start == "ports" and found.type in ("NAME", "BUILTIN") and expected == {"COLON"}:
-        return "write `name : type`"
-    if start == "ports" and "COMMA" in expected and found.type in ("NAME", "SEMICOLON"):
-        return "separate them by commas: `a : REAL, b : BOOL`"
-    if start == "ports" and found.type == "COMMA" and expected == {"COLON"}:
-        return "each has a type of its own: `a : REAL, b : REAL`"
-    if start == "declaration" and found.text == ":=":
-        return "a constant is declared with `=`, a type with `:`"
-    if (
-        start == "declaration"
-        and found.type in ("NUMBER", "STRING", "MINUS", "TRUE", "FALSE")
-        and _is_type(tokens, before)
-    ):
-        return "a constant is declared with `=`: `Name = value;`"
-    if start in ("declaration", "ports") and (
-        found.type == "STAR" or (before is not None and before.text in _SEQUENCES)
-    ):
-        return "a type of sequences is written `<REAL>`"
-    if start == "declaration" and before is not None and before.type == "EQUALS":
-        return "equality is written `==`; a constant is `Name = value;`"
-    if found.type == "EQUALS":
-        return "a type is declared with `:`, a constant with `=`"
-    if found.type in ("STRING", "NUMBER") and before is not None and before.type in ("LBRACE", "COMMA"):
-        return "a set type lists names, as in `{red, green}`; a set of values is a constant: `Name = {1, 2};`"
-    if found.type in ("BAR", "IMPLIES", "COMMA") and expected & {"ARROW", "$END"}:
-        return "write a function as `A x B --> C`, and a choice of values as `{a, b}`"
-    return keyword
-
-
-def _is_type(tokens: Sequence[Token], before: Token | None) -> bool:
-    return len(tokens) > 1 and before is not None and before is tokens[1] and before.type == "COLON"
+        said = _in_formula(tokens[:at], before, found, after, expected)
+    elif start == "topics":
+        said = in_topics(tokens, at, found, expected)
+    else:
+        said = in_types(start, tokens, at, found, expected)
+    return said or _about_keyword(found)
 
 
 def _in_formula(
     earlier: Sequence[Token], before: Token | None, found: Token, after: Token | None, expected: frozenset[str]
 ) -> str | None:
-    quantified = any(t.type in _QUANTIFIERS for t in earlier)
+    return (
+        _in_relation(earlier, before, found, after, expected)
+        or _in_quantifier(earlier, before, found, expected)
+        or _in_general(earlier, before, found, after, expected)
+    )
+
+
+def _in_relation(
+    earlier: Sequence[Token], before: Token | None, found: Token, after: Token | None, expected: frozenset[str]
+) -> str | None:
+    """Comparisons and names of inputs and outputs."""
+    if before is not None and before.end < found.start and before.text + found.text in SYMBOLS:
+        return f"write `{before.text}{found.text}` without a space in it"
+    if before is not None and before.type == "LPAR" and found.type == "STAR":
+        return "a comment is written `/* … */`"
+    if before is not None and before.type == "LPAR" and found.type in (*_ORDER, "AND", "OR", "IMPLIES"):
+        return "an operator stands between what it joins: `r > 3 and r < 5`"
     if found.type == "EQUALS" or (before is not None and before.type == "EQUALS"):
         return "equality is written `==`"
-    if before is not None and before.type in _QUANTIFIERS:
-        return f"write `{before.text}(x in S | …)`"
-    if quantified and expected <= {"IN", "COMMA"}:
-        if any(t.type == "IN" for t in earlier) and found.type in _RELATIONS:
-            return "a bar stands between the variables and the formula: `forall(x in REAL | …)`"
-        return "say what each variable ranges over before the bar: `forall(x, y in REAL, i in NATURAL | …)`"
-    if before is not None and before.type == "LPAR" and found.type == "LPAR" and expected == {"NAME"}:
-        return "the variables stand without parentheses: `exists_unique(x, y in REAL | …)`"
-    if found.text == "x" and quantified and "BAR" in expected:
-        return "a variable ranges over one type: write `x, y in REAL`, not `(x, y) in REAL x REAL`"
-    if found.type in ("BAR", "IN") and any(t.text.casefold().replace("_", "") in _QUANTIFIER_LIKE for t in earlier):
-        like = next(t for t in earlier if t.text.casefold().replace("_", "") in _QUANTIFIER_LIKE)
-        return f"write `{_QUANTIFIER_LIKE[like.text.casefold().replace('_', '')]}(x in S | …)`, not `{like.text}`"
-    if found.type == "COLON" and quantified:
-        return "a bar stands between the variables and the formula: `forall(x in REAL | …)`"
     if found.type == "EMPTY_SEQUENCE" and "NE" in expected:
         return "unequal is written `!=`"
     if found.type == "NOT" and after is not None and after.type == "IN":
         return "write `!in`"
-    if expected == {"DOT"} and before is not None and found.type == "NAME":
-        return f"write `{before.text}.{found.text}`"
+    if _has_no_left_side(earlier, before, found, expected):
+        return "say what is compared each time: `0 < r and r < 3`, or `0 < r < 3`"
+    if expected == {"DOT"} and before is not None:
+        name = found if found.type == "NAME" else after
+        if name is not None and name.type == "NAME":
+            return f"write `{before.text}.{name.text}`"
+        return f"write `{before.text}.v` for the {before.text}put `v`: `{before.text}` is a keyword"
+    if found.type == "DOT" and len(earlier) > 2 and [t.type for t in earlier[-2:]] == ["DOT", "NAME"]:
+        return f"a value has no fields: {FIELDS}"
+    if found.type == "DOT" and after is not None and after.type == "NUMBER":
+        return f"write `0.{after.text}`"
+    return None
+
+
+def _has_no_left_side(earlier: Sequence[Token], before: Token | None, found: Token, expected: frozenset[str]) -> bool:
+    """`0 < r and < 3`: where `<` begins a sequence that is none, or another sign begins nothing."""
+    if found.type in ("GT", "LE", "GE", "EQ", "NE", "IN", "NOT_IN"):
+        return before is None or before.type in _CONNECTIVES
+    if "GT" not in expected or "EQ" in expected:
+        return False
+    opening = next((i for i in range(len(earlier) - 1, -1, -1) if earlier[i].type == "LT"), None)
+    return opening is not None and opening > 0 and earlier[opening - 1].type in _CONNECTIVES
+
+
+def _in_quantifier(
+    earlier: Sequence[Token], before: Token | None, found: Token, expected: frozenset[str]
+) -> str | None:
+    if before is not None and before.type in _QUANTIFIERS:
+        return f"write `{before.text}(x in S | …)`"
+    like = next(
+        (t for t in earlier if t.type == "NAME" and t.text.casefold().replace("_", "") in _QUANTIFIER_LIKE), None
+    )
+    if like is not None and (found.type in ("BAR", "IN") or found.text == "for" or before is like):
+        return f"write `{_QUANTIFIER_LIKE[like.text.casefold().replace('_', '')]}(x in S | …)`, not `{like.text}`"
+    if found.type in _QUANTIFIERS and before is not None and before.type == "NAME":
+        return f"write `{found.text}(x in S | …)`"
+    if not any(t.type in _QUANTIFIERS for t in earlier):
+        return None
+    if found.type == "IN" and "NAME" in expected and before is not None and before.type in ("LPAR", "COMMA"):
+        return "name the variable before `in`: `forall(x in REAL | …)`"
+    if found.type == "BAR":
+        if any(t.type == "SEMICOLON" for t in earlier):
+            return "`;` stands for the `|`: separate the variables by commas, `x in REAL, y in REAL`"
+        if expected != {"IN", "COMMA"}:
+            return "one bar stands in a quantifier, between the variables and the formula: `forall(x in REAL | …)`"
+    if expected <= {"IN", "COMMA"}:
+        if any(t.type == "IN" for t in earlier) and found.type in _RELATIONS:
+            return _BAR
+        return "say what each variable ranges over before the bar: `forall(x, y in REAL, i in NATURAL | …)`"
+    if before is not None and before.type == "LPAR" and found.type == "LPAR" and expected == {"NAME"}:
+        return "the variables stand without parentheses: `exists_unique(x, y in REAL | …)`"
+    if "BAR" not in expected:
+        return _BAR if found.type == "COLON" else None
+    if found.text == "x":
+        return "a variable ranges over one type: write `x, y in REAL`, not `(x, y) in REAL x REAL`"
+    if found.text in OPERATORS or found.type not in ("NAME", "NUMBER"):
+        return _BAR
+    return None
+
+
+def _in_general(
+    earlier: Sequence[Token], before: Token | None, found: Token, after: Token | None, expected: frozenset[str]
+) -> str | None:
+    if found.type in ("AND", "OR", "IMPLIES", "IFF") and expected >= _TERM:
+        return f"`{found.text}` joins two formulas: one is missing before it"
+    if found.type in _ORDER and "RBRACE" in expected:
+        return "`{ … }` is a set: formulas are grouped by `( … )`"
     if found.type == "ARROW":
         return "implication is written `->`"
     if found.type == "SEMICOLON":
+        if "RBRACE" in expected:
+            return "separate them by commas"
         return "no `;` here: it ends a declaration, or stands for the `|` of a quantifier"
-    if found.type == "DOT" and after is not None and after.type == "NUMBER":
-        return f"write `0.{after.text}`"
-    if earlier and earlier[0].text == "if":
+    if found.type == "COLON":
+        return "no `:` here: `x in S` says that x is in S; a type is said in `inputs`, `outputs`, or the quantifier"
+    if found.type == "BAR":
+        return "the bar stands in quantifiers only; the length of a sequence is `length(s)`, and or is `or`"
+    if earlier and earlier[0].text in ("if", "If", "IF", "when", "When", "while"):
         return "write `A -> B` for: if A then B"
     if found.type == "COMMA":
+        if before is not None and any(t.type in ("IN", "NOT_IN") for t in earlier[-3:]):
+            return "join formulas by `and`; a set has braces: `x in {a, b}`"
         return "join formulas by `and`"
-    if found.text in _ALIASES:
-        return f"write `{_ALIASES[found.text]}`"
-    if before is not None and before.text in _ALIASES:
-        return f"write `{_ALIASES[before.text]}`"
+    if found.type == "LBRACE" or (found.type == "BUILTIN" and before is not None):
+        return "`{ … }` is a set: formulas are grouped by `( … )`" if found.type == "LBRACE" else None
+    for token in (found, before):
+        if token is not None and token.type == "NAME" and (token.text in OPERATORS or token.text.lower() in OPERATORS):
+            return OPERATORS.get(token.text) or OPERATORS[token.text.lower()]
+    if before is not None and before.text == "length":
+        return "write `length(s)`"
+    if found.type in ("NAME", "NUMBER", "STRING", "IN", "OUT") and "COMMA" in expected:
+        return "separate them by commas"
+    if found.type in ("NAME", "NUMBER", "STRING", "LPAR", "FORALL", "EXISTS", "UNIQUE", "NOT") and "AND" in expected:
+        if before is not None and before.type == "NAME" and found.type in ("NAME", "NUMBER"):
+            return f"write `{before.text}(…)` if it is applied; join formulas by `and`, `or` or `->`"
+        return "join formulas by `and`, `or` or `->`"
     return None
 
 
 def _about_keyword(found: Token) -> str | None:
     if found.type in ("CONTEXT", "NODE", "INPUTS", "OUTPUTS", "TOPICS", "MATCHES", "ASSUME", "GUARANTEE", "UPTO"):
         return f"`{found.text}` is a keyword and cannot be a name"
-    if found.text in ("in", "out", "not", "and", "or", "forall", "exists"):
-        return f"`{found.text}` is a keyword"
+    if found.text in ("in", "out", "not", "and", "or", "forall", "exists", "exists_unique", "TRUE", "FALSE"):
+        return f"`{found.text}` is a keyword and cannot be a name"
     return None
 
 
+_BAR = "a bar stands between the variables and the formula: `forall(x in REAL | …)`"
+_ORDER = ("EQ", "NE", "LE", "GE", "LT", "GT")
 _QUANTIFIERS = frozenset(("FORALL", "EXISTS", "UNIQUE"))
+_CONNECTIVES = frozenset(("AND", "OR", "NOT", "IMPLIES", "IFF", "BAR"))
 _RELATIONS = frozenset(("EQ", "NE", "LE", "GE", "LT", "GT", "LPAR", "DOT", "PLUS", "MINUS"))
-_SEQUENCES = frozenset(("seq", "sequence", "list", "List", "Seq", "Sequence", "array"))
 _QUANTIFIER_LIKE = {
     **dict.fromkeys(("exists1", "existsone", "existsunique", "existsexactlyone", "unique"), "exists_unique"),
-    **dict.fromkeys(("all", "every", "foreach", "forevery"), "forall"),
-    **dict.fromkeys(("exist", "some", "forsome", "any"), "exists"),
-}
-_ALIASES = {
-    "true": "TRUE",
-    "false": "FALSE",
-    "implies": "->",
-    "iff": "<=>",
-    "AND": "and",
-    "OR": "or",
-    "NOT": "not",
-    "is": "==",
-    "equals": "==",
-    "then": "->",
-    "IN": "in",
-    "FORALL": "forall",
-    "EXISTS": "exists",
+    **dict.fromkeys(("forall", "all", "every", "foreach", "forevery"), "forall"),
+    **dict.fromkeys(("exists", "exist", "some", "forsome", "any"), "exists"),
 }

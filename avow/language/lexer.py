@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from avow.language.foreign import FOREIGN_TYPES, SIGNS, foreign, invisible, wide
 from avow.language.source import Reports
 
 MAX_TOKENS = 1_000_000
@@ -60,62 +61,7 @@ SYMBOLS = {
     "*": "STAR",
     "/": "SLASH",
 }
-FOREIGN = {
-    "<->": "write `<=>`",
-    "=>": "write `->`",
-    "==>": "write `->`",
-    "&&": "write `and`",
-    "&": "write `and`",
-    "||": "write `or`",
-    "!": "write `not`",
-    "~": "write `not`",
-    ":=": "write `==` for equality, `=` for a constant",
-    "/=": "write `!=`",
-    "=/=": "write `!=`",
-    "=<": "write `<=`",
-    "...": "write a range as `<a upto b>`",
-    "..": "write a range as `<a upto b>`",
-    "[": "write sets as `{a, b}` and sequences as `<a, b>`",
-    "]": "write sets as `{a, b}` and sequences as `<a, b>`",
-    "/\\": "write `and`",
-    "\\/": "write `or`",
-    "\\": "write operators as words: `in`, `and`, `or`, `not`, `forall`, `exists`",
-    "∃!": "write `exists_unique(x in S | …)`",
-    "exists!": "write `exists_unique(x in S | …)`",
-    "#": "a comment begins with `//`",
-    "^": "RCL has no powers: write `x * x`",
-    "%": "RCL has no remainder",
-    "'": 'write texts as `"…"`, and the elements of types without quotation marks',
-    "@": "RCL speaks of one step: there is no earlier or later value",
-    "∀": "write `forall(x in S | …)`",
-    "∃": "write `exists(x in S | …)`",
-    "∧": "write `and`",
-    "∨": "write `or`",
-    "¬": "write `not`",
-    "→": "write `->`",
-    "⇒": "write `->`",
-    "↔": "write `<=>`",
-    "⇔": "write `<=>`",
-    "∈": "write `in`",
-    "∉": "write `!in`",
-    "≤": "write `<=`",
-    "≥": "write `>=`",
-    "≠": "write `!=`",
-    "×": "write `x` between types, `*` between numbers",
-    "·": "write `*`",
-    "ℝ": "write `REAL`",
-    "ℤ": "write `INTEGER`",
-    "ℕ": "write `NATURAL`",
-    "“": 'write the straight quotation mark `"`',
-    "”": 'write the straight quotation mark `"`',
-    "’": "write the straight quote `'`",
-    "′": "write the straight quote `'`",
-    "−": "write the plain minus `-`",
-    "–": "write the plain minus `-`",
-}
-"""What stands for it in RCL, for what other notations (and the prototype) write."""
-
-_FOREIGN = "|".join(re.escape(s) for s in sorted(FOREIGN, key=len, reverse=True))
+_FOREIGN = "|".join(re.escape(s) for s in sorted(SIGNS, key=len, reverse=True))
 _SYMBOLS = "|".join(re.escape(s) for s in sorted(SYMBOLS, key=len, reverse=True))
 _PATTERN = re.compile(
     r"(?P<space>[ \t\r\n\f]+)"
@@ -125,15 +71,19 @@ _PATTERN = re.compile(
     r"|(?P<open_comment>/\*)"
     r"|(?P<not_in>!\s*in(?![A-Za-z0-9_']))"
     r"|(?P<empty><[ \t]*>)"
-    r"|(?P<ne>!=)"
+    r"|(?P<ne>!=(?!=))"
     r"|(?P<old_comment>--(?!>)[^\n]*)"
-    rf"|(?P<arrow>-->|<=>|==(?!>)|<=(?!>)|>=(?!=))"
-    rf"|(?P<foreign>{_FOREIGN})"
+    r"|(?P<arrow>-->|<=>|==(?![>=])|<=(?!=?>)|>=(?!=))"
+    r"|(?P<quoted>'[^'\n]*'|[“„”][^“”„\n]*[“”]|‘[^’\n]*’|`[^`\n]*`)"
+    r"|(?P<point>(?<![A-Za-z0-9_')])\.[0-9]+)"
+    rf"|(?P<foreign>\\[A-Za-z]+|{_FOREIGN})"
+    r"|(?P<square>[\[\]])"
     rf"|(?P<symbol>{_SYMBOLS})"
-    r"|(?P<number>[0-9]+(?:\.[0-9]+)?)(?P<tail>[A-Za-z0-9_'.]*)"
+    r"|(?P<number>[0-9]+(?:\.[0-9]+)?)(?P<tail>(?:[A-Za-z0-9_']|\.(?!\.))*)"
     r'|(?P<string>"(?:[^"\\\n]|\\[^\n])*")'
     r'|(?P<open_string>"[^\n]*)'
-    r"|(?P<junk>[^\x00-\x7f\s]+|.)",
+    r"|(?P<word>[^\W\d_][\w']*)"
+    r"|(?P<junk>[^\x00-\x7f\w\s]+|.)",
     re.DOTALL,
 )
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
@@ -145,19 +95,20 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
     text = reports.source.text
     found: list[Token] = []
     append = found.append
+    other = _Other(reports, found)
     at, end = 0, len(text)
     match_at = _PATTERN.match
-    junk_from = junk_to = -1
     while at < end and not reports.full:
         match = match_at(text, at)
         if match is None:  # pragma: no cover - the last alternative takes any character
             break
         kind, start, at = match.lastgroup, at, match.end()
-        piece = match.group()
         if kind == "space":
             continue
+        piece = match.group()
         if kind == "name":
-            append(Token(KEYWORDS.get(piece, "NAME"), piece, start, at))
+            word = KEYWORDS.get(piece, "NAME")
+            append(other.section(piece, word, start, at) if word in _STRUCTURE else Token(word, piece, start, at))
         elif kind in ("symbol", "arrow"):
             append(Token(SYMBOLS[piece], piece, start, at))
         elif kind == "ne":
@@ -170,30 +121,16 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
             if comments is not None:
                 comments.append(Token("COMMENT", piece, start, at))
         elif kind in ("number", "tail"):
-            number = _number(reports, match, start, at)
-            if number is not None:
-                append(number)
+            append(_number(reports, match, start, at))
         elif kind == "string":
             _check_escapes(reports, piece, start)
             append(Token("STRING", piece, start, at))
-        elif kind in ("foreign", "unique"):
-            reports.error("RCL101", f"`{piece}` is not RCL", start, at, hint=FOREIGN[piece])
-            stand_in = _STAND_IN.get(piece)
-            if stand_in is not None:
-                append(Token(stand_in, piece, start, at))
-        elif kind == "old_comment":
-            reports.error("RCL102", "`--` does not begin a comment", start, start + 2, hint="write `// …`")
         elif kind == "open_comment":
             reports.error("RCL103", "this comment is never closed", start, at, hint="close it with `*/`")
             break
-        elif kind == "open_string":
-            reports.error("RCL104", "this string is not closed on its line", start, at, hint='close it with `"`')
-        elif start == junk_to:
-            junk_to = at
         else:
-            _junk(reports, junk_from, junk_to)
-            junk_from, junk_to = start, at
-    _junk(reports, junk_from, junk_to)
+            at = other.read(str(kind), piece, start, at)
+    other.finish()
     if len(found) > MAX_TOKENS:
         last = found[MAX_TOKENS]
         reports.error("RCL003", f"the text has more than {MAX_TOKENS:,} words and signs", last.start, last.end)
@@ -201,46 +138,194 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
     return found
 
 
-_STAND_IN = {
-    **dict.fromkeys(("<->", "↔", "⇔"), "IFF"),
-    **dict.fromkeys(("=>", "==>", "→", "⇒"), "IMPLIES"),
-    **dict.fromkeys(("&&", "&", "∧", "/\\"), "AND"),
-    **dict.fromkeys(("||", "∨", "\\/"), "OR"),
-    **dict.fromkeys(("∃!", "exists!"), "UNIQUE"),
-    **dict.fromkeys(("!", "~", "¬"), "NOT"),
-    **dict.fromkeys(("/=", "=/=", "≠"), "NE"),
-    **dict.fromkeys(("=<", "≤"), "LE"),
-    "≥": "GE",
-    "∈": "IN",
-    "∉": "NOT_IN",
-    ":=": "EQ",
-    "∀": "FORALL",
-    "∃": "EXISTS",
-    "·": "STAR",
-    "^": "STAR",
-    "%": "STAR",
-    "−": "MINUS",
-    "–": "MINUS",
-    "ℝ": "BUILTIN",
-    "ℤ": "BUILTIN",
-    "ℕ": "BUILTIN",
-}
-"""The token that a foreign sign is read as, after its error, so that nothing else is reported because of it."""
+_STRUCTURE = frozenset(("CONTEXT", "NODE", "INPUTS", "OUTPUTS", "TOPICS", "MATCHES", "ASSUME", "GUARANTEE"))
+_WITHIN = frozenset(("LPAR", "COMMA", "DOT", "EQ", "NE", "LE", "GE", "LT", "GT", "IN", "NOT_IN", "PLUS", "MINUS"))
+_CONNECTIVES = frozenset(("AND", "OR", "NOT", "IMPLIES", "IFF", "BAR"))
+_GOES_ON = re.compile(r"\s*(?:[.:,)=<>!+*/|&-]|(?:in|and|or)\b)")
+_ARRAY = re.compile(r"\]|\s*(?:REAL|INTEGER|NATURAL|BOOL|STRING)\b")
+_PORT = re.compile(r"\.[A-Za-z_]")
 
 
-def _number(reports: Reports, match: re.Match[str], start: int, end: int) -> Token | None:
+class _Other:
+    """What is no token of RCL: said once, and read as what it must mean, or left out."""
+
+    def __init__(self, reports: Reports, found: list[Token]) -> None:
+        self.reports = reports
+        self.found = found
+        self.square: list[tuple[str, str]] = []
+        self.junk = (-1, -1)
+        self.unseen: dict[str, tuple[int, int]] = {}
+
+    def read(self, kind: str, piece: str, start: int, end: int) -> int:
+        """Reads one piece of the text; the offset where reading goes on."""
+        reports = self.reports
+        if kind in ("foreign", "unique"):
+            return self.sign(piece, start, end)
+        if kind == "square":
+            self.bracket(piece, start, end)
+        elif kind == "quoted":
+            hint = 'write texts as `"…"`, and the elements of types without quotation marks'
+            reports.error("RCL101", f"`{_short(piece)}` is not RCL", start, end, hint=hint)
+            self.stand_in(("STRING", piece), start, end)
+        elif kind == "point":
+            reports.error("RCL105", f"`{_short(piece)}` is no number", start, end, hint=f"write `0{_short(piece)}`")
+            self.found.append(Token("NUMBER", "1", start, end))
+        elif kind == "word":
+            self.word(piece, start, end)
+        elif kind == "old_comment":
+            reports.error("RCL102", "`--` does not begin a comment", start, start + 2, hint="write `// …`")
+            reports.torn.append(start)
+        elif kind == "open_string":
+            reports.error("RCL104", "this string is not closed on its line", start, end, hint='close it with `"`')
+            reports.torn.append(start)
+            self.found.append(Token("STRING", piece, start, end))
+        else:
+            self.other(piece, start, end)
+        return end
+
+    def stand_in(self, token: tuple[str, str], start: int, end: int) -> None:
+        self.reports.odd.add(start)
+        self.found.append(Token(*token, start, end))
+
+    def sign(self, piece: str, start: int, end: int) -> int:
+        reports = self.reports
+        if piece == "#" and not reports.source.text[reports.source.text.rfind("\n", 0, start) + 1 : start].strip():
+            reports.error("RCL102", "`#` does not begin a comment", start, end, hint="write `// …`")
+            line_end = reports.source.text.find("\n", start)
+            return line_end if line_end >= 0 else len(reports.source.text)
+        hint, token = foreign(piece)
+        if piece == "::" and len(self.found) > 1 and self.found[-2].start in reports.odd:
+            self.found.append(Token("SLASH", "/", start, end))  # `std_msgs::msg::Bool` is one mistake
+            return end
+        if token is None or token[0] != "UPTO" or not self.square:  # `[0..9]` is one mistake
+            reports.error("RCL101", f"`{_short(piece)}` is not RCL", start, end, hint=hint)
+        if token is None:
+            reports.torn.append(start)
+        else:
+            self.stand_in(token, start, end)
+        return end
+
+    def bracket(self, piece: str, start: int, end: int) -> None:
+        """A square bracket: of an item (`s[0]`), an array type (`REAL[]`), an interval, or a collection."""
+        reports, text = self.reports, self.reports.source.text
+        if piece == "]" and self.square:
+            kind, sign = self.square.pop()
+            if kind:
+                self.stand_in((kind, sign), start, end)
+            return
+        hint, opening, closing = "write sets as `{a, b}` and sequences as `<a, b>`", "", ("", "")
+        before = self.found[-1] if self.found and piece == "[" else Token("", "", -1, -1)
+        if before.type == "BUILTIN" or before.text in FOREIGN_TYPES or _ARRAY.match(text, end):
+            hint = "a type of sequences is written `<REAL>`; a topic has the type of its message, `package/Type`"
+        elif before.type in ("NAME", "RPAR") and before.end == start:
+            hint = "the item of a sequence at position i is written `s(i)`"
+            opening, closing = "(", ("RPAR", ")")
+        elif before.type in ("IN", "NOT_IN"):
+            hint = "write a set as `{a, b}`, whole numbers as `<0 upto 9>`, an interval of reals as `0 <= r <= 9`"
+        reports.error("RCL101", f"`{piece}` is not RCL", start, end, hint=hint)
+        if opening:
+            self.stand_in(("LPAR", opening), start, end)
+        else:
+            reports.torn.append(start)
+        if piece == "[":
+            self.square.append(closing)
+
+    def section(self, word: str, kind: str, start: int, end: int) -> Token:
+        """A keyword that begins a clause or section; or one that someone took for a name, or for `in`."""
+        reports, text = self.reports, self.reports.source.text
+        before = self.found[-1].type if self.found else ""
+        if kind in ("INPUTS", "OUTPUTS") and before != "RPAR" and _PORT.match(text, end):
+            meant = "in" if kind == "INPUTS" else "out"
+            reports.error("RCL101", f"`{word}.` is not RCL", start, end, hint=f"write `{meant}.`")
+            return Token(meant.upper(), meant, start, end)
+        if (before in _WITHIN or before in _CONNECTIVES) and _GOES_ON.match(text, end):
+            message = f"`{word}` is a keyword and cannot be a name"
+            reports.error("RCL120", message, start, end, hint=f"choose another, such as `{word}_`")
+            reports.odd.add(start)
+            return Token("NAME", word, start, end)
+        return Token(kind, word, start, end)
+
+    def word(self, piece: str, start: int, end: int) -> None:
+        """A name with letters that names do not have: read as one all the same."""
+        if self.found and self.found[-1].end == start and self.found[-1].text[:1].isalpha():
+            before = self.found.pop()
+            piece, start = before.text + piece, before.start
+        message = f"the name `{_short(piece)}` is not made of the letters A-Z and a-z"
+        hint = "names are made of the letters A-Z and a-z, digits, `_` and primes"
+        self.reports.error("RCL107", message, start, end, hint=hint)
+        self.stand_in(("NAME", piece), start, end)
+
+    def other(self, piece: str, start: int, end: int) -> None:
+        plain = wide(piece[0])
+        if plain is not None and (plain in SYMBOLS or plain in KEYWORDS):
+            at = start + 1
+            message = f"`{piece[0]}` is not RCL"
+            self.reports.error("RCL101", message, start, at, hint=f"write the plain sign `{plain}`")
+            self.stand_in((SYMBOLS[plain], plain), start, at)
+            if end > at:
+                self.other(piece[1:], at, end)
+            return
+        if invisible(piece[0]) is not None:
+            first, count = self.unseen.get(piece[0], (start, 0))
+            self.unseen[piece[0]] = (first, count + 1)
+            if not piece[0].isspace():  # it may split a name in two
+                self.reports.torn.append(start)
+            if len(piece) > 1:
+                self.other(piece[1:], start + 1, end)
+            return
+        self.reports.torn.append(start)
+        begun, ended = self.junk
+        if ended != start:
+            self.finish_junk()
+            begun = start
+        self.junk = (begun, end)
+
+    def finish_junk(self) -> None:
+        start, end = self.junk
+        if start < 0:
+            return
+        piece = self.reports.source.text[start:end]
+        what = "character" if len(piece) == 1 else "characters"
+        verb = "has" if len(piece) == 1 else "have"
+        message = f"the {what} {_visible(_short(piece))} {verb} no place in RCL"
+        self.reports.error("RCL107", message, start, end)
+        self.junk = (-1, -1)
+
+    def finish(self) -> None:
+        self.finish_junk()
+        for character, (start, count) in self.unseen.items():
+            often = f", {count} times" if count > 1 else ""
+            message = f"the invisible character {invisible(character)} has no place in RCL{often}"
+            hint = "replace it by a plain space" if character.isspace() else "delete it"
+            self.reports.error("RCL107", message, start, start + 1, hint=f"{hint}: it may come from a copied text")
+
+
+def _number(reports: Reports, match: re.Match[str], start: int, end: int) -> Token:
     number, tail = match.group("number"), match.group("tail")
     if tail:
-        hint = "names begin with a letter" if not tail.startswith(".") else "a decimal has digits after its point"
-        if re.fullmatch(r"[eE][0-9]*", tail):
-            hint = "write the number out: RCL has no exponents"
-        reports.error("RCL105", f"`{_short(number + tail)}` is neither a number nor a name", start, end, hint=hint)
-        return Token("NUMBER", "0", start, end)
+        message = f"`{_short(number + tail)}` is neither a number nor a name"
+        reports.error("RCL105", message, start, end, hint=_about_tail(number, tail))
+        reports.odd.add(start)
+        return Token("NUMBER", "1", start, end)
     if len(number) > MAX_DIGITS:
         message = f"this number has {len(number)} digits; {MAX_DIGITS} is the most"
         reports.error("RCL105", message, start, end)
-        return Token("NUMBER", "0", start, end)
+        return Token("NUMBER", "1", start, end)
     return Token("NUMBER", number, start, end)
+
+
+def _about_tail(number: str, tail: str) -> str:
+    if tail.startswith("."):
+        return "a decimal has digits after its one point"
+    if re.fullmatch(r"[eE][0-9]*", tail):
+        return "write the number out: RCL has no exponents"
+    if re.fullmatch(r"[fFdDlLuU]+", tail):
+        return f"write `{_short(number)}`: numbers have no endings"
+    if number == "0" and re.fullmatch(r"[xXbBoO][0-9A-Fa-f_]+", tail):
+        return "write the number in decimal"
+    if re.fullmatch(r"[0-9_']+", tail):
+        return f"write `{_short(number + re.sub('[^0-9]', '', tail))}`"
+    return "names begin with a letter, and numbers have no units"
 
 
 def _check_escapes(reports: Reports, piece: str, start: int) -> None:
@@ -262,18 +347,6 @@ def quote(value: str) -> str:
     """A string token of that value."""
     escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\t", "\\t")
     return f'"{escaped}"'
-
-
-def _junk(reports: Reports, start: int, end: int) -> None:
-    if start < 0:
-        return
-    piece = reports.source.text[start:end]
-    if len(piece) == 1:
-        message = f"the character {_visible(piece)} has no place in RCL"
-    else:
-        message = f"the characters {_visible(_short(piece))} have no place in RCL"
-    hint = "names are made of the letters A-Z and a-z, digits, `_` and primes" if piece[0].isalpha() else None
-    reports.error("RCL107", message, start, end, hint=hint)
 
 
 def _short(text: str) -> str:

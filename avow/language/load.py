@@ -96,6 +96,8 @@ def decode(data: bytes, file: str) -> Source | Diagnostic:
         begin = data.rfind(b"\n", 0, error.start) + 1
         column = len(data[begin : error.start].decode("utf-8", "replace")) + 1
         hint = "save the file as UTF-8"
+        if b"\0" in data and data[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+            return Diagnostic("RCL005", "the file holds NUL characters: it is not a text", start)
         if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
             hint = "this looks like UTF-16: save the file as UTF-8"
         message = f"the file is not UTF-8: the byte 0x{data[error.start]:02X} cannot stand here"
@@ -107,7 +109,7 @@ def clean_text(text: str, file: str) -> Source | Diagnostic:
     """A text as the lexer wants it: without byte order mark, with plain line ends; or why it is none."""
     if len(text) > MAX_BYTES:
         return Diagnostic("RCL003", f"the text is larger than {MAX_BYTES // 1_000_000} MB", Span(file, 1, 1, 1, 1))
-    text = text.removeprefix("\ufeff").replace("\r\n", "\n")
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     at = text.find("\0")
     if at >= 0:
         line, column = Source(file, text).place(at)

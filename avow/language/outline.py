@@ -70,6 +70,9 @@ class _Reader:
         self.tokens = tokens
         self.reports = reports
         self.at = 0
+        self.complained = -1
+        self.innermost: Token | None = None
+        """The bracket that the last search of `balanced` found closed by one of another kind."""
         self.out = FileSyntax()
 
     # --- looking at tokens -------------------------------------------------------------------------------------------
@@ -91,6 +94,10 @@ class _Reader:
 
     def complain(self, code: str, message: str, at: int, hint: str | None = None) -> None:
         words, start, end = self.found(at)
+        near = self.tokens[at - 1].start if 0 < at <= len(self.tokens) else start
+        if self.reports.is_torn(near, end) or start in self.reports.odd or start == self.complained:
+            return  # something stands here that could not be read, which has been said
+        self.complained = start
         self.reports.error(code, message.replace("%", words, 1), start, end, hint=hint)
 
     # --- the file ----------------------------------------------------------------------------------------------------
@@ -108,14 +115,17 @@ class _Reader:
                 self.context()
             elif self.kind() == "NODE":
                 self.node()
-            elif self.kind() == "NAME" and self.tokens[self.at].text.lower() in ("node", "context"):
+            elif self.kind() == "NAME" and self.tokens[self.at].text.lower() in ("context", "contexts"):
                 word = self.tokens[self.at].text
-                self.complain("RCL111", f"`{word}` is not a clause of RCL", self.at, f"write `{word.lower()}`")
-                if word.lower() == "node":
-                    self.node()
-                else:
-                    self.at += 1
-                    self.context()
+                self.complain("RCL111", f"`{word}` is not a clause of RCL", self.at, "write `context`")
+                self.at += 1
+                self.context()
+            elif self.kind() == "NAME" and (
+                self.tokens[self.at].text.lower() == "node" or (self.kind(1) == "NAME" and self.kind(2) == "LBRACE")
+            ):
+                word = self.tokens[self.at].text
+                self.complain("RCL111", f"`{word}` is not a clause of RCL", self.at, "write `node`")
+                self.node()
             elif self.kind() == "NAME" and self.kind(1) == "LBRACE":
                 word = self.tokens[self.at].text
                 if word in ("types", "constants", "type", "constant"):
@@ -222,8 +232,13 @@ class _Reader:
             self.at += 1
             self.skip_to_top()
             return
-        part = [t._replace(type="EQUALS") if t.text == ":=" else t for t in self.tokens[first : self.at]]
-        tree = parse("declaration", part, self.reports, part[-1].end)
+        text = self.reports.source.text
+        part = [
+            t._replace(type="EQUALS") if t.type == "EQ" and text.startswith(":=", t.start) else t
+            for t in self.tokens[first : self.at]
+        ]
+        begin = self.tokens[first - 1].end if first else 0
+        tree = parse("declaration", part, self.reports, part[-1].end, begin)
         self.out.parts.append((part[0].start, part[-1].end))
         if tree is not None:
             self.out.declarations.append(tree)
@@ -245,17 +260,21 @@ class _Reader:
             node = NodeSyntax(self.tokens[self.at], start)
             self.at += 1
         else:
-            hint = "a name stands without quotation marks" if self.kind() == "STRING" else "write `node NAME {`"
+            hint = "write `node NAME {`, with a name of letters, digits and `_`"
+            if self.kind() == "STRING":
+                hint = "a name stands without quotation marks"
             self.complain("RCL113", "expected the node's name and not %", self.at, hint)
             node = NodeSyntax(Token("NAME", "", start, start), start)
-            if self.kind() not in ("LBRACE", "$END") and self.kind() not in _TOP:
-                self.at += 1
+            ahead = next((i for i in range(4) if self.kind(i) in ("LBRACE", "$END") or self.kind(i) in _SECTIONS), 0)
+            if not any(self.kind(i) in _TOP for i in range(1, ahead)):
+                self.at += ahead
         brace = self.open_brace("the node's name")
         self.out.nodes.append(node)
-        before, seen = "", dict[str, Token]()
+        before, seen, closed = "", dict[str, Token](), False
         while self.at < len(self.tokens) and self.kind() not in _TOP and not self.reports.full:
             if self.kind() == "RBRACE":
                 self.at += 1
+                closed = True
                 break
             section = self.section() or self.meant_section()
             if section is None:
@@ -283,20 +302,23 @@ class _Reader:
                 self.reports.error("RCL115", message, brace.start, brace.end, hint="close it with `}`")
         node.end = self.tokens[min(self.at, len(self.tokens)) - 1].end
         self.out.parts.append((node.start, node.end))
-        self.missing(node, seen)
+        self.missing(node, seen, closed)
 
-    def missing(self, node: NodeSyntax, seen: dict[str, Token]) -> None:
-        """Reports the sections that a node must have and does not."""
+    def missing(self, node: NodeSyntax, seen: dict[str, Token], closed: bool) -> None:
+        """Reports the sections that a node must have and does not. In one that is not `closed`, which has been
+        reported, those at the end may be still to come."""
         if not node.name.text:
             return
         where = (node.name.start, node.name.end)
+        last = max((_ORDER[s] for s in seen), default=-1)
         for section in ("INPUTS", "OUTPUTS", "TOPICS"):
-            if section not in seen:
-                word = section.lower()
-                message = f"node `{node.name.text}` has no `{word}( … )`"
+            if section in seen:
+                continue
+            node.broken.add("*")
+            if closed or _ORDER[section] < last:
+                message = f"node `{node.name.text}` has no `{section.lower()}( … )`"
                 self.reports.error("RCL118", message, *where, hint=_FORMS[section])
-                node.broken.add("*")
-        if "GUARANTEE" not in seen:
+        if "GUARANTEE" not in seen and closed:
             message = f"node `{node.name.text}` guarantees nothing"
             self.reports.error("RCL118", message, *where, hint="a node has at least one `guarantee( … )`")
 
@@ -310,6 +332,10 @@ class _Reader:
 
     def meant_section(self) -> str | None:
         """The section that a word not quite right begins: said once, and read as that, so that nothing else is said."""
+        if self.kind() in ("IN", "OUT") and self.kind(1) == "LPAR":
+            meant = "inputs" if self.kind() == "IN" else "outputs"
+            self.complain("RCL113", "% begins no part of a node", self.at, f"write `{meant}`")
+            return meant.upper()
         if self.kind() != "NAME" or self.kind(1) not in ("LPAR", "NAME", "STRING"):
             return None
         word = self.tokens[self.at].text
@@ -328,7 +354,10 @@ class _Reader:
         if token.type == "RPAR":
             message, hint = "this `)` closes nothing", "remove it, or find where a `(` is missing"
         elif token.type in ("SEMICOLON", "COMMA", "DOT"):
-            hint = "no sign stands between the parts of a node: remove it"
+            message, hint = (
+                "% stands between the parts of a node",
+                "no sign stands between the parts of a node: remove it",
+            )
         self.complain("RCL113", message, self.at, hint)
         self.at += 1
         while self.at < len(self.tokens) and self.kind() not in _TOP and self.section() is None:
@@ -342,7 +371,8 @@ class _Reader:
     def balanced(self) -> int | None:
         """Past the bracket here and its partner; the partner's position, or None where it has none (then: where the
         search ended, at a section keyword or the end)."""
-        stack = [_OPEN[self.kind()]]
+        stack, opened = [_OPEN[self.kind()]], [self.tokens[self.at]]
+        self.innermost = None
         self.at += 1
         while self.at < len(self.tokens):
             kind = self.kind()
@@ -350,10 +380,13 @@ class _Reader:
                 return None
             if kind in _OPEN:
                 stack.append(_OPEN[kind])
+                opened.append(self.tokens[self.at])
             elif kind in _CLOSE:
                 if kind != stack[-1]:
+                    self.innermost = opened[-1]
                     return None
                 stack.pop()
+                opened.pop()
                 if not stack:
                     self.at += 1
                     return self.at - 1
@@ -373,6 +406,8 @@ class _Reader:
                 self.at += 1
         if self.kind() != "LPAR":
             hint = f"write `{keyword.text}( … )`"
+            if section in ("ASSUME", "GUARANTEE") and self.kind() not in ("LBRACE", "RBRACE", "$END"):
+                hint = f'write `{keyword.text} NAME "sentence" ( … )`; the name and the sentence may be left out'
             self.complain("RCL113", f"expected `(` after `{(name or keyword).text}` and not %", self.at, hint)
             if self.kind() == "LBRACE":
                 self.balanced()
@@ -387,15 +422,15 @@ class _Reader:
         first = self.at + 1
         close = self.balanced()
         if close is None:
-            self.unclosed(opening, first, section, node)
+            self.unclosed(self.innermost or opening, first, section, node)
             return
         part = self.tokens[first:close]
         end = self.tokens[close].start
         if section in ("ASSUME", "GUARANTEE"):
             kind = ClauseKind.ASSUMPTION if section == "ASSUME" else ClauseKind.GUARANTEE
             formula = None
-            if part:
-                formula = parse("formula", part, self.reports, end)
+            if part or self.reports.is_torn(opening.end, end):
+                formula = parse("formula", part, self.reports, end, opening.end)
             else:
                 message = f"this {kind.value} says nothing"
                 hint = "leave it out: no assumption means that every input is accepted"
@@ -407,7 +442,7 @@ class _Reader:
                 ClauseSyntax(kind, name, sentence, formula, inside, keyword.start, self.tokens[close].end)
             )
             return
-        tree = parse("topics" if section == "TOPICS" else "ports", part, self.reports, end)
+        tree = parse("topics" if section == "TOPICS" else "ports", part, self.reports, end, opening.end)
         if tree is None:
             node.broken.update(t.text for t in part if t.type == "NAME")
         else:
@@ -424,14 +459,15 @@ class _Reader:
         """Reports a parenthesis without partner and goes to where reading can begin again."""
         words, start, end = self.found(self.at)
         where = self.reports.source.span(start, end)
-        self.reports.error(
-            "RCL115",
-            "this `(` is never closed",
-            opening.start,
-            opening.end,
-            hint="close it with `)`",
-            notes=((f"it should be closed before {words} here", where),),
-        )
+        if not self.reports.is_torn(opening.end, end):  # what could not be read may hold the partner
+            self.reports.error(
+                "RCL115",
+                f"this `{_SIGN[opening.type]}` is never closed",
+                opening.start,
+                opening.end,
+                hint=f"close it with `{_SIGN[_OPEN[opening.type]]}`",
+                notes=((f"it should be closed before {words} here", where),),
+            )
         if section not in ("ASSUME", "GUARANTEE"):
             node.broken.update(t.text for t in self.tokens[first : self.at] if t.type == "NAME")
             node.broken.add("*")

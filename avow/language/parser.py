@@ -26,14 +26,23 @@ QUANTIFIERS = {"FORALL": "forall", "EXISTS": "exists", "UNIQUE": "exists_unique"
 STARTS = ("declaration", "ports", "topics", "formula")
 
 
-def parse(start: str, tokens: Sequence[Token], reports: Reports, end: int) -> Tree | None:
-    """The tree of one part of a file; `end` is the offset where it ends. Reports the first error; then None."""
+def parse(start: str, tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None) -> Tree | None:
+    """The tree of one part of a file, which stands between the offsets `begin` (of its first token, where not given)
+    and `end`. Reports the first error, unless it follows from what the lexer had to leave out or guess; then None."""
     tree = _run(_tables(start), tokens, Token("$END", "", end, end))
+    if begin is None:
+        begin = tokens[0].start if tokens else end
     if isinstance(tree, Token):
-        from avow.language.expectations import explain
+        at = next((i for i, t in enumerate(tokens) if t is tree), len(tokens))
+        guessed = any(t.start in reports.odd for t in tokens[max(at - 1, 0) : at + 1])
+        guessed = guessed or any(t.type == "UPTO" and t.start in reports.odd for t in tokens[at + 1 : at + 2])
+        if not guessed and not reports.is_torn(begin, tree.end):
+            from avow.language.expectations import explain
 
-        explain(start, tokens, tree, _accepted(start, tokens, tree), reports)
+            explain(start, tokens, at, tree, _accepted(start, tokens, tree), reports)
         return None
+    if start in ("formula", "topics") and reports.is_torn(begin, end):
+        return None  # what it says would be something else
     if tree.depth > MAX_DEPTH:
         reports.error(
             "RCL110",

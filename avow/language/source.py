@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+import re
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
 
 from avow.diagnostics import Diagnostic, Severity, Span
 
 MAX_DIAGNOSTICS = 200
 """More than this of one file are of no use to anyone: reading ends there."""
+
+
+_LONG_NAME = re.compile(r"(`[^`]{50})[^`]{30,}`")
 
 
 @dataclass(slots=True)
@@ -49,6 +53,10 @@ class Reports:
 
     source: Source
     found: list[Diagnostic] = field(default_factory=list)
+    odd: set[int] = field(default_factory=set)
+    """Where a token of the lexer begins that stands for something that is not RCL, which has been reported."""
+    torn: list[int] = field(default_factory=list)
+    """Where the lexer left something out, in ascending order: what is found near it is most likely a consequence."""
     _seen: set[tuple[str, str, Span | None]] = field(default_factory=set)
 
     def add(self, diagnostic: Diagnostic) -> None:
@@ -72,7 +80,13 @@ class Reports:
         severity: Severity = Severity.ERROR,
     ) -> None:
         if not self.full:
+            message, hint = _short(message), hint and _short(hint)
             self.add(Diagnostic(code, message, self.source.span(start, end), severity, hint, notes))
+
+    def is_torn(self, start: int, end: int) -> bool:
+        """Whether something was left out of this part of the text, so that no more should be said of it."""
+        at = bisect_left(self.torn, start)
+        return at < len(self.torn) and self.torn[at] <= end
 
     @property
     def full(self) -> bool:
@@ -82,3 +96,8 @@ class Reports:
     @property
     def failed(self) -> bool:
         return any(d.is_error for d in self.found)
+
+
+def _short(message: str) -> str:
+    """The message with very long names in it cut: nobody reads a hundred thousand letters."""
+    return message if len(message) <= 300 else _LONG_NAME.sub(r"\1…`", message)

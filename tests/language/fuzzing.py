@@ -283,7 +283,7 @@ def examine(text: str) -> Contract | None:
         contract, found = check_text(text, "f")
         assert (contract is None) == any(d.is_error for d in found)
         assert len(found) <= MAX_DIAGNOSTICS + 1
-        lines = text.removeprefix("\ufeff").replace("\r\n", "\n").split("\n")
+        lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
         for diagnostic in found:
             _place(diagnostic, lines)
         shown = render(found, {"f": text})

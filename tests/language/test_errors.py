@@ -37,7 +37,7 @@ def test_every_code_has_an_example_that_triggers_it(code) -> None:  # type: igno
         assert d.code in CODES
 
 
-_FOLLOWING = {"RCL104": ("RCL113",), "RCL006": ("RCL107", "RCL111", "RCL105")}
+_FOLLOWING = {"RCL104": ("RCL113",), "RCL006": ("RCL101", "RCL107", "RCL111", "RCL105")}
 
 
 def test_codes_without_example_are_few() -> None:
@@ -83,7 +83,7 @@ def test_codes_without_example_are_few() -> None:
         ("r == 1 / 0", "RCL309"),
         ("length(r) > 0", "RCL303 `length` is of a sequence"),
         ("sq(1.5) > 0", "RCL303 a position in a sequence"),
-        ("other.stat == red", r"RCL205 .*\[write `in.stat` or `out.stat`"),
+        ("other.stat == red", r"RCL205 .*\[write `out.stat`: a contract"),
         ("stat == Stat", "RCL204"),
         ("not r", "RCL301"),
         ("r and both", "RCL301"),
@@ -99,7 +99,7 @@ def test_codes_without_example_are_few() -> None:
         ),
         ("exists_unique((x, y) in REAL x REAL | at(x, y))", r"RCL120 .*\[the variables stand without parentheses"),
         ("stat == red <-> both", r"RCL101 `<->` is not RCL \[write `<=>`\]"),
-        ("in.r => out.both", r"RCL101 `=>` is not RCL \[write `->`\]"),
+        ("in.r => out.both", r"RCL101 `=>` is not RCL \[write `->` \(if … then\), or `>=` \(at least\)\]"),
         ("stat == red && TRUE", r"RCL101 .*\[write `and`\]"),
         ("∀ stat", "RCL101"),
         ("stat == réd", "RCL107"),
