@@ -106,6 +106,15 @@ class Translates(Protocol):
 
 
 @runtime_checkable
+class Suits(Protocol):
+    """What a backend may offer besides: whether it is worth suggesting for a node."""
+
+    def suits(self, node: Node) -> bool:
+        """Whether the node's contract looks like what the backend verifies. Cheap; a guess is good enough."""
+        ...
+
+
+@runtime_checkable
 class Backend(Protocol):
     """See `docs/adding-a-backend.md`."""
 

@@ -23,7 +23,7 @@ from avow.evidence.encoding import decode as decode_evidence
 from avow.evidence.record import Evidence
 from avow.files import write
 
-SCHEMA = "https://avow.invalid/schemas/case-2"
+SCHEMA = "https://avow.invalid/schemas/case-3"
 """Names the format in ``report.json``; raised when it changes incompatibly."""
 
 

@@ -204,11 +204,12 @@ def _planned(view: ObligationView, facts: Facts) -> Mapping[str, str]:
 def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], facts: Facts) -> Suggestion:
     strong_enough = view.status in demand.one_of
     order = costs()
+    node = view.obligation.node
 
     def fits(info: MethodInfo) -> bool:
-        if info.name in used.values() or (
-            demand.links and info.link not in demand.links and info.strength is not Verdict.REVIEWED
-        ):
+        if info.name in used.values() or node in info.unsuited:
+            return False
+        if demand.links and info.link not in demand.links and info.strength is not Verdict.REVIEWED:
             return False
         return strong_enough or Status(info.strength) in demand.one_of
 
@@ -220,7 +221,6 @@ def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], f
     fitting = sorted(
         (info for info in facts.methods if fits(info)), key=lambda i: (dear(i), -link_rank(i.link), i.name)
     )
-    node = view.obligation.node
     if not fitting:
         wanted = (
             "a second, independent method" if strong_enough else f"a method that can give {' or '.join(demand.one_of)}"

@@ -59,6 +59,8 @@ class MethodInfo:
     green_means: str = ""
     available: bool = True
     install: str = ""
+    unsuited: tuple[str, ...] = ()
+    """Nodes whose contracts do not look like what it verifies: it is not suggested for them."""
 
 
 @dataclass(frozen=True, slots=True)

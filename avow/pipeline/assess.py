@@ -15,6 +15,7 @@ from doit.exceptions import TaskError
 
 from avow import __version__
 from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
+from avow.backend import Suits
 from avow.diagnostics import Rejected
 from avow.evidence.continuity import continuity
 from avow.evidence.heads import index_path, read_index
@@ -163,8 +164,12 @@ def _methods(assessment: Assessment) -> tuple[MethodInfo, ...]:
         tool = backend(name, plugins)
         missing = [t for t in tool.tools() if not t.present and not t.optional]
         install = missing[0].install if missing else ""
+        suits = tool.suits if isinstance(tool, Suits) else lambda _: True
+        unsuited = tuple(node.name for node in assessment.surveyed.system.contract.nodes if not suits(node))
         found.append(
-            MethodInfo(tool.name, tool.title, tool.strength, tool.link, tool.green_means, not missing, install)
+            MethodInfo(
+                tool.name, tool.title, tool.strength, tool.link, tool.green_means, not missing, install, unsuited
+            )
         )
     return tuple(found)
 

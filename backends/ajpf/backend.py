@@ -13,6 +13,7 @@ from avow.backend import Job, Limits, Report, Tool
 from avow.backends.ajpf.codes import CODES
 from avow.backends.ajpf.schema import SCHEMA
 from avow.diagnostics import Diagnostic, Rejected
+from avow.language.contract import Node
 from avow.system.paths import inside
 from avow.verdict import Link, Verdict
 
@@ -38,6 +39,11 @@ class AjpfBackend:
         from avow.backends.ajpf import ajpf_tool, spin
 
         return (ajpf_tool.tool(), spin.tool())
+
+    def suits(self, node: Node) -> bool:
+        from avow.backends.ajpf.suits import looks_like_an_agent
+
+        return looks_like_an_agent(node)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from avow.backends.ajpf.instances import diagnose, instances

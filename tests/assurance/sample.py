@@ -211,10 +211,9 @@ def case(
         keys=keys_of(records) if keys is None else keys,
         today=TODAY,
         run=run,
-        methods=METHODS,
         tools=TOOLS,
         ledger_head=entries[-1].hash if entries else GENESIS,
-        **{"discrepancies": (), **others},
+        **{"methods": METHODS, "discrepancies": (), **others},
     )
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from assurance.sample import SPAN, TODAY, case, evidence, guarantee, node_plan, obligation, system
+from assurance.sample import METHODS, SPAN, TODAY, case, evidence, guarantee, node_plan, obligation, system
 from avow.assurance.demand import independent
-from avow.assurance.model import Case
+from avow.assurance.model import Case, MethodInfo
 from avow.assurance.policy import costs, profile, profile_names, read_policy, techniques
 from avow.diagnostics import Rejected, Span
 from avow.evidence.obligation import Kind
@@ -313,3 +313,17 @@ def test_who_gives_up_the_method_that_refutes_is_told_of() -> None:
 def test_reproduction_asks_nothing_of_guarantees() -> None:
     assert the_case("reproduction").exit_code == 0
     assert the_case("default").exit_code == 1
+
+
+def test_a_method_is_suggested_where_the_contract_looks_like_its_matter() -> None:
+    def step(methods: tuple[MethodInfo, ...]) -> str:
+        subject = system({"n": ["g"]}, plans=[node_plan("n", "high", "hoare")])
+        unknown = evidence("n.g", Verdict.UNKNOWN)
+        suggestion = case(subject, [guarantee("n", "g")], [unknown], methods=methods).obligations[0].suggestion
+        return suggestion.text if suggestion else ""
+
+    assert step(METHODS).startswith("add `ajpf`")
+    assert step(tuple(replace(m, unsuited=("n",)) if m.name == "ajpf" else m for m in METHODS)).startswith(
+        "add `dafny`"
+    )
+    assert step(tuple(replace(m, unsuited=("m",)) if m.name == "ajpf" else m for m in METHODS)).startswith("add `ajpf`")
