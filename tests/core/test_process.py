@@ -10,15 +10,9 @@ import time
 from pathlib import Path
 
 import pytest
+from helpers import alive
 
 from avow import process
-
-
-def _alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 def test_output_and_code_are_the_tools() -> None:
@@ -43,7 +37,7 @@ def test_a_hanging_tool_is_killed_with_all_that_it_started(tmp_path: Path) -> No
     assert done.timed_out
     assert time.monotonic() - start < 5
     time.sleep(0.1)
-    assert [pid for pid in map(int, pids.read_text().split()) if _alive(pid)] == []
+    assert [pid for pid in map(int, pids.read_text().split()) if alive(pid)] == []
 
 
 def test_a_tool_does_not_outlive_a_killed_avow(tmp_path: Path) -> None:
@@ -56,9 +50,9 @@ def test_a_tool_does_not_outlive_a_killed_avow(tmp_path: Path) -> None:
     pid = int(pid_file.read_text())
     avow.kill()
     avow.wait()
-    while _alive(pid) and time.monotonic() < deadline:
+    while alive(pid) and time.monotonic() < deadline:
         time.sleep(0.02)
-    assert not _alive(pid)
+    assert not alive(pid)
 
 
 def test_memory_is_bounded() -> None:

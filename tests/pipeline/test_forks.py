@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from helpers import alive
 
 from avow import process
 from avow.backend import Limits, Report
@@ -112,13 +113,6 @@ def until(happens: object) -> None:
     while not happens():  # type: ignore[operator]
         assert time.monotonic() < deadline
         time.sleep(0.01)
-
-
-def alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
 
 
 def server() -> int:

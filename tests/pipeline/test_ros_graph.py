@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from helpers import edit
 
 from avow.diagnostics import Diagnostic, Rejected, Severity
 from avow.pipeline.check import check, diagnostics, is_current
@@ -28,12 +29,6 @@ def told(folder: Path) -> list[Diagnostic]:
     return [d for d in diagnostics(load_system(folder)) if d.code == "PLAN127"]
 
 
-def edit(path: Path, old: str, new: str) -> None:
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new))
-
-
 def test_the_shipped_account_is_complete() -> None:
     assert [d.message for d in told(SHIPPED) if d.severity is not Severity.NOTE] == []
 
@@ -53,7 +48,7 @@ def test_the_shipped_account_is_complete() -> None:
     ],
 )
 def test_what_goes_missing_is_said(rover: Path, old: str, new: str, severity: Severity, message: str) -> None:
-    edit(rover / "plan.yaml", old, new)
+    edit(rover / "plan.yaml", (old, new))
     assert any(d.severity is severity and message in d.message for d in told(rover)), told(rover)
 
 
@@ -71,9 +66,9 @@ def test_another_graph_is_checked_again(rover: Path) -> None:
     assert isinstance(surveyed, Survey)
     check(workspace, surveyed)
     assert is_current(workspace, surveyed)
-    edit(rover / GRAPH, "n___rviz [", 'n___extra [label="/extra"]; n___rviz [')
+    edit(rover / GRAPH, ("n___rviz [", 'n___extra [label="/extra"]; n___rviz ['))
     assert not is_current(workspace, surveyed)
-    edit(rover / "plan.yaml", "[imu, odometry, amcl]", "[imu, odometry, amlc]")
+    edit(rover / "plan.yaml", ("[imu, odometry, amcl]", "[imu, odometry, amlc]"))
     surveyed = survey(rover)
     assert isinstance(surveyed, Survey)
     with pytest.raises(Rejected) as rejected:

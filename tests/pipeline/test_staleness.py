@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from helpers import edit
 
 from avow.diagnostics import Rejected
 from avow.pipeline.survey import survey
@@ -34,14 +35,6 @@ def copied(source: Path, place: Path) -> Path:
     target = place / "contracts" / source.name
     shutil.copytree(source, target)
     return target
-
-
-def edit(path: Path, *pairs: tuple[str, str]) -> None:
-    text = path.read_text(encoding="utf-8")
-    for old, new in pairs:
-        assert old in text, old
-        text = text.replace(old, new)
-    path.write_text(text, encoding="utf-8")
 
 
 def changed(before: Keys, after: Keys) -> set[tuple[str, str]]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import yaml
+from helpers import edit
 
 from avow.backend import Backend, Job, Limits
 from avow.backends.review import BACKEND
@@ -25,12 +26,6 @@ MakeNode = Callable[..., Node]
 def settle(job: Job) -> tuple[Outcome, Outcome]:
     first, second = BACKEND.discharge(job, job.root, Limits()).outcomes
     return first, second
-
-
-def edit(path: Path, old: str, new: str) -> None:
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new))
 
 
 def test_it_is_a_backend() -> None:
@@ -91,7 +86,7 @@ def test_an_unstamped_review_is_not_green(make_job: MakeJob, stamped: Path) -> N
 
 
 def test_a_rejection_refutes(make_job: MakeJob, stamped: Path) -> None:
-    edit(stamped, "conclusion: accepted", "conclusion: rejected\nremarks: two publishers")
+    edit(stamped, ("conclusion: accepted", "conclusion: rejected\nremarks: two publishers"))
     for outcome in settle(make_job()):
         assert outcome.verdict is Verdict.REFUTED
         assert outcome.counterexample is not None
@@ -101,7 +96,7 @@ def test_a_rejection_refutes(make_job: MakeJob, stamped: Path) -> None:
 
 
 def test_conditions_become_hypotheses(make_job: MakeJob, stamped: Path) -> None:
-    edit(stamped, "conclusion: accepted", "conclusion: conditional\nconditions: [the map is loaded]")
+    edit(stamped, ("conclusion: accepted", "conclusion: conditional\nconditions: [the map is loaded]"))
     outcome = settle(make_job())[0]
     assert outcome.verdict is Verdict.REVIEWED
     assert outcome.hypotheses == ("the map is loaded",)
@@ -119,7 +114,7 @@ def test_one_guarantee_may_fare_worse_but_not_better(make_job: MakeJob, stamped:
 
 
 def test_material_kept_elsewhere_is_a_hypothesis(make_job: MakeJob, stamped: Path) -> None:
-    edit(stamped, "read:\n", "read:\n  - material: the data sheet\n")
+    edit(stamped, ("read:\n", "read:\n  - material: the data sheet\n"))
     outcome = settle(make_job())[0]
     assert outcome.verdict is Verdict.REVIEWED
     assert "the data sheet" in outcome.hypotheses[0]
@@ -155,7 +150,7 @@ def test_material_kept_elsewhere_is_a_hypothesis(make_job: MakeJob, stamped: Pat
     ],
 )
 def test_a_bad_record_is_told_and_never_green(make_job: MakeJob, stamped: Path, old: str, new: str, word: str) -> None:
-    edit(stamped, old, new)
+    edit(stamped, (old, new))
     job = make_job()
     problems = BACKEND.check(job)
     assert any(word in p.message for p in problems), problems
