@@ -46,12 +46,19 @@ class Document:
     tokens: tuple[Token, ...]
 
 
-def analyse(text: str, file: str, before: Document | None = None, others: tuple[Source, ...] = ()) -> Document:
-    """Check a text. `others` are the other files of its system; `before` is what was known before the last change."""
+def analyse(
+    text: str,
+    file: str,
+    before: Document | None = None,
+    others: tuple[Source, ...] = (),
+    off: frozenset[str] = frozenset(),
+) -> Document:
+    """Check a text. `others` are the other files of its system, `off` the codes of lints that are not wanted; `before`
+    is what was known before the last change."""
     source = clean_text(text, file)
     if isinstance(source, Diagnostic):
         return Document(file, text, (source,), before.contract if before else None, FileSyntax(), ())
-    contract, found = check_sources([source, *others])
+    contract, found = check_sources([source, *others], off=off)
     reports = Reports(source)
     stream = tokens(reports)
     syntax = read(stream, reports)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from lsprotocol import types
 from pygls.lsp.server import LanguageServer
-from pygls.uris import to_fs_path
 
 from avow import __version__
 from avow.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.language.format import format_text
 from avow.language.load import read_source
+from avow.language.outline import FileSyntax
 from avow.language.source import Source
 from avow.lsp import answers
 from avow.lsp.answers import Document, StatusLookup, Symbol
+from avow.lsp.surroundings import PLAN, about_plan, companions, file_of
 
 _SEVERITIES = {
     Severity.ERROR: types.DiagnosticSeverity.Error,
@@ -32,42 +34,91 @@ _KINDS = {
 }
 
 
+CHARACTERS_PER_SECOND = 500_000
+"""About how fast texts are checked: a text so long that it takes a while is checked when its author pauses."""
+
+NOTICED = 0.05
+"""So many seconds are a while."""
+
+
 def _nothing(file: str) -> StatusLookup:
     return lambda node, clause: None
 
 
 def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageServer:
     """A server with every answer registered; `status` gives, for a file, how the clauses in it stand in the ledger."""
-    server = LanguageServer("avow", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Full)
+    server = LanguageServer("avow", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Incremental)
     documents: dict[str, Document] = {}
+    open_now: set[str] = set()
+    later: dict[str, asyncio.TimerHandle] = {}
+    """Documents that have changed and are read again in a moment, if nothing more comes in before."""
 
-    def refresh(uri: str) -> None:
-        text = server.workspace.get_text_document(uri).source
-        file = to_fs_path(uri) or uri
-        document = answers.analyse(text, file, documents.get(uri), _companions(file))
+    def publish(uri: str, document: Document) -> None:
         documents[uri] = document
+        if uri not in open_now:
+            return  # asked about, but not open
         server.text_document_publish_diagnostics(
             types.PublishDiagnosticsParams(
                 uri=uri, diagnostics=[_diagnostic(d, document) for d in document.diagnostics]
             )
         )
 
+    def refresh(uri: str) -> tuple[str, ...]:
+        """Reads a document again; the other files of its system."""
+        file = file_of(uri)
+        text = _text(server, uri)
+        waiting = later.pop(uri, None)
+        if waiting is not None:
+            waiting.cancel()
+        if Path(file).name == PLAN:
+            publish(uri, Document(file, text, about_plan(file), None, FileSyntax(), ()))
+            return ()
+        others, off = companions(file, {d.file: d.text for u, d in documents.items() if u != uri})
+        publish(uri, answers.analyse(text, file, documents.get(uri), others, off))
+        return tuple(other.file for other in others)
+
+    def refresh_all(uri: str) -> None:
+        """Reads a document again, and those open beside it that use what it declares."""
+        files = {Path(f).resolve() for f in refresh(uri)}
+        folder = Path(file_of(uri)).parent if Path(file_of(uri)).name == PLAN else None
+        for other, document in list(documents.items()):
+            path = Path(document.file)
+            if other != uri and (path.resolve() in files or path.parent == folder):
+                refresh(other)
+
     def current(uri: str) -> Document:
-        if uri not in documents:
+        if uri in later:
+            refresh_all(uri)
+        elif uri not in documents:
             refresh(uri)
         return documents[uri]
 
     def opened(params: types.DidOpenTextDocumentParams) -> None:
-        refresh(params.text_document.uri)
+        open_now.add(params.text_document.uri)
+        refresh_all(params.text_document.uri)
 
     def changed(params: types.DidChangeTextDocumentParams) -> None:
-        refresh(params.text_document.uri)
+        uri = params.text_document.uri
+        if Path(file_of(uri)).name == PLAN:
+            return  # a plan is read from the disk, once it is saved
+        pause = len(_text(server, uri)) / CHARACTERS_PER_SECOND
+        if pause < NOTICED:
+            refresh_all(uri)
+            return
+        if uri in later:
+            later[uri].cancel()
+        later[uri] = asyncio.get_running_loop().call_later(pause, refresh_all, uri)
 
     def saved(params: types.DidSaveTextDocumentParams) -> None:
-        refresh(params.text_document.uri)
+        refresh_all(params.text_document.uri)
 
     def closed(params: types.DidCloseTextDocumentParams) -> None:
-        documents.pop(params.text_document.uri, None)
+        uri = params.text_document.uri
+        documents.pop(uri, None)
+        open_now.discard(uri)
+        if uri in later:
+            later.pop(uri).cancel()
+        server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri=uri, diagnostics=[]))
 
     def hover(params: types.HoverParams) -> types.Hover | None:
         document = current(params.text_document.uri)
@@ -81,6 +132,9 @@ def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSer
             return None
         if span.file == document.file:
             return types.Location(params.text_document.uri, _range(span, document.text))
+        for uri, other in documents.items():
+            if Path(other.file).resolve() == Path(span.file).resolve():
+                return types.Location(uri, _range(span, other.text))
         source = read_source(Path(span.file))
         text = source.text if isinstance(source, Source) else ""
         return types.Location(Path(span.file).resolve().as_uri(), _range(span, text))
@@ -118,23 +172,13 @@ def serve(status: Callable[[str], StatusLookup] = _nothing) -> None:
     make_server(status).start_io()
 
 
-def _companions(file: str) -> tuple[Source, ...]:
-    """The other files of the system that a file belongs to, where its folder has a plan that names it."""
-    path = Path(file)
-    plan_file = path.parent / "plan.yaml"
-    if not plan_file.is_file():
-        return ()
-    from avow.system.plan_file import read_plan
-
+def _text(server: LanguageServer, uri: str) -> str:
+    """A document's text; of one that is not open, the file's; nothing where there is none."""
     try:
-        files = read_plan(plan_file)[0].contract_files
-    except Rejected:
-        return ()
-    names = [f.resolve() for f in files]
-    if path.resolve() not in names:
-        return ()
-    found = [read_source(f) for f in names if f != path.resolve()]
-    return tuple(f for f in found if isinstance(f, Source))
+        text: str = server.workspace.get_text_document(uri).source
+    except (OSError, ValueError):
+        return ""
+    return text
 
 
 # --- the protocol's words --------------------------------------------------------------------------------------------
@@ -142,7 +186,7 @@ def _companions(file: str) -> tuple[Source, ...]:
 
 def _units(text: str) -> int:
     """The length in UTF-16 code units, in which the protocol counts columns."""
-    return len(text.encode("utf-16-le")) // 2
+    return len(text.encode("utf-16-le", "surrogatepass")) // 2
 
 
 def _position(line: int, column: int, lines: list[str]) -> types.Position:
