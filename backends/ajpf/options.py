@@ -18,13 +18,14 @@ from avow.backends.ajpf.mapping import Row
 from avow.backends.ajpf.parser import read_program
 from avow.backends.ajpf.psl import AGENT_NAME, KEYWORDS, Formula, Modality, atoms
 from avow.backends.ajpf.psl_parser import Malformed, index_names, instantiate, parse_psl
+from avow.backends.ajpf.scenario import domain_of
 from avow.backends.ajpf.schema import SCHEMA
 from avow.backends.ajpf.shape import TooComplex, free, shape
 from avow.backends.ajpf.syntax import Program
 from avow.diagnostics import Diagnostic, Rejected, Span
 from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
-from avow.language.terms import Not, Quantified, Term
+from avow.language.terms import Not, Quantified, Role, Term, Variable
 from avow.logic.traversal import subterms
 from avow.system.paths import inside
 
@@ -219,6 +220,13 @@ class _Reader:
         ports = {p.name for p in (*self.job.node.inputs, *self.job.node.outputs)}
         return {name: sort for name, sort in found.items() if name not in ports}
 
+    def domains(self) -> dict[str, tuple[int, ...]]:
+        """The scenario's domains of the variables that the node's clauses quantify over: what they range over where the
+        plan's `instances` say nothing."""
+        scenario = self.job.system.plan.scenario
+        variables = (Variable(Role.BOUND, name, sort) for name, sort in self.sorts().items() if is_index(sort))
+        return {v.name: tuple(found) for v in variables if (found := domain_of(v, scenario))}
+
     def rows(self, program: Program | None) -> tuple[Row, ...]:
         sorts = self.sorts()
         rows = []
@@ -280,7 +288,8 @@ class _Reader:
                 self.fault("AJPF125", message, "properties", name, "guarantee")
                 continue
             data = {} if isinstance(entry, str) else entry
-            ranges = {**instances, **self.ranges(data.get("instances", {}), "properties", name, "instances")}
+            own = self.ranges(data.get("instances", {}), "properties", name, "instances")
+            ranges = {**self.domains(), **instances, **own}
             indices = {i: ranges[i] for i in sorted(index_names(formula) & set(ranges))}
             try:
                 for choice in product(*indices.values()):

@@ -242,3 +242,14 @@ def test_what_a_property_may_look_at(formula, expected):
             parse_psl(formula)
     else:
         assert holds(plans, formula, ["p"], beliefs="v(1)", goals="g(1) [perform]") is expected
+
+
+def test_an_agent_that_falls_behind_its_percepts_is_told():
+    """Each draw brings an event, each answer to it an action, and each action a draw: intentions pile up."""
+    plans = "+p(X) : { True } <- go(X), rest(X), turn(X);"
+    draws = environment(("p(0)", "p(1)"), at_quiescence="repeatedly")
+    hasty = explore(Agent(program(plans), draws, Semantics.MCAPL), states=2_000)
+    assert "intentions at once" in hasty.unfinished
+    assert "keep" in hasty.unfinished
+    counting = explore(Agent(program("+p(X) : { True } <- +seen(X);"), draws, Semantics.MCAPL), states=2)
+    assert counting.unfinished == "more than 2 states"

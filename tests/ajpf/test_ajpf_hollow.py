@@ -258,3 +258,11 @@ def test_instances_that_leave_out_what_the_scenario_has(lift, tmp_path):
     assert "f = 0, 3" in message
     assert told([0, 1, 2], [1, 2]) == []
     assert told([1, 2], None) == []
+
+
+def test_properties_of_the_plan_range_over_the_scenario_where_the_instances_say_nothing(lift):
+    job = lift({"instances": None, "properties": {"heard": "[] (B(cabin, call(f)) -> <> D(cabin, go(f)))"}})
+    plan = replace(job.system.plan, scenario=Scenario(domains={"NATURAL": ("1", "2", "3")}))
+    text = BACKEND.export(replace(job, system=replace(job.system, plan=plan)))["cabin.psl"]
+    assert [n for n in range(5) if f"[] (B(cabin, call({n})) -> (<> D(cabin, go({n}))))" in text] == [1, 2, 3]
+    assert "call(f)" not in text
