@@ -16,10 +16,12 @@ def command(name: str, as_json: bool) -> int:
     ID is an obligation's id, whole (system/node/kind/name) or in part, or a guarantee as node.name.
     """
     from avow.assurance.codec import to_json
-    from avow.cli.ledgers import find_claim, reported_cases
+    from avow.cli.ledgers import find_claim, reported_cases, unreported
     from avow.cli.workspace import workspace
 
-    found = find_claim(reported_cases(workspace()), name)
+    place = workspace()
+    cases_here = reported_cases(place)
+    found = find_claim(cases_here, name, unreported(place, cases_here))
     if as_json:
         wanted = {view.id for _, view in found}
         cases = {case.system: case for case, _ in found}.values()

@@ -44,7 +44,6 @@ def command(directory: Path) -> int:
     write(directory / "dodo.py", _DODO)
     for folder in ("artifacts", "reports"):
         write(directory / folder / "README.md", f"Made by `doit verify`: see Avow's documentation of {folder}/.\n")
-    click.echo(
-        f"{directory}: a workspace with one system, contracts/thermostat\n\nnext:\n  cd {directory}\n  doit verify"
-    )
+    go = "" if directory.resolve() == Path.cwd() else f"  cd {directory}\n"
+    click.echo(f"{directory}: a workspace with one system, contracts/thermostat\n\nnext:\n{go}  doit verify")
     return 0

@@ -141,10 +141,18 @@ def reported_cases(place: Workspace) -> tuple[Case, ...]:
     return tuple(found)
 
 
-def find_claim(cases: Sequence[Case], wanted: str) -> tuple[tuple[Case, ObligationView], ...]:
+def unreported(place: Workspace, cases: Sequence[Case]) -> tuple[str, ...]:
+    """Systems of the workspace of which there is no report that can be read."""
+    folders = sorted(f.name for f in place.contracts.iterdir() if f.is_dir()) if place.contracts.is_dir() else []
+    return tuple(name for name in folders if name not in {case.system for case in cases})
+
+
+def find_claim(
+    cases: Sequence[Case], wanted: str, without_report: Sequence[str] = ()
+) -> tuple[tuple[Case, ObligationView], ...]:
     """The obligations that a name means: a whole id, one without the system, ``agent.low``, or the end of one.
 
-    Raises Rejected where nothing is called so.
+    Raises Rejected where nothing is called so. `without_report`: systems of which nothing can be known here.
     """
     named = [(case, view) for case in cases for view in case.obligations]
     for test in (
@@ -155,7 +163,11 @@ def find_claim(cases: Sequence[Case], wanted: str) -> tuple[tuple[Case, Obligati
         found = tuple((case, view) for case, view in named if test(view))
         if found:
             return found
-    known = [name for _, view in named for name in (view.id, short(view.id))]
+    system = wanted.partition("/")[0]
+    if system in without_report:
+        hint = f"`avow verify {system}` makes one; it says why, if there is something wrong with the system's files"
+        raise Rejected(Diagnostic("REPORT001", f"there is no report of {system} yet", hint=hint))
+    known = list(dict.fromkeys(name for _, view in named for name in (short(view.id), view.id)))
     raise Rejected(_unknown(f"there is no obligation '{wanted}'", wanted, known))
 
 

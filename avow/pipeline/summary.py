@@ -44,7 +44,8 @@ def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, s
     if results:
         index = str(Path(results[0].report).parent.parent / "index.html")
         console.print(f"{index if len(results) > 1 else results[0].report}   ", markup=False, end="")
-    console.print(f"({done} stages run, {seconds:.1f} s)" if done else f"(nothing to do, {seconds:.1f} s)")
+    idle = "nothing to do" if not broken else "nothing could be run"
+    console.print(f"({f'{done} stages run' if done else idle}, {seconds:.1f} s)")
 
 
 def append_job_summary(results: Sequence[Result], broken: Sequence[str]) -> None:

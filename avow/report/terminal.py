@@ -82,6 +82,19 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
         out.print(f"[dim]needed by {escape(', '.join(needed_by))}[/]")
 
 
+def _show_changes(example: Counterexample, out: Console) -> None:
+    """A run that is too wide for a table: of each step what has changed, in the contract's words."""
+    before: dict[str, str] = {}
+    for at, step in enumerate(example.trace[:60]):
+        values = {name: value for name, value in step if not name.startswith("(")}
+        changed = ", ".join(f"{name}: {value}" for name, value in values.items() if before.get(name) != value)
+        mark = " ↺" if at == example.loop else ""
+        out.print(f"    [bold]step {at}{mark}[/]  {escape(changed) or '[dim]as before[/]'}")
+        before = values
+    if any(name.startswith("(") for step in example.trace for name, _ in step):
+        out.print("    [dim]what the tool itself shows of each step stands in the report[/]")
+
+
 def _status(status: Status) -> str:
     return f"[{_COLOURS[tone(status)]}]{MARKS[status]} {status}[/]"
 
@@ -97,6 +110,9 @@ def _show_counterexample(example: Counterexample, out: Console) -> None:
             values = dict(step)
             mark = " ↺" if at == example.loop else ""
             table.add_row(f"{at}{mark}", *(escape(values.get(name, "")) for name in columns))
-        out.print(table)
+        if table.__rich_measure__(out, out.options.update(width=10_000)).maximum <= out.width:
+            out.print(table)
+        else:
+            _show_changes(example, out)
         if example.loop is not None:
             out.print(f"    after the last step the run returns to step {example.loop}")

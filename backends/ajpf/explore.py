@@ -5,6 +5,7 @@ from __future__ import annotations
 import resource
 import time
 from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from avow.backends.ajpf.beliefs import TooDeep
@@ -34,6 +35,20 @@ class Graph:
         return len(self.targets)
 
 
+_MANY = 6
+"""So many intentions at once, and the agent has probably fallen behind its percepts for good."""
+
+
+def _backlog(newest: Sequence[State]) -> str:
+    most = max(len(state.active) + len(state.suspended) for state in newest)
+    if most < _MANY:
+        return ""
+    return (
+        f", with up to {most} intentions at once: each action draws percepts, and the agent falls behind them. If an "
+        "action leaves some as they are, the environment file can say so (`after: {action: {group: [keep]}}`)"
+    )
+
+
 def explore(agent: Agent, *, states: int = MAX_STATES, seconds: float = 60.0, megabytes: int = 4096) -> Graph:
     """Every reachable state, breadth first, as far as the bounds let it (`Graph.unfinished`)."""
     deadline = time.monotonic() + seconds
@@ -61,6 +76,7 @@ def explore(agent: Agent, *, states: int = MAX_STATES, seconds: float = 60.0, me
         elif at & 1023 == 0 and _memory() > memory:
             unfinished = f"{len(found)} states fill {megabytes} MB"
         if unfinished is not None:
+            unfinished += _backlog(found[-1_000:])
             break
         try:
             reached = successors(found[at])

@@ -91,7 +91,9 @@ def _verdict(
         details["not proved"] = list(unproved)
         if tried:
             details["candidates"] = tried  # what the prover could not rule out; nobody ran the implementation there
-        return Settled(Verdict.UNKNOWN, f"not proved: {_few(unproved)}", taken, details)
+        where = ", ".join(f"{name} = {value}" for name, value in tried[0].items()) if tried else ""
+        doubt = f"; the prover could not rule it out at {where}" if where else ""
+        return Settled(Verdict.UNKNOWN, f"not proved: {_few(unproved)}{doubt}", taken, details)
     if taken:
         return Settled(
             Verdict.UNKNOWN, f"proved only if what it takes for granted holds: {_few(taken)}", taken, details

@@ -39,7 +39,18 @@ from avow.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Contract, Node, Port
 from avow.language.printer import show_sort as show
 from avow.language.printer import show_term
-from avow.language.sorts import BOOL, INTEGER, NATURAL, FunctionSort, SequenceSort, Sort, TupleSort, components
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    NATURAL,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    SequenceSort,
+    Sort,
+    TupleSort,
+    components,
+)
 from avow.language.terms import Apply, Role, Term, TupleTerm, Variable
 from avow.logic.formula import free_variables, substitute
 
@@ -390,6 +401,9 @@ class _Checker:
         if name.name not in words.constructors or words.constructors[name.name][0] != subject.sort:
             known = [c for c, (data, _) in words.constructors.items() if data == subject.sort]
             message = f"`{name.name}` does not make values of {show(subject.sort)}"
+            if isinstance(subject.sort, EnumSort) or (isinstance(subject.sort, DataSort) and not known):
+                hint = f"MATCH takes constructors with arguments apart; for an element, write IF (… == {name.name})"
+                raise rejected("HOARE300", message, name.span, hint)
             raise rejected("HOARE300", message, name.span, suggest(name.name, known))
         parameters = words.constructors[name.name][1].parameters
         if len(parameters) != len(statement.variables):

@@ -192,7 +192,9 @@ class _Reader:
             return {}
         for key in piece.entries:
             if key not in known:
-                self.add("REV111", f"unknown key '{key}'", piece.key_span(key), suggest(key, known))
+                value = piece.entries[key].data
+                comma = f"a text with a comma needs quotes here: “…, {key}”" if value is None else None
+                self.add("REV111", f"unknown key '{key}'", piece.key_span(key), comma or suggest(key, known))
         return piece.entries
 
     def items(self, key: str, top: dict[str, Piece], wanted: str | None) -> list[Piece]:

@@ -389,3 +389,8 @@ def test_deep_contracts_do_not_crash(tmp_path: Path, depth: int) -> None:
     BACKEND.export(wanted)
     report = BACKEND.discharge(wanted, tmp_path, Limits(seconds=20))
     assert {o.verdict for o in report.outcomes} <= {Verdict.PROVED, Verdict.UNKNOWN, Verdict.ERROR}
+
+
+def test_match_on_an_element_says_what_to_write(tmp_path: Path) -> None:
+    found = BACKEND.check(job(tmp_path, sensor(), PROGRAM + "\nMATCH output WITH red THEN\n   SKIP\n", TABLE))
+    assert any(d.code == "HOARE300" and "write IF" in (d.hint or "") for d in found), found

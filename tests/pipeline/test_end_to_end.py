@@ -274,6 +274,15 @@ def test_init_overwrites_nothing(made: Path) -> None:
     assert "not empty" in done.stderr
 
 
+def test_a_system_without_a_report_is_said_to_have_none(robot: Path) -> None:
+    (robot / "contracts" / "kettle").mkdir()
+    (robot / "contracts" / "kettle" / "plan.yaml").write_text("node: {}")
+    done = run(robot, "avow", "explain", "kettle/boiler/guarantee/boils")
+    assert done.returncode == 2
+    assert "there is no report of kettle yet" in done.stderr
+    assert "avow verify kettle" in done.stderr
+
+
 def test_outside_a_workspace_the_message_says_what_to_do(tmp_path: Path) -> None:
     done = run(tmp_path, "avow", "verify")
     assert done.returncode == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import StringIO
 
 from assurance.sample import case, evidence, guarantee, obligation, system
@@ -10,7 +11,7 @@ from rich.console import Console
 from avow.evidence.obligation import Kind
 from avow.report.terminal import show_obligation
 from avow.system.plan import Finding
-from avow.verdict import Verdict
+from avow.verdict import Counterexample, Verdict
 
 
 def shown(name: str) -> str:
@@ -39,3 +40,29 @@ def test_an_accepted_refutation_says_who_and_until_when() -> None:
 
 def test_a_long_formula_is_in_lines() -> None:
     assert max(len(line) for line in shown("redundant").splitlines()) <= 100
+
+
+def run_of_an_agent(width: int) -> str:
+    steps = (("no", "none", "nothing new"), ("yes", "none", "estop"), ("yes", "wait", "estop"))
+    names = ("in.estop", "out.command = wait, as the contract has it", "(what the agent believes of the world)")
+    example = Counterexample((), "it waits", tuple(tuple(zip(names, step, strict=True)) for step in steps), 2)
+    target = guarantee("n", "g")
+    records = [replace(evidence(target, Verdict.REFUTED, "hoare"), counterexample=example)]
+    found = case(system({"n": ["g"]}), (target,), records)
+    out = StringIO()
+    show_obligation(found, found.obligations[0], Console(file=out, width=width, highlight=False))
+    return out.getvalue()
+
+
+def test_a_run_is_a_table_where_there_is_room() -> None:
+    assert "(what the agent believes of the world)" in run_of_an_agent(160)
+
+
+def test_a_run_too_wide_for_the_terminal_is_told_by_what_changes() -> None:
+    told = run_of_an_agent(76)
+    assert "…" not in told
+    assert "what the agent believes" not in told
+    lines = [line.strip() for line in told.splitlines()]
+    assert "step 1  in.estop: yes" in lines
+    assert any(line.startswith("step 2 ↺") and "wait" in line for line in lines)
+    assert "what the tool itself shows of each step stands in the report" in told

@@ -251,3 +251,9 @@ class TestStamp:
         (stamped.parent / "models/code.py").unlink()
         with pytest.raises(Rejected, match="no file"):
             stamp_record(stamped, stamped.parent, make_node(), ("G1", "G2"))
+
+
+def test_a_text_with_a_comma_needs_quotes(make_job: MakeJob, stamped: Path) -> None:
+    edit(stamped, ("read:\n", "read:\n  - {material: data sheet of the lidar, rev. 4}\n"))
+    (found,) = [d for d in BACKEND.check(make_job()) if d.code == "REV111"]
+    assert "quotes" in (found.hint or "")
