@@ -19,18 +19,23 @@ from avow.system.strict_yaml import read_yaml
 
 REMARK = "remark"
 """The kind of these open items; all of them are advice."""
-_FIRST = "RCL401"
-"""Another bracketing means something else: the one remark that changes what every verdict is about."""
+_FIRST = ("RCL401", "RCL413", "RCL414", "RCL415", "RCL412")
+"""Another bracketing means something else, a sentence says otherwise, a function cannot say what is meant: remarks that
+change what a verdict is about."""
 
 
 def remarks(sources: Sequence[SourceView], views: Sequence[ObligationView]) -> tuple[OpenItem, ...]:
-    """An advice for each lint of the contracts, brackets first, each with the guarantee or assumption it stands in;
-    then for each remark of a method."""
+    """An advice for each lint of the contracts, with the guarantee or assumption that it stands in, and for each remark
+    of a method: first what changes what a verdict is about, then the methods', then the rest."""
     contracts = tuple((s.path, s.text) for s in sources if s.is_contract)
     off = _switched_off(sources)
-    found = [d for d in _lints(contracts, off) if d.span]
-    found.sort(key=lambda d: d.code != _FIRST)
-    return (*(_item(d, d.span, views) for d in found if d.span), *_of_methods(views, off))
+    weighty, rest = list[OpenItem](), list[OpenItem]()
+    for found in sorted(
+        _lints(contracts, off), key=lambda d: _FIRST.index(d.code) if d.code in _FIRST else len(_FIRST)
+    ):
+        if found.span:
+            (weighty if found.code in _FIRST else rest).append(_item(found, found.span, views))
+    return (*weighty, *_of_methods(views, off), *rest)
 
 
 def _of_methods(views: Sequence[ObligationView], off: frozenset[str]) -> Iterator[OpenItem]:

@@ -77,7 +77,7 @@ def _remarks(case: Case) -> Iterable[str]:
     """How the contracts are written, brackets first: what a verdict is about depends on how a formula is read."""
     found = [item for item in case.open_items if item.kind == REMARK]
     if found:
-        yield "## Remarks on the contracts' text"
+        yield "## Remarks on contracts and models"
         yield "\n".join(f"- {_md(item.title)} ({_md(item.text)})" for item in found[:_LONG])
 
 
