@@ -194,6 +194,10 @@ def _files(
             left[path] = (mark, entry)
         for path, mark in record.inputs.items():
             read[path] = (mark, entry)
+    # What counts today was asked of today's files, though a later attempt read them in another state in between.
+    for entry in entries:
+        if keys and keys.get((entry.evidence.obligation, entry.evidence.method)) == entry.evidence.key:
+            read |= {path: (mark, entry) for path, mark in entry.evidence.inputs.items()}
     relied_upon = [newest] if keys is None else [keys, newest] if strict else [keys]
 
     def serious(entry: Entry) -> bool:

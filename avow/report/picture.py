@@ -252,7 +252,7 @@ def _text(box: _Box) -> str:
         x, y = box.x + _RADIUS, box.y + _RADIUS
         return (
             f'<text class="id middle" x="{x:.0f}" y="{y - 14:.1f}">{escape(element.id)}</text>'
-            f'<text class="middle" x="{x:.0f}" y="{y + 2:.1f}">{escape(box.title)}</text>'
+            f'<text class="middle"{_squeezed(box.title)} x="{x:.0f}" y="{y + 2:.1f}">{escape(box.title)}</text>'
             f'<text class="status middle" x="{x:.0f}" y="{y + 18:.1f}">{status}</text>'
         )
     letter = element.shape.value if element.shape in (Shape.ASSUMPTION, Shape.JUSTIFICATION) else ""
@@ -267,6 +267,12 @@ def _text(box: _Box) -> str:
         y += _LINE
         parts.append(f'<text x="{x:.0f}" y="{y:.1f}">{line}</text>')
     return "".join(parts)
+
+
+def _squeezed(title: str) -> str:
+    """A method's name that is wider than its circle is set narrower."""
+    room = 2 * _RADIUS - 10
+    return f' textLength="{room:.0f}" lengthAdjust="spacingAndGlyphs"' if len(title) * _CHARACTER > room else ""
 
 
 def _full(element: Element) -> str:

@@ -220,7 +220,9 @@ def _cuts(text: str, wanted: int) -> tuple[list[int], str]:
 
 def bound_text(bound: Mapping[str, Any]) -> str:
     """``cases 2000, seed 0``."""
-    return ", ".join(f"{name.replace('_', ' ')} {_plain(value)}" for name, value in bound.items())
+    return ", ".join(
+        f"{name.replace('_', ' ')} {_plain(value)}" for name, value in bound.items() if value not in ([], (), {}, "")
+    )
 
 
 def mutation(evidence: Evidence) -> str:

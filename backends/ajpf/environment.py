@@ -14,7 +14,7 @@ drawn for ever, then draws that contain the percept never cease. Nothing is fair
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -66,6 +66,10 @@ SCHEMA: dict[str, Any] = {
 }
 
 
+def _listed(names: Sequence[str], last: str = "and") -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} {last} {names[-1]}"
+
+
 @dataclass(frozen=True, slots=True)
 class Fairness:
     percept: Struct
@@ -104,6 +108,22 @@ class Environment:
         ]
         return tuple(product(*options))
 
+    def _narrowings(self) -> Iterator[str]:
+        """What is drawn after single actions, and at the start: in one sentence where it is the same."""
+        alike: dict[tuple[str, ...], list[str]] = {}
+        for action, narrowed in (*self.after.items(), *([("the start", self.start)] if self.start else [])):
+            drawn: dict[str, list[str]] = {}
+            for name, places in narrowed.items():
+                what = " or ".join("as before" if i < 0 else self._said(name, i) for i in places)
+                drawn.setdefault(what, []).append(name)
+            said = tuple(
+                f"{_listed(names)} {'is' if len(names) == 1 else 'are'} {what}" for what, names in drawn.items()
+            )
+            alike.setdefault(said, []).append(action)
+        for said, actions in alike.items():
+            if said:
+                yield f"after {_listed(actions, 'or')}, {', '.join(said)}"
+
     def describe(self) -> tuple[str, ...]:
         """What the environment may do, in sentences."""
         groups = "; ".join(
@@ -115,11 +135,7 @@ class Environment:
             often = "once" if self.at_quiescence == "once" else "again and again"
             when.append(f"{often} when the agent has nothing to do")
         said = [f"percepts are drawn {', '.join(when)}, one of each group: {groups}"]
-        said += [
-            f"after {action}, {name} is " + " or ".join("as before" if i < 0 else self._said(name, i) for i in places)
-            for action, narrowed in (*self.after.items(), *([("the start", self.start)] if self.start else []))
-            for name, places in narrowed.items()
-        ]
+        said += self._narrowings()
         said += [f"fairness: draws with {show(f.percept)} never cease ({f.because})" for f in self.fair]
         return tuple(said)
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from avow.backends.ajpf.checker import Checker, Property, needs_fine_steps
-from avow.backends.ajpf.environment import Environment
+from avow.backends.ajpf.environment import Environment, read_environment
 from avow.backends.ajpf.explore import explore
 from avow.backends.ajpf.interpreter import NONE, Agent, Semantics
 from avow.backends.ajpf.parser import parse_fact, parse_program
@@ -253,3 +253,14 @@ def test_an_agent_that_falls_behind_its_percepts_is_told():
     assert "keep" in hasty.unfinished
     counting = explore(Agent(program("+p(X) : { True } <- +seen(X);"), draws, Semantics.MCAPL), states=2)
     assert counting.unfinished == "more than 2 states"
+
+
+def test_what_actions_leave_as_it_was_is_one_sentence(tmp_path):
+    path = tmp_path / "e.yaml"
+    after = "{zone: [keep], tank: [keep]}"
+    path.write_text(
+        "draws: {at_quiescence: repeatedly}\npercepts: {zone: [in, out, nothing], tank: [dry, nothing]}\n"
+        f"after: {{park: {after}, spray: {after}, move: {{zone: [in, keep]}}}}\n"
+    )
+    said = [line for line in read_environment(path).describe() if line.startswith("after")]
+    assert said == ["after park or spray, zone and tank are as before", "after move, zone is in or as before"]

@@ -96,3 +96,17 @@ def test_files_of_superseded_attempts_are_history(ledger: Ledger, tmp_path: Path
     assert faults(ledger, tmp_path) == []
     (tmp_path / "b.log").unlink()
     assert faults(ledger, tmp_path, keys={}) == [(Fault.GONE, "b.log", False)]
+
+
+def test_what_was_tried_in_between_makes_nothing_stale(ledger: Ledger, tmp_path: Path) -> None:
+    """A fault was planted and taken out again: the newest record is of another text, the one that counts is not."""
+    program = tmp_path / "prog.imp"
+    before = program.read_text()
+    program.write_text("x := 1")
+    ledger.append(evidence("node.a", Verdict.REFUTED, key="planted", inputs={"prog.imp": digest_file(program)}))
+    program.write_text(before)
+    first = ledger.records()[0].evidence
+    keys = {(first.obligation, first.method): first.key}
+    assert faults(ledger, tmp_path, keys=keys) == []
+    program.write_text("x := 2")
+    assert faults(ledger, tmp_path, keys=keys) == [(Fault.OUTDATED, "prog.imp", False)]

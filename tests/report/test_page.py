@@ -299,3 +299,11 @@ def test_the_plans_reason_comes_first() -> None:
     text = render_page(told)
     assert "<b>because of &lt;the&gt; wind</b>" in text
     assert "<p>It flies</p>" in text
+
+
+def test_a_bound_that_is_empty_is_not_named() -> None:
+    from avow.report.wording import bound_text
+
+    assert bound_text({"tables": [], "steps": 2, "indices": (), "seed": 0, "exhaustive": False}) == (
+        "steps 2, seed 0, exhaustive no"
+    )
