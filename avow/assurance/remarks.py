@@ -13,9 +13,11 @@ from avow.assurance.model import ObligationView, OpenItem, SourceView
 from avow.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.evidence.obligation import Kind
 from avow.evidence.record import REMARKS
+from avow.language.contract import Contract
 from avow.language.load import check_sources
 from avow.language.source import Source
-from avow.system.strict_yaml import read_yaml
+from avow.system.sentences import said_otherwise
+from avow.system.strict_yaml import Piece, read_yaml
 
 REMARK = "remark"
 """The kind of these open items; all of them are advice."""
@@ -25,17 +27,36 @@ change what a verdict is about."""
 
 
 def remarks(sources: Sequence[SourceView], views: Sequence[ObligationView]) -> tuple[OpenItem, ...]:
-    """An advice for each lint of the contracts, with the guarantee or assumption that it stands in, and for each remark
-    of a method: first what changes what a verdict is about, then the methods', then the rest."""
-    contracts = tuple((s.path, s.text) for s in sources if s.is_contract)
-    off = _switched_off(sources)
+    """An advice for each lint of the contracts, with the guarantee or assumption that it stands in, of the plan's
+    requirements, and for each remark of a method: first what changes what a verdict is about, then the methods', then
+    the rest."""
+    contract, found = _checked(tuple((s.path, s.text) for s in sources if s.is_contract))
+    plans = [root for source in sources if (root := _plan(source)) is not None]
+    off = _switched_off(plans)
     weighty, rest = list[OpenItem](), list[OpenItem]()
-    for found in sorted(
-        _lints(contracts, off), key=lambda d: _FIRST.index(d.code) if d.code in _FIRST else len(_FIRST)
-    ):
-        if found.span:
-            (weighty if found.code in _FIRST else rest).append(_item(found, found.span, views))
+    for lint in sorted(found, key=lambda d: _FIRST.index(d.code) if d.code in _FIRST else len(_FIRST)):
+        if lint.span and lint.code not in off:
+            (weighty if lint.code in _FIRST else rest).append(_item(lint, lint.span, _clause(lint.span, views)))
+    if contract is not None:
+        weighty += [item for plan in plans for item in _of_requirements(plan, contract, views, off)]
     return (*weighty, *_of_methods(views, off), *rest)
+
+
+def _of_requirements(
+    plan: Piece, contract: Contract, views: Sequence[ObligationView], off: frozenset[str]
+) -> Iterator[OpenItem]:
+    """What the sentences of requirements say otherwise than their formulas."""
+    listed = plan.at("requirements")
+    for name, piece in (listed.entries or {}).items() if listed else ():
+        text, formula = piece.at("text"), piece.at("formula")
+        if text is None or formula is None:
+            continue
+        claim = next((v.id for v in views if v.obligation.kind is Kind.REQUIREMENT and v.obligation.name == name), "")
+        try:
+            told = tuple(said_otherwise(text.text, formula.text, contract, text.span))
+        except Rejected:
+            continue  # of a system taken in: its own report has it
+        yield from (_item(d, text.span, claim or name) for d in told if d.code not in off)
 
 
 def _of_methods(views: Sequence[ObligationView], off: frozenset[str]) -> Iterator[OpenItem]:
@@ -56,37 +77,37 @@ def _of_methods(views: Sequence[ObligationView], off: frozenset[str]) -> Iterato
 
 
 @lru_cache(maxsize=64)
-def _lints(contracts: tuple[tuple[str, str], ...], off: frozenset[str]) -> tuple[Diagnostic, ...]:
+def _checked(contracts: tuple[tuple[str, str], ...]) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
     if not contracts:
-        return ()
-    _, found = check_sources([Source(path, text) for path, text in contracts], off=off)
-    return tuple(d for d in found if d.severity is Severity.WARNING)
+        return None, ()
+    contract, found = check_sources([Source(path, text) for path, text in contracts])
+    return contract, tuple(d for d in found if d.severity is Severity.WARNING)
 
 
-def _switched_off(sources: Sequence[SourceView]) -> frozenset[str]:
-    """The plan's `lints_off`, read from its text: the report is concluded from what it holds, on any machine."""
-    names: set[str] = set()
-    for source in sources:
-        if source.path.rpartition("/")[2] == "plan.yaml":
-            try:
-                root, _ = read_yaml(source.text.encode("utf-8", "replace"), source.path)
-            except Rejected:
-                continue  # somebody edited the text that a report holds; `avow report --check` tells
-            listed = root.at("lints_off")
-            names |= {piece.text for piece in (listed.items or [listed])} if listed else set()
-    return frozenset(names)
+def _plan(source: SourceView) -> Piece | None:
+    if source.path.rpartition("/")[2] != "plan.yaml":
+        return None
+    try:
+        return read_yaml(source.text.encode("utf-8", "replace"), source.path)[0]
+    except Rejected:
+        return None  # somebody edited the text that a report holds; `avow report --check` tells
 
 
-def _item(found: Diagnostic, span: Span, views: Sequence[ObligationView]) -> OpenItem:
-    claim = next((v.id for v in views if v.obligation.kind is Kind.GUARANTEE and _within(span, v.obligation.span)), "")
+def _switched_off(plans: Sequence[Piece]) -> frozenset[str]:
+    """The plans' `lints_off`, read from their texts: the report is concluded from what it holds, on any machine."""
+    listed = [found for plan in plans if (found := plan.at("lints_off"))]
+    return frozenset(piece.text for found in listed for piece in (found.items or [found]))
+
+
+def _item(found: Diagnostic, span: Span, claim: str) -> OpenItem:
     hint = f": {found.hint}" if found.hint else ""
-    return OpenItem(
-        REMARK,
-        claim or f"{span.file}:{span.line}",
-        f"{found.code}, {span.file}:{span.line}{hint}",
-        advice=True,
-        title=found.message,
-    )
+    place = f"{span.file}:{span.line}"
+    return OpenItem(REMARK, claim or place, f"{found.code}, {place}{hint}", advice=True, title=found.message)
+
+
+def _clause(span: Span, views: Sequence[ObligationView]) -> str:
+    """The guarantee in which the place is, if there is one."""
+    return next((v.id for v in views if v.obligation.kind is Kind.GUARANTEE and _within(span, v.obligation.span)), "")
 
 
 def _within(inner: Span, outer: Span | None) -> bool:

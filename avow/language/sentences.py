@@ -8,7 +8,7 @@ Each is a hint, with a code of its own; what cannot be seen to differ is left al
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -45,12 +45,16 @@ class Mismatch:
 
 def mismatches(clause: Clause, node: Node) -> Iterator[Mismatch]:
     """What the clause's sentence is seen to say otherwise than its formula."""
-    if clause.sentence is None:
-        return
-    sentence = clause.sentence[:LONGEST]
-    yield from _comparisons(sentence, clause.formula)
-    yield from _directions(sentence, clause.formula)
-    yield from _elements(sentence, clause.formula, node)
+    if clause.sentence is not None:
+        yield from differences(clause.sentence, clause.formula, (node,))
+
+
+def differences(sentence: str, formula: Term, nodes: Iterable[Node]) -> Iterator[Mismatch]:
+    """What a sentence is seen to say otherwise than a formula about these nodes."""
+    sentence = sentence[:LONGEST]
+    yield from _comparisons(sentence, formula)
+    yield from _directions(sentence, formula)
+    yield from _elements(sentence, formula, nodes)
 
 
 # --- comparisons -----------------------------------------------------------------------------------------------------
@@ -137,9 +141,9 @@ def _is_both_ways(term: Term) -> bool:
 # --- elements --------------------------------------------------------------------------------------------------------
 
 
-def _elements(sentence: str, formula: Term, node: Node) -> Iterator[Mismatch]:
+def _elements(sentence: str, formula: Term, nodes: Iterable[Node]) -> Iterator[Mismatch]:
     spoken = [name.lower() for name in _names_in(formula) if len(name) > 2]
-    for name in dict.fromkeys(_elements_of(node)):
+    for name in dict.fromkeys(name for node in nodes for name in _elements_of(node)):
         said = mention(sentence, name)
         if said is None or any(o.startswith(name.lower()) or said.lower().startswith(o) for o in spoken):
             continue

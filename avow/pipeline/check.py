@@ -47,9 +47,11 @@ def diagnostics(system: System) -> tuple[Diagnostic, ...]:
 
 
 def of_plan(system: System) -> tuple[Diagnostic, ...]:
-    """What is to be said of a plan that can be read: its account of the ROS graph, and what each backend says of its
-    options; without the warnings that the plan switches off."""
-    found = list(_model(system))
+    """What is to be said of a plan that can be read: its account of the ROS graph, its requirements' sentences, and
+    what each backend says of its options; without the warnings that the plan switches off."""
+    from avow.system.sentences import requirement_sentences
+
+    found = [*_model(system), *requirement_sentences(system)]
     for plan in system.plan.nodes:
         for method in plan.methods:
             found += _method(system, plan.node, method)

@@ -117,6 +117,13 @@ def test_check_of_a_system_reads_its_plan(tmp_path: Path) -> None:
     assert "plan.yaml:4:" in output
     (tmp_path / "plan.yaml").write_text(plan + "lints_off: [RCL405]\n")
     assert "RCL405" not in invoke("check", str(tmp_path))[1]
+    requirement = "requirements:\n  R: {text: It is on below 3, formula: n.r > 3 -> n.b}\n"
+    (tmp_path / "plan.yaml").write_text(plan + requirement)
+    code, output = invoke("check", str(tmp_path))
+    assert code == 0
+    assert "the sentence says “below 3”, the formula `n.in.r > 3`" in output
+    (tmp_path / "plan.yaml").write_text(plan + requirement + "lints_off: [RCL413]\n")
+    assert "below 3" not in invoke("check", str(tmp_path))[1]
 
 
 def test_fmt(tmp_path: Path) -> None:

@@ -160,6 +160,16 @@ def test_what_the_plan_switches_off_is_not_remarked_and_a_broken_plan_hides_noth
     assert any("RCL401" in i.text for i in broken.open_items)
 
 
+def test_a_requirement_whose_sentence_says_otherwise_is_remarked() -> None:
+    plan = "system: rover\nrequirements:\n  R: {{text: Green from 9 on, formula: '{}'}}\n  S: {{text: Some prose}}\n"
+    wrong = plan.replace("Green from 9 on", "Green if at least 9").format("agent.r < 8 -> agent.c == green")
+    (item,) = [i for i in remarked(wrong).open_items if i.kind == REMARK and "plan.yaml" in i.text]
+    assert item.title == "the sentence says “at least 9”, and the formula has `8`"
+    assert item.claim == "R"
+    for fine in (plan.format("agent.r < 9 -> agent.c == green"), plan.format("of ( another system"), plan.format("")):
+        assert not [i for i in remarked(fine).open_items if i.kind == REMARK and "plan.yaml" in i.text]
+
+
 def test_what_a_method_remarks_of_its_input_is_in_the_report_once() -> None:
     told = [{"code": "HOARE410", "place": "models/p.imp:2", "message": "the program compares with 10"}]
     odd: list[object] = [*told, {"code": 3}, "words", {"code": "X", "place": "", "message": "<b>bold</b>"}]

@@ -1,0 +1,24 @@
+"""Requirements whose sentence says otherwise than their formula: the sentence is what an assessor reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from avow.diagnostics import Diagnostic, Severity, Span
+from avow.language.contract import Contract
+from avow.language.sentences import differences
+from avow.system.plan import System
+from avow.system.temporal import parse_state
+
+
+def requirement_sentences(system: System) -> Iterator[Diagnostic]:
+    """The lints RCL413 to RCL415 of the plan's requirements that have a formula."""
+    for requirement in system.plan.requirements:
+        if requirement.formula is not None:
+            yield from said_otherwise(requirement.text, requirement.formula, system.contract, requirement.span)
+
+
+def said_otherwise(text: str, formula: str, contract: Contract, span: Span | None) -> Iterator[Diagnostic]:
+    """What a requirement's sentence says otherwise than its formula. Raises Rejected where that is none."""
+    for found in differences(text, parse_state(formula, contract, span), contract.nodes):
+        yield Diagnostic(found.code, found.message, span, Severity.WARNING, found.hint)
