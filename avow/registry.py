@@ -5,10 +5,12 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 
 from avow.backend import Backend, Translates
+from avow.codes import Code
+from avow.codes_workspace import CORE_CODES, of_backend
 from avow.diagnostics import Diagnostic, Rejected
 
 GROUP = "avow.backends"
@@ -54,6 +56,16 @@ def backend(name: str, plugins: tuple[str, ...] = ()) -> Backend:
         broken = Diagnostic("BACKEND003", f"the backend '{name}' ({point.value}) does not load: {error}")
         raise Rejected(broken) from error
     return _promise(found, point.value)
+
+
+@functools.cache
+def every_code() -> Mapping[str, Code]:
+    """The diagnostic codes of the core and of every installed backend that loads."""
+    found = dict(CORE_CODES)
+    for name in names():
+        with contextlib.suppress(Rejected):
+            found |= of_backend(backend(name))
+    return found
 
 
 def translators(plugins: tuple[str, ...] = ()) -> dict[str, Translates]:

@@ -14,6 +14,7 @@ from pathlib import Path, PurePath
 from typing import Any
 from urllib.parse import quote
 
+from avow.codes import Code
 from avow.codes_workspace import CORE_CODES
 from avow.diagnostics import Diagnostic, Severity, Span
 
@@ -166,14 +167,17 @@ def _decoded(text: str) -> str:
 _SURROGATES = re.compile("[\ud800-\udfff]")
 
 
-def to_sarif(diagnostics: Sequence[Diagnostic], *, version: str = "") -> dict[str, Any]:
-    """A SARIF 2.1.0 log with one run. Paths are kept as given, so relative ones are relative to the working folder."""
+def to_sarif(
+    diagnostics: Sequence[Diagnostic], *, version: str = "", codes: Mapping[str, Code] = CORE_CODES
+) -> dict[str, Any]:
+    """A SARIF 2.1.0 log with one run; `codes` describe its rules. Paths are kept as given: relative ones are relative to
+    the working folder."""
     used = sorted({d.code for d in diagnostics})
     rules = []
     for code in used:
         rule: dict[str, Any] = {"id": code}
-        if code in CORE_CODES:
-            known = CORE_CODES[code]
+        if code in codes:
+            known = codes[code]
             rule["shortDescription"] = {"text": known.title}
             rule["fullDescription"] = {"text": known.explanation}
             rule["defaultConfiguration"] = {"level": str(known.severity)}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ import click
 from avow.cli.paths import PathArgument
 
 if TYPE_CHECKING:
+    from avow.codes import Code
     from avow.diagnostics import Diagnostic
 
 
@@ -53,7 +55,7 @@ def command(
     if as_json:
         click.echo(json.dumps(to_json(found), indent=1))
     elif sarif:
-        click.echo(json.dumps(to_sarif(found, version=__version__), indent=1))
+        click.echo(json.dumps(to_sarif(found, version=__version__, codes=_codes(found)), indent=1))
     else:
         tint = sys.stdout.isatty() if colour is None else colour
         if found:
@@ -65,10 +67,21 @@ def command(
 
 
 def _explain(found: list[Diagnostic]) -> None:
+    codes = _codes(found)
+    for code in sorted({d.code for d in found} & set(codes)):
+        known = codes[code]
+        click.echo(f"{code} ({known.title}): {known.explanation}{known.remedy and ' '}{known.remedy}\n")
+
+
+def _codes(found: list[Diagnostic]) -> Mapping[str, Code]:
+    """What is known of codes; of the backends' only where there is one."""
     from avow.codes_workspace import CORE_CODES
 
-    for code in sorted({d.code for d in found} & set(CORE_CODES)):
-        click.echo(f"{code} ({CORE_CODES[code].title}): {CORE_CODES[code].explanation}\n")
+    if all(d.code in CORE_CODES for d in found):
+        return CORE_CODES
+    from avow.registry import every_code
+
+    return every_code()
 
 
 def _groups(
@@ -117,9 +130,19 @@ def _of_plan(folder: Path) -> Iterator[Diagnostic]:
     from avow.system.load import load_system
 
     try:
-        yield from of_plan(load_system(folder))
+        found = of_plan(load_system(folder))
     except Rejected as rejected:
-        yield from (d for d in rejected.diagnostics if not d.code.startswith("RCL"))
+        found = tuple(d for d in rejected.diagnostics if not d.code.startswith("RCL"))
+    yield from (_as_told(d, folder) for d in found)
+
+
+def _as_told(found: Diagnostic, folder: Path) -> Diagnostic:
+    """With the path under the folder as the command was told it; tools get absolute ones."""
+    if found.span is None or not Path(found.span.file).is_absolute():
+        return found
+    path, root = Path(found.span.file), folder.resolve()
+    file = folder / path.relative_to(root) if path.is_relative_to(root) else path
+    return replace(found, span=replace(found.span, file=str(file)))
 
 
 def _off(folder: Path) -> frozenset[str]:

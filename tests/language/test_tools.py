@@ -121,6 +121,14 @@ def test_check_of_a_system_reads_its_plan(tmp_path: Path) -> None:
     (tmp_path / "plan.yaml").write_text(plan + requirement)
     code, output = invoke("check", str(tmp_path))
     assert code == 0
+    assert invoke("check", "--sarif", str(tmp_path))[1].count(str(tmp_path / "system.rcl")) == 1
+    (tmp_path / "p.imp").write_text("IF (r > 7) THEN b := TRUE ELSE b := FALSE ENDIF")
+    text = (tmp_path / "system.rcl").read_text()
+    (tmp_path / "system.rcl").write_text(text.replace("r > 0", "r > 5"))
+    told = json.loads(invoke("check", "--sarif", str(tmp_path))[1])["runs"][0]
+    (rule,) = [r for r in told["tool"]["driver"]["rules"] if r["id"] == "HOARE410"]
+    assert rule["shortDescription"] == {"text": "other numbers"}
+    assert "HOARE410 (other numbers): " in invoke("check", "--explain", str(tmp_path))[1]
     assert "the sentence says “below 3”, the formula `n.in.r > 3`" in output
     (tmp_path / "plan.yaml").write_text(plan + requirement + "lints_off: [RCL413]\n")
     assert "below 3" not in invoke("check", str(tmp_path))[1]
