@@ -8,10 +8,9 @@ from avow.diagnostics import Diagnostic, Span
 from avow.language.contract import Contract, Node, Port
 from avow.language.sorts import BOOL, FunctionSort
 from avow.system.plan import Plan
+from avow.system.scenario_values import BASE_SORTS, domain_sort, unusable
 from avow.system.schema import suggest
 from avow.system.strict_yaml import Piece
-
-_BASE_SORTS = ("BOOL", "INTEGER", "NATURAL", "REAL", "STRING")
 
 
 def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic, ...]:
@@ -156,12 +155,24 @@ def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node
         if len(columns) != wanted:
             message = f"scenario.interpret.{name}: {wanted} columns are wanted, {table} gives {len(columns)} here"
             yield Diagnostic("PLAN109", message, span)
+            continue
+        given = plan.scenario.table(table)
+        for column, cells in zip(columns, (*sort.parameters, sort.result), strict=False):
+            yield from unusable(
+                f"scenario.interpret.{name}: {table}.{column}", given.column(column), cells, contract, span
+            )
     domains = root.at("scenario", "domains")
-    types = [name for name, _ in contract.types]
-    for name in plan.scenario.domains:
+    types = dict(contract.types)
+    for name, texts in plan.scenario.domains.items():
         span = domains.key_span(name) if domains else root.span
-        if name not in _BASE_SORTS and name not in types and not ports_named(name, contract.nodes):
-            yield _unknown("scenario.domains: type or port", name, [*_BASE_SORTS, *types, *everything], span)
+        if name not in BASE_SORTS and name not in types and not ports_named(name, contract.nodes):
+            yield _unknown("scenario.domains: type or port", name, [*BASE_SORTS, *types, *everything], span)
+            continue
+        place = (domains.at(name) or domains).span if domains else root.span
+        named = BASE_SORTS.get(name) or types.get(name)
+        sorts = [named] if named else [domain_sort(port.sort) for _, port in ports_named(name, contract.nodes)]
+        if len(set(sorts)) == 1 and not isinstance(sorts[0], FunctionSort):
+            yield from unusable(f"scenario.domains.{name}", texts, sorts[0], contract, place)
 
 
 def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:

@@ -18,7 +18,7 @@ MAX_VALUES = 100_000
 
 _COLUMNS_OF = re.compile(r"\s*([^\s(),]+)\s*\(\s*([^()]*)\)\s*\Z")
 _CELL = re.compile(r"\b([A-Za-z_][A-Za-z0-9_-]*)\.([A-Za-z_][A-Za-z0-9_]*)")
-_RANGE = re.compile(r"\s*(-?[0-9]{1,9})\s*\.\.\s*(-?[0-9]{1,9})\s*\Z")
+_RANGE = re.compile(r"\s*(-?[0-9]{1,40})\s*\.\.\s*(-?[0-9]{1,40})\s*\Z")
 
 
 def read_csv(name: str, path: Path, span: Span) -> tuple[Table | None, tuple[Diagnostic, ...]]:

@@ -118,7 +118,6 @@ def test_constants_stay_and_other_inputs_change(tmp_path: Path) -> None:
         (node("a", "r : REAL", "x : BOOL"), "{}", "infinitely many values"),
         (node("a", "f : REAL --> BOOL", "x : BOOL").replace("f : REAL --> BOOL", "f : F"), "{}", "interpret"),
         (node("a", "y : BOOL", "x : BOOL") + node("b", "x : BOOL", "y : BOOL"), "{}", "start-up deadlock"),
-        (node("a", "r : REAL", "x : BOOL"), "scenario: {domains: {in.r: [blue]}}", "blue"),
         (
             node("a", "r : REAL", "x : BOOL"),
             'scenario: {domains: {in.r: [1]}}\nenvironment: {in.r: {assume: "in.r > 2", because: b}}',
