@@ -132,7 +132,8 @@ def _of_plan(folder: Path) -> Iterator[Diagnostic]:
     try:
         found = of_plan(load_system(folder))
     except Rejected as rejected:
-        found = tuple(d for d in rejected.diagnostics if not d.code.startswith("RCL"))
+        # what is wrong in contract files is told already; a formula of the plan has faults of the same codes
+        found = tuple(d for d in rejected.diagnostics if not d.span or not d.span.file.endswith(".rcl"))
     yield from (_as_told(d, folder) for d in found)
 
 

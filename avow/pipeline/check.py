@@ -51,7 +51,7 @@ def of_plan(system: System) -> tuple[Diagnostic, ...]:
     what each backend says of its options; without the warnings that the plan switches off."""
     from avow.system.sentences import requirement_sentences
 
-    found = [*_model(system), *requirement_sentences(system)]
+    found = [*_model(system), *_policy(system), *requirement_sentences(system)]
     for plan in system.plan.nodes:
         for method in plan.methods:
             found += _method(system, plan.node, method)
@@ -68,6 +68,16 @@ def _model(system: System) -> tuple[Diagnostic, ...]:
     except Rejected as rejected:  # a graph that cannot be read: said with everything else that is wrong
         return rejected.diagnostics
     return told.findings if told is not None else ()
+
+
+def _policy(system: System) -> tuple[Diagnostic, ...]:
+    from avow.assurance.policy import read_policy
+
+    try:
+        read_policy(system.plan.policy)
+    except Rejected as rejected:
+        return rejected.diagnostics
+    return ()
 
 
 def _method(system: System, node: str, method: Method) -> Iterable[Diagnostic]:

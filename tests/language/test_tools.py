@@ -117,6 +117,14 @@ def test_check_of_a_system_reads_its_plan(tmp_path: Path) -> None:
     assert "plan.yaml:4:" in output
     (tmp_path / "plan.yaml").write_text(plan + "lints_off: [RCL405]\n")
     assert "RCL405" not in invoke("check", str(tmp_path))[1]
+    for wrong, said in (
+        ("policy: sil9\n", "POLICY001"),
+        ("requirements:\n  R: {text: t, temporal: alway (n.b)}\n", "`alway` is not declared"),
+    ):
+        (tmp_path / "plan.yaml").write_text(plan + wrong)
+        code, output = invoke("check", str(tmp_path))
+        assert code == 2
+        assert said in output
     requirement = "requirements:\n  R: {text: It is on below 3, formula: n.r > 3 -> n.b}\n"
     (tmp_path / "plan.yaml").write_text(plan + requirement)
     code, output = invoke("check", str(tmp_path))
