@@ -10,7 +10,7 @@ from typing import Literal as OneOf
 
 import z3
 
-from avow.logic.clock import WALL, watchdog
+from avow.logic.clock import WALL, allowed, watchdog
 from avow.logic.models import Model
 from avow.logic.translation import Expr, Translator
 
@@ -71,6 +71,9 @@ def _ask(
     seed: int,
     engine: Engine,
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
+    timeout_ms = allowed(timeout_ms)
+    if timeout_ms <= 0:
+        return "unknown", None, (), "no answer in time"
     if engine == "qsat":
         with _limited(translator, timeout_ms):
             return _ask_qsat(translator, assertions, tracked, timeout_ms)

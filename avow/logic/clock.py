@@ -23,6 +23,34 @@ def now() -> float:
     return time.thread_time()
 
 
+class _Budget(threading.local):
+    """When the time of all questions of this thread together is up, by `now`."""
+
+    end: float = math.inf
+
+
+_budget = _Budget()
+
+
+@contextlib.contextmanager
+def budget(milliseconds: float) -> Iterator[None]:
+    """All questions asked within the block share this much processor time, however long each may take by itself; a
+    block within a block cannot extend it."""
+    before = _budget.end
+    _budget.end = min(before, now() + milliseconds / 1000)
+    try:
+        yield
+    finally:
+        _budget.end = before
+
+
+def allowed(milliseconds: int) -> int:
+    """What is left of a question's limit within the budget; 0 if nothing is."""
+    if math.isinf(_budget.end):
+        return milliseconds
+    return max(0, min(milliseconds, int((_budget.end - now()) * 1000)))
+
+
 def _clock() -> Callable[[], float]:
     """Processor time of this thread, to be read by another one; wall-clock time where the system cannot tell it."""
     if not hasattr(time, "pthread_getcpuclockid"):

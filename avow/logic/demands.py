@@ -51,6 +51,9 @@ from avow.logic.traversal import depth, subterms
 MAX_DEPTH = 200
 """Formulas nested deeper are not searched for witnesses (they remain correct to ask about, only harder)."""
 
+_BOUNDS = 4
+"""Half way between so many numbers, each with each, values are looked for."""
+
 
 @dataclass(frozen=True, slots=True)
 class Definition:
@@ -78,6 +81,9 @@ class Candidates:
     blocks: list[tuple[Term, ...]] = field(default_factory=list)
     """The same, in the groups in which they were chosen."""
     pool: dict[Sort, list[Term]] = field(default_factory=dict)
+    floors: dict[Term, Variable] = field(default_factory=dict)
+    bounds: dict[Variable, list[Term]] = field(default_factory=dict)
+    """What an output that is a real number is compared with."""
     effort: int = 200_000
     """What is left of it, in visits times conditions. `<=>` is read four ways, so a chain of them would double the work
     with every link; and what is not read is not suggested, which is sound."""
@@ -257,6 +263,8 @@ def _suggest(found: Candidates, left: Term, right: Term, operator: str, known: M
                 left, right = inner, right.term
             case Widen(term=inner) if isinstance(right, Literal) and Fraction(right.value).denominator == 1:
                 left, right = inner, Literal(int(Fraction(right.value)), INTEGER)
+            case Widen(term=inner):
+                left, right = inner, _floor(found, right, known)
             case Negative(term=inner):
                 left, right = inner, Negative(right, right.sort)
             case Arithmetic(operator="+", left=one, right=other, sort=sort):
@@ -285,11 +293,37 @@ def _suggest(found: Candidates, left: Term, right: Term, operator: str, known: M
         return
     options = found.values.setdefault(left, [])
     near = [value]
-    if operator not in {"==", "!="} or operator == "!=":
+    if operator != "==":
         near += _neighbours(value)
+        near += _halfway(found, left, value)
     for option in near:
         if option not in options:
             options.append(option)
+
+
+def _floor(found: Candidates, value: Term, known: Mapping[Variable, Term]) -> Term:
+    """A constant for the greatest integer not greater than a number: there is one, but RCL has no term for it."""
+    ground = substitute(value, dict(known))
+    if ground not in found.floors:
+        constant = Variable(Role.BOUND, f"floor ({len(found.constants) + 1})", INTEGER)
+        whole = Widen(constant, REAL)
+        next_one = Arithmetic("+", whole, Literal(Fraction(1), REAL), REAL)
+        found.constants.append(constant)
+        found.axioms.append(And((Compare("<=", whole, ground), Compare("<", ground, next_one))))
+        found.floors[ground] = constant
+    return found.floors[ground]
+
+
+def _halfway(found: Candidates, output: Variable, bound: Term) -> list[Term]:
+    """Between two numbers that a number is compared with lies the one half way."""
+    if not isinstance(output.sort, RealSort):
+        return []
+    others = found.bounds.setdefault(output, [])
+    half = Literal(Fraction(1, 2), REAL)
+    sums = [Arithmetic("+", other, bound, REAL) for other in others if other != bound]
+    others.append(bound)
+    del others[_BOUNDS:]
+    return [Arithmetic("*", half, both, REAL) for both in sums]
 
 
 def _neighbours(value: Term) -> list[Term]:

@@ -9,62 +9,39 @@ tried for these values, and if it holds there it is `checked`, and says that it 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from avow.diagnostics import Severity, Span
+from avow.diagnostics import Severity
 from avow.language.contract import ClauseKind, Contract, Node
+from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort, Sort
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.logic.claims import Claim, Property, claims, node_key, triggers
+from avow.logic.clock import now
 from avow.logic.finite import Ranges
 from avow.logic.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.logic.sanity_results import Bounds, Patience, SanityResult, as_outcome, listing
 from avow.logic.values import Value
 from avow.verdict import Counterexample, Outcome, Verdict
 
-__all__ = ["Bounds", "Claim", "Property", "SanityResult", "analyse", "claims", "node_key", "outcomes"]
+if TYPE_CHECKING:
+    from avow.logic.realizability import Realizability
+
+__all__ = [
+    "Bounds",
+    "Claim",
+    "Property",
+    "SanityResult",
+    "analyse",
+    "as_outcome",
+    "claims",
+    "listing",
+    "node_key",
+    "outcomes",
+]
 
 Given = Mapping[Variable, Value]
-
-
-@dataclass(frozen=True, slots=True)
-class Bounds:
-    """Limits on the analysis of a node: milliseconds for one question whose answer makes a contract good or bad (a
-    third of it for warnings and notes), and the solver's seed."""
-
-    milliseconds: int = 5_000
-    seed: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class SanityResult:
-    """What became of one claim. `subject` is the clause or output that the claim is about, if it is about one."""
-
-    node: str
-    about: Property
-    subject: str | None
-    name: str
-    """``realizable``, ``vacuous-G1``."""
-    claim: str
-    verdict: Verdict
-    severity: Severity
-    clauses: tuple[str, ...] = ()
-    """The clauses that a refutation or a proof rests on (of a conflict: the first one's), without the node's name."""
-    counterexample: Counterexample | None = None
-    explanation: str = ""
-    conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
-    """Every conflict found: a minimal set of clauses that cannot all be met, with an input and what each demands."""
-    because: str | None = None
-    """The name of the result of which this one is a mere consequence."""
-    engine: str = "z3"
-    bounded: bool = False
-    """The answer is about the scenario only."""
-    seconds: float = 0.0
-    span: Span | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def fails(self) -> bool:
-        """Whether it is reason enough to call the contract bad."""
-        return self.verdict is Verdict.REFUTED and self.severity is Severity.ERROR
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,33 +96,6 @@ def outcomes(
     return tuple(as_outcome(identity, node.name, name, results.get(name)) for identity, name in obligations.items())
 
 
-def as_outcome(identity: str, node: str, name: str, result: SanityResult | None) -> Outcome:
-    """A result as the outcome of an obligation; None says that there is no such claim."""
-    if result is None:
-        return Outcome(identity, Verdict.ERROR, f"{node} has no sanity claim named {name}")
-    details: dict[str, object] = {"severity": str(result.severity), "clauses": list(result.clauses)}
-    if result.because:
-        details["because"] = result.because
-    if result.conflicts:
-        details["conflicts"] = [{"clauses": list(c), "counterexample": e.text()} for c, e in result.conflicts]
-    return Outcome(
-        identity,
-        result.verdict,
-        result.explanation or _SUMMARY[result.verdict],
-        result.counterexample,
-        bound={"scenario": True} if result.bounded else {},
-        details=details,
-    )
-
-
-_SUMMARY = {
-    Verdict.PROVED: "proved for all inputs",
-    Verdict.CHECKED: "holds within the scenario",
-    Verdict.REFUTED: "does not hold",
-    Verdict.UNKNOWN: "the solver could not decide it",
-}
-
-
 def _result(node: Node, claim: Claim, finding: _Finding, seconds: float) -> SanityResult:
     return SanityResult(
         node.name,
@@ -167,6 +117,10 @@ def _result(node: Node, claim: Claim, finding: _Finding, seconds: float) -> Sani
     )
 
 
+_GLANCE_MS = 300
+"""Whether a contract is consistent is asked for so long; then, whether it is realizable, which says more."""
+
+
 class _Analysis:
     """One node under analysis. Each claim is settled once, others ask for it."""
 
@@ -174,26 +128,33 @@ class _Analysis:
         self.node = node
         self.scenario = scenario
         self.ranges = ranges
-        # What is merely worth knowing is not worth waiting for.
-        self.limits = {True: bounds, False: replace(bounds, milliseconds=max(1, bounds.milliseconds // 3))}
-        self.bounds = bounds
+        self.patience = Patience(bounds.milliseconds)
+        self.serious = True
+        self.seed = bounds.seed
         self.inputs = tuple(port.variable for port in node.inputs)
         self.outputs = tuple(port.variable for port in node.outputs)
         self.assumptions = {c.name: c.formula for c in node.assumptions}
         self.guarantees = {c.name: c.formula for c in node.guarantees}
         self.known: dict[str, _Finding] = {}
         self.claims = {claim.name: claim for claim in claims(node)}
-        self.needed: tuple[str, ...] = ()
+        self.answer: tuple[Realizability, bool] | None = None
 
     def settle(self, claim: Claim) -> _Finding:
         if claim.name not in self.known:
-            asked = self.bounds
-            self.bounds = self.limits[claim.severity is Severity.ERROR]
+            asked, self.serious = self.serious, claim.severity is Severity.ERROR
+            start, lost = now(), self.patience.lost
             try:
-                self.known[claim.name] = self._settle(claim)
+                found = self.known[claim.name] = self._settle(claim)
             finally:
-                self.bounds = asked
+                self.serious = asked
+            if found.verdict is Verdict.UNKNOWN:
+                self.patience.lost = max(self.patience.lost, lost + now() - start)
         return self.known[claim.name]
+
+    @property
+    def limit(self) -> int:
+        """Milliseconds for a question of the claim that is being settled."""
+        return self.patience.milliseconds(self.serious)
 
     def _settle(self, claim: Claim) -> _Finding:
         subject = claim.subject or ""
@@ -219,23 +180,31 @@ class _Analysis:
         return self._possible(self.assumptions, "no input meets {} together", "no input meets {}")
 
     def _consistent(self) -> _Finding:
-        finding = self._possible(
-            {**self.assumptions, **self.guarantees},
-            "no inputs and outputs meet {} together",
-            "no inputs and outputs meet {}",
-        )
+        together = {**self.assumptions, **self.guarantees}
+        texts = ("no inputs and outputs meet {} together", "no inputs and outputs meet {}")
+        finding = self._possible(together, *texts, limit=_GLANCE_MS)
+        if finding.verdict is Verdict.UNKNOWN and self.limit > _GLANCE_MS:
+            answer, bounded = self._realizability()
+            if answer.verdict is Verdict.PROVED and not bounded:
+                allowed = self._other("assumptions-satisfiable")
+                return _Finding(allowed.verdict, allowed.explanation, engine=answer.engine)
+            finding = self._possible(together, *texts)
         if finding.verdict is Verdict.REFUTED and self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
             return replace(finding, because="assumptions-satisfiable")
         return finding
 
-    def _realizable(self) -> _Finding:
-        from avow.logic.conflicts import conflicts
-        from avow.logic.realizability import Realizability, groups, realizable
+    def _realizability(self) -> tuple[Realizability, bool]:
+        """The answer, and whether it is about the scenario only."""
+        from avow.logic.realizability import realizable
+
+        if self.answer is not None:
+            return self.answer
+        start = now()
 
         def ask(
             assumptions: Mapping[str, Term], guarantees: Mapping[str, Term], given: Given | None = None
         ) -> Realizability:
-            limit = 2 * self.bounds.milliseconds
+            limit = 2 * self.patience.milliseconds(serious=True)
             return realizable(
                 self.inputs,
                 self.outputs,
@@ -243,7 +212,7 @@ class _Analysis:
                 guarantees,
                 given=given,
                 timeout_ms=limit,
-                seed=self.bounds.seed,
+                seed=self.seed,
             )
 
         answer, bounded = ask(self.assumptions, self.guarantees), False
@@ -262,8 +231,17 @@ class _Analysis:
             ):  # a refutation need not be one where quantifiers range over everything
                 needed = tuple(label for label in within.needed if label in self.assumptions)
                 answer, bounded = replace(within, needed=needed), True
+        self.answer = answer, bounded
+        if answer.verdict is Verdict.UNKNOWN:
+            self.patience.lose(now() - start)
+        return self.answer
+
+    def _realizable(self) -> _Finding:
+        from avow.logic.conflicts import conflicts
+        from avow.logic.realizability import groups
+
+        answer, bounded = self._realizability()
         if answer.verdict is Verdict.PROVED:
-            self.needed = answer.needed
             if self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
                 return _Finding(Verdict.PROVED, "vacuously: no input is allowed", because="assumptions-satisfiable")
             verdict = Verdict.CHECKED if bounded else Verdict.PROVED
@@ -276,8 +254,8 @@ class _Analysis:
             group,
             self.assumptions,
             answer.inputs,
-            timeout_ms=self.bounds.milliseconds,
-            seed=self.bounds.seed,
+            timeout_ms=3 * self.patience.full,
+            seed=self.seed,
         )
         listed = tuple((conflict.clauses, conflict.counterexample()) for conflict in found)
         if not listed:
@@ -347,7 +325,7 @@ class _Analysis:
             return _Finding(Verdict.REFUTED, "it rules out nothing that the others do not", (name,), because=weaker)
         because = self._if_refuted("assumptions-satisfiable")
         unused = _Finding(Verdict.REFUTED, "every guarantee can be met without it", (name,), because=because)
-        if self._other("realizable").verdict is Verdict.PROVED and name not in self.needed:
+        if self._other("realizable").verdict is Verdict.PROVED and name not in self._realizability()[0].needed:
             return unused
         # What it rules out is all that there is to ask about: an output for each of these inputs makes it idle.
         outside = {label: negation(f) if label == name else f for label, f in self.assumptions.items()}
@@ -356,8 +334,8 @@ class _Analysis:
             self.outputs,
             outside,
             self.guarantees,
-            timeout_ms=self.bounds.milliseconds,
-            seed=self.bounds.seed,
+            timeout_ms=self.limit,
+            seed=self.seed,
             doubtful=True,
         )
         match answer.verdict:
@@ -404,9 +382,7 @@ class _Analysis:
             "different": Not(Compare("==", output, again[output])),
         }
         for given in self._attempts():
-            answer = solve(
-                question, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed, given=given, shown=False
-            )
+            answer = solve(question, timeout_ms=self.limit, seed=self.seed, given=given, shown=False)
             if answer.status == "unsat" and not given:
                 return _Finding(Verdict.PROVED, engine=answer.engine, because=self._if_refuted("consistent"))
             if answer.status == "sat":
@@ -415,6 +391,9 @@ class _Analysis:
                 shown = Counterexample(show_values(values)) if values else None
                 because = self._if_refuted(f"unconstrained-{name}")
                 return _Finding(Verdict.REFUTED, text, counterexample=shown, because=because, engine=answer.engine)
+        if self._by_definitions(question, self.limit // 2):
+            because = self._if_refuted(f"unconstrained-{name}")
+            return _Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name}", because=because)
         return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
 
     # -- asking --------------------------------------------------------------------------------------------------------
@@ -427,21 +406,23 @@ class _Analysis:
         """Whether any input of the scenario meets these: without one, nothing has been checked."""
         from avow.logic.smt import solve
 
-        limit = self.bounds.milliseconds
-        return solve(assumed, timeout_ms=limit, given=self.scenario, shown=False).status == "sat"
+        return solve(assumed, timeout_ms=self.limit, given=self.scenario, shown=False).status == "sat"
 
     def _if_refuted(self, name: str) -> str | None:
         return name if name in self.claims and self._other(name).verdict is Verdict.REFUTED else None
 
-    def _possible(self, formulas: Mapping[str, Term], several: str, one: str) -> _Finding:
+    def _possible(self, formulas: Mapping[str, Term], several: str, one: str, limit: int | None = None) -> _Finding:
         """Can they hold together? If not, the texts say so of the smallest set that cannot."""
         from avow.logic.smt import solve
 
-        answer = solve(formulas, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed, shown=False)
+        limit = min(limit or self.limit, self.limit)
+        answer = solve(formulas, timeout_ms=limit, seed=self.seed, shown=False)
         if answer.status == "unknown" and self.scenario:
-            within = solve(formulas, timeout_ms=self.bounds.milliseconds, seed=self.bounds.seed, given=self.scenario)
+            within = solve(formulas, timeout_ms=limit, seed=self.seed, given=self.scenario)
             # An example in the scenario is an example; that there is none in it proves nothing.
             answer = within if within.status == "sat" else answer
+        if answer.status == "unknown" and self._by_definitions(formulas, limit // 2):
+            return _Finding(Verdict.PROVED)
         match answer.status:
             case "sat":
                 return _Finding(Verdict.PROVED, engine=answer.engine)
@@ -450,6 +431,14 @@ class _Analysis:
                 return _Finding(Verdict.REFUTED, text.format(listing(answer.core)), answer.core, engine=answer.engine)
             case _:
                 return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+
+    def _by_definitions(self, formulas: Mapping[str, Term], limit: int) -> bool:
+        """Whether these hold together, for functions that have no finite table."""
+        from avow.logic.realizability import possible
+
+        if not any(_is_endless(v.sort) for f in formulas.values() for v in free_variables(f)):
+            return False
+        return possible(formulas, timeout_ms=limit, seed=self.seed)
 
     def _fails_somewhere(self, hypotheses: Mapping[str, Term], formula: Term, alone: str, implied: str) -> _Finding:
         """Is there a case where the hypotheses hold and the formula does not? If not, the texts say so."""
@@ -461,9 +450,10 @@ class _Analysis:
         return replace(finding, explanation=text, clauses=needed)
 
 
-def listing(labels: Sequence[str]) -> str:
-    """``a, b and c``."""
-    return labels[0] if len(labels) == 1 else f"{', '.join(labels[:-1])} and {labels[-1]}" if labels else "nothing"
+def _is_endless(sort: Sort) -> bool:
+    """Whether it is one of functions that need not have a finite table."""
+    numbers = RealSort | IntegerSort | NaturalSort
+    return isinstance(sort, FunctionSort) and any(isinstance(p, numbers) for p in sort.parameters)
 
 
 def _resting(needed: tuple[str, ...]) -> str:

@@ -25,7 +25,7 @@ from avow.language.sorts import (
 )
 from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
 from avow.logic.checking import DEFAULT_TIMEOUT_MS, Answer, Engine, Status, check, z3_version
-from avow.logic.clock import now
+from avow.logic.clock import allowed, budget, now
 from avow.logic.counterexample import show_values
 from avow.logic.formula import conjunction, free_variables, negation
 from avow.logic.models import Model
@@ -103,18 +103,20 @@ def solve(
     start = time.monotonic()
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
     free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
-    try:
-        solution = _within_bounds(labelled, free, given or {}, timeout_ms, seed) or _solve(
-            Translator(), labelled, free, given or {}, timeout_ms, seed
-        )
-    except Unsupported as error:
-        solution = Solution("unknown", reason=f"Avow cannot express {error.what} for the solver")
-    except z3.Z3Exception as error:
-        solution = Solution("unknown", reason=f"Z3: {error}")
-    if solution.status == "unknown" and not shown and _has_solution(labelled, free, given or {}, timeout_ms, seed):
-        solution = Solution("sat")
-    if solution.status == "unknown" and not given and timeout_ms >= _PATIENT_MS:
-        solution = _second_opinion(labelled, timeout_ms) or solution
+    with budget(timeout_ms * _ALTOGETHER):
+        try:
+            solution = _within_bounds(labelled, free, given or {}, timeout_ms, seed) or _solve(
+                Translator(), labelled, free, given or {}, timeout_ms, seed
+            )
+        except Unsupported as error:
+            solution = Solution("unknown", reason=f"Avow cannot express {error.what} for the solver")
+        except z3.Z3Exception as error:
+            solution = Solution("unknown", reason=f"Z3: {error}")
+        if solution.status == "unknown" and not shown and _has_solution(labelled, free, given or {}, timeout_ms, seed):
+            solution = Solution("sat")
+        patient = solution.status == "unknown" and not given and timeout_ms >= _PATIENT_MS
+        if patient and allowed(timeout_ms):
+            solution = _second_opinion(labelled, timeout_ms) or solution
     return Solution(
         solution.status,
         solution.values,
@@ -222,7 +224,10 @@ methods before any gets long."""
 _GLANCE_MS = 30
 """Where there are functions, the solver's own methods answer at once or mostly not at all; then tables are tried."""
 
-_PATIENT_MS = 5_000
+_ALTOGETHER = 1.3
+"""The share of the limit for everything that is done to answer one question, replays of what is found included."""
+
+_PATIENT_MS = 1_500
 """From this much time on, another solver is worth its start."""
 
 

@@ -17,6 +17,8 @@ from itertools import islice, pairwise, product
 
 from avow.language.sorts import (
     BOOL,
+    INTEGER,
+    REAL,
     BoolSort,
     DataSort,
     EnumSort,
@@ -35,6 +37,7 @@ from avow.language.terms import (
     TRUE,
     And,
     Apply,
+    Arithmetic,
     Construct,
     EnumValue,
     Literal,
@@ -46,6 +49,7 @@ from avow.language.terms import (
     Term,
     TupleTerm,
     Variable,
+    Widen,
 )
 from avow.logic.demands import MAX_DEPTH, Candidates, Definition
 from avow.logic.formula import conjunction, disjunction, free_variables, negation, substitute
@@ -136,6 +140,10 @@ def _functions(found: Candidates, function: Variable, sort: FunctionSort) -> Ite
             (_at(d, parameters), substitute(v, dict(zip(d.parameters, parameters, strict=True)))) for d, v in branches
         )
         yield Cases(parameters, default, cases)
+    if branches:
+        for value in _ground(found, sort.result)[:4]:
+            yield Definition(parameters, value)
+    yield from _rising(found, parameters, sort)
 
 
 def _partly_applied(found: Candidates, parameters: tuple[Variable, ...], sort: FunctionSort) -> Iterable[Definition]:
@@ -147,6 +155,23 @@ def _partly_applied(found: Candidates, parameters: tuple[Variable, ...], sort: F
             continue
         if len(term.arguments) >= count and term.function.sort.parameters[-count:] == sort.parameters:
             yield Definition(parameters, replace(term, arguments=(*term.arguments[:-count], *parameters), span=None))
+
+
+def _rising(found: Candidates, parameters: tuple[Variable, ...], sort: FunctionSort) -> Iterable[Definition]:
+    """Functions of a number that are different everywhere, and grow."""
+    numbers = RealSort | IntegerSort | NaturalSort
+    if [isinstance(s, numbers) for s in (*sort.parameters, sort.result)] != [True, True]:
+        return
+    argument: Term = parameters[0]
+    if isinstance(sort.result, RealSort) and isinstance(argument.sort, IntegerSort | NaturalSort):
+        argument = Widen(argument, REAL)
+    if isinstance(argument.sort, RealSort) is not isinstance(sort.result, RealSort):
+        return
+    yield Definition(parameters, argument)
+    whole = REAL if isinstance(sort.result, RealSort) else INTEGER
+    few = [Literal(Fraction(k), REAL) if whole == REAL else Literal(k, INTEGER) for k in (1, 2)]
+    for start in (*few, *_ground(found, sort.result)[:4]):
+        yield Definition(parameters, Arithmetic("+", argument, start, whole))
 
 
 def _unique_definitions(definitions: Iterable[Definition]) -> Iterable[Definition]:
