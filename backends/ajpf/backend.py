@@ -48,12 +48,13 @@ class AjpfBackend:
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from avow.backends.ajpf.instances import diagnose, instances
         from avow.backends.ajpf.options import read
+        from avow.backends.ajpf.vocabulary import unknown_words
 
         try:
             setup = read(job)
         except Rejected as error:
             return error.diagnostics
-        return tuple(diagnose(job, setup, instances(job, setup)))
+        return (*diagnose(job, setup, instances(job, setup)), *unknown_words(job, setup))
 
     def files(self, job: Job) -> tuple[Path, ...]:
         names = [v for key in ("program", "environment") if isinstance(v := job.options.get(key), str)]

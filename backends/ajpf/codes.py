@@ -118,4 +118,12 @@ CODES = register(
         "Leave the variable out of `instances`, or say in the plan why the rest does not matter.",
         warning=True,
     ),
+    declare(
+        "AJPF134",
+        "word that the agent lacks",
+        "A row, a property or the environment file speaks of a belief, goal, action or percept that there never is. "
+        "What is forbidden in such a word is forbidden for nothing.",
+        "Correct its spelling, or the number of its arguments.",
+        warning=True,
+    ),
 )

@@ -266,3 +266,23 @@ def test_properties_of_the_plan_range_over_the_scenario_where_the_instances_say_
     text = BACKEND.export(replace(job, system=replace(job.system, plan=plan)))["cabin.psl"]
     assert [n for n in range(5) if f"[] (B(cabin, call({n})) -> (<> D(cabin, go({n}))))" in text] == [1, 2, 3]
     assert "call(f)" not in text
+
+
+def test_words_that_the_agent_lacks_are_told(lift):
+    """Seeded fault: a slip in the table, so that what is forbidden never comes, whatever the agent does."""
+
+    def told(rows, environment=ONE_AT_A_TIME):
+        contract = (lift().root / "system.rcl").read_text()
+        contract = contract[: contract.rindex("}")] + STAYS
+        program = PROGRAM + "+call(F) : { B shut } <- go(F);\n+open : { True } <- halt(0);\n"
+        files = {"system.rcl": contract, "cabin.gwen": program, "cabin.yaml": environment}
+        found = BACKEND.check(lift({"predicates": dict(rows)}, files))
+        return [d.message for d in found if d.code == "AJPF134"]
+
+    assert told(TABLE) == []
+    (message,) = told({**TABLE, "exists(n in NATURAL | out.motion == go(n))": "D(cabin, goes(_))"})
+    assert "the action goes(_)" in message
+    (message,) = told({**TABLE, "in.call(f)": "B(cabin, call(f, _))"})
+    assert "the belief call(_, _)" in message
+    (message,) = told(TABLE, ONE_AT_A_TIME.replace("halt: {", "hold: {"))
+    assert "cabin.yaml speaks of the action hold" in message

@@ -1,0 +1,72 @@
+"""Words that the plan uses of an agent and that neither its program nor its environment ever has: mostly slips of the
+pen. They matter most where something is forbidden: what no agent of this program could do is forbidden for nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from avow.backend import Job
+from avow.backends.ajpf import psl
+from avow.backends.ajpf.options import Setup
+from avow.backends.ajpf.psl import Modality
+from avow.backends.ajpf.syntax import DeedKind, Struct, Term
+from avow.diagnostics import Diagnostic, Severity, Span
+
+_Word = tuple[str, int]
+_KINDS = {
+    Modality.BELIEVES: "belief",
+    Modality.WANTS: "goal",
+    Modality.INTENDS: "goal",
+    Modality.INTENDS_TO_DO: "action",
+    Modality.DID: "action",
+    Modality.PERCEPT: "percept",
+}
+
+
+def unknown_words(job: Job, setup: Setup) -> Iterator[Diagnostic]:
+    """A warning (AJPF134) for each row, property and entry of the environment file that speaks of such a word."""
+    known = _vocabulary(setup)
+    places = [(f"the row “{row.text}”", row.formula, row.span) for row in setup.rows]
+    places += [(f"the property '{extra.name}'", extra.formula, extra.span) for extra in setup.extras]
+    for what, formula, span in places:
+        for atom in dict.fromkeys(psl.atoms(formula)):
+            kind = _KINDS[atom.modality]
+            if _word(atom.term) not in known[kind]:
+                yield _warning(what, _word(atom.term), kind, known[kind], span)
+    actions = {name for name, _ in known["action"]}
+    span = job.method.options.at("environment")
+    for action in (*setup.environment.after, *sorted(setup.environment.quiet - {"print"})):
+        if action not in actions:
+            yield _warning(setup.environment_path.name, (action, 0), "action", known["action"], span)
+
+
+def _vocabulary(setup: Setup) -> dict[str, set[_Word]]:
+    program = setup.program
+    deeds = [deed for plan in program.plans for deed in plan.deeds]
+
+    def done(*kinds: DeedKind) -> Iterable[Term]:
+        return (deed.term for deed in deeds if deed.kind in kinds)
+
+    percepts = _words(fact for _, group in setup.environment.groups for fact in group if fact is not None)
+    beliefs = _words((*program.beliefs, *(rule.head for rule in program.rules), *done(DeedKind.ADD_BELIEF)))
+    goals = _words((*(goal.term for goal in program.goals), *done(DeedKind.ADD_GOAL)))
+    return {"belief": beliefs | percepts, "goal": goals, "action": _words(done(DeedKind.ACTION)), "percept": percepts}
+
+
+def _words(terms: Iterable[Term]) -> set[_Word]:
+    return {_word(term) for term in terms if isinstance(term, Struct)}
+
+
+def _word(term: Struct) -> _Word:
+    return term.functor, len(term.args)
+
+
+def _shown(word: _Word) -> str:
+    name, arity = word
+    return f"{name}({', '.join('_' * arity)})" if arity else name
+
+
+def _warning(what: str, word: _Word, kind: str, known: set[_Word], span: Span | None) -> Diagnostic:
+    message = f"{what} speaks of the {kind} {_shown(word)}, which neither the program nor the environment ever has"
+    hint = f"{kind}s that there are: {', '.join(sorted(map(_shown, known))[:12])}" if known else None
+    return Diagnostic("AJPF134", message, span, Severity.WARNING, hint=hint)
