@@ -65,15 +65,17 @@ def _range(constant: Expr, parts: Sequence[Expr]) -> range | None:
 
 def _bounds(part: Expr) -> Iterator[tuple[Expr, Expr, bool, bool]]:
     """(x, t, whether t is an upper bound of x, whether it is out of bounds itself), for each side of a comparison."""
-    negated = z3.is_not(part)
+    operator = _operator(part)
+    negated = operator == z3.Z3_OP_NOT
     atom = part.arg(0) if negated else part
-    for test, upper, strict in (
-        (z3.is_le, True, False),
-        (z3.is_lt, True, True),
-        (z3.is_ge, False, False),
-        (z3.is_gt, False, True),
+    operator = _operator(atom) if negated else operator
+    for comparison, upper, strict in (
+        (z3.Z3_OP_LE, True, False),
+        (z3.Z3_OP_LT, True, True),
+        (z3.Z3_OP_GE, False, False),
+        (z3.Z3_OP_GT, False, True),
     ):
-        if test(atom):
+        if operator == comparison:
             one, two = (z3.simplify(side) if not z3.is_const(side) else side for side in atom.children())
             yield one, two, upper != negated, strict != negated
             yield two, one, upper == negated, strict != negated
@@ -85,17 +87,27 @@ def _flat(conjuncts: Sequence[Expr]) -> list[Expr]:
     stack = list(reversed(conjuncts))
     while stack:
         part = stack.pop()
-        if z3.is_and(part):
+        operator = _operator(part)
+        if operator == z3.Z3_OP_AND:
             stack.extend(reversed(part.children()))
-        elif z3.is_not(part) and z3.is_not(part.arg(0)):
-            stack.append(part.arg(0).arg(0))
-        elif z3.is_not(part) and z3.is_or(part.arg(0)):
-            stack.extend(z3.Not(item) for item in reversed(part.arg(0).children()))
-        elif z3.is_not(part) and z3.is_implies(part.arg(0)):
-            stack.extend((z3.Not(part.arg(0).arg(1)), part.arg(0).arg(0)))
+            continue
+        inside: Expr = part.arg(0) if operator == z3.Z3_OP_NOT else None
+        denied = _operator(inside) if operator == z3.Z3_OP_NOT else None
+        if denied == z3.Z3_OP_NOT:
+            stack.append(inside.arg(0))
+        elif denied == z3.Z3_OP_OR:
+            stack.extend(z3.Not(item) for item in reversed(inside.children()))
+        elif denied == z3.Z3_OP_IMPLIES:
+            stack.extend((z3.Not(inside.arg(1)), inside.arg(0)))
         else:
             found.append(part)
     return found
+
+
+def _operator(expr: Expr) -> int | None:
+    """The kind of an expression's outermost operator: one question to Z3, where each of its ``is_and``, ``is_or`` and
+    so on asks anew."""
+    return int(expr.decl().kind()) if z3.is_app(expr) else None
 
 
 def _step(constants: list[Expr], parts: list[Expr]) -> tuple[list[Expr], list[Expr]] | None:

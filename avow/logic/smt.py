@@ -158,17 +158,24 @@ def entails(
             return Entailment(Verdict.UNKNOWN, reason=reason, engine=engine, seconds=seconds)
 
 
-def replay(formulas: Iterable[Term], values: Mapping[Variable, Value], *, timeout_ms: int = 5_000) -> bool | None:
+def replay(
+    formulas: Iterable[Term],
+    values: Mapping[Variable, Value],
+    *,
+    timeout_ms: int = 5_000,
+    beside: Translator | None = None,
+) -> bool | None:
     """Do the formulas hold of these values, whatever partial operations yield outside their domains?
 
     True only if that is proved; False if some formula is proved false; None if neither could be shown. An unspecified
-    sort has the elements that the values name, and up to three more if the formulas hold only then.
+    sort has the elements that the values name, and up to three more if the formulas hold only then. A translator of the
+    same formulas, if there is one, lends its context.
     """
     formulas = tuple(formulas)
     unspecified = sorted({sort for f in formulas for sort in _opaque_sorts(f)}, key=lambda sort: sort.name)
     try:
         for more in range(4 if unspecified else 1):
-            found = _replay(formulas, values, unspecified, more, timeout_ms)
+            found = _replay(Translator(beside), formulas, values, unspecified, more, timeout_ms)
             if found or not unspecified:
                 return found
     except (Unsupported, z3.Z3Exception):
@@ -177,13 +184,13 @@ def replay(formulas: Iterable[Term], values: Mapping[Variable, Value], *, timeou
 
 
 def _replay(
+    translator: Translator,
     formulas: Sequence[Term],
     values: Mapping[Variable, Value],
     unspecified: Sequence[OpaqueSort],
     more: int,
     timeout_ms: int,
 ) -> bool | None:
-    translator = Translator()
     meanings = {variable: translator.value(value, variable.sort) for variable, value in values.items()}
     for sort in unspecified:
         translator.add_elements(sort, more)
@@ -261,7 +268,7 @@ def _solve(
         if answer.model is not None:
             values = _read(answer.model, free)
             simple = values is not None and all(_is_simple(value) for value in values.values())
-            if values is not None and simple and replay(labelled.values(), {**values, **given}):
+            if values is not None and simple and replay(labelled.values(), {**values, **given}, beside=translator):
                 return Solution("sat", values)
         reason = answer.reason
         if not functions:
@@ -270,16 +277,16 @@ def _solve(
             if answer.status == "unsat":
                 return Solution("unsat", core=answer.core, engine="z3, qsat")
             values = _read(answer.model, free) if answer.model is not None else None
-            if values is not None and replay(labelled.values(), {**values, **given}):
+            if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
                 return Solution("sat", values, engine="z3, qsat")
         if functions:
             limit = max(1, int(timeout_ms * tables))
             found = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=seed)
-            if found is not None and replay(labelled.values(), {**found, **given}):
+            if found is not None and replay(labelled.values(), {**found, **given}, beside=translator):
                 return Solution("sat", found, engine="z3, functions as tables")
         if answer.model is not None:
             values = _read(answer.model, free)
-            if values is not None and replay(labelled.values(), {**values, **given}):
+            if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
                 return Solution("sat", values)
             reason = "the solver's model could not be replayed"
     return Solution("unknown", reason=reason or "no answer in time")
@@ -301,10 +308,11 @@ def _within_bounds(
     flat = flatten({**labelled, _INSIDE: inside}, sequences)
     formulas = dict(flat.formulas if flat else {**labelled, _INSIDE: inside})
     variables = frozenset(flat.variables(free) if flat else free)
-    found = _solve(Translator(), formulas, variables, given, timeout_ms // 3, seed)
+    translator = Translator()
+    found = _solve(translator, formulas, variables, given, timeout_ms // 3, seed)
     if found.status == "sat":
         values = flat.values(found.values) if flat else found.values
-        if values is not None and replay(labelled.values(), {**values, **given}):
+        if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
             return Solution("sat", values, engine=found.engine)
     if flat is None:
         return None

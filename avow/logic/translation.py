@@ -58,8 +58,8 @@ __all__ = ["Expr", "Meaning", "Translator", "Unsupported"]
 class Translator(Sorts):
     """Sorts, variables and terms in one Z3 context; the same variable always becomes the same Z3 symbol."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, beside: Sorts | None = None) -> None:
+        super().__init__(beside)
         self._constants: dict[Variable, Expr] = {}
         self._functions: dict[Variable, Any] = {}
 

@@ -60,14 +60,18 @@ def _whole(sort: Sort) -> Sort:
 
 
 class Sorts:
-    """The Z3 sorts of one context, which of their values are members of RCL's sorts, and concrete values."""
+    """The Z3 sorts of one context, which of their values are members of RCL's sorts, and concrete values.
 
-    def __init__(self) -> None:
-        self.context = z3.Context()
-        self._sorts: dict[Sort, Any] = {}
+    `beside` another one, its context and sorts are used, and nothing else of it: a context costs more than most
+    questions.
+    """
+
+    def __init__(self, beside: Sorts | None = None) -> None:
+        self.context: Any = beside.context if beside else z3.Context()
+        self._sorts: dict[Sort, Any] = beside._sorts if beside else {}
+        self._names: dict[str, Sort] = beside._names if beside else {}
         self._opaque: dict[tuple[str, int], Expr] = {}
         self._count = 0
-        self._names: dict[str, Sort] = {}
 
     # -- sorts ---------------------------------------------------------------------------------------------------------
 

@@ -76,7 +76,7 @@ def test_an_initial_value_that_breaks_the_assumption_is_found(tmp_path: Path) ->
         "out.at(0, 0) and out.at(9, 9)",
     )
     assert plan != REPAIRED
-    _, answers = settled(case_study(tmp_path, "remote_inspection", plan), milliseconds=700)
+    _, answers = settled(case_study(tmp_path, "remote_inspection", plan), milliseconds=250)
     clause = {str(condition.about): answer for condition, answer in answers.settled.items()}
     assert clause["navigation.was_somewhere"].verdict is not Verdict.PROVED
     assert answers.verdict is not Verdict.PROVED

@@ -11,6 +11,13 @@ from pathlib import Path
 
 import pytest
 
+from avow.backend import Limits
+from avow.files import write
+from avow.pipeline.engines import discharge_composition, discharge_sanity
+from avow.pipeline.survey import Survey, survey
+from avow.pipeline.work import Work, method_backend, method_job, planned_method
+from avow.verdict import Outcome, Verdict
+
 FERRY = Path(__file__).parent / "fixtures" / "ferry"
 
 
@@ -36,6 +43,44 @@ def verify(folder: Path) -> tuple[int, dict[tuple[str, str], dict[str, object]],
     return done.returncode, found, done.stdout + done.stderr
 
 
+def settle(work: Work, folder: Path) -> tuple[Outcome, ...]:
+    """What a worker does, here: `doit verify` starts some twenty processes for it."""
+    limits = Limits(seconds=60)
+    match work.engine:
+        case "language":
+            return ()
+        case "sanity":
+            node = work.system.contract.node(work.node)
+            return discharge_sanity(work.system, node, work.obligations, limits).outcomes
+        case "compose":
+            return discharge_composition(work.system, work.obligations, limits).outcomes
+    method = planned_method(work)
+    backend = method_backend(work.system, method)
+    job = method_job(work.system, work.system.contract.node(work.node), method)
+    assert not [d for d in backend.check(job) if d.is_error]
+    for name, text in backend.export(job).items():
+        write(folder / name, text)
+    return backend.discharge(job, folder, limits).outcomes
+
+
+def test_each_engine_settles_its_part(tmp_path: Path) -> None:
+    system = survey(FERRY)
+    assert isinstance(system, Survey)
+    found = {
+        (outcome.obligation.removeprefix("ferry/"), work.method): outcome.verdict
+        for work in system.catalogue.works
+        for outcome in settle(work, tmp_path / work.node / work.method)
+    }
+    assert found["gauge/guarantee/good", "hoare"] is Verdict.PROVED
+    assert found["gauge/guarantee/good", "hypothesis"] is Verdict.TESTED
+    assert found["pilot/guarantee/docks", "ajpf"] is Verdict.CHECKED
+    assert found["pilot/guarantee/docks", "hypothesis"] is Verdict.TESTED
+    assert found["pilot/sanity/realizable", "sanity"] is Verdict.PROVED
+    assert found["system/requirement/SAFE", "compose"] is Verdict.PROVED
+    assert not {Verdict.UNKNOWN, Verdict.ERROR, Verdict.NOT_RUN} & set(found.values())
+
+
+@pytest.mark.slow
 def test_it_verifies(harbour: Path) -> None:
     code, found, text = verify(harbour)
     assert code == 0, text

@@ -62,8 +62,9 @@ def composition() -> Composition:
     return compose(system())
 
 
-def requirement(name: str, limits: Limits | None = None, of: System | None = None) -> Outcome:
-    composed = compose(of) if of else composition()  # one composition shares what its answers have in common
+def requirement(name: str, limits: Limits | None = None, of: Composition | System | None = None) -> Outcome:
+    """One composition shares what its answers have in common."""
+    composed = compose(of) if isinstance(of, System) else of or composition()
     [obligation] = [o for o in requirement_obligations(composed.frame.system) if o.name == name]
     [outcome] = settle_all(composed, [obligation], limits or Limits())
     return outcome
@@ -209,7 +210,7 @@ def test_every_step_on_the_grid_is_looked_at() -> None:
 
 
 def test_a_small_mission_on_the_grid(tmp_path: Path) -> None:
-    of = copy(tmp_path, SMALL, use="0.08")
+    of = compose(copy(tmp_path, SMALL, use="0.08"))
     for name in ("R1_grid", "PLANS_grid"):
         outcome = requirement(name, of=of)
         assert outcome.verdict is Verdict.CHECKED, outcome.summary
