@@ -128,7 +128,7 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
                 "repair what the counterexample shows, or accept the finding with a dated reason", cost=100
             )
         case Status.CONTRADICTORY:
-            return Suggestion("find out which tool is wrong: one proves the claim and another refutes it", cost=100)
+            return Suggestion(_two_answers(view), cost=100)
         case Status.ERROR:
             # the same question is not asked twice: it has to change, or be asked afresh
             again = f"`avow verify --fresh {facts.system}`"
@@ -171,6 +171,24 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
             "narrow the question (a scenario in the plan), raise the time limit, or accept it with a reason", cost=20
         )
     return _new_method(view, demand, used, facts)
+
+
+def _two_answers(view: ObligationView) -> str:
+    """Of one and the same thing two answers cannot both be right; a model and a trace of the robot may well differ."""
+    records = [item.entry.evidence for item in view.counting]
+    for proof in (r for r in records if effective(r) is Verdict.PROVED):
+        for refutation in (r for r in records if r.verdict is Verdict.REFUTED):
+            read, other = set(proof.inputs), set(refutation.inputs)
+            if read and other and not read & other:
+                proved = f"`{proof.method}` proves it of {_files(read)}"
+                refuted = f"`{refutation.method}` refutes it of {_files(other)}"
+                return f"{proved} and {refuted}: repair what the counterexample shows, or find out which tool is wrong"
+    return "find out which tool is wrong: one proves the claim and another refutes it"
+
+
+def _files(paths: set[str]) -> str:
+    names = sorted(path.rpartition("/")[2] for path in paths)
+    return ", ".join(names[:2]) + (", …" if len(names) > 2 else "")
 
 
 def _is_score(item: EvidenceView) -> bool:
