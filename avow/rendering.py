@@ -170,8 +170,8 @@ _SURROGATES = re.compile("[\ud800-\udfff]")
 def to_sarif(
     diagnostics: Sequence[Diagnostic], *, version: str = "", codes: Mapping[str, Code] = CORE_CODES
 ) -> dict[str, Any]:
-    """A SARIF 2.1.0 log with one run; `codes` describe its rules. Paths are kept as given: relative ones are relative to
-    the working folder."""
+    """A SARIF 2.1.0 log with one run; `codes` describe its rules. Paths are kept as given: relative ones are relative
+    to the working folder."""
     used = sorted({d.code for d in diagnostics})
     rules = []
     for code in used:
