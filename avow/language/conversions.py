@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from fractions import Fraction
 
@@ -70,7 +71,8 @@ def convert(term: Term, wanted: Sort) -> Term | None:
         case SequenceTerm(items=items), SequenceSort(item=item):
             made = [convert(i, item) for i in items]
             if all(m is not None for m in made):
-                return replace(term, items=tuple(m for m in made if m is not None), sort=SequenceSort(item))
+                kept = tuple(m for m in made if m is not None)
+                return replace(term, items=kept, sort=SequenceSort(joined(list(kept)) if kept else item))
     return None
 
 
@@ -105,7 +107,18 @@ def common(terms: list[Term]) -> list[Term] | None:
 
 
 def joined(terms: list[Term]) -> Sort:
-    """The sort of a set or sequence of these (non-empty, already `common`): INTEGER where some may be negative."""
-    if any(t.sort == INTEGER for t in terms) and all(isinstance(t.sort, WHOLE) for t in terms):
-        return INTEGER
-    return terms[0].sort
+    """The sort of a set or sequence of these (non-empty, already `common`): INTEGER where some may be negative, also
+    within tuples and sequences. Every one of them is a value of it: a variable that ranges over them has this sort."""
+    return functools.reduce(_join, (t.sort for t in terms))
+
+
+def _join(left: Sort, right: Sort) -> Sort:
+    """The sort that has the values of both, which are alike."""
+    if left == right:
+        return left
+    match left, right:
+        case TupleSort(items=a), TupleSort(items=b):
+            return TupleSort(tuple(map(_join, a, b)))
+        case SequenceSort(item=a_), SequenceSort(item=b_):
+            return SequenceSort(_join(a_, b_))
+    return INTEGER

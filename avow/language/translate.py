@@ -19,6 +19,7 @@ from avow.language.latex import to_latex
 from avow.language.lexer import quote
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.sorts import (
+    BOOL,
     DataSort,
     EnumSort,
     FunctionSort,
@@ -28,7 +29,7 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.styles import StyleName
-from avow.language.terms import Construct, EnumValue, Term, children
+from avow.language.terms import Construct, EnumValue, Literal, Term, children
 
 
 def to_rcl(contract: Contract) -> str:
@@ -92,10 +93,16 @@ def _declarations(contract: Contract) -> Iterator[str]:
         for constant, term in waiting:  # an enumeration that is a constant: first the constants before it
             if constant == name:
                 break
-            yield f"  {constant} = {show_term(term, 'rcl')};"
+            yield f"  {constant} = {_value(term)};"
         yield f"  {name} = {show_type(sort)};"
     for constant, term in waiting:
-        yield f"  {constant} = {show_term(term, 'rcl')};"
+        yield f"  {constant} = {_value(term)};"
+
+
+def _value(term: Term) -> str:
+    """A constant's value as a declaration takes it: a formula has parentheses."""
+    shown = show_term(term, "rcl")
+    return f"({shown})" if term.sort == BOOL and not isinstance(term, Literal) else shown
 
 
 def _head(clause: Clause) -> str:

@@ -5,7 +5,9 @@ The text is Z3's own printing of the one translation, with what is Z3's dialect 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
+from itertools import pairwise
 
 from avow.language.terms import Term
 from avow.logic.formula import free_variables
@@ -23,12 +25,40 @@ def export(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") 
     solver = z3.Solver(ctx=translator.context)
     solver.add(*background, *(expr for _, expr in named))
     # Z3 prints declarations first; the assertions are printed one by one, so that each can bear its name.
-    declarations = solver.sexpr().split("(assert", 1)[0].strip()
+    declarations = _ASSERTION.split(solver.sexpr(), maxsplit=1)[0].strip()
     lines = [f"; {_harmless(line)}" for line in comment.splitlines()]
-    lines += ["(set-logic ALL)", *([declarations] if declarations else [])]
+    lines += ["(set-logic ALL)", *_in_order(declarations)]
     lines += [f"(assert {expr.sexpr()})" for expr in background]
     lines += [f"(assert (! {expr.sexpr()} :named |clause {_harmless(label)}|))" for label, expr in named]
-    return "\n".join([*lines, "(check-sat)", ""])
+    return _quoted("\n".join([*lines, "(check-sat)", ""]))
+
+
+_ASSERTION = re.compile(r"^\(assert\s", re.MULTILINE)  # not the element of a type that is called `assert`
+_PIECE = re.compile(r'\|[^|]*\||"(?:[^"]|"")*"|;[^\n]*|[^\s()|";]+')
+
+
+_COMMAND = re.compile(r"^\(", re.MULTILINE)
+_DECLARED = re.compile(r"\(declare-(?:sort |datatypes \(\()(\|[^|]*\||[^\s()]+)")
+
+
+def _in_order(declarations: str) -> list[str]:
+    """The declarations, each after those of the sorts that it speaks of. (Z3 forgets sequences of sequences.)"""
+    text = _quoted(declarations)
+    starts = [m.start() for m in _COMMAND.finditer(text)]
+    waiting = [text[a:b].strip() for a, b in pairwise([*starts, len(text)])]
+    names = {line: m[1] for line in waiting if (m := _DECLARED.match(line))}
+    made: list[str] = []
+    while waiting:
+        missing = {names[line] for line in waiting if line in names}
+        ready = [line for line in waiting if not (missing - {names.get(line)}) & set(_PIECE.findall(line))]
+        made += ready or waiting  # in a circle there is no order; RCL's types have none
+        waiting = [line for line in waiting if line not in ready] if ready else []
+    return made
+
+
+def _quoted(script: str) -> str:
+    """The script with bars around each symbol that needs them. (Z3 prints what a datatype declares without.)"""
+    return _PIECE.sub(lambda m: f"|{m[0]}|" if "'" in m[0] and m[0][0] not in '|";' else m[0], script)
 
 
 def _harmless(text: str) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from avow.diagnostics import Diagnostic
-from avow.language.english import both_ways, comparisons, is_one_way, mention
+from avow.language.english import both_ways, comparisons, is_one_way, mentions
 from avow.language.load import check_paths, check_text
 
 ROOT = Path(__file__).parents[2]
@@ -141,8 +141,12 @@ def test_the_language_of_sentences() -> None:
     assert not is_one_way("It stops only while the door is open")
     assert both_ways("ok IFF ready") == "IFF"
     assert both_ways("ok if ready") is None
-    assert mention("It moves on", "move") == "moves"
-    assert mention("It is removed", "move") is None
+    names = {"move": "move", "stop": "STOP", "on": "on"}
+    assert list(mentions("It moves on, Stopped or moving; not stopping, never removed", names)) == [
+        ("moves", "move"),
+        ("Stopped", "STOP"),
+        ("moving", "move"),
+    ]
 
 
 # --- total functions -------------------------------------------------------------------------------------------------
