@@ -4,7 +4,7 @@ condition one way or both ways, and which words may stand for a name."""
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -110,15 +110,26 @@ _COMMON = frozenset(
 _EXCEPT = re.compile(r"\b(?:not|neither|nor|never|no longer|other than|unless|except|without|instead)\b|n't\b", re.I)
 
 
-def mention(sentence: str, name: str) -> str | None:
-    """The word with which the sentence speaks of `name` (``stop``, ``stops``, ``stopped``, ``stopping``), as something
-    that is; None where it does not, or names it as an exception (``neither low nor high`` is normal)."""
-    stem = name.lower()
-    if len(stem) < 3 or stem in _COMMON:
-        return None
-    forms = {stem, *(stem + ending for ending in ("s", "es", "d", "ed", "ing")), stem.removesuffix("e") + "ing"}
-    forms |= {stem + stem[-1] + "ed", stem + stem[-1] + "ing"}
+def mentions(sentence: str, names: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """The words with which the sentence speaks of one of the names as of something that is, each with the name: of
+    ``stop`` speak ``stop``, ``stops``, ``stopped`` and ``stopping``, but not an exception (``neither low nor high`` is
+    normal). `names` are by their lower-case form; those of one or two letters say nothing."""
     for word in re.finditer(r"[A-Za-z_][\w']*", sentence):
-        if word[0].lower() in forms and not _EXCEPT.search(re.split(r"[.;:]", sentence[: word.start()])[-1]):
-            return word[0]
-    return None
+        for stem in _stems(word[0].lower()):
+            if stem in names and stem not in _COMMON and len(stem) > 2:
+                if not _EXCEPT.search(re.split(r"[.;:]", sentence[: word.start()])[-1]):
+                    yield word[0], names[stem]
+                break
+
+
+def _stems(word: str) -> Iterator[str]:
+    """What the word may be a form of, itself first."""
+    yield word
+    for ending in ("s", "es", "d", "ed", "ing"):
+        if word.endswith(ending):
+            stem = word.removesuffix(ending)
+            yield stem
+            if ending == "ing":
+                yield stem + "e"
+            if ending in ("ed", "ing") and stem[-2:-1] == stem[-1:]:
+                yield stem[:-1]

@@ -18,7 +18,7 @@ from avow.language.lexer import Token
 from avow.language.lookups import lookups, walk
 from avow.language.outline import FileSyntax
 from avow.language.printer import show_sort, show_term
-from avow.language.sentences import mismatches
+from avow.language.sentences import elements_of, mismatches
 from avow.language.sorts import BOOL, EnumSort, FunctionSort, NaturalSort
 from avow.language.source import Reports
 from avow.language.spelling import similar
@@ -183,11 +183,12 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
         if clause.formula != TRUE and _always(clause.formula):
             message = f"the assumption `{clause.name}` says nothing: the types of the inputs make it true"
             yield _warning("RCL408", message, clause.formula.span, "leave it out, or say what was meant")
+    elements = elements_of((node,)) if any(clause.sentence for clause in node.clauses) else {}
     for clause in node.clauses:
         for unused in _unused(clause.formula):
             message = f"`{unused.name}` is quantified and never used"
             yield _warning("RCL407", message, unused.span, "remove it, or tie it to what was meant")
-        for mismatch in mismatches(clause, node):
+        for mismatch in mismatches(clause, elements):
             yield _warning(mismatch.code, mismatch.message, clause.sentence_span, mismatch.hint)
     yield from _looked_up(node)
 

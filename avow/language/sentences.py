@@ -8,13 +8,13 @@ Each is a hint, with a code of its own; what cannot be seen to differ is left al
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
 from avow.language.bounds import bounds, constant
 from avow.language.contract import Clause, Node
-from avow.language.english import LONGEST, Comparison, both_ways, comparisons, is_one_way, mention
+from avow.language.english import LONGEST, Comparison, both_ways, comparisons, is_one_way, mentions
 from avow.language.lookups import walk
 from avow.language.printer import show_number, show_term
 from avow.language.sorts import BOOL, DataSort, EnumSort, components
@@ -43,18 +43,31 @@ class Mismatch:
     hint: str
 
 
-def mismatches(clause: Clause, node: Node) -> Iterator[Mismatch]:
-    """What the clause's sentence is seen to say otherwise than its formula."""
+def mismatches(clause: Clause, elements: Mapping[str, str]) -> Iterator[Mismatch]:
+    """What the clause's sentence is seen to say otherwise than its formula; `elements` are those of its node."""
     if clause.sentence is not None:
-        yield from differences(clause.sentence, clause.formula, (node,))
+        yield from differences(clause.sentence, clause.formula, elements)
 
 
-def differences(sentence: str, formula: Term, nodes: Iterable[Node]) -> Iterator[Mismatch]:
-    """What a sentence is seen to say otherwise than a formula about these nodes."""
+def differences(sentence: str, formula: Term, elements: Mapping[str, str]) -> Iterator[Mismatch]:
+    """What a sentence is seen to say otherwise than a formula in which these elements could stand."""
     sentence = sentence[:LONGEST]
     yield from _comparisons(sentence, formula)
     yield from _directions(sentence, formula)
-    yield from _elements(sentence, formula, nodes)
+    yield from _elements(sentence, formula, elements)
+
+
+def elements_of(nodes: Iterable[Node]) -> dict[str, str]:
+    """The elements and constructors of the nodes' types, by their names in lower case."""
+    sorts = components(*(port.sort for node in nodes for port in (*node.inputs, *node.outputs)))
+    names: dict[str, str] = {}
+    for sort in sorts:
+        match sort:
+            case EnumSort(members=members):
+                names |= {name.lower(): name for name in members}
+            case DataSort(constructors=constructors):
+                names |= {c.name.lower(): c.name for c in constructors}
+    return names
 
 
 # --- comparisons -----------------------------------------------------------------------------------------------------
@@ -141,26 +154,18 @@ def _is_both_ways(term: Term) -> bool:
 # --- elements --------------------------------------------------------------------------------------------------------
 
 
-def _elements(sentence: str, formula: Term, nodes: Iterable[Node]) -> Iterator[Mismatch]:
-    spoken = [name.lower() for name in _names_in(formula) if len(name) > 2]
-    for name in dict.fromkeys(name for node in nodes for name in _elements_of(node)):
-        said = mention(sentence, name)
-        if said is None or any(o.startswith(name.lower()) or said.lower().startswith(o) for o in spoken):
-            continue
-        yield Mismatch(
-            "RCL415",
-            f"the sentence says “{said}”, and the formula does not speak of `{name}`",
-            "say it in the formula too, or leave it out of the sentence",
-        )
-
-
-def _elements_of(node: Node) -> Iterator[str]:
-    for sort in components(*(port.sort for port in (*node.inputs, *node.outputs))):
-        match sort:
-            case EnumSort(members=members):
-                yield from members
-            case DataSort(constructors=constructors):
-                yield from (c.name for c in constructors)
+def _elements(sentence: str, formula: Term, elements: Mapping[str, str]) -> Iterator[Mismatch]:
+    said = dict[str, str]()
+    for word, name in mentions(sentence, elements):
+        said.setdefault(name, word)
+    spoken = [name.lower() for name in _names_in(formula) if len(name) > 2] if said else []
+    for name, word in said.items():
+        if not any(o.startswith(name.lower()) or word.lower().startswith(o) for o in spoken):
+            yield Mismatch(
+                "RCL415",
+                f"the sentence says “{word}”, and the formula does not speak of `{name}`",
+                "say it in the formula too, or leave it out of the sentence",
+            )
 
 
 def _names_in(formula: Term) -> Iterator[str]:

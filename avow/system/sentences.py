@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from avow.diagnostics import Diagnostic, Severity, Span
 from avow.language.contract import Contract
-from avow.language.sentences import differences
+from avow.language.sentences import differences, elements_of
 from avow.system.plan import System
 from avow.system.temporal import parse_state
 
@@ -20,5 +20,5 @@ def requirement_sentences(system: System) -> Iterator[Diagnostic]:
 
 def said_otherwise(text: str, formula: str, contract: Contract, span: Span | None) -> Iterator[Diagnostic]:
     """What a requirement's sentence says otherwise than its formula. Raises Rejected where that is none."""
-    for found in differences(text, parse_state(formula, contract, span), contract.nodes):
+    for found in differences(text, parse_state(formula, contract, span), elements_of(contract.nodes)):
         yield Diagnostic(found.code, found.message, span, Severity.WARNING, found.hint)
