@@ -63,6 +63,37 @@ def check(
     return Answer(status, found, tuple(dict.fromkeys(order)), reason, time.monotonic() - start)
 
 
+_AT_ONCE_MS = 150
+
+
+def with_small_numbers(
+    translator: Translator, assertions: Iterable[Expr], numbers: Iterable[Expr], answer: Answer, *, seed: int = 0
+) -> Answer:
+    """The answer, or the same with a model whose numbers are small, if there is one and it is found at once: people
+    are to read it, and 21238 looks as if it meant something."""
+    numbers = [number for number in numbers if z3.is_arith(number)]
+    if answer.model is None or all(map(_is_small, map(answer.model.evaluate, numbers))):
+        return answer
+    assertions = list(assertions)
+    for least, most in ((0, 9), (-9, 9), (-_SMALL, _SMALL)):
+        within = [z3.And(least <= number, number <= most) for number in numbers]
+        again = check(translator, [*assertions, *within], timeout_ms=_AT_ONCE_MS, seed=seed)
+        if again.model is not None:
+            return again
+    return answer
+
+
+_SMALL = 99
+
+
+def _is_small(value: Expr) -> bool:
+    if z3.is_int_value(value):
+        return abs(int(value.as_long())) <= _SMALL
+    if z3.is_rational_value(value):
+        return abs(int(value.numerator_as_long())) <= _SMALL * int(value.denominator_as_long())
+    return True
+
+
 def _ask(
     translator: Translator,
     assertions: Sequence[Expr],

@@ -62,6 +62,10 @@ class Model:
         """The value in this model of an expression of a sort. Raises Unsupported."""
         return self._value(self._eval(expr), sort)
 
+    def evaluate(self, expr: Expr) -> Expr:
+        """The solver's value of an expression in this model."""
+        return self._eval(expr)
+
     def _eval(self, expr: Expr) -> Expr:
         return self.z3_model.eval(expr, model_completion=True)
 

@@ -254,7 +254,7 @@ class _Analysis:
             group,
             self.assumptions,
             answer.inputs,
-            timeout_ms=3 * self.patience.full,
+            timeout_ms=2 * self.patience.full,
             seed=self.seed,
         )
         listed = tuple((conflict.clauses, conflict.counterexample()) for conflict in found)

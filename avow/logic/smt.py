@@ -24,7 +24,15 @@ from avow.language.sorts import (
     components,
 )
 from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
-from avow.logic.checking import DEFAULT_TIMEOUT_MS, Answer, Engine, Status, check, z3_version
+from avow.logic.checking import (
+    DEFAULT_TIMEOUT_MS,
+    Answer,
+    Engine,
+    Status,
+    check,
+    with_small_numbers,
+    z3_version,
+)
 from avow.logic.clock import allowed, budget, now
 from avow.logic.counterexample import show_values
 from avow.logic.formula import conjunction, free_variables, negation
@@ -253,6 +261,9 @@ def _solve(
     ordinary = [v for v in free if not isinstance(v.sort, FunctionSort)]
     functions = [v for v in free if isinstance(v.sort, FunctionSort)]
 
+    whole = [*background, *(expr for _, expr in tracked)]
+    numbers = [translator.variable(v) for v in ordinary]
+
     def build(meanings: Mapping[Variable, Meaning]) -> list[Expr]:
         parts = [translator.term(formula, {**fixed, **meanings}) for formula in labelled.values()]
         return [*translator.opaque_facts(), *parts]
@@ -265,6 +276,7 @@ def _solve(
         answer = check(translator, background, timeout_ms=limit, seed=seed, tracked=tracked)
         if answer.status == "unsat":
             return Solution("unsat", core=answer.core)
+        answer = with_small_numbers(translator, whole, numbers, answer, seed=seed)
         if answer.model is not None:
             values = _read(answer.model, free)
             simple = values is not None and all(_is_simple(value) for value in values.values())
@@ -276,6 +288,7 @@ def _solve(
             answer = check(translator, background, timeout_ms=limit, tracked=tracked, engine="qsat")
             if answer.status == "unsat":
                 return Solution("unsat", core=answer.core, engine="z3, qsat")
+            answer = with_small_numbers(translator, whole, numbers, answer, seed=seed)
             values = _read(answer.model, free) if answer.model is not None else None
             if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
                 return Solution("sat", values, engine="z3, qsat")
@@ -432,9 +445,12 @@ def _with_tables(
     answer = check(translator, facts, timeout_ms=timeout_ms // 3, seed=seed)
     if answer.status == "unknown":
         answer = check(translator, facts, timeout_ms=timeout_ms * 2 // 3, engine="qsat")
-    if answer.model is None:
+    numbers = [translator.variable(v) for v in ordinary]
+    for points, default in parts.values():
+        numbers += [default, *(e for point, value in points for e in (*point, value))]
+    model = with_small_numbers(translator, facts, numbers, answer, seed=seed).model
+    if model is None:
         return None
-    model = answer.model
     try:
         values = model.values(ordinary)
         for variable, (points, default) in parts.items():
