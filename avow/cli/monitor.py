@@ -34,7 +34,7 @@ def command(
     """Judge TRACE against the contracts of SYSTEM (a folder, or a name under contracts/).
 
     TRACE is JSON lines in ROSMonitoring's shape, a ROS 1 or ROS 2 bag, or - for standard input. Code 1 where something
-    was broken, 2 where an input cannot be used.
+    was broken or nothing could be judged, 2 where an input cannot be used.
     """
     from avow.cli.workspace import system_folder
     from avow.system.load import load_system
@@ -74,7 +74,7 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
         if not show_all and count > SHOWN:
             click.echo(f"… and {count - SHOWN} more (--all shows them)")
         _print_summary(running)
-    return 0 if running.clean else 1
+    return 0 if running.clean and _anything_judged(running) else 1
 
 
 def _events(trace: str) -> Iterator[Recorded]:
@@ -93,6 +93,10 @@ def _events(trace: str) -> Iterator[Recorded]:
     return read_lines(lines(), "<stdin>")
 
 
+def _anything_judged(running: Session) -> bool:
+    return any(tally.judged for *_, tally in running.clauses())
+
+
 def _print_summary(running: Session) -> None:
     for monitor, name, kind, tally in running.clauses():
         words = [f"judged {tally.judged} times"]
@@ -106,7 +110,12 @@ def _print_summary(running: Session) -> None:
             words.append(tally.reason)
         click.echo(f"  {monitor.setup.node.name}.{name} ({kind}): {', '.join(words)}")
     faults = ", ".join(f"{count} × {fault}" for fault, count in running.counts.items())
-    click.echo(f"{running.events} events: {faults or 'nothing broken'}")
+    fine = (
+        "nothing broken"
+        if _anything_judged(running)
+        else "nothing was judged: no clause ever had a value for all that it speaks of"
+    )
+    click.echo(f"{running.events} events: {faults or fine}")
 
 
 def _serve(system: System, nodes: tuple[str, ...], port: int) -> None:

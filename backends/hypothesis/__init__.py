@@ -25,7 +25,7 @@ class HypothesisBackend:
 
     name = "hypothesis"
     title = "Property-based tests of a Python function, generated from the contract"
-    version = "2"
+    version = "3"
     strength = Verdict.TESTED
     uses_wiring = False
     link = Link.GENERATED

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -16,9 +17,12 @@ from avow.language.sorts import (
     BoolSort,
     EnumSort,
     FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
     Sort,
 )
-from avow.language.terms import Arithmetic, Literal, Negative, Term
+from avow.language.terms import Arithmetic, Compare, Literal, Negative, Term, Widen
 from avow.logic.evaluate import NotEvaluable, evaluate
 from avow.logic.formula import free_variables
 from avow.logic.traversal import subterms
@@ -49,6 +53,7 @@ class Pools:
 def pools(formulas: Iterable[Term], rows: Mapping[str, tuple[tuple[Value, ...], ...]]) -> Pools:
     """From the constants in the formulas and from the scenario's rows."""
     numbers: set[Fraction] = set()
+    solved: set[Fraction] = set()
     strings: set[str] = {""}
     for formula in formulas:
         for part in subterms(formula):
@@ -61,7 +66,9 @@ def pools(formulas: Iterable[Term], rows: Mapping[str, tuple[tuple[Value, ...], 
                 with contextlib.suppress(NotEvaluable):
                     value = evaluate(part, {})  # `4 * Flow` is a threshold as much as 2 is
                     numbers.add(Fraction(value) if isinstance(value, int | Fraction) else Fraction(0))
-    around = _around(numbers)
+            elif isinstance(part, Compare):
+                solved |= _solved(part)
+    around = _around(numbers | solved)
     few = sorted({*numbers, Fraction(0)}) if len(numbers) <= MANY else []
     # An output's threshold may be reached from an input by adding or taking away.
     combined = _simple((*around, *(a + b for a in few for b in few), *(a - b for a in few for b in few)))
@@ -75,6 +82,55 @@ def pools(formulas: Iterable[Term], rows: Mapping[str, tuple[tuple[Value, ...], 
         STRING: texts,
     }
     return Pools(_by_sort(combined, texts), near, rows, _by_sort(around, texts))
+
+
+def _solved(comparison: Compare) -> set[Fraction]:
+    """Where the two sides meet, if all that is open is one value: ``4 * gauge < 20`` has its threshold at 5."""
+    left, right = _linear(comparison.left), _linear(comparison.right)
+    if left is None or right is None:
+        return set()
+    total = {what: left.get(what, Fraction(0)) - right.get(what, Fraction(0)) for what in left | right}
+    constant = total.pop(None, Fraction(0))
+    slopes = [slope for slope in total.values() if slope]
+    if len(slopes) != 1:
+        return set()
+    meeting = -constant / slopes[0]
+    return {meeting, Fraction(math.floor(meeting)), Fraction(math.ceil(meeting))}
+
+
+def _linear(term: Term) -> dict[Term | None, Fraction] | None:
+    """The coefficients of what is no arithmetic (under None, the constant); None if it is not linear in it."""
+    match term:
+        case Literal(value=bool()) | Literal(value=str()):
+            return None
+        case Literal(value=value) if isinstance(value, int | Fraction):
+            return {None: Fraction(value)}
+        case Widen(term=inner):
+            return _linear(inner)
+        case Negative(term=inner):
+            return _times(_linear(inner), Fraction(-1))
+        case Arithmetic(operator=operator, left=left, right=right):
+            one, other = _linear(left), _linear(right)
+            if one is None or other is None:
+                return None
+            match operator:
+                case "+" | "-":
+                    more = _times(other, Fraction(1 if operator == "+" else -1)) or {}
+                    return {what: one.get(what, Fraction(0)) + more.get(what, Fraction(0)) for what in one | more}
+                case "*" if other.keys() <= {None}:
+                    return _times(one, other.get(None, Fraction(0)))
+                case "*" if one.keys() <= {None}:
+                    return _times(other, one.get(None, Fraction(0)))
+                case "/" if other.keys() == {None} and other[None]:
+                    return _times(one, 1 / other[None])
+            return None
+        case _ if isinstance(term.sort, RealSort | IntegerSort | NaturalSort):
+            return {term: Fraction(1)}
+    return None
+
+
+def _times(linear: dict[Term | None, Fraction] | None, factor: Fraction) -> dict[Term | None, Fraction] | None:
+    return None if linear is None else {what: coefficient * factor for what, coefficient in linear.items()}
 
 
 def _by_sort(numbers: tuple[Fraction, ...], texts: tuple[str, ...]) -> dict[Sort, tuple[Value, ...]]:

@@ -33,6 +33,9 @@ node n {{
         ("not safe -> y", "row in todo", "not safe and row != 2"),
         ("y <=> length(loads) < 3", "", "len(loads) < 4"),
         ("before - Flow >= 10 -> y", "", "before > 10.5"),
+        ("y <=> before * 7 / 3 < Limit", "", "before * 7 / 3 < 501"),
+        ("y <=> 30 - 4 * before <= before - 100", "", "before >= 26.1"),
+        ("y <=> 3 * row >= 1000", "", "row > 334"),
     ],
 )
 def test_is_refuted(tmp_path: Path, formula: str, assume: str, subject: str) -> None:

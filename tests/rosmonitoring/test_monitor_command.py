@@ -77,6 +77,15 @@ def test_bad_input_is_code_2_with_its_place(case_folder: Path, traces: dict[str,
     assert "Traceback" not in done.stderr
 
 
+def test_a_trace_of_other_topics_is_no_success(case_folder: Path, traces: dict[str, Path]) -> None:
+    """Seeded fault: a remapped robot, whose every topic has another name."""
+    events = [json.loads(line) for line in traces["nominal"].read_text().splitlines()]
+    text = "".join(json.dumps({**event, "topic": f"robot2/{event['topic']}"}) + "\n" for event in events)
+    done = avow(str(case_folder), "-", stdin=text)
+    assert done.returncode == 1
+    assert "nothing was judged" in done.stdout
+
+
 def test_usage(case_folder: Path) -> None:
     assert avow(str(case_folder)).returncode == 2
     assert avow(str(case_folder), "x", "--serve", "0").returncode == 2
