@@ -27,6 +27,7 @@ _HEAD = r"""\documentclass[a4paper]{article}
 _TABLE = r"""
 \begin{longtable}{@{}>{\raggedright}p{0.15\textwidth}|l|>{\raggedright\arraybackslash}p{0.66\textwidth}@{}}
 """
+_CONTEXT = r"\begin{longtable}[l]{@{}l@{\;}>{\raggedright\arraybackslash}p{0.75\textwidth}@{}}"
 
 
 def to_latex(contract: Contract) -> str:
@@ -36,16 +37,16 @@ def to_latex(contract: Contract) -> str:
 
 def _context(contract: Contract) -> Iterable[str]:
     types = dict(contract.types)
-    rows = [rf"{latex_name(name)} :& {show_type(sort, 'latex')} \\" for name, sort in contract.types]
+    rows = [rf"${latex_name(name)}$ & ${{}}: {show_type(sort, 'latex')}$ \\" for name, sort in contract.types]
     rows += [
-        rf"{latex_name(name)} =& {show_term(term, 'latex')} \\"
+        rf"${latex_name(name)}$ & ${{}}= {show_term(term, 'latex')}$ \\"
         for name, term in contract.constants
         if name not in types
     ]
     if rows:
-        yield r"\textbf{Context}" + "\n\\begin{align*}"
-        yield "\n".join(rows).removesuffix(r" \\")
-        yield "\\end{align*}\n"
+        yield r"\textbf{Context}" + "\n\n" + _CONTEXT
+        yield "\n".join(rows)
+        yield "\\end{longtable}\n"
 
 
 def _node(node: Node) -> str:

@@ -224,10 +224,10 @@ class _Printer:
         for i, argument in enumerate(arguments):
             real = i < len(parameters) and parameters[i] == REAL
             shown.append(self.show(argument, _LOOSEST, real=real))
-        return f"{name}({', '.join(shown)})"
+        return f"{name}({self.style.comma.join(shown)})"
 
     def listed(self, items: tuple[Term, ...], place: int, *, real: bool = False) -> str:
-        return ", ".join(self.show(i, place, real=real) for i in items)
+        return self.style.comma.join(self.show(i, place, real=real) for i in items)
 
     def arithmetic(self, term: Arithmetic) -> tuple[str, int]:
         level = SUM if term.operator in "+-" else PRODUCT

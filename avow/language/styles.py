@@ -27,6 +27,8 @@ class Style:
     braces: Callable[[str], str]
     tight_quantifier: bool
     """Whether a quantifier closes itself, so that it never needs parentheses."""
+    comma: str = ", "
+    """Between arguments and items; where lines are broken, a place to do so if there is no better one."""
     careful: bool = False
     """Whether `and` and `or` stand in parentheses beside `->` and `<=>`, though they need none."""
 
@@ -212,6 +214,7 @@ STYLES: dict[StyleName, Style] = {
         arrow=r" \rightarrow ",
         unspecified=r"\text{(unspecified)}",
         sequence=(r"\langle ", r"\rangle "),
+        comma=r",\penalty9000 ",
         name=latex_name,
         string=lambda value: rf"\text{{``{latex_escape(value)}''}}",
         braces=lambda inner: rf"\{{{inner}\}}",

@@ -11,6 +11,7 @@ from avow.backends.dafny.printer import NotExpressible, Predicate, Vocabulary, c
 from avow.language.contract import Clause, Node
 from avow.language.sorts import DataSort, EnumSort, OpaqueSort
 from avow.language.terms import Variable
+from avow.logic.formula import free_variables
 
 _MODULE = 'module {:options "--function-syntax:3"}'
 """Ignored by 2.3; makes `predicate` ghost in 4.x, as it is in 2.3."""
@@ -63,6 +64,9 @@ def generate(node: Node, guarantees: Sequence[str]) -> Generated:
     for port in inputs + outputs:
         words.local(port)
         sort_text(port.sort, words)
+    for clause in node.assumptions:
+        if told := [v.name for v in free_variables(clause.formula) if v in outputs]:
+            raise NotExpressible(f"assumption {clause.name}: it speaks of the output {told[0]}", clause.span)
     assumed = [print_clause(c.name, c.formula, words) for c in node.assumptions]
     promised: list[tuple[Clause, tuple[Predicate, ...]]] = []
     uncovered: list[tuple[str, str]] = []

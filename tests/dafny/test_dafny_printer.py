@@ -15,10 +15,10 @@ from avow.backend import Job, Limits
 from avow.backends.dafny import BACKEND
 from avow.backends.dafny.modules import Generated, generate
 from avow.backends.dafny.names import RESERVED, Names, identifier
-from avow.backends.dafny.printer import Vocabulary, print_clause
+from avow.backends.dafny.printer import NotExpressible, Vocabulary, print_clause
 from avow.backends.dafny.runner import verify
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
-from avow.language.load import load_contract
+from avow.language.load import check_text, load_contract
 from avow.language.sorts import BOOL, INTEGER, REAL, Constructor, DataSort, EnumSort, FunctionSort, OpaqueSort
 from avow.language.terms import FALSE, And, Compare, Literal, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.logic.smt import entails
@@ -338,3 +338,12 @@ def _help(name: str) -> str:
 def test_false_is_false() -> None:
     x = Variable(Role.INPUT, "x", BOOL)
     assert print_clause("c", FALSE, Vocabulary(Names(), Names(), (x,)))[0].body == "false"
+
+
+def test_an_assumption_about_an_output_is_refused() -> None:
+    """Step's requirement can speak of the inputs only: nothing is generated that Dafny could not resolve."""
+    text = "node n { inputs( a : BOOL ) outputs( b : BOOL ) topics() assume( in.a or out.b ) guarantee( out.b ) }"
+    contract = check_text(text, "f")[0]
+    assert contract is not None
+    with pytest.raises(NotExpressible, match="assumption A1: it speaks of the output b"):
+        generate(contract.nodes[0], ["G1"])
