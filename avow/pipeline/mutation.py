@@ -51,7 +51,11 @@ class Score:
 
     def blind(self, difference: Difference) -> str:
         """What the method did not see, and what would show it."""
-        table = ", or what the plan gives it (a table, instances) leaves that out" if self.mapped else ""
+        table = (
+            ", or what the plan gives it (a table, instances, a property for a ban) leaves that out"
+            if self.mapped
+            else ""
+        )
         if difference.forced:
             return f"`{self.method}` has not looked there{table}; it would notice, given such a case"
         if not difference.answer:
