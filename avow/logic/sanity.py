@@ -9,13 +9,13 @@ tried for these values, and if it holds there it is `checked`, and says that it 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from avow.diagnostics import Severity
 from avow.language.contract import ClauseKind, Contract, Node
-from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort, Sort
+from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.logic.claims import Claim, Property, claims, node_key, triggers
 from avow.logic.clock import now
@@ -391,7 +391,7 @@ class _Analysis:
                 shown = Counterexample(show_values(values)) if values else None
                 because = self._if_refuted(f"unconstrained-{name}")
                 return _Finding(Verdict.REFUTED, text, counterexample=shown, because=because, engine=answer.engine)
-        if self._by_definitions(question, self.limit // 2):
+        if _are_endless(question.values()) and self._by_definitions(question, self.limit // 2):
             because = self._if_refuted(f"unconstrained-{name}")
             return _Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name}", because=because)
         return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
@@ -416,13 +416,16 @@ class _Analysis:
         from avow.logic.smt import solve
 
         limit = min(limit or self.limit, self.limit)
-        answer = solve(formulas, timeout_ms=limit, seed=self.seed, shown=False)
+        first = min(limit, _GLANCE_MS // 2) if _are_endless(formulas.values()) else limit
+        answer = solve(formulas, timeout_ms=first, seed=self.seed, shown=False)
+        if answer.status == "unknown" and first < limit:
+            if self._by_definitions(formulas, limit // 2):
+                return _Finding(Verdict.PROVED)
+            answer = solve(formulas, timeout_ms=limit, seed=self.seed, shown=False)
         if answer.status == "unknown" and self.scenario:
             within = solve(formulas, timeout_ms=limit, seed=self.seed, given=self.scenario)
             # An example in the scenario is an example; that there is none in it proves nothing.
             answer = within if within.status == "sat" else answer
-        if answer.status == "unknown" and self._by_definitions(formulas, limit // 2):
-            return _Finding(Verdict.PROVED)
         match answer.status:
             case "sat":
                 return _Finding(Verdict.PROVED, engine=answer.engine)
@@ -436,8 +439,6 @@ class _Analysis:
         """Whether these hold together, for functions that have no finite table."""
         from avow.logic.realizability import possible
 
-        if not any(_is_endless(v.sort) for f in formulas.values() for v in free_variables(f)):
-            return False
         return possible(formulas, timeout_ms=limit, seed=self.seed)
 
     def _fails_somewhere(self, hypotheses: Mapping[str, Term], formula: Term, alone: str, implied: str) -> _Finding:
@@ -450,10 +451,11 @@ class _Analysis:
         return replace(finding, explanation=text, clauses=needed)
 
 
-def _is_endless(sort: Sort) -> bool:
-    """Whether it is one of functions that need not have a finite table."""
-    numbers = RealSort | IntegerSort | NaturalSort
-    return isinstance(sort, FunctionSort) and any(isinstance(p, numbers) for p in sort.parameters)
+def _are_endless(formulas: Iterable[Term]) -> bool:
+    """Whether they speak of functions that need not have a finite table."""
+    sorts = {v.sort for formula in formulas for v in free_variables(formula)}
+    parameters = {p for sort in sorts if isinstance(sort, FunctionSort) for p in sort.parameters}
+    return any(isinstance(p, RealSort | IntegerSort | NaturalSort) for p in parameters)
 
 
 def _resting(needed: tuple[str, ...]) -> str:

@@ -9,7 +9,9 @@ import weakref
 
 import pytest
 
-from avow.logic.clock import watchdog
+from avow.logic.checking import check
+from avow.logic.clock import allowed, budget, now, watchdog
+from avow.logic.translation import Translator
 
 
 def busy(seconds: float) -> None:
@@ -82,3 +84,26 @@ def test_a_forked_process_has_a_watchdog_of_its_own() -> None:
             busy(0.3)
         os._exit(0 if interrupted.is_set() else 1)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+def test_questions_within_a_budget_share_it() -> None:
+    with budget(10_000):
+        assert 9_000 < allowed(60_000) <= 10_000
+        assert allowed(50) == 50
+        with budget(100):
+            assert allowed(60_000) <= 100
+            end = now() + 0.15
+            while now() < end:
+                pass
+            assert allowed(60_000) == 0
+            with budget(5_000):
+                assert allowed(60_000) == 0, "a block within cannot extend it"
+        assert allowed(60_000) > 9_000
+    assert allowed(60_000) == 60_000
+
+
+def test_without_time_left_nothing_is_asked() -> None:
+    translator = Translator()
+    with budget(0):
+        assert check(translator, [translator.true()]).status == "unknown"
+    assert check(translator, [translator.true()]).status == "sat"
