@@ -83,7 +83,7 @@ _PATTERN = re.compile(
     r'|(?P<string>"(?:[^"\\\n]|\\[^\n])*")'
     r'|(?P<open_string>"[^\n]*)'
     r"|(?P<word>[^\W\d_][\w']*)"
-    r"|(?P<junk>[^\x00-\x7f\w\s]+|.)",
+    r"|(?P<junk>.)",
     re.DOTALL,
 )
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
@@ -255,23 +255,19 @@ class _Other:
         self.reports.error("RCL107", message, start, end, hint=hint)
         self.stand_in(("NAME", piece), start, end)
 
-    def other(self, piece: str, start: int, end: int) -> None:
-        plain = wide(piece[0])
-        if plain is not None and (plain in SYMBOLS or plain in KEYWORDS):
-            at = start + 1
-            message = f"`{piece[0]}` is not RCL"
-            self.reports.error("RCL101", message, start, at, hint=f"write the plain sign `{plain}`")
-            self.stand_in((SYMBOLS[plain], plain), start, at)
-            if end > at:
-                self.other(piece[1:], at, end)
+    def other(self, character: str, start: int, end: int) -> None:
+        """A character that has no place: a full-width sign, one that nobody sees, or any other."""
+        plain = wide(character)
+        if plain is not None and plain in SYMBOLS:
+            hint = f"write the plain sign `{plain}`"
+            self.reports.error("RCL101", f"`{character}` is not RCL", start, end, hint=hint)
+            self.stand_in((SYMBOLS[plain], plain), start, end)
             return
-        if invisible(piece[0]) is not None:
-            first, count = self.unseen.get(piece[0], (start, 0))
-            self.unseen[piece[0]] = (first, count + 1)
-            if not piece[0].isspace():  # it may split a name in two
+        if invisible(character) is not None:
+            first, count = self.unseen.get(character, (start, 0))
+            self.unseen[character] = (first, count + 1)
+            if not character.isspace():  # it may split a name in two
                 self.reports.torn.append(start)
-            if len(piece) > 1:
-                self.other(piece[1:], start + 1, end)
             return
         self.reports.torn.append(start)
         begun, ended = self.junk

@@ -194,6 +194,12 @@ node Agent {
         '"' * 100_001,
         "/*" * 100_000,
         "node " * 100_000,
+        *(
+            FRAME % (sign * 100_000)
+            for sign in ("\u200b", "（", "§ ", "é§", "[", "s[0] ", "'a' ", "“", "`", "a::", "..", "\\a ")
+        ),
+        *(FRAME % (words * 30_000) for words in ("(node) ", "inputs.r ", "b and < 3 ", "forall(x in REAL ", "#a ")),
+        *(text * 100_000 for text in ("# a\n", "\r", "a b {", "G x ", "node node {", "node n { in( [ ' “ ")),
         "\x00\x01\xff" * 1000,
         "\ud800",
     ],
@@ -203,6 +209,7 @@ def test_hostile_texts_are_diagnosed(text: str) -> None:
     contract, found = check_text(text, "f")
     assert contract is None
     assert 0 < len(found) <= 201
+    assert max(len(d.message) for d in found) < 500
     assert all(d.span is not None for d in found)
 
 
