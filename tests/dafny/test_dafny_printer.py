@@ -166,6 +166,7 @@ WORDS = """
 
 
 @pytest.mark.needs_dafny
+@pytest.mark.slow
 def test_any_word_may_be_the_name_of_a_clause_a_port_a_type_or_an_element() -> None:
     """The words that some language or other keeps for itself; one run for all of them."""
     words = WORDS.split()

@@ -75,6 +75,7 @@ def test_many_blocks_take_one_thread_and_keep_nothing_alive() -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:This process .*multi-threaded:DeprecationWarning")
 def test_a_forked_process_has_a_watchdog_of_its_own() -> None:
     with watchdog(1_000, lambda: None):
         pass

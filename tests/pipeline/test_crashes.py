@@ -52,6 +52,7 @@ def test_an_answer_that_a_killed_worker_did_not_give_is_asked_for_again(
     assert assess.is_settled()
 
 
+@pytest.mark.filterwarnings("ignore:This process .*multi-threaded:DeprecationWarning")
 def test_what_was_left_half_written_is_swept_away(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     place = Workspace(workspace)
     kept = place.artifacts / "s" / ".export.json"
