@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +24,7 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool) -> int:
 
     PATHS are .rcl files, folders of them, or - for the standard input. A file with a syntax error stays as it is.
     """
-    from avow.diagnostics import Rejected
+    from avow.diagnostics import Diagnostic, Rejected
     from avow.files import write
     from avow.language.format import format_text
     from avow.language.load import MAX_BYTES, decode, read_source
@@ -54,7 +55,13 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool) -> int:
         elif check:
             click.echo(f"{printable(str(path))} is not in the canonical layout")
         else:
-            write(path.resolve(), formatted)  # through a symbolic link, not in its place
+            target = path.resolve()  # through a symbolic link, not in its place
+            mode = target.stat().st_mode
+            if not mode & stat.S_IWUSR:
+                faults.append(Diagnostic("RCL002", f"{path} is read-only and stays as it is"))
+                continue
+            write(target, formatted)
+            target.chmod(stat.S_IMODE(mode))
             click.echo(f"formatted {printable(str(path))}")
     if faults:
         click.echo(render(faults), err=True)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from avow.diagnostics import Diagnostic, Rejected
 from avow.language.flat import flat
 from avow.language.lexer import Token, tokens
-from avow.language.load import clean_text
+from avow.language.load import clean_text, in_order, unless_torn
 from avow.language.outline import FileSyntax, read
 from avow.language.source import Reports, Source
 from avow.language.syntax import Tree
@@ -29,8 +29,8 @@ def format_text(text: str, file: str) -> str:
     reports = Reports(found)
     comments: list[Token] = []
     stream = tokens(reports, comments)
-    syntax = read(stream, reports)
-    errors = tuple(d for d in reports.found if d.is_error)
+    syntax = read(stream, unless_torn(reports))
+    errors = tuple(d for d in in_order(reports) if d.is_error)
     if errors:
         raise Rejected(*errors)
     return _Layout(found, stream, comments, syntax).file()

@@ -129,8 +129,7 @@ def check_sources(
         reports = Reports(source)
         comments: list[Token] = []
         found = tokens(reports, comments)
-        torn = any(d.code == "RCL103" for d in reports.found)
-        syntax = read(found, Reports(source) if torn else reports)  # half a file: what is missing says nothing
+        syntax = read(found, unless_torn(reports))
         parsed.append((syntax, reports))
         first = found[0].start if found else len(source.text)
         linted.append(LintedFile(syntax, tuple(comments), first, reports))
@@ -143,10 +142,16 @@ def check_sources(
     contract = _contract(parsed, declarations)
     sound = not partial and not any(reports.failed for _, reports in parsed)
     lint(linted, contract if sound else None, off)
-    diagnostics = [d for _, reports in parsed for d in _sorted(reports)]
+    diagnostics = [d for _, reports in parsed for d in in_order(reports)]
     if not any(d.is_error for d in diagnostics):
         return contract, tuple(diagnostics)
     return None, tuple(diagnostics)
+
+
+def unless_torn(reports: Reports) -> Reports:
+    """Where to report syntax errors: nowhere if a comment swallows the rest of the file, since what is missing then
+    says nothing."""
+    return Reports(reports.source) if any(d.code == "RCL103" for d in reports.found) else reports
 
 
 def _contract(parsed: Sequence[tuple[FileSyntax, Reports]], declarations: Declarations) -> Contract:
@@ -171,7 +176,8 @@ def _contract(parsed: Sequence[tuple[FileSyntax, Reports]], declarations: Declar
     )
 
 
-def _sorted(reports: Reports) -> list[Diagnostic]:
+def in_order(reports: Reports) -> list[Diagnostic]:
+    """What was found, by its place; at the end, that there is more than is kept."""
     found = sorted(reports.found, key=lambda d: (d.span.line, d.span.column) if d.span else (0, 0))
     if reports.full:
         severity = Severity.ERROR if reports.failed else Severity.WARNING
@@ -252,7 +258,7 @@ def _parse(
         else:
             term = checker.term(tree)
     if term is None or reports.failed:
-        raise Rejected(*_sorted(reports))
+        raise Rejected(*in_order(reports))
     return term
 
 

@@ -70,7 +70,9 @@ def test_styles() -> None:
         "for all x' in reals: in.m(x', 1) and out.st2 not in {red, green} implies out.c is move(x', 0.5)"
     )
     latex = show_term(term, "latex")
-    assert latex.startswith(r"\forall x' \in \mathbb{R} \bullet \mathit{in.m}(x',\penalty9000 1) \land \mathit{out.st2} \notin \{")
+    assert latex.startswith(
+        r"\forall x' \in \mathbb{R} \bullet \mathit{in.m}(x',\penalty9000 1) \land \mathit{out.st2} \notin \{"
+    )
     inner = parse_formula("(forall(x in REAL | x < r)) <=> b", NODE, LOADED)
     assert show_term(inner) == "(∀ x ∈ ℝ · x < in.r) ↔ in.b"
 

@@ -159,6 +159,32 @@ def test_fmt(tmp_path: Path) -> None:
     assert path.read_text() == "node n{"
 
 
+def test_fmt_keeps_what_a_file_is(tmp_path: Path) -> None:
+    path, link = tmp_path / "f.rcl", tmp_path / "link.rcl"
+    text = "node n{inputs()outputs(b:BOOL)topics()G(b)}"
+    path.write_text(text)
+    path.chmod(0o640)
+    link.symlink_to(path)
+    assert invoke("fmt", str(link))[0] == 0
+    assert link.is_symlink()
+    assert path.stat().st_mode & 0o777 == 0o640
+    path.write_text(text)
+    path.chmod(0o440)
+    code, said = invoke("fmt", str(path))
+    assert code == 2
+    assert "read-only" in said
+    assert path.read_text() == text
+
+
+def test_fmt_reports_in_order_and_nothing_after_an_open_comment(tmp_path: Path) -> None:
+    path = tmp_path / "f.rcl"
+    path.write_text("node n { inputs( /* to be done")
+    said = invoke("fmt", str(path))[1]
+    assert [line[:14] for line in said.splitlines() if line.startswith("error")] == ["error[RCL103]:"]
+    path.write_text("node n { inputs(")
+    assert [line.strip()[-3:] for line in invoke("fmt", str(path))[1].splitlines() if "-->" in line] == ["1:8", ":16"]
+
+
 @pytest.mark.parametrize("notation", ["rcl", "text", "unicode", "latex", "json"])
 def test_translate(files: dict[str, str], tmp_path: Path, notation: str) -> None:
     code, output = invoke("translate", files["good"], "--to", notation)
