@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from datetime import date
 
 from avow.assurance.facts import Facts
@@ -12,6 +13,9 @@ from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, effective, join, link_rank, weigh
 from avow.verdict import Link, Verdict
+
+_LONG = 160
+"""So much of a tool's own words stands in a suggestion."""
 
 
 def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date) -> str | None:
@@ -170,7 +174,18 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         return Suggestion(
             "narrow the question (a scenario in the plan), raise the time limit, or accept it with a reason", cost=20
         )
-    return _new_method(view, demand, used, facts)
+    new = _new_method(view, demand, used, facts)
+    for item in view.counting:
+        record = item.entry.evidence
+        if record.method in used and record.verdict is Verdict.ERROR:
+            return Suggestion(f"repair what keeps `{record.method}` from answering: {_clipped(record.summary)}", cost=8)
+        if record.method in used and record.verdict is Verdict.UNKNOWN and not record.vacuous:
+            return replace(new, text=f"{new.text}; or see why `{record.method}` gave up: {_clipped(record.summary)}")
+    return new
+
+
+def _clipped(text: str) -> str:
+    return text if len(text) <= _LONG else f"{text[:_LONG].rpartition(' ')[0]} …"
 
 
 def _two_answers(view: ObligationView) -> str:

@@ -342,3 +342,17 @@ def test_two_answers_about_different_things_need_no_wrong_tool(read: str, said: 
     suggestion = the_case("default", proof, refutation).obligations[0].suggestion
     assert suggestion is not None
     assert suggestion.text.startswith(said)
+
+
+def test_a_method_that_gave_no_answer_is_seen_to_first() -> None:
+    def step(verdict: Verdict, words: str) -> str:
+        other = replace(evidence("n.g", verdict, "hypothesis"), summary=words)
+        suggestion = the_case("default", PROOF, other).obligations[0].suggestion
+        return suggestion.text if suggestion else ""
+
+    assert step(Verdict.ERROR, "n.py, line 3: no Python") == (
+        "repair what keeps `hypothesis` from answering: n.py, line 3: no Python"
+    )
+    given_up = step(Verdict.UNKNOWN, "its condition was never met " * 20)
+    assert "; or see why `hypothesis` gave up: its condition was never met" in given_up
+    assert given_up.endswith("…")
