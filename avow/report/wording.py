@@ -51,7 +51,8 @@ MEANINGS = {
     Status.UNSUPPORTED: "nothing speaks against it, but something that it rests on fails",
     Status.CIRCULAR: "it would support itself: refused",
     Status.REFUTED: "false: there is a counterexample",
-    Status.CONTRADICTORY: "one tool proves it, another refutes it: one of them is wrong, or they were shown different things",
+    Status.CONTRADICTORY: "one tool proves it, another refutes it: "
+    "one of them is wrong, or they were shown different things",
 }
 
 _DIGEST = re.compile(r"[0-9a-f]{64}\Z")
