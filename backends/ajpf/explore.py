@@ -44,8 +44,9 @@ def _backlog(newest: Sequence[State]) -> str:
     if most < _MANY:
         return ""
     return (
-        f", with up to {most} intentions at once: each action draws percepts, and the agent falls behind them. If an "
-        "action leaves some as they are, the environment file can say so (`after: {action: {group: [keep]}}`)"
+        f", with up to {most} intentions at once: each action draws percepts, and the agent falls behind them. Guards "
+        "can keep it from acting again on what it knows; with `semantics: edge`, only changes are events, and the "
+        "environment file can say what an action leaves as it is (`after: {action: {group: [keep]}}`)"
     )
 
 

@@ -264,3 +264,19 @@ def test_what_actions_leave_as_it_was_is_one_sentence(tmp_path):
     )
     said = [line for line in read_environment(path).describe() if line.startswith("after")]
     assert said == ["after park or spray, zone and tank are as before", "after move, zone is in or as before"]
+
+
+def test_the_small_agent_of_the_documentation_does_what_is_said(root, tmp_path):
+    page = (root / "docs/backends/ajpf.md").read_text()
+    text = page.partition("```gwendolen\n")[2].partition("```")[0]
+    drawn = page.partition("```yaml environment\n")[2].partition("```")[0]
+    (tmp_path / "e.yaml").write_text(drawn)
+    program, draws = parse_program(text, "warden.gwen"), read_environment(tmp_path / "e.yaml")
+    graph = explore(Agent(program, draws, Semantics.EDGE), states=20_000)
+    assert graph.unfinished is None
+    parks = Property("p", parse_psl("[] (B(warden, outside) -> (<> D(warden, park)))"))
+    sprays = Property("s", parse_psl("[] (B(warden, outside) -> (<> D(warden, spray)))"))
+    checker = Checker(graph, (parks, sprays))
+    assert checker.check(parks).holds
+    assert not checker.check(sprays).holds
+    assert "intentions at once" in explore(Agent(program, draws, Semantics.MCAPL), states=2_000).unfinished
