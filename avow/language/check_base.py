@@ -18,9 +18,7 @@ from avow.language.sorts import (
 )
 from avow.language.source import Reports
 from avow.language.syntax import Tree
-from avow.language.terms import (
-    Term,
-)
+from avow.language.terms import Construct, EnumValue, Term
 
 
 class Base:
@@ -40,6 +38,8 @@ class Base:
             return None
         shown = show_sort(term.sort)
         hint = "compare it with something: `… == …`"
+        if isinstance(term, EnumValue | Construct):
+            hint = "compare each time: `s == red or s == green`, or `s in {red, green}`"
         if isinstance(term.sort, FunctionSort) and term.sort.result == BOOL:
             hint = f"apply it to its {len(term.sort.parameters)} argument(s)"
         self.error("RCL301", f"this must be true or false, and it is of type {shown}", tree, hint=hint)

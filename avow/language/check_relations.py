@@ -14,6 +14,7 @@ from avow.language.sorts import (
     BOOL,
     INTEGER,
     REAL,
+    STRING,
     EnumSort,
     FunctionSort,
     SequenceSort,
@@ -165,7 +166,7 @@ class Relations(Applications):
                 return f"apply `{self.text(tree)}` to its {count(len(one.sort.parameters), 'argument')} first"
             if isinstance(one.sort, EnumSort) and isinstance(other, Literal) and other.value in one.sort.members:
                 return f"write `{other.value}` without quotation marks"
-            if isinstance(one.sort, EnumSort) and other.sort == BOOL:
+            if isinstance(one.sort, EnumSort) and (other.sort in (BOOL, STRING) or isinstance(other.sort, NUMERIC)):
                 return f"the values of {one.sort.name} are {', '.join(one.sort.members[:6])}"
         return None
 

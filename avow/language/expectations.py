@@ -96,8 +96,8 @@ def _in_relation(
         return "equality is written `==`"
     if found.type == "EMPTY_SEQUENCE" and "NE" in expected:
         return "unequal is written `!=`"
-    if found.type == "NOT" and after is not None and after.type == "IN":
-        return "write `!in`"
+    if found.type == "NOT" and after is not None and after.type in ("IN", "EQ", "EQUALS"):
+        return "write `!in`" if after.type == "IN" else "write `!=`"
     if _has_no_left_side(earlier, before, found, expected):
         return "say what is compared each time: `0 < r and r < 3`, or `0 < r < 3`"
     if expected == {"DOT"} and before is not None:

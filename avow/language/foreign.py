@@ -64,6 +64,9 @@ SIGNS: dict[str, Foreign] = {
     **_as("LT", "<", "⟨", "〈", hint="write sequences as `<a, b>`"),
     **_as("GT", ">", "⟩", "〉", hint="write sequences as `<a, b>`"),
     **_as("UPTO", "upto", "...", "..", "…", hint="write a range as `<a upto b>`"),
+    **_hint(
+        "RCL has no inverse functions: say which values are meant, `exists(x in REAL | f(x) == y and …)`", "^-1", "⁻¹"
+    ),
     **_hint("write `REAL`: reals are exact", "ℚ"),
     **_hint(_SET_OPERATORS, "∪", "∩", "⊆", "⊂", "⊇", "∖"),
     **_hint("the empty set is written `{}`", "∅"),
@@ -162,7 +165,8 @@ OPERATORS = {
     **dict.fromkeys(("implies", "then", "THEN", "IMPLIES", "Implies"), "write `->`"),
     **dict.fromkeys(("iff", "IFF", "equiv"), "write `<=>`"),
     **{w: f"write `{w.lower()}`" for w in ("AND", "OR", "NOT", "IN", "FORALL", "EXISTS", "And", "Or", "Not")},
-    **dict.fromkeys(("is", "equals", "eq"), "write `==`"),
+    "is": "write `==` (or `!=`, `<`, `<=`, `>`, `>=`)",
+    **dict.fromkeys(("equals", "eq"), "write `==`"),
     **dict.fromkeys(("xor", "XOR"), "write `(a) != (b)` for: either a or b"),
     **dict.fromkeys(("mod", "div", "rem"), "RCL has no remainder and no whole division"),
     "unless": "write `not B -> A` for: A unless B",

@@ -199,9 +199,9 @@ class _Other:
             return end
         if token is None or token[0] != "UPTO" or not self.square:  # `[0..9]` is one mistake
             reports.error("RCL101", f"`{_short(piece)}` is not RCL", start, end, hint=hint)
-        if token is None:
+        if token is None or piece == "::":  # which may stand for several things
             reports.torn.append(start)
-        else:
+        if token is not None:
             self.stand_in(token, start, end)
         return end
 

@@ -353,6 +353,8 @@ class _Reader:
         message = "expected `inputs`, `outputs`, `topics`, `assume`, `guarantee` or `}` and not %"
         if token.type == "RPAR":
             message, hint = "this `)` closes nothing", "remove it, or find where a `(` is missing"
+            if self.out.parts and self.reports.is_torn(self.out.parts[-1][0], token.end):
+                self.complained = token.start  # `[0, 1)`: what could not be read may have been its partner
         elif token.type in ("SEMICOLON", "COMMA", "DOT"):
             message, hint = (
                 "% stands between the parts of a node",
