@@ -210,7 +210,9 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
                 run.unknown = f"{name}: time was up after {monitor.events} events"
                 break
     except Rejected as error:
-        run.trouble = f"{name}: {'; '.join(f'{d.span or name}: {d.message}' for d in error.diagnostics)}"
+        # by the plan's name for it: where the folder lies on this machine is no part of what was found
+        told = ((f"{name}, line {d.span.line}" if d.span else name, d.message) for d in error.diagnostics)
+        run.trouble = "; ".join(f"{where}: {message.replace(str(path), name)}" for where, message in told)
     except OSError as error:
         run.trouble = f"{name}: {error.strerror or error}"
     return run

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -87,6 +88,14 @@ def test_a_broken_guarantee_is_refuted_with_its_event(tmp_path: Path) -> None:
     assert found["high"].counterexample is not None
     assert ("out.radiationStatus", "green") in found["high"].counterexample.values
     assert {found[n].verdict for n in ("low", "medium", "marks_inspected")} == {Verdict.MONITORED}
+
+
+def test_an_unreadable_line_is_named_by_the_plans_path(tmp_path: Path) -> None:
+    system = changed(tmp_path, lambda text: text + "{")
+    found = discharge(system, "radiationSensor", tmp_path)["high"]
+    assert found.verdict is Verdict.ERROR
+    assert re.match(r"traces/[a-z]+\.jsonl, line \d+: this is not JSON", found.summary), found.summary
+    assert str(tmp_path) not in found.summary
 
 
 def test_bad_traces_are_errors_or_unknown_never_support(tmp_path: Path) -> None:
