@@ -44,6 +44,8 @@ def command(system: str, method: str | None, node: str | None, limit: int, jobs:
             click.echo(f"    {found.change}: {found.formula}")
             click.echo(f"      {found.why}.")
             click.echo(f"      {score.blind(found)}.")
+        for change, reason in zip(score.unjudged, score.reasons, strict=False):
+            click.echo(f"    {change}: not judged: {reason}")
     hollow = [s for s in scores if s.hollow]
     if not scores:
         click.echo("no current evidence to examine: run `doit verify` first")

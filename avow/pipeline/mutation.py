@@ -46,6 +46,8 @@ class Score:
     unjudged: tuple[str, ...]
     differences: tuple[Difference, ...] = ()
     """Of each survivor, in their order."""
+    reasons: tuple[str, ...] = ()
+    """Of each that was not judged, in their order, what the method said."""
     mapped: bool = False
     """Whether a person's table stands between the formula and what the method looks at."""
 
@@ -102,7 +104,7 @@ def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
     work, obligation, record = task
     node = work.system.contract.node(work.node)
     mutants = chosen(node, node.clause(obligation.name), limit)
-    killed, survivors, unjudged = 0, list[Mutant](), list[str]()
+    killed, survivors, unjudged = 0, list[Mutant](), list[tuple[str, str]]()
     for number, mutant in enumerate(mutants):
         folder = Path(tempfile.mkdtemp(prefix="avow-mutant-"))
         try:
@@ -115,14 +117,15 @@ def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
             case False:
                 survivors.append(mutant)
             case None:
-                unjudged.append(mutant.change)
+                unjudged.append((mutant.change, report.outcomes[0].summary))
     score = Score(
         obligation.id,
         work.method,
         killed,
         tuple(mutant.change for mutant in survivors),
-        tuple(unjudged),
+        tuple(change for change, _ in unjudged),
         tuple(difference(node, mutant) for mutant in survivors),
+        tuple(reason for _, reason in unjudged),
         record.link is Link.MAPPED,
     )
     ledger_of(workspace.ledger(work.system.name)).append(_scored(record, score, run))
@@ -156,6 +159,7 @@ def _scored(record: Evidence, score: Score, run: Run) -> Evidence:
         ]
     if score.unjudged:
         details["unjudged"] = list(score.unjudged)
+        details["unjudged_because"] = list(score.reasons)
     return replace(
         record,
         details={**record.details, "mutation": details},

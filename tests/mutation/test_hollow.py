@@ -85,6 +85,7 @@ def test_a_method_that_supports_everything_is_found_out(place: Workspace) -> Non
     assert newest["yes"].vacuous
     assert "accepts every mutant" in newest["yes"].summary
     assert newest["lost"].details["mutation"]["unjudged"]
+    assert set(newest["lost"].details["mutation"]["unjudged_because"]) == {"so it is"}
     # of each mutant that it let pass, where it differs, and whether the method should have seen it
     told = newest["yes"].details["mutation"]["differences"]
     assert [d["change"] for d in told] == list(scores["yes"].survivors)
