@@ -376,6 +376,13 @@ _LINTS = (
         "The sentence has the name of an element, and the formula does not speak of it.",
         'guarantee halt "At a high level it stops" (in.level > 3 -> out.status == high)',
     ),
+    _lint(
+        "RCL416",
+        "assumption about an output",
+        "What a node assumes is about its inputs: of its own outputs it can only give guarantees. Whoever feeds the node "
+        "cannot see to it.",
+        "assume(out.status == low) guarantee(out.status != high)",
+    ),
 )
 
 CODES: dict[str, Code] = {c.code: c for c in (*_FILE, *_SYNTAX, *_NAMES, *_SORTS, *_LINTS)}

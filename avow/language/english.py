@@ -107,7 +107,11 @@ _COMMON = frozenset(
     "all and any are can end for has its left may none not off one out say the two was yes".split()  # noqa: SIM905
 )
 """English words that stand in sentences without naming anything."""
-_EXCEPT = re.compile(r"\b(?:not|neither|nor|never|no longer|other than|unless|except|without|instead)\b|n't\b", re.I)
+_EXCEPT = re.compile(
+    r"\b(?:no|not|nothing|none|nobody|nowhere|neither|nor|never|other than|unless|except|without|instead|rather|avoid\w*"
+    r"|prevent\w*|forbid\w*)\b|n't\b",
+    re.IGNORECASE,
+)
 
 
 def mentions(sentence: str, names: Mapping[str, str]) -> Iterator[tuple[str, str]]:

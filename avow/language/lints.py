@@ -183,6 +183,10 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
         if clause.formula != TRUE and _always(clause.formula):
             message = f"the assumption `{clause.name}` says nothing: the types of the inputs make it true"
             yield _warning("RCL408", message, clause.formula.span, "leave it out, or say what was meant")
+        spoken = sorted(name for role, name in _variables(clause.formula) if role is Role.OUTPUT)
+        if spoken:
+            message = f"the assumption `{clause.name}` speaks of the node's own output `{spoken[0]}`"
+            yield _warning("RCL416", message, clause.formula.span, "assume of inputs, guarantee of outputs")
     elements = elements_of((node,)) if any(clause.sentence for clause in node.clauses) else {}
     for clause in node.clauses:
         for unused in _unused(clause.formula):

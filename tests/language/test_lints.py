@@ -54,6 +54,8 @@ def test_a_tidy_node_has_none() -> None:
         ("assume( s in {red, orange} )", []),
         ("assume( k >= 0 )", ["RCL408"]),
         ("assume( k >= 1 )", []),
+        ("assume( out.t != red )", ["RCL416"]),
+        ("assume( b -> out.t == s )", ["RCL416"]),
         ("assume( r >= 0 )", []),
         ("assume( s == red or s == orange or s == green )", ["RCL408"]),
         ("assume( s == red or s == orange )", []),

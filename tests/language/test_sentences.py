@@ -110,6 +110,7 @@ def test_comparisons_that_agree(sentence: str, formula: str) -> None:
         ("If b then the light is neither red nor amber", "in.b -> out.light == green", None),
         ("If b then the light is not red", "in.b -> out.light == green", None),
         ("Reddish light is fine", "in.b -> out.light == green", None),
+        ("Nothing is stopped beyond b", "in.b -> out.light == green", None),
     ],
 )
 def test_directions_and_elements(sentence: str, formula: str, code: str | None) -> None:
