@@ -379,8 +379,8 @@ _LINTS = (
     _lint(
         "RCL416",
         "assumption about an output",
-        "What a node assumes is about its inputs: of its own outputs it can only give guarantees. Whoever feeds the node "
-        "cannot see to it.",
+        "What a node assumes is about its inputs: of its own outputs it can only give guarantees. Whoever feeds the "
+        "node cannot see to it.",
         "assume(out.status == low) guarantee(out.status != high)",
     ),
 )

@@ -108,8 +108,8 @@ _COMMON = frozenset(
 )
 """English words that stand in sentences without naming anything."""
 _EXCEPT = re.compile(
-    r"\b(?:no|not|nothing|none|nobody|nowhere|neither|nor|never|other than|unless|except|without|instead|rather|avoid\w*"
-    r"|prevent\w*|forbid\w*)\b|n't\b",
+    r"\b(?:no|not|nothing|none|nobody|nowhere|neither|nor|never|other than|unless|except|without|instead|rather"
+    r"|avoid\w*|prevent\w*|forbid\w*)\b|n't\b",
     re.IGNORECASE,
 )
 
