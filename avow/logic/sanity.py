@@ -334,7 +334,7 @@ class _Analysis:
             self.outputs,
             outside,
             self.guarantees,
-            timeout_ms=self.limit,
+            timeout_ms=2 * self.limit,
             seed=self.seed,
             doubtful=True,
         )
@@ -391,7 +391,7 @@ class _Analysis:
                 shown = Counterexample(show_values(values)) if values else None
                 because = self._if_refuted(f"unconstrained-{name}")
                 return _Finding(Verdict.REFUTED, text, counterexample=shown, because=because, engine=answer.engine)
-        if _are_endless(question.values()) and self._by_definitions(question, self.limit // 2):
+        if self._by_definitions(question, self.limit // 2):
             because = self._if_refuted(f"unconstrained-{name}")
             return _Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name}", because=because)
         return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
@@ -416,16 +416,13 @@ class _Analysis:
         from avow.logic.smt import solve
 
         limit = min(limit or self.limit, self.limit)
-        first = min(limit, _GLANCE_MS // 2) if _are_endless(formulas.values()) else limit
-        answer = solve(formulas, timeout_ms=first, seed=self.seed, shown=False)
-        if answer.status == "unknown" and first < limit:
-            if self._by_definitions(formulas, limit // 2):
-                return _Finding(Verdict.PROVED)
-            answer = solve(formulas, timeout_ms=limit, seed=self.seed, shown=False)
+        answer = solve(formulas, timeout_ms=limit, seed=self.seed, shown=False)
         if answer.status == "unknown" and self.scenario:
             within = solve(formulas, timeout_ms=limit, seed=self.seed, given=self.scenario)
             # An example in the scenario is an example; that there is none in it proves nothing.
             answer = within if within.status == "sat" else answer
+        if answer.status == "unknown" and self._by_definitions(formulas, limit // 2):
+            return _Finding(Verdict.PROVED)
         match answer.status:
             case "sat":
                 return _Finding(Verdict.PROVED, engine=answer.engine)
@@ -439,7 +436,7 @@ class _Analysis:
         """Whether these hold together, for functions that have no finite table."""
         from avow.logic.realizability import possible
 
-        return possible(formulas, timeout_ms=limit, seed=self.seed)
+        return _are_endless(formulas.values()) and possible(formulas, timeout_ms=limit, seed=self.seed)
 
     def _fails_somewhere(self, hypotheses: Mapping[str, Term], formula: Term, alone: str, implied: str) -> _Finding:
         """Is there a case where the hypotheses hold and the formula does not? If not, the texts say so."""

@@ -251,10 +251,15 @@ def _resolve(choice: Mapping[Variable, Term | Definition], found: Candidates) ->
     """Put the chosen terms of other outputs where a candidate mentions them; None for a circle."""
     outputs = set(found.outputs)
     terms = {output: value for output, value in choice.items() if not isinstance(value, Definition)}
-    for _ in terms:
-        terms = {output: substitute(value, _chosen(terms, value, outputs)) for output, value in terms.items()}
-    if any(free_variables(value) & outputs for value in terms.values()):
-        return None
+    mentioned = {output: free_variables(value) & outputs for output, value in terms.items()}
+    done: dict[Variable, Term] = {}
+    while len(done) < len(terms):
+        ready = [output for output in terms if output not in done and mentioned[output] <= done.keys()]
+        if not ready:
+            return None
+        for output in ready:
+            done[output] = substitute(terms[output], {other: done[other] for other in mentioned[output]})
+    terms = done
     witness: dict[Variable, Meant] = {}
     for output, value in choice.items():
         if not isinstance(value, Definition):
@@ -267,10 +272,6 @@ def _resolve(choice: Mapping[Variable, Term | Definition], found: Candidates) ->
             return None  # a function defined by another function that is an output: not tried
         witness[output] = value
     return witness
-
-
-def _chosen(terms: Mapping[Variable, Term], value: Term, outputs: set[Variable]) -> dict[Variable, Term]:
-    return {other: terms[other] for other in free_variables(value) & outputs if other in terms}
 
 
 def _instantiate(found: Candidates, term: Term, wide: bool) -> Term:

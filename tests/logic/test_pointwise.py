@@ -5,9 +5,12 @@ from __future__ import annotations
 import pytest
 
 from avow.language.terms import Variable
+from avow.logic.clock import now
+from avow.logic.demands import candidates
 from avow.logic.pointwise import pointwise
 from avow.logic.realizability import realizable
 from avow.logic.tuples import untupled
+from avow.logic.witness import witnesses
 from avow.verdict import Verdict
 
 from .contracts import node
@@ -95,3 +98,14 @@ def test_tuples_come_apart_and_together() -> None:
     assert apart.values([p, x], {x: 3}) == {x: 3}
     found = realizable([p, x], [q], {}, {c.name: c.formula for c in of.guarantees})
     assert found.verdict is Verdict.PROVED
+
+
+def test_outputs_that_are_defined_by_each_other_do_not_grow() -> None:
+    """Eight numbers, each the sum of others: put into one another again and again, they would fill the memory."""
+    names = [f"o{k}" for k in range(8)]
+    each = " and ".join(f"{name} == {' + '.join(o for o in names if o != name)}" for name in names)
+    of = node(f"inputs( x : REAL ) outputs( {', '.join(f'{n} : REAL' for n in names)} )|guarantee( {each} )")
+    start = now()
+    found = candidates([p.variable for p in of.outputs], (), [c.formula for c in of.guarantees])
+    assert isinstance(witnesses(found), list)
+    assert now() - start < 2
