@@ -15,7 +15,7 @@ from avow.diagnostics import Diagnostic, Severity, Span
 from avow.language.bracketing import misreadings
 from avow.language.contract import Contract, Node
 from avow.language.lexer import Token
-from avow.language.lookups import lookups, walk
+from avow.language.lookups import lookups
 from avow.language.outline import FileSyntax
 from avow.language.printer import show_sort, show_term
 from avow.language.sentences import elements_of, mismatches
@@ -37,6 +37,7 @@ from avow.language.terms import (
     SetTerm,
     Term,
     Variable,
+    subterms,
 )
 
 _ALLOW = re.compile(r"\bavow:\s*allow\b([^\n*]*)")
@@ -217,11 +218,11 @@ def _looked_up(node: Node) -> Iterator[Diagnostic]:
 
 
 def _variables(term: Term) -> set[tuple[Role, str]]:
-    return {(t.role, t.name) for t in walk(term) if isinstance(t, Variable)}
+    return {(t.role, t.name) for t in subterms(term) if isinstance(t, Variable)}
 
 
 def _unused(term: Term) -> Iterator[Variable]:
-    for part in walk(term):
+    for part in subterms(term):
         if isinstance(part, Quantified):
             used = {name for role, name in _variables(part.body) if role is Role.BOUND}
             yield from (v for v in part.variables if v.name not in used)

@@ -20,7 +20,7 @@ from avow.language.sorts import (
     StringSort,
     components,
 )
-from avow.language.terms import And, Apply, Compare, Not, Or, Quantified, Quantifier, Role, Term, Variable, children
+from avow.language.terms import And, Apply, Compare, Not, Or, Quantified, Quantifier, Role, Term, Variable, subterms
 
 _NAMES = (NaturalSort, IntegerSort, StringSort, OpaqueSort)
 """Sorts of which values are names of things; a REAL is a measure, an element of an enumeration a state."""
@@ -38,20 +38,11 @@ class Lookup:
 def lookups(formula: Term) -> Iterator[Lookup]:
     """Every place in the formula that asks which arguments of an input or output, a total function from infinitely many
     arguments to names of things, have a given value."""
-    for part in walk(formula):
+    for part in subterms(formula):
         if isinstance(part, Quantified):
             function = _asked(part)
             if function is not None:
                 yield Lookup(function, part)
-
-
-def walk(term: Term) -> Iterator[Term]:
-    """The term and all its subterms, in reading order; as deep as it may be."""
-    stack = [term]
-    while stack:
-        part = stack.pop()
-        yield part
-        stack.extend(reversed(children(part)))
 
 
 def _asked(quantified: Quantified) -> Variable | None:
@@ -78,7 +69,7 @@ def _asked(quantified: Quantified) -> Variable | None:
 
 
 def _variables(term: Term) -> set[Variable]:
-    return {part for part in walk(term) if isinstance(part, Variable)}
+    return {part for part in subterms(term) if isinstance(part, Variable)}
 
 
 def _operands(body: Term) -> Iterator[Term]:

@@ -15,7 +15,6 @@ from fractions import Fraction
 from avow.language.bounds import bounds, constant
 from avow.language.contract import Clause, Node
 from avow.language.english import LONGEST, Comparison, both_ways, comparisons, is_one_way, mentions
-from avow.language.lookups import walk
 from avow.language.printer import show_number, show_term
 from avow.language.sorts import BOOL, DataSort, EnumSort, components
 from avow.language.terms import (
@@ -29,6 +28,7 @@ from avow.language.terms import (
     Quantifier,
     Term,
     Variable,
+    subterms,
 )
 
 _SHOWN = 60
@@ -85,7 +85,7 @@ def _comparisons(sentence: str, formula: Term) -> Iterator[Mismatch]:
     if not said:
         return
     found = list(bounds(formula))
-    numbers = sorted({n for t in walk(formula) if (n := constant(t)) is not None})
+    numbers = sorted({n for t in subterms(formula) if (n := constant(t)) is not None})
     for what in said:
         about = [b for b in found if _same(what, b.number)]
         if any(b.may_mean(what.signs) for b in about):
@@ -134,7 +134,7 @@ def _directions(sentence: str, formula: Term) -> Iterator[Mismatch]:
             "write `->`, or say in the sentence that it is so exactly then",
         )
     words = both_ways(sentence)
-    if words and isinstance(core, Implies) and not any(map(_is_both_ways, walk(core))):
+    if words and isinstance(core, Implies) and not any(map(_is_both_ways, subterms(core))):
         yield Mismatch(
             "RCL414",
             f"the sentence goes both ways (“{words}”), the formula one way (`->`)",
@@ -169,7 +169,7 @@ def _elements(sentence: str, formula: Term, elements: Mapping[str, str]) -> Iter
 
 
 def _names_in(formula: Term) -> Iterator[str]:
-    for part in walk(formula):
+    for part in subterms(formula):
         match part:
             case EnumValue(name=name) | Variable(name=name) | Construct(constructor=name):
                 yield name

@@ -6,6 +6,7 @@ All later stages (Z3, Dafny, monitors, printers, hashes) read this and nothing e
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from fractions import Fraction
@@ -292,3 +293,12 @@ def children(term: Term) -> tuple[Term, ...]:
             return (item, collection)
         case Not(body=body) | Quantified(body=body):
             return (body,)
+
+
+def subterms(term: Term) -> Iterator[Term]:
+    """The term and everything in it, in reading order; however deep it is."""
+    stack = [term]
+    while stack:
+        current = stack.pop()
+        yield current
+        stack.extend(reversed(children(current)))

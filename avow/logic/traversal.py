@@ -6,7 +6,7 @@ function is written as a generator that *yields* its recursive calls and returns
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from typing import Any, TypeVar
 
 from avow.language.terms import (
@@ -35,6 +35,7 @@ from avow.language.terms import (
     Widen,
     children,
 )
+from avow.language.terms import subterms as subterms
 
 T = TypeVar("T")
 
@@ -57,15 +58,6 @@ def run(steps: Steps[T]) -> T:
             value = None
     result: T = value
     return result
-
-
-def subterms(term: Term) -> Iterator[Term]:
-    """The term and everything in it, in reading order."""
-    stack = [term]
-    while stack:
-        current = stack.pop()
-        yield current
-        stack.extend(reversed(children(current)))
 
 
 def depth(term: Term) -> int:
