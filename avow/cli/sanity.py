@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
 @click.option("--json", "as_json", is_flag=True, help="For machines: see docs/schemas/sanity.schema.json.")
 @click.option("--all", "everything", is_flag=True, help="List also what is as it should be.")
-@seconds_option(1.5)
+@seconds_option(3)
 @seed_option()
 def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool, seconds: float, seed: int) -> int:
     """Ask of every node whether its contract is worth verifying: can its assumptions hold, do its guarantees agree, is

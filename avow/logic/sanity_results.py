@@ -16,7 +16,7 @@ class Bounds:
     third of it for warnings and notes; less, the more time went into questions that stayed open), and the solver's
     seed."""
 
-    milliseconds: int = 1_500
+    milliseconds: int = 3_000
     seed: int = 0
 
 
