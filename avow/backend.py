@@ -88,7 +88,7 @@ class Translated:
     """A node in a notation of a backend's own."""
 
     files: Mapping[str, str]
-    """Name → text; names are relative to a folder of the node's own."""
+    """Name → text; names are relative to a folder of the node's own. None, where nothing of the node can be said."""
     missing: tuple[Diagnostic, ...] = ()
     """A warning for each guarantee that is not in them, with the reason."""
 
@@ -101,7 +101,8 @@ class Translates(Protocol):
     """Notation → what it is, in a few words."""
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:
-        """Pure, like `export`. Raises Rejected where nothing of the node can be said in the notation."""
+        """Pure, like `export`. Raises Rejected where the input is at fault: what the notation merely cannot say is
+        `Translated.missing`."""
         ...
 
 

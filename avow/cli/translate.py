@@ -53,7 +53,9 @@ def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], outp
 
 
 def _by_backend(notation: str, paths: tuple[Path, ...], nodes: tuple[str, ...], output: Path | None) -> int:
-    from avow.diagnostics import Rejected
+    from dataclasses import replace
+
+    from avow.diagnostics import Rejected, Severity
     from avow.registry import translators
     from avow.rendering import render
     from avow.system.load import load_bare, load_system
@@ -74,6 +76,8 @@ def _by_backend(notation: str, paths: tuple[Path, ...], nodes: tuple[str, ...], 
             continue
         missing += made.missing
         files.update({f"{_folder(node.name, system)}/{name}": text for name, text in made.files.items()})
+    if not files:
+        missing = [replace(fault, severity=Severity.ERROR) for fault in missing]
     if refused or missing:
         click.echo(render([*refused, *missing]), err=True)
     if not files:

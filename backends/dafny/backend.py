@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -116,13 +115,13 @@ class DafnyBackend:
             generated = generate(node, names)
         except NotExpressible as problem:
             message = f"node '{node.name}' cannot be put into Dafny: {problem.what}"
-            raise Rejected(Diagnostic("DFY105", message, problem.span or node.span)) from None
+            return Translated({}, (Diagnostic("DFY105", message, problem.span or node.span, Severity.WARNING),))
         missing = tuple(
             Diagnostic("DFY105", f"{node.name}.{name}: {reason}", node.clause(name).span, Severity.WARNING)
             for name, reason in generated.uncovered
         )
         if len(missing) == len(names):
-            raise Rejected(*(replace(fault, severity=Severity.ERROR) for fault in missing))
+            return Translated({}, missing)
         return Translated({**_specification(generated), generated.impl_file: generated.skeleton}, missing)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -110,12 +109,13 @@ class RosMonitoringBackend:
         if faults:
             raise Rejected(*faults)
         made = translate(found, node.guarantees)
+        hint = None if options else f"the plan has no method {self.name} for node {node.name}, whose `mapping` says how"
         missing = tuple(
-            Diagnostic("MON105", f"{node.name}.{name}: {reason}", node.clause(name).span, Severity.WARNING)
+            Diagnostic("MON105", f"{node.name}.{name}: {reason}", node.clause(name).span, Severity.WARNING, hint)
             for name, reason in made.refused.items()
         )
         if len(missing) == len(node.guarantees):
-            raise Rejected(*(replace(fault, severity=Severity.ERROR) for fault in missing))
+            return Translated({}, missing)
         return Translated({f"{identifier('', node.name)}.rml": made.text}, missing)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:

@@ -44,7 +44,7 @@ CODES = register(
     declare(
         "MON204",
         "wrong event",
-        "A line of the trace is too long, not UTF-8, or no JSON object.",
+        "A line of the trace is too long, not UTF-8, no JSON object, or without a `time` in seconds from 0.",
         "Correct the line; none is left out silently.",
     ),
     declare(

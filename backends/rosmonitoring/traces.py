@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from avow.backends.rosmonitoring.numbers import Decimal
+from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
 from avow.diagnostics import Diagnostic, Rejected, Span
 
 MAX_LINE = 8_000_000
@@ -41,6 +41,20 @@ def parse_event(text: str) -> Event:
     return found
 
 
+def wrong_time(event: Event) -> str:
+    """What is wrong with the time of a recorded event, if anything is: ROSMonitoring writes one with every event, as
+    seconds, and a record without it was cut or put together by hand."""
+    raw = event.get("time")
+    if raw is None:
+        return "the event has no `time`: seconds, as a number"
+    if isinstance(raw, Decimal) and raw.text[0] != "-" and len(raw.text) < 40 and "e" not in raw.text.lower():
+        return ""  # as nearly all are; kept out of the cache of values that are seen again
+    try:
+        return "" if exact(raw) >= 0 else f"`time` is negative: {raw}"
+    except NotANumber:
+        return f"`time` is no number of seconds: {json.dumps(raw, default=str)[:60]}"
+
+
 def read_lines(lines: Iterable[str], name: str) -> Iterator[Recorded]:
     """Events from lines of text; blank lines are skipped. Raises Rejected at the first line that is no event."""
     index = 0
@@ -51,7 +65,10 @@ def read_lines(lines: Iterable[str], name: str) -> Iterator[Recorded]:
             raise Rejected(_fault(name, number, 1, f"the line is longer than {MAX_LINE} characters"))
         index += 1
         try:
-            yield Recorded(index, number, parse_event(line))
+            event = parse_event(line)
+            if wrong := wrong_time(event):
+                raise Rejected(_fault(name, number, max(1, line.find('"time"') + 1), wrong))
+            yield Recorded(index, number, event)
         except json.JSONDecodeError as error:
             raise Rejected(_fault(name, number, error.colno, f"this is not JSON: {error.msg}")) from None
         except ValueError as error:

@@ -58,8 +58,22 @@ def test_rml_with_the_plans_mapping(place: Path, capsys: pytest.CaptureFixture[s
     read(text)
     code, text, said = run("translate --to rml s", capsys)
     assert code == 1
-    assert "error[MON105]: m.G1" in said, "nothing of that node can be translated"
+    assert "warning[MON105]: m.G1" in said, "nothing of that node can be translated, but of others"
+    assert "the plan has no method rosmonitoring for node m" in said
+    assert "for node n" not in said
+    assert "error" not in said
     assert "m.rml" not in text
+    code, text, said = run("translate --to rml --node m s", capsys)
+    assert (code, text) == (2, "")
+    assert "error[MON105]: m.G1" in said, "nothing at all can be"
+
+
+def test_a_wrong_mapping_stays_an_error(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (place / "s" / "plan.yaml").write_text(PLAN + "  m: {methods: [{rosmonitoring: {mapping: {in.b: data}}}]}\n")
+    code, text, said = run("translate --to rml s", capsys)
+    assert "G1<" in text
+    assert code == 1
+    assert "error[MON101]" in said
 
 
 def test_rml_without_a_plan_says_what_it_lacks(place: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -149,7 +149,7 @@ def test_without_a_trace_nothing_ran(make_system: Callable[..., System], tmp_pat
 def test_what_cannot_be_observed_is_unknown(make_system: Callable[..., System], tmp_path: Path) -> None:
     system = make_system(SYSTEM, traces=["t.jsonl"])
     trace = system.plan.root / "t.jsonl"
-    rows: list[dict[str, Any]] = [{"topic": "r", "data": 1}, {"topic": "o", "data": 2}]
+    rows: list[dict[str, Any]] = [{"topic": "r", "data": 1, "time": 0}, {"topic": "o", "data": 2, "time": 1}]
     trace.write_text("".join(json.dumps(r) + "\n" for r in rows), encoding="utf-8")
     job = job_for(system, "n")
     assert any("unseen cannot be monitored" in d.message and not d.is_error for d in BACKEND.check(job))
@@ -165,7 +165,7 @@ def test_a_guarantee_only_judged_while_its_assumption_is_broken_is_not_supported
 ) -> None:
     system = make_system(SYSTEM, traces=["t.jsonl"])
     trace = system.plan.root / "t.jsonl"
-    trace.write_text('{"topic": "r", "data": -1}\n{"topic": "o", "data": -2}\n', encoding="utf-8")
+    trace.write_text('{"topic": "r", "data": -1, "time": 0}\n{"topic": "o", "data": -2, "time": 1}\n', encoding="utf-8")
     found = discharge(system, "n", tmp_path)
     assert found["seen"].verdict is Verdict.UNKNOWN
     assert "assumption" in found["seen"].summary

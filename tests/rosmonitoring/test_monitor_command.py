@@ -29,8 +29,10 @@ def traces(case_folder: Path) -> dict[str, Path]:
     assert '"level": "red"' in text
     faulty.write_text(text.replace('"level": "red"', '"level": "green"', 1), encoding="utf-8")
     broken = case_folder / "traces" / "broken.jsonl"
-    broken.write_text('{"topic": "r", "radiation": 1}\n{"topic": "r", "radiation": }\n', encoding="utf-8")
-    return {"nominal": nominal, "faulty": faulty, "broken": broken}
+    broken.write_text('{"topic": "r", "time": 0, "radiation": 1}\n{"topic": "r", "radiation": }\n', encoding="utf-8")
+    timeless = case_folder / "traces" / "timeless.jsonl"
+    timeless.write_text(text.replace('"time": 10.37', '"time": "soon"', 1), encoding="utf-8")
+    return {"nominal": nominal, "faulty": faulty, "broken": broken, "timeless": timeless}
 
 
 def test_nominal(case_folder: Path, traces: dict[str, Path]) -> None:
@@ -65,7 +67,12 @@ def test_faulty_as_json_and_from_standard_input(case_folder: Path, traces: dict[
 
 @pytest.mark.parametrize(
     ("trace", "words"),
-    [("broken", "broken.jsonl:2:"), ("absent", "cannot read"), ("nodes", "did you mean")],
+    [
+        ("broken", "broken.jsonl:2:"),
+        ("timeless", "timeless.jsonl:2:"),
+        ("absent", "cannot read"),
+        ("nodes", "did you mean"),
+    ],
 )
 def test_bad_input_is_code_2_with_its_place(case_folder: Path, traces: dict[str, Path], trace: str, words: str) -> None:
     if trace == "nodes":

@@ -15,20 +15,30 @@ from avow.diagnostics import Rejected
 
 
 def test_lines_are_counted_with_blank_ones() -> None:
-    found = list(read_lines(['{"topic": "a"}\n', "\n", '{"topic": "b", "x": 0.1}\n'], "t"))
+    found = list(read_lines(['{"topic": "a", "time": 0}\n', "\n", '{"topic": "b", "x": 0.1, "time": 0.5}\n'], "t"))
     assert [(r.index, r.line, r.event["topic"]) for r in found] == [(1, 1, "a"), (2, 3, "b")]
 
 
 @pytest.mark.parametrize(
     ("text", "line", "column", "words"),
     [
-        ('{"topic": "a"}\n{"topic": }\n', 2, 11, "not JSON"),
+        ('{"topic": "a", "time": 0}\n{"topic": }\n', 2, 11, "not JSON"),
         ("[1, 2]\n", 1, 1, "a JSON object"),
         ("3\n", 1, 1, "a JSON object"),
         ('{"a": 1} {"b": 2}\n', 1, 10, "not JSON"),
         ('{"topic": "a"', 1, 14, "not JSON"),
         ("[" * 100_000 + "\n", 1, 1, "too deeply"),
         ('{"a": ' + "9" * 5000 + "}\n", 1, 1, "digits"),
+        ('{"topic": "a", "time": 0}\n{"topic": "a"}\n', 2, 1, "no `time`"),
+        ('{"topic": "a", "time": null}\n', 1, 16, "no `time`"),
+        ('{"topic": "a", "time": "12.5"}\n', 1, 16, 'no number of seconds: "12.5"'),
+        ('{"time": true, "topic": "a"}\n', 1, 2, "no number of seconds"),
+        ('{"topic": "a", "time": {"secs": 1, "nsecs": 0}}\n', 1, 16, "no number of seconds"),
+        ('{"topic": "a", "time": NaN}\n', 1, 16, "no number of seconds"),
+        ('{"topic": "a", "time": Infinity}\n', 1, 16, "no number of seconds"),
+        ('{"topic": "a", "time": 1e999999999}\n', 1, 16, "no number of seconds"),
+        ('{"topic": "a", "time": -1}\n', 1, 16, "negative: -1"),
+        ('{"topic": "a", "time": -0.25}\n', 1, 16, "negative: -0.25"),
     ],
 )
 def test_malformed_lines_are_located(tmp_path: Path, text: str, line: int, column: int, words: str) -> None:
@@ -40,6 +50,12 @@ def test_malformed_lines_are_located(tmp_path: Path, text: str, line: int, colum
     assert fault.span is not None
     assert (fault.span.line, fault.span.column) == (line, column)
     assert words in fault.message
+
+
+@pytest.mark.parametrize("time", ["0", "-0.0", "12", "1763766000.123456789", "1.5e3", "0." + "1" * 50])
+def test_times_are_numbers_from_0(time: str) -> None:
+    (found,) = read_lines([f'{{"topic": "a", "time": {time}}}\n'], "t")
+    assert found.line == 1
 
 
 def test_files_that_are_no_text(tmp_path: Path) -> None:
