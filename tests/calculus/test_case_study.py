@@ -87,7 +87,7 @@ def test_waypoints_too_close_are_found_at_the_hair(tmp_path: Path) -> None:
     just_enough = case_study(tmp_path, "remote_inspection", REPAIRED)
     assert settled(just_enough, "D1")[1].verdict is Verdict.PROVED
     closer = REPAIRED.replace("-0.5 <= x - x' <= 0.5", "-0.49 <= x - x' <= 0.49")
-    _, answers = settled(case_study(tmp_path, "remote_inspection", closer), "D1", 1_500)
+    _, answers = settled(case_study(tmp_path, "remote_inspection", closer), "D1", 6_000)
     clause = {condition.clause: answer for condition, answer in answers.settled.items()}
     assert clause["one_waypoint"].verdict is Verdict.REFUTED
     shown = clause["one_waypoint"].cases[0].counterexample
