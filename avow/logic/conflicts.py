@@ -17,7 +17,8 @@ from avow.logic.clock import now
 from avow.logic.counterexample import show_values
 from avow.logic.formula import free_variables
 from avow.logic.realizability import Formulas, Given, Group, Search
-from avow.logic.smt import solve
+from avow.logic.smt import Unsupported, solve
+from avow.logic.solver import z3
 from avow.logic.values import Data, Value, show
 from avow.verdict import Counterexample, Verdict
 
@@ -66,7 +67,10 @@ def conflicts(
             outputs = tuple(v for v in group.outputs if v in mentioned)
             limit = min(left, patience)
             search = Search(inputs, Group(formulas, outputs), assumptions, given or {}, limit, seed)
-            answer = search.refute(possible, limit)
+            try:
+                answer = search.refute(possible, limit)
+            except (Unsupported, z3.Z3Exception):  # what is not found is only not shown
+                continue
             if answer is not None and answer.verdict is Verdict.REFUTED:
                 learn(answer.inputs)
     order = {label: k for k, label in enumerate(labels)}

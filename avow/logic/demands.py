@@ -38,6 +38,7 @@ from avow.language.terms import (
     Quantified,
     Quantifier,
     Role,
+    SequenceRange,
     SequenceTerm,
     SetTerm,
     Term,
@@ -209,7 +210,7 @@ def _choose(
 def _remember(found: Candidates, term: Term, known: Mapping[Variable, Term]) -> None:
     """Keep the ground terms in a term that knows no output: arguments for constructors."""
     for part in subterms(term):
-        if part.sort == BOOL or isinstance(part, Quantified | SetTerm) or found.mentions(part):
+        if part.sort == BOOL or isinstance(part, Quantified | SetTerm | SequenceRange) or found.mentions(part):
             continue
         if isinstance(part.sort, FunctionSort | SetSort):
             continue

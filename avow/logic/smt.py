@@ -471,5 +471,9 @@ def _second_opinion(labelled: Mapping[str, Term], timeout_ms: int) -> Solution |
     """cvc5, if it is installed: only its `unsat` counts, since its models are not read."""
     from avow.logic import smtlib
 
-    answer = smtlib.ask_cvc5(smtlib.export(labelled), timeout_ms=timeout_ms)
+    try:
+        script = smtlib.export(labelled)
+    except Unsupported:
+        return None
+    answer = smtlib.ask_cvc5(script, timeout_ms=timeout_ms)
     return Solution("unsat", core=tuple(labelled), engine="cvc5") if answer == "unsat" else None

@@ -15,6 +15,7 @@ from typing import Any
 
 from avow.diagnostics import Span
 from avow.language.sorts import (
+    INTEGER,
     FunctionSort,
     RealSort,
     SequenceSort,
@@ -225,6 +226,10 @@ class Translator(Sorts):
                 term.left.sort, *(self._callable(side, bound, meanings) for side in (term.left, term.right))
             )
             return same if term.operator == "==" else z3.Not(same)
+        for one, other in ((term.left, term.right), (term.right, term.left)):
+            if isinstance(one, SequenceRange) and not _is_written_out(one):
+                same = yield self._same_range(one, other, bound, meanings)
+                return same if term.operator == "==" else z3.Not(same)
         left, right = yield self._terms((term.left, term.right), bound, meanings)
         if left.sort() != right.sort():
             left, right = self._real(left), self._real(right)
@@ -248,6 +253,21 @@ class Translator(Sorts):
         equal = one(*arguments) == other(*arguments)
         allowed = self.all_of(self.member(p, a) for p, a in zip(sort.parameters, arguments, strict=True))
         return z3.ForAll(arguments, equal if allowed is None else z3.Implies(allowed, equal))
+
+    def _same_range(
+        self, one: SequenceRange, other: Term, bound: Mapping[Variable, Expr], meanings: Mapping[Variable, Meaning]
+    ) -> Steps[Expr]:
+        """That a range, which is no value of its own for the solver, is another sequence: the same length, and the
+        same number at every position."""
+        low, high = yield self._terms((one.low, one.high), bound, meanings)
+        if isinstance(other, SequenceRange):
+            start, end = yield self._terms((other.low, other.high), bound, meanings)
+            return z3.Or(z3.And(low == start, high == end), z3.And(high < low, end < start))
+        sequence = yield self._term(other, bound, meanings)
+        length, k = z3.Length(sequence), self.fresh("k", INTEGER)
+        inside = z3.And(k >= 0, k < length)
+        count = z3.If(high >= low, high - low + 1, z3.IntVal(0, self.context))
+        return z3.And(length == count, z3.ForAll([k], z3.Implies(inside, sequence[k] == low + k)))
 
     def _in(self, term: In, bound: Mapping[Variable, Expr], meanings: Mapping[Variable, Meaning]) -> Steps[Expr]:
         item = yield self._term(term.item, bound, meanings)
@@ -348,3 +368,7 @@ class Translator(Sorts):
             case "/":
                 return left / right
         raise Unsupported(f"the operator {operator}")
+
+
+def _is_written_out(term: SequenceRange) -> bool:
+    return isinstance(term.low, Literal) and isinstance(term.high, Literal)

@@ -196,7 +196,10 @@ class Search:
         for witness in asked:
             if now() > end:
                 break
-            whole = {**meanings, **meanings_of(translator, witness, meanings)}
+            try:
+                whole = {**meanings, **meanings_of(translator, witness, meanings)}
+            except Unsupported:  # `<1 upto in.n>` as a value: to suggest less is sound
+                continue
             met = [*translator.background(witness, whole), *(translator.term(g, whole) for g in guarantees)]
             facts.append(z3.Not(z3.And(met)))
         return [*facts, *translator.opaque_facts()]
