@@ -1,0 +1,133 @@
+"""Random contracts: every sanity verdict against the oracle's.
+
+`AVOW_ORACLE_CONTRACTS=1000 pytest tests/logic/test_oracle.py -m slow -s` asks for more contracts than the slow test
+does by itself (from the seed AVOW_ORACLE_FIRST on), and says how many claims stayed open.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+import pytest
+
+from avow.language.contract import Node
+from avow.language.load import check_text
+from avow.logic.claims import Property
+from avow.logic.sanity import SanityResult, analyse
+from avow.verdict import Verdict
+
+from .contracts import node
+from .enumeration import Enumeration
+from .oracle import Survey, is_small, judge
+from .random_contracts import random_contract
+
+QUICK = (1, 3, 7, 8, 22, 24, 25, 28)
+COUNT = int(os.environ.get("AVOW_ORACLE_CONTRACTS", "60"))
+FIRST = int(os.environ.get("AVOW_ORACLE_FIRST", "100"))
+
+ONE_SIDED = {Property.TAUTOLOGY, Property.VACUOUS, Property.REDUNDANT, Property.UNNEEDED}
+"""Where types are infinite, the oracle knows of these only that they hold."""
+
+OPPOSITE = {Verdict.PROVED: Verdict.REFUTED, Verdict.REFUTED: Verdict.PROVED}
+
+
+@dataclass(slots=True)
+class Tally:
+    skipped: int = 0
+    contracts: int = 0
+    claims: int = 0
+    hinging: int = 0
+    wrong: list[str] = field(default_factory=list)
+    unknown: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        return (
+            f"{self.contracts} contracts ({self.skipped} skipped), {self.claims} claims, {len(self.wrong)} wrong, "
+            f"{len(self.unknown)} open, {self.hinging} open where something unspecified is asked for: {self.unknown}"
+        )
+
+
+def small_contract(seed: int) -> Node | None:
+    """None if the text is ill-typed (``<> == <>``), or has too many cases for the oracle."""
+    found, _ = check_text(random_contract(seed), "test.rcl")
+    return found.nodes[0] if found is not None and is_small(found.nodes[0]) else None
+
+
+@cache
+def analysed(seed: int) -> tuple[Node, tuple[SanityResult, ...]]:
+    found = small_contract(seed)
+    assert found is not None, "the quick ones are small"
+    return found, analyse(found)
+
+
+def tally(seeds: Iterable[int]) -> Tally:
+    found = Tally()
+    for seed in seeds:
+        asked = small_contract(seed)
+        if asked is None:
+            found.skipped += 1
+            continue
+        results = analysed(seed)[1] if seed in QUICK else analyse(asked)
+        judgement = judge(asked, results)
+        found.contracts += 1
+        found.claims += len(results)
+        found.hinging += len(judgement.hinging)
+        found.wrong += [f"{seed}: {name}\n{random_contract(seed)}" for name in judgement.wrong]
+        found.unknown += [f"{seed}: {name}" for name in judgement.unknown]
+    return found
+
+
+def test_a_few_contracts() -> None:
+    found = tally(QUICK)
+    assert not found.wrong, "\n".join(found.wrong)
+    assert found.contracts == len(QUICK)
+    assert not found.unknown
+
+
+@pytest.mark.slow
+def test_every_verdict_is_right() -> None:
+    found = tally(range(FIRST, FIRST + COUNT))
+    print(found)
+    assert not found.wrong, "\n".join(found.wrong)
+    assert found.contracts * 3 >= COUNT * 2, "too much is skipped"
+    assert len(found.unknown) * 100 <= found.claims, found.unknown
+    assert found.hinging * 10 <= found.claims
+
+
+def test_a_flipped_verdict_is_caught() -> None:
+    caught: set[Property] = set()
+    missed: set[Property] = set()
+    for seed in QUICK:
+        asked, results = analysed(seed)
+        flipped = {r.name: replace(r, verdict=OPPOSITE[r.verdict]) for r in results if r.verdict in OPPOSITE}
+        judgement = judge(asked, flipped.values())
+        caught |= {flipped[name].about for name in judgement.wrong}
+        missed |= {flipped[name].about for name in judgement.right}
+    assert caught == set(Property) - {Property.UNMEETABLE}
+    assert missed <= ONE_SIDED
+
+
+def test_the_verdicts_of_another_contract_are_caught() -> None:
+    ports = "inputs( i : BOOL, j : BOOL ) outputs( o : BOOL, p : BOOL )| assume( in.i )"
+    asked = node(f"{ports} guarantee( in.j -> out.o ) guarantee( out.p )")
+    assert not judge(asked, analyse(asked)).wrong
+    other = node(f"{ports} guarantee( in.j -> out.o ) guarantee( out.p or out.o )")
+    assert set(judge(asked, analyse(other)).wrong) == {"undetermined-p"}
+    assert set(judge(other, analyse(asked)).wrong) == {"undetermined-p"}
+
+
+def test_the_facts_of_a_contract_that_is_bad_in_every_way() -> None:
+    bad = node(
+        "inputs( i : BOOL, n : NATURAL ) outputs( o : BOOL, free : BOOL )"
+        "| assume limit_n ( n <= 1 ) assume TRUISM ( n >= 0 ) assume ( n <= 2 ) assume ONLY ( n == 0 )"
+        " guarantee DEMAND ( in.i -> out.o ) guarantee NEVER ( n == 1 -> out.o ) guarantee DENIAL ( not out.o )"
+    )
+    facts = Survey(bad, Enumeration()).facts()
+    assert {name for name, fact in facts.items() if not fact.holds} == {
+        *("realizable", "tautology-NEVER", "vacuous-NEVER", "redundant-NEVER", "unconstrained-free"),
+        *("undetermined-free", "tautology-TRUISM", "redundant-TRUISM", "unneeded-TRUISM"),
+        *("redundant-A3", "unneeded-A3", "redundant-limit_n", "unneeded-limit_n"),
+    }
