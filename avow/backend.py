@@ -128,8 +128,9 @@ class Backend(Protocol):
     link: Link
     options_schema: Mapping[str, Any]
     """JSON schema (2020-12) of the method's options in plan.yaml."""
-    # Optional: `uses_scenario = False` for a backend that never looks at the plan's scenario, `uses_wiring = False` for
-    # one that looks at no topics, connections or other nodes. Then a change there re-runs nothing of it.
+    # Optional: `uses_scenario = False` for a backend that never looks at the plan's scenario, `uses_steps = False` for
+    # one that looks at all of it but its `steps`, `uses_wiring = False` for one that looks at no topics, connections or
+    # other nodes. Then a change there re-runs nothing of it.
     green_means: str
     """What a good verdict of this backend does and does not show, in a sentence or two."""
 

@@ -176,7 +176,7 @@ def _false_at_the_end(machine: Machine, name: str, claim: Term, steps: list[Step
     broken = sorted({clause for step in steps for clause in step.broken})
     if broken:
         told += f"; on the way an assumption does not hold: {', '.join(broken)}"
-    bound: dict[str, object] = {"steps": len(steps), "scenario": machine.world.scenario.digest}
+    bound: dict[str, object] = {"steps": len(steps), "scenario": machine.world.scenario.content}
     shown = Counterexample(trace[-1], told, trace)
     return Answer(Verdict.REFUTED, told, shown, bound=bound, details={"genuine": True, "run": len(steps)})
 

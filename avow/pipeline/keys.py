@@ -4,7 +4,7 @@ A claim's digest covers its clause and the node's assumptions. A method may see 
 ports (a program is run on inputs that the clause does not mention), the values of the contract's constants (an option
 or a program may name one), the scenario, and what the node is wired to. What is left out here would make evidence look
 current that is not; so a backend is taken to see all of it unless it says that it does not (`uses_scenario`,
-`uses_wiring`), and a constant counts as soon as its name occurs anywhere in the options or files.
+`uses_steps`, `uses_wiring`), and a constant counts as soon as its name occurs anywhere in the options or files.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ from avow.system.plan import System
 def surroundings(tool: Backend, job: Job, options: str) -> str:
     """As text; `options` are the method's, as they enter its key."""
     parts: list[Any] = [_ports(job.node), list(_constants(job.contract, options, tool.files(job)))]
-    if getattr(tool, "uses_scenario", True) is not False and job.system.plan.scenario:
-        parts.append(job.system.plan.scenario.digest)
+    scenario = job.system.plan.scenario
+    if getattr(tool, "uses_scenario", True) is not False and scenario:
+        parts.append(scenario.digest if getattr(tool, "uses_steps", True) is not False else scenario.content)
     if getattr(tool, "uses_wiring", True) is not False:
         parts.append(_wiring(job.system, job.node, tool.name))
     return json.dumps(parts)

@@ -248,7 +248,8 @@ def _digest(path: Path) -> str:
 
 
 def _scenario(system: System) -> str:
-    return system.plan.scenario.digest if system.plan.scenario else ""
+    """What the core's engines see of it; its `steps` only temporal requirements ask for, whose digest has them."""
+    return system.plan.scenario.content if system.plan.scenario else ""
 
 
 @functools.cache

@@ -103,6 +103,9 @@ class Scenario:
     domains: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     steps: int | None = None
     digest: str = ""
+    """Of all of it."""
+    content: str = ""
+    """Digest of tables, interpretation and domains: for what does not ask how far a bounded check goes (`steps`)."""
 
     def table(self, name: str) -> Table:
         """Raises KeyError."""

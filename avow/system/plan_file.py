@@ -253,10 +253,15 @@ class _Reader:
             *(f"table {t.name!r} {t.columns!r} {t.rows!r}" for t in sorted(tables.values(), key=lambda t: t.name)),
             *(f"interpret {port!r} {value!r}" for port, value in sorted(interpret.items())),
             *(f"domain {name!r} {values!r}" for name, values in sorted(domains.items())),
-            f"steps {steps.value if steps else None!r}",
         ]
+        deepest = steps.value if steps else None
         return Scenario(
-            tuple(tables.values()), interpret, domains, steps.value if steps else None, digest("\n".join(parts))
+            tuple(tables.values()),
+            interpret,
+            domains,
+            deepest,
+            digest("\n".join([*parts, f"steps {deepest!r}"])),
+            digest("\n".join(parts)),
         )
 
     def table(self, name: str, piece: Piece) -> Table | None:

@@ -25,6 +25,7 @@ class AjpfBackend:
     title = "agent programs (Gwendolen), model-checked against properties instantiated from the contract"
     version = "4"
     strength = Verdict.CHECKED
+    uses_steps = False
     uses_wiring = False
     link = Link.MAPPED
     options_schema: Mapping[str, Any] = SCHEMA

@@ -27,6 +27,7 @@ class HypothesisBackend:
     title = "Property-based tests of a Python function, generated from the contract"
     version = "3"
     strength = Verdict.TESTED
+    uses_steps = False
     uses_wiring = False
     link = Link.GENERATED
     options_schema: Mapping[str, Any] = {

@@ -34,6 +34,7 @@ class RosMonitoringBackend:
     version = "2"
     strength = Verdict.MONITORED
     link = Link.MAPPED
+    uses_steps = False
     options_schema: Mapping[str, Any] = SCHEMA
     codes = CODES
     translations: Mapping[str, str] = {"rml": "an RML specification for each node, by the plan's mapping"}

@@ -11,12 +11,23 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import pytest
 from helpers import edit
 
+from avow.backend import Backend, Limits
+from avow.calculus.composition import compose
+from avow.calculus.discharge import Bounds
+from avow.calculus.requirements import FormulaQuestion, TemporalQuestion, requirement_question
 from avow.diagnostics import Rejected
+from avow.pipeline.engines import discharge_sanity
+from avow.pipeline.keys import surroundings
 from avow.pipeline.survey import survey
+from avow.pipeline.work import catalogue, method_job, planned_method
+from avow.registry import backend
+from avow.system.load import load_system
+from avow.system.plan import Scenario, System
 
 ROOT = Path(__file__).parents[2]
 FERRY = ROOT / "tests" / "pipeline" / "fixtures" / "ferry"
@@ -323,6 +334,91 @@ def test_a_row_of_the_scenario_reruns_what_looks_at_it(tmp_path: Path) -> None:
     assert {name for name, method in moved if name.startswith("system/requirement/")}, (
         "temporal requirements look at it"
     )
+
+
+def test_steps_of_the_scenario_re_ask_what_goes_so_far(tmp_path: Path) -> None:
+    folder = copied(SHIPPED, tmp_path)
+    before = keys(folder)
+    for pair in (("  steps: 40\n", "  steps: 41\n"), ("  steps: 41\n", "")):
+        edit(folder / "plan.yaml", pair)
+        after = keys(folder)
+        assert changed(before, after) == {("system/requirement/REQ4", "compose")}, "the one temporal requirement"
+        before = after
+
+
+class Watched(Scenario):
+    """A scenario whose `steps` must not be read."""
+
+    __slots__ = ()
+
+    def __getattribute__(self, name: str) -> object:
+        if name == "steps":
+            raise AssertionError("it looks at the scenario's steps")
+        return super().__getattribute__(name)
+
+
+def watched(folder: Path) -> System:
+    system = load_system(folder)
+    given = system.plan.scenario
+    assert given is not None
+    scenario = Watched(given.tables, given.interpret, given.domains, given.steps, given.digest, given.content)
+    return replace(system, plan=replace(system.plan, scenario=scenario))
+
+
+@pytest.mark.parametrize(
+    "method", ["hypothesis", "rosmonitoring", pytest.param("ajpf", marks=pytest.mark.slow), "sanity"]
+)
+def test_who_says_that_it_needs_no_steps_does_not_look_at_them(tmp_path: Path, method: str) -> None:
+    folder = copied(SHIPPED, tmp_path)
+    edit(folder / "plan.yaml", ("cases: 2000", "cases: 20"))
+    system = watched(folder)
+    work = catalogue(system).work("agent", method)
+    if method == "sanity":
+        few = [o for o in work.obligations if o.name.startswith("consistent")] or work.obligations[:1]
+        outcomes = discharge_sanity(system, system.contract.node("agent"), few, Limits(seconds=30)).outcomes
+    else:
+        planned = planned_method(work)
+        job, tool = method_job(system, system.contract.node("agent"), planned), backend(method)
+        assert getattr(tool, "uses_steps", True) is False
+        assert tool.check(job) is not None
+        tool.export(job)
+        outcomes = tool.discharge(job, tmp_path, Limits(seconds=60)).outcomes
+    assert outcomes
+
+
+def test_temporal_requirements_look_at_the_steps_and_others_do_not(tmp_path: Path) -> None:
+    system = watched(copied(SHIPPED, tmp_path))
+    composition = compose(system)
+    asked = {r.id: requirement_question(composition.frame, r) for r in system.plan.requirements}
+    temporal, formula = asked["REQ4"], asked["REQ3"]
+    assert isinstance(temporal, TemporalQuestion)
+    assert isinstance(formula, FormulaQuestion)
+    formula.broken_by_a_run(composition, Bounds(milliseconds=300))
+    with pytest.raises(AssertionError, match="looks at the scenario's steps"):
+        temporal(composition, Bounds(milliseconds=300))
+
+
+def test_a_plug_in_is_taken_to_look_at_the_steps(tmp_path: Path) -> None:
+    system = load_system(copied(SHIPPED, tmp_path))
+    given = system.plan.scenario
+    assert given is not None
+    other = replace(system, plan=replace(system.plan, scenario=replace(given, steps=1, digest="other")))
+
+    class Tool:
+        name = "plugin"
+
+        def files(self, job: object) -> tuple[Path, ...]:
+            return ()
+
+    class Short(Tool):
+        uses_steps = False
+
+    def key(tool: object, of: System) -> str:
+        work = catalogue(system).work("agent", "hypothesis")
+        return surroundings(cast("Backend", tool), method_job(of, of.contract.node("agent"), planned_method(work)), "")
+
+    assert key(Tool(), system) != key(Tool(), other)
+    assert key(Short(), system) == key(Short(), other)
 
 
 FILES: dict[str, tuple[str, str]] = {
