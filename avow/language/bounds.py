@@ -22,7 +22,8 @@ from avow.language.terms import (
 
 OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 """What holds where a comparison does not."""
-_FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+"""The same comparison with its sides exchanged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +46,11 @@ def bounds(formula: Term) -> Iterator[Bound]:
     while stack:
         term, turned = stack.pop()
         match term:
-            case Compare(operator=sign, left=left, right=right) if sign in _FLIPPED:
+            case Compare(operator=sign, left=left, right=right) if sign in FLIPPED:
                 if (number := constant(right)) is not None:
                     yield Bound(term, sign, number, turned)
                 elif (number := constant(left)) is not None:
-                    yield Bound(term, _FLIPPED[sign], number, turned)
+                    yield Bound(term, FLIPPED[sign], number, turned)
             case Implies(left=left, right=right):
                 stack += [(right, turned), (left, True)]
             case Iff() | Or() | Not():

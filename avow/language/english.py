@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from avow.language.bounds import OPPOSITE
+from avow.language.bounds import FLIPPED, OPPOSITE
 
 LONGEST = 4_000
 """So many characters of a sentence are read."""
 
-_LESS = r"(?:less|fewer|smaller|lower|shorter|earlier|sooner)"
-_MORE = r"(?:greater|more|larger|higher|longer|bigger|later)"
+_LESS = r"(?:less|fewer|smaller|lower|shorter|earlier|sooner|closer|nearer|slower|colder|cooler|lighter)"
+_MORE = r"(?:greater|more|larger|higher|longer|bigger|later|farther|further|faster|hotter|warmer|heavier)"
 _PHRASES = (
     ("<=", rf"{_LESS} than or equals? to|no {_MORE} than|at most|not exceed(?:ing|s)?|never exceeds?|<=|≤"),
     (">=", rf"{_MORE} than or equals? to|no {_LESS} than|at least|>=|≥"),
@@ -36,9 +36,20 @@ _COMPARISON = re.compile(
     rf"\s*(?P<number>{_NUMBER})(?!\d|\.\d)(?P<unit>{_UNIT})(?!\w)(?:\s*and\s+(?P<second>{_NUMBER}))?",
     re.IGNORECASE,
 )
-_JUST_BEFORE = re.compile(
-    r"(?:\b(?:not|never|cannot)|n't)(?:\s+(?:be|is|go|goes|get|rise|fall|drop|stay|have))?\s*$", re.I
+_OR_MORE = re.compile(
+    rf"(?<![\w.<>=-])(?P<number>{_NUMBER})(?!\d|\.\d)(?P<unit>{_UNIT})\s+or\s+"
+    rf"(?:(?P<more>{_MORE}|above|over)|{_LESS}|below|under)(?!\w|\s+than\b|\s+{_NUMBER})",
+    re.IGNORECASE,
 )
+_SPEED = re.compile(r"\b(?:faster|slower)\b", re.IGNORECASE)
+_NO_SPEED = re.compile(r"|(?:milli|micro|[µunm])?s|sec|(?:milli|micro)?seconds?|min|minutes?|h|hours?", re.IGNORECASE)
+"""A unit of time, or none: ``faster than 2 s`` is less than 2 s, ``faster than 2 m/s`` is more."""
+_JUST_BEFORE = re.compile(
+    r"(?:\b(?:not|never|cannot)|n't)(?:\s+(?:be|is|goe?s?|gets?|rises?|falls?|drops?|stays?|have|has|comes?|moves?|drives?"
+    r"|travels?|runs?|fl(?:y|ies)|turns?|rotates?))?\s*$",
+    re.IGNORECASE,
+)
+_MAY = re.compile(r"\b(?:may|might|allowed|permitted)\b", re.IGNORECASE)
 _NEGATION = re.compile(r"\b(?:not|never|no|cannot|nor|without|unless)\b|n't\b", re.IGNORECASE)
 
 
@@ -66,12 +77,24 @@ def comparisons(sentence: str) -> Iterator[Comparison]:
             continue
         text = sentence[match.start() : match.end("unit")].strip()
         signs = frozenset({"<", "<="} if kind == "up to" else {kind})
-        before = re.split(r"[.;:,]", sentence[: match.start()])[-1]
-        if _JUST_BEFORE.search(before):
-            signs = frozenset(OPPOSITE[sign] for sign in signs)
-        elif _NEGATION.search(before):
-            signs |= {OPPOSITE[sign] for sign in signs}
-        yield Comparison(text, signs, number, unit, in_digits)
+        yield Comparison(text, _meant(signs, sentence[: match.start()], text, unit), number, unit, in_digits)
+    for match in _OR_MORE.finditer(sentence):
+        text, unit = match[0], match["unit"].strip()
+        signs = _meant(frozenset({">=" if match["more"] else "<="}), sentence[: match.start()], text, unit)
+        yield Comparison(text, signs, _number(match["number"]), unit, match["number"].lower() not in _WORDS)
+
+
+def _meant(signs: frozenset[str], before: str, text: str, unit: str) -> frozenset[str]:
+    """What these signs may mean in a comparison with these words before it. What may be more than a number where
+    something is so, is at most that number elsewhere."""
+    if _SPEED.search(text) and _NO_SPEED.fullmatch(unit):
+        signs |= {FLIPPED[sign] for sign in signs}
+    clause = re.split(r"[.;:,]", before)[-1]
+    opposite = frozenset(OPPOSITE[sign] for sign in signs)
+    if _JUST_BEFORE.search(clause):
+        return opposite
+    allowed = signs <= {"<", ">"} and _MAY.search(clause)
+    return signs | opposite if allowed or _NEGATION.search(clause) else signs
 
 
 def _number(text: str) -> Fraction:
@@ -82,7 +105,10 @@ def _number(text: str) -> Fraction:
 # --- conditions ------------------------------------------------------------------------------------------------------
 
 _CONDITION = re.compile(r"\b(?:if|when|whenever|while|once|provided|as (?:soon|long) as|in case)\b", re.IGNORECASE)
-_BOTH = re.compile(r"\b(?:if and only if|iff|(?:exactly|precisely|just) (?:if|when|while|then))\b", re.IGNORECASE)
+_BOTH = re.compile(
+    r"\b(?:if,? and only if|iff|when,? and only when|(?:exactly|precisely|just) (?:if|when|while|then))\b",
+    re.IGNORECASE,
+)
 _PERHAPS_BOTH = re.compile(
     r"\b(?:only|exactly|precisely|iff|otherwise|else|unless|equals?|equivalent|same|vice versa|conversely|except"
     r"|no other|not? (?:\w+ ){0,2}other\w*|until|just)\b",

@@ -50,7 +50,7 @@ def _context(contract: Contract) -> Iterable[str]:
 
 
 def _node(node: Node) -> str:
-    rows = [rf"\multicolumn{{3}}{{c}}{{\textbf{{{latex_escape(node.name)}}}}} \\ \hline\hline"]
+    rows = [rf"\multicolumn{{3}}{{c}}{{\textbf{{{latex_escape(node.name)}}}}} \\* \hline\hline"]
     rows += _ports("Input", node.inputs)
     rows += _ports("Output", node.outputs)
     if node.topics:

@@ -41,6 +41,7 @@ from avow.language.terms import (
 )
 
 _ALLOW = re.compile(r"\bavow:\s*allow\b([^\n*]*)")
+_CODE = re.compile(r"[A-Za-z]+[0-9]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,7 @@ def lint(files: Sequence[LintedFile], contract: Contract | None, off: frozenset[
         found.extend(_spellings(contract))
     by_name = {file.reports.source.file: file for file in files}
     allowances = {name: _allowances(file) for name, file in by_name.items()}
+    found.extend(unknown for file in files for unknown in _no_lints(file))
     for diagnostic in found:
         if diagnostic.code in off or diagnostic.span is None or diagnostic.span.file not in by_name:
             continue
@@ -90,12 +92,7 @@ def _allowances(file: LintedFile) -> list[tuple[frozenset[str], int, int]]:
         match = _ALLOW.search(comment.text)
         if match is None:
             continue
-        codes = frozenset(re.findall(r"[A-Za-z]+[0-9]+", match.group(1)))
-        for code in sorted(codes):
-            if code not in CODES or not CODES[code].is_lint:
-                file.reports.add(
-                    _warning("RCL410", f"`{code}` is not the code of a lint", source.span(comment.start, comment.end))
-                )
+        codes = frozenset(_CODE.findall(match.group(1)))
         line, _ = source.place(comment.start)
         before = source.text[source.text.rfind("\n", 0, comment.start) + 1 : comment.start]
         if comment.end <= file.first_token:
@@ -109,6 +106,16 @@ def _allowances(file: LintedFile) -> list[tuple[frozenset[str], int, int]]:
                 end = max(part[1] for part in following if part[0] == start)
                 found.append((codes, source.place(start)[0], source.place(end)[0]))
     return found
+
+
+def _no_lints(file: LintedFile) -> Iterator[Diagnostic]:
+    """What the comments allow and is no lint."""
+    for comment in file.comments:
+        match = _ALLOW.search(comment.text)
+        for code in sorted(set(_CODE.findall(match.group(1)))) if match is not None else ():
+            if code not in CODES or not CODES[code].is_lint:
+                span = file.reports.source.span(comment.start, comment.end)
+                yield _warning("RCL410", f"`{code}` is not the code of a lint", span)
 
 
 # --- about the text --------------------------------------------------------------------------------------------------

@@ -129,6 +129,8 @@ def test_switched_off_by_code_and_by_comment() -> None:
     assert codes(NODE.format("// avow: allow RCL402\n  " + clause)) == ["RCL401"]
     assert codes(NODE.format(clause).replace("node n", "/* avow: allow RCL401 */\nnode n")) == []
     assert sorted(codes(NODE.format(clause + " // avow: allow RCL201"))) == ["RCL401", "RCL410"]
+    assert codes(NODE.format(clause + " // avow: allow RCL201, RCL401, RCL410")) == []
+    assert codes(NODE.format(clause + " // avow: allow RCL201"), frozenset({"RCL410"})) == ["RCL401"]
 
 
 def test_errors_cannot_be_switched_off() -> None:

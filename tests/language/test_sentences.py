@@ -46,6 +46,11 @@ COMPARED = [
     ("Fewer than 12 of them", "in.k < 13", "the formula has `13`"),
     ("Between 120 and 205", "120 <= in.r < 250", "the formula has `120`, `250`"),
     ("A reading above 3.5", "in.b", "the formula has no number"),
+    # other words
+    ("It never drives faster than 1.5 m/s", "in.r >= 1.5", "greater than or equal to 1.5"),
+    ("It must not come closer than 30 cm", "in.r <= 0.3", "less than or equal to 0.3"),
+    ("At 80 degrees or more it is ok", "in.r > 80 -> in.b", "greater than 80"),
+    ("Two or fewer of them", "in.k >= 2", "greater than or equal to 2"),
 ]
 AGREE = [
     ("The reading is greater than or equal to 0", "0 <= in.r"),
@@ -68,6 +73,16 @@ AGREE = [
     ("See section 3.2, step 4 of the handbook", "in.r < 250"),  # no comparison
     ("Over the whole range", "in.r < 250"),
     ("More than version 1.2.3", "in.r < 250"),
+    ("It never drives faster than 1.5 m/s", "in.r <= 1.5"),
+    ("It answers faster than 2 s", "in.r < 2"),
+    ("It answers no slower than 2 s", "in.r <= 2"),
+    ("It answers after 100 ms or faster", "in.r <= 100"),
+    ("When b it may go faster than 2 m/s", "in.b or in.r <= 2"),
+    ("It does not move under 250", "in.r < 250 -> in.b"),
+    ("At 80 degrees or more it is ok", "in.r >= 80 -> in.b"),
+    ("It is not ok at 80 or more", "in.r >= 80 -> in.b"),
+    ("One or more of them", "in.b"),
+    ("Room 12 or under 250", "in.r < 250"),
 ]
 
 
@@ -97,6 +112,8 @@ def test_comparisons_that_agree(sentence: str, formula: str) -> None:
         ("It is ok only if b", "in.b <=> out.ok", None),
         ("If b it is ok; nothing else makes it so, and no other input", "in.b <=> out.ok", None),
         ("It is ok exactly when b", "in.b <=> out.ok", None),
+        ("It is ok when and only when b", "in.b -> out.ok", "RCL414"),
+        ("It is ok if, and only if, b", "in.b -> out.ok", "RCL414"),
         ("It is ok exactly when b", "in.c -> (in.b == out.ok)", None),
         ("If it is certain, then it is ok exactly when b", "in.c -> (in.b <=> out.ok)", None),
         ("Ok as b", "in.b <=> out.ok", None),
