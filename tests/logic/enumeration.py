@@ -222,7 +222,7 @@ def _range_of(variable: Variable, term: Quantified) -> Term:
             case In(item=Variable() as item, collection=collection) if item == variable:
                 return collection
             case And(items=items):
-                stack.extend(items)
+                stack.extend(reversed(items))
             case Implies(left=left) if term.quantifier is Quantifier.FORALL:
                 stack.append(left)
     raise AssertionError(f"{variable.name} ranges over too much")
