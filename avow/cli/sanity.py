@@ -143,4 +143,6 @@ def _style(result: SanityResult) -> str:
 
 
 def _examples(result: SanityResult) -> list[Counterexample]:
-    return [example for _, example in result.conflicts] or ([result.counterexample] if result.counterexample else [])
+    if result.counterexample is None:  # what contradicts itself does so for every input, and the explanation has it all
+        return []
+    return [example for _, example in result.conflicts] or [result.counterexample]

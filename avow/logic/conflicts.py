@@ -78,6 +78,34 @@ def conflicts(
     return tuple(_explain(tuple(sorted(clauses, key=order.__getitem__)), group, at, seed) for clauses, at in listed)
 
 
+_MANY = 8
+
+
+def contradictions(
+    formulas: Mapping[str, Term], first: Iterable[str], *, timeout_ms: int, seed: int = 0
+) -> tuple[tuple[str, ...], ...]:
+    """The minimal sets of formulas that cannot hold together, `first` before the others that are found within the time
+    (eight at most): a set other than these lacks a formula of each of them (Reiter, "A theory of diagnosis from first
+    principles", 1987)."""
+    deadline = now() + timeout_ms / 1000
+    found = [frozenset(first)]
+    waiting: list[frozenset[str]] = [frozenset()]
+    for without in waiting:  # which grows
+        if now() > deadline or len(found) >= _MANY:
+            break
+        core = next((known for known in found if not known & without), None)
+        if core is None:
+            kept = {label: formula for label, formula in formulas.items() if label not in without}
+            answer = solve(kept, timeout_ms=min(500, timeout_ms), seed=seed, shown=False)
+            if answer.status != "unsat":
+                continue
+            core = frozenset(answer.core)
+            found.append(core)
+        further = (without | {label} for label in formulas if label in core)
+        waiting.extend(labels for labels in further if labels not in waiting)
+    return tuple(tuple(label for label in formulas if label in core) for core in found)
+
+
 def _minimal_sets(group: Group, at: Mapping[Variable, Value], deadline: float, seed: int) -> Iterable[frozenset[str]]:
     """The minimal sets of guarantees that no output meets at this input, smallest first."""
     minimal: list[frozenset[str]] = []

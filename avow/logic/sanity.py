@@ -26,7 +26,8 @@ from avow.logic.values import Value
 from avow.verdict import Counterexample, Outcome, Verdict
 
 if TYPE_CHECKING:
-    from avow.logic.realizability import Realizability
+    from avow.logic.conflicts import Conflict
+    from avow.logic.realizability import Group, Realizability
 
 __all__ = [
     "Bounds",
@@ -177,7 +178,8 @@ class _Analysis:
     # -- the whole contract --------------------------------------------------------------------------------------------
 
     def _satisfiable(self) -> _Finding:
-        return self._possible(self.assumptions, "no input meets {} together", "no input meets {}")
+        finding = self._possible(self.assumptions, "no input meets {} together", "no input meets {}")
+        return self._with_all_sets(finding, self.assumptions)
 
     def _consistent(self) -> _Finding:
         together = {**self.assumptions, **self.guarantees}
@@ -191,7 +193,20 @@ class _Analysis:
             finding = self._possible(together, *texts)
         if finding.verdict is Verdict.REFUTED and self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
             return replace(finding, because="assumptions-satisfiable")
-        return finding
+        return self._with_all_sets(finding, together)
+
+    def _with_all_sets(self, finding: _Finding, formulas: Mapping[str, Term]) -> _Finding:
+        """Where formulas contradict each other, every smallest set of them that does."""
+        from avow.logic.conflicts import contradictions
+
+        if finding.verdict is not Verdict.REFUTED or not finding.clauses:
+            return finding
+        sets = contradictions(formulas, finding.clauses, timeout_ms=self.patience.full // 2, seed=self.seed)
+        if len(sets) == 1:
+            return finding
+        text = ", nor ".join((finding.explanation, *map(listing, sets[1:])))
+        shown = tuple((s, Counterexample(explanation=f"nothing meets {listing(s)}")) for s in sets)
+        return replace(finding, explanation=text, conflicts=shown)
 
     def _realizability(self) -> tuple[Realizability, bool]:
         """The answer, and whether it is about the scenario only."""
@@ -248,15 +263,13 @@ class _Analysis:
             return _Finding(verdict, _resting(answer.needed), answer.needed, engine=answer.engine, bounded=bounded)
         if answer.verdict is not Verdict.REFUTED:
             return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
-        group = next(g for g in groups(self.guarantees, self.outputs) if tuple(g.guarantees) == answer.group)
-        found = conflicts(
-            self.inputs,
-            group,
-            self.assumptions,
-            answer.inputs,
-            timeout_ms=2 * self.patience.full,
-            seed=self.seed,
-        )
+        found: list[Conflict] = []
+        for group in groups(self.guarantees, self.outputs):
+            at = answer.inputs if tuple(group.guarantees) == answer.group else self._refuting(group)
+            if at is not None:
+                limit = 2 * self.patience.full
+                found += conflicts(self.inputs, group, self.assumptions, at, timeout_ms=limit, seed=self.seed)
+        found.sort(key=lambda conflict: not set(conflict.clauses) <= set(answer.group))
         listed = tuple((conflict.clauses, conflict.counterexample()) for conflict in found)
         if not listed:
             from avow.logic.counterexample import show_values
@@ -268,6 +281,16 @@ class _Analysis:
         because = "consistent" if self._other("consistent").verdict is Verdict.REFUTED else None
         text = f"for some inputs no output meets {listing(clauses)}"
         return _Finding(Verdict.REFUTED, text, clauses, shown, listed, because, answer.engine)
+
+    def _refuting(self, group: Group) -> Mapping[Variable, Value] | None:
+        """An input for which no output meets these guarantees, which share no output with the others."""
+        from avow.logic.realizability import realizable
+
+        limit = self.patience.full
+        answer = realizable(
+            self.inputs, group.outputs, self.assumptions, group.guarantees, timeout_ms=limit, seed=self.seed
+        )
+        return answer.inputs if answer.verdict is Verdict.REFUTED else None
 
     # -- one clause ----------------------------------------------------------------------------------------------------
 

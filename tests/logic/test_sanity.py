@@ -290,3 +290,29 @@ def test_a_chain_of_equivalences_does_not_double_the_work_with_every_link() -> N
     found = results(node(f"inputs( a : BOOL ) outputs( o : BOOL ) | guarantee( {chain} )"))
     assert time.process_time() - began < 20
     assert found["consistent"].verdict is Verdict.PROVED
+
+
+def test_conflicts_about_different_outputs_are_all_shown() -> None:
+    text = """
+    node n {
+      inputs( d : REAL, e : REAL ) outputs( v : REAL, w : REAL ) topics()
+      guarantee( d > 3 -> v > 3 ) guarantee( d > 4 -> v < 2 )
+      guarantee( e > 1 -> w > d ) guarantee( e < 2 -> w < d )
+    }"""
+    found = {r.name: r for r in analyse(contract(text).nodes[0], wanted={"realizable"})}["realizable"]
+    assert [clauses for clauses, _ in found.conflicts] == [("G1", "G2"), ("G3", "G4")]
+    assert all(shown.values for _, shown in found.conflicts)
+
+
+def test_all_minimal_sets_of_a_contradiction_are_shown() -> None:
+    text = """
+    node n {
+      inputs( d : REAL ) outputs( v : REAL, w : REAL ) topics()
+      assume( d < 1 )
+      guarantee( v > 3 ) guarantee( v < 2 ) guarantee( w > d ) guarantee( w < d ) guarantee( w > 0 ) guarantee( d > 1 )
+    }"""
+    found = {r.name: r for r in analyse(contract(text).nodes[0], wanted={"consistent"})}["consistent"]
+    sets = {frozenset(clauses) for clauses, _ in found.conflicts}
+    assert sets == {frozenset({"G1", "G2"}), frozenset({"G3", "G4"}), frozenset({"A1", "G6"})}
+    assert found.explanation.startswith("no inputs and outputs meet ")
+    assert found.explanation.count(", nor ") == 2
