@@ -30,7 +30,9 @@ def export(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") 
     lines += ["(set-logic ALL)", *_in_order(declarations)]
     lines += [f"(assert {expr.sexpr()})" for expr in background]
     lines += [f"(assert (! {expr.sexpr()} :named |clause {_harmless(label)}|))" for label, expr in named]
-    return _quoted("\n".join([*lines, "(check-sat)", ""]))
+    script = _quoted("\n".join([*lines, "(check-sat)", ""]))
+    # An option in the script itself would be an error to Z3.
+    return f"; cvc5 reads sequences with --strings-exp\n{script}" if "(seq." in script else script
 
 
 _ASSERTION = re.compile(r"^\(assert\s", re.MULTILINE)  # not the element of a type that is called `assert`

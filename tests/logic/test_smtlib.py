@@ -6,8 +6,8 @@ import pytest
 import z3
 from hypothesis import HealthCheck, given, settings
 
-from avow.language.sorts import STRING
-from avow.language.terms import Compare, Literal, Not, Role, Term, Variable
+from avow.language.sorts import NATURAL, REAL, STRING, SequenceSort
+from avow.language.terms import Compare, Length, Literal, Not, Role, Term, Variable
 from avow.logic.formula import negation
 from avow.logic.smt import solve
 from avow.logic.smtlib import ask_cvc5, export
@@ -75,3 +75,10 @@ def test_the_same_question_gives_the_same_text() -> None:
 
 def test_a_missing_or_puzzled_cvc5_says_nothing() -> None:
     assert ask_cvc5("(this is no script") is None
+
+
+def test_scripts_with_sequences_say_how_cvc5_reads_them() -> None:
+    reals = Variable(Role.INPUT, "s", SequenceSort(REAL))
+    long = Compare("<", Literal(0, NATURAL), Length(reals, NATURAL))
+    assert export([long]).startswith("; cvc5 reads sequences with --strings-exp\n")
+    assert "strings-exp" not in export([say("in.r < 3")])
