@@ -46,7 +46,7 @@ class DafnyBackend:
 
     name = "dafny"
     title = "a Dafny implementation, verified against the contract"
-    version = "2"
+    version = "3"
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False

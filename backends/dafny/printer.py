@@ -15,6 +15,7 @@ from fractions import Fraction
 from avow.backends.dafny.names import Names
 from avow.diagnostics import Span
 from avow.language.sorts import (
+    REAL,
     BoolSort,
     DataSort,
     EnumSort,
@@ -213,7 +214,8 @@ class _Printer:
                 return f"{inner} as real", False
             case Negative(term=inner_term, sort=sort):
                 inner = yield self.operand(inner_term, scope)
-                return f"-{inner}", False
+                # Of a natural, Dafny 2.3 takes `-n` to be one too, and then complains that it may not be.
+                return (f"-{inner}" if sort == REAL or isinstance(inner_term, Literal) else f"0 - {inner}"), False
             case Arithmetic(operator="/", left=left, right=right):
                 inner = yield self.list((left, right), scope)
                 return f"Types.Divide({inner})", True

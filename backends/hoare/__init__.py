@@ -26,7 +26,7 @@ class Hoare:
 
     name = "hoare"
     title = "Hoare triples from the guarantee, proved of an imperative program by weakest preconditions"
-    version = "2"
+    version = "3"
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False

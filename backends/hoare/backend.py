@@ -29,6 +29,9 @@ from avow.logic.values import show as show_value
 from avow.system.paths import inside
 from avow.verdict import Counterexample, Link, Outcome, Verdict
 
+BRIEFLY = 5.0
+"""Seconds for whether the program has an output for every input, where that can only turn `unknown` into `refuted`."""
+
 
 @dataclass(frozen=True)
 class Work:
@@ -171,11 +174,17 @@ def settle(job: Job, limits: Limits) -> Report:
         return Report(failed, "weakest preconditions", version)
     logs: dict[str, str] = {}
     outcomes = tuple(_obligation(o, found[o.id], work, limits, logs) for o in job.obligations)
-    if any(o.verdict is Verdict.PROVED for o in outcomes):
-        running = _every_run(work, limits)
+    open_ = {o.verdict for o in outcomes} & {Verdict.PROVED, Verdict.UNKNOWN}
+    if open_:
+        # where nothing is proved that would rest on it, it is worth a look but not the time of another guarantee
+        seconds = limits.seconds if Verdict.PROVED in open_ else min(limits.seconds, BRIEFLY)
+        running = _every_run(work, replace(limits, seconds=seconds))
         logs["every-run.log"] = f"{running.verdict} - {running.why}\n"
-        if running.verdict is not Verdict.PROVED:
-            outcomes = tuple(_stopped(o, running, work) if o.verdict is Verdict.PROVED else o for o in outcomes)
+        if running.verdict is Verdict.REFUTED:  # it settles also what the guarantee's own triples leave open
+            worse = {Verdict.PROVED, Verdict.UNKNOWN}
+        else:
+            worse = {Verdict.PROVED} if running.verdict is not Verdict.PROVED else set()
+        outcomes = tuple(_stopped(o, running, work) if o.verdict in worse else o for o in outcomes)
     return Report(outcomes, "weakest preconditions", version, logs=logs)
 
 
@@ -260,7 +269,7 @@ def _holds(condition: Condition, deadline: float, limits: Limits) -> bool:
 
 
 def _stopped(outcome: Outcome, running: Settled, work: Work) -> Outcome:
-    """In place of a proof of the guarantee's own triples, where some run has no output."""
+    """In place of an answer of the guarantee's own triples, where some run has no output."""
     shown = _counterexample(running, work) if running.breach is not None else None
     return replace(
         outcome, verdict=running.verdict, summary=running.why, counterexample=shown, hypotheses=(), vacuous=False

@@ -25,7 +25,7 @@ class HypothesisBackend:
 
     name = "hypothesis"
     title = "Property-based tests of a Python function, generated from the contract"
-    version = "3"
+    version = "4"
     strength = Verdict.TESTED
     uses_steps = False
     uses_wiring = False

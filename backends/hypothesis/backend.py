@@ -162,8 +162,10 @@ def _doubt(answer: Mapping[str, Any], own: Mapping[str, Any], valid: int, reject
         return f"the assumptions are met too rarely: {valid} of {valid + rejected} generated inputs"
     if answer["stopped"] == "time":
         return f"only {valid} of {wanted} cases in the time given"
-    if own["undecided"] or answer["undecided"]:
-        return f"{own['undecided'] or answer['undecided']} of {valid} cases could not be judged"
+    if own["undecided"]:
+        return f"{own['undecided']} of {valid + answer['edges']} cases could not be judged"
+    if answer["undecided"]:
+        return f"of {answer['undecided']} generated inputs it could not be told whether they meet the assumptions"
     return ""
 
 

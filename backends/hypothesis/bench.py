@@ -278,13 +278,14 @@ class Bench:
 
     def _assumed(self, inputs: Inputs) -> bool:
         values = valuation(inputs, {})
+        unknown = False
         for assumption in self.assumptions:
             held = assumption.holds(values)
-            if held is None:
-                self.undecided += 1
-            if not held:
-                return False
-        return True
+            if held is False:
+                return False  # whatever cannot be told of the others
+            unknown = unknown or held is None
+        self.undecided += unknown
+        return not unknown
 
     def _blamed(self, inputs: Inputs) -> tuple[str, ...] | None:
         return blamed(self.assumptions, valuation(inputs, {}))

@@ -202,6 +202,19 @@ def test_division_by_zero_breaks_a_triple(tmp_path: Path) -> None:
     assert verdicts(job(tmp_path, small("out.y * in.b == in.a", "in.b > 0"), "y := a / b"))["G1"] is Verdict.PROVED
 
 
+def test_a_run_without_an_output_refutes_what_a_triple_cannot_tell(tmp_path: Path) -> None:
+    """Where b is 0, the guarantee has no truth value: no run shows its triple to be broken. But there is no output."""
+    rcl = small("0 <= in.a / in.b < 1 -> out.y <= in.a")
+    program = "IF 0 <= a / b < 2 THEN\n  y := a\nELSE\n  y := 0"
+    outcome = settle(job(tmp_path, rcl, program))["G1"]
+    assert outcome.verdict is Verdict.REFUTED
+    assert outcome.counterexample is not None
+    assert dict(outcome.counterexample.values)["in.b"] == "0"
+    assert "division by zero" in outcome.summary
+    guarded = small("0 <= in.a / in.b < 1 -> out.y <= in.a", "in.b != 0")
+    assert verdicts(job(tmp_path, guarded, program))["G1"] is Verdict.PROVED
+
+
 def test_short_circuit_guards_a_division(tmp_path: Path) -> None:
     program = "IF b != 0 and a / b > 1 THEN y := 1 ELSE y := 0"
     assert verdicts(job(tmp_path, small("0 <= out.y <= 1"), program))["G1"] is Verdict.PROVED

@@ -182,6 +182,17 @@ def test_a_crash_is_shown_with_its_smallest_input(tmp_path: Path) -> None:
     assert "s.py, line 3" in low.summary
 
 
+def test_an_assumption_without_a_value_is_said_to_be_one(tmp_path: Path) -> None:
+    rcl = "node n {{ inputs( a : REAL, b : REAL ) outputs( y : REAL ) topics() {} guarantee g ( out.y == in.a ) }}"
+    text = "def step(a): return a"
+    unsure = settle(job(tmp_path, text, rcl.format("assume( 1 <= in.a / in.b )"), "n", cases=30))["g"]
+    assert unsure.verdict is Verdict.UNKNOWN
+    assert "could not be told whether they meet the assumptions" in unsure.summary
+    # what another assumption rules out is no question
+    both = rcl.format("assume( 1 <= in.a / in.b ) assume( in.b != 0 )")
+    assert settle(job(tmp_path, text, both, "n", cases=30))["g"].verdict is Verdict.TESTED
+
+
 def test_printing_does_not_disturb(tmp_path: Path) -> None:
     noisy = STEP.replace("    done =", "    print('{}' * 1000, flush=True)\n    done =", 1)
     assert {o.verdict for o in settle(job(tmp_path, noisy)).values()} == {Verdict.TESTED}
