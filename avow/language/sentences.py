@@ -77,7 +77,7 @@ _SCALES = tuple(Fraction(10) ** k for k in range(-9, 10)) + tuple(
     scale for k in (60, 3600) for scale in (Fraction(k), Fraction(1, k))
 )
 """Between a unit of the sentence and that of the contract: powers of ten, minutes, hours."""
-_EITHER = "write the one as the other, whichever is meant"
+_EITHER = "make the two say the same, whichever is meant"
 
 
 def _comparisons(sentence: str, formula: Term) -> Iterator[Mismatch]:
