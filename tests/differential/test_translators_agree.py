@@ -2,8 +2,8 @@
 
 Each contract comes with a program, both of them right or with one small fault, printed for each translator from one
 source. `proved` must go with no violation among the inputs at, below and above every constant; a counterexample must be
-one; a monitor must say of every step what the oracle says. Seeds 0 to 1,050 were run when this was written (Hypothesis: 400, Dafny: 100);
-here are a few of them.
+one; a monitor must say of every step what the oracle says. Seeds 0 to 1,050 were run when this was written (Hypothesis:
+400, Dafny: 100); here are a few of them.
 """
 
 from __future__ import annotations
