@@ -5,14 +5,20 @@ The text is Z3's own printing of the one translation, with what is Z3's dialect 
 
 from __future__ import annotations
 
+import importlib.util
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from itertools import pairwise
 
+from avow import process
 from avow.language.terms import Term
 from avow.logic.formula import free_variables
 from avow.logic.solver import z3
-from avow.logic.translation import Translator, Unsupported
+from avow.logic.translation import Translator
+
+_STARTING = 2.0
+"""Seconds that cvc5's process may take beyond the limit of the question."""
 
 
 def export(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") -> str:
@@ -69,28 +75,12 @@ def _harmless(text: str) -> str:
 
 
 def ask_cvc5(script: str, *, timeout_ms: int = 10_000) -> str | None:
-    """cvc5's answer to a script, or None where the package is not installed or cannot read the script."""
-    try:
-        import cvc5
-    except ImportError:
+    """cvc5's answer to a script (``unknown`` where it takes longer), or None where the package is not installed or
+    cannot read the script."""
+    if importlib.util.find_spec("cvc5") is None:
         return None
-    try:
-        terms = cvc5.TermManager()
-        solver = cvc5.Solver(terms)
-        solver.setOption("tlimit-per", str(timeout_ms))
-        solver.setOption("full-saturate-quant", "true")
-        parser = cvc5.InputParser(solver)
-        parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, script, "query")
-        symbols = parser.getSymbolManager()
-        answer = None
-        while True:
-            command = parser.nextCommand()
-            if command.isNull():
-                return answer
-            said = command.invoke(solver, symbols).strip()
-            if said.split(" ")[0] in {"sat", "unsat", "unknown"}:
-                answer = said.split(" ")[0]  # "unknown (INCOMPLETE)"
-            elif said and said != "success":
-                return None
-    except (RuntimeError, Unsupported):
-        return None
+    command = (sys.executable, "-P", "-m", "avow.logic.cvc5_process", str(timeout_ms))
+    done = process.run(command, seconds=timeout_ms / 1000 + _STARTING, stdin=script)
+    if done.timed_out:
+        return "unknown"
+    return done.stdout.strip() or None

@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, given, settings
 
 from avow.language.sorts import NATURAL, REAL, STRING, SequenceSort
 from avow.language.terms import Compare, Length, Literal, Not, Role, Term, Variable
+from avow.logic import smtlib
 from avow.logic.formula import negation
 from avow.logic.smt import solve
 from avow.logic.smtlib import ask_cvc5, export
@@ -82,3 +83,12 @@ def test_scripts_with_sequences_say_how_cvc5_reads_them() -> None:
     long = Compare("<", Literal(0, NATURAL), Length(reals, NATURAL))
     assert export([long]).startswith("; cvc5 reads sequences with --strings-exp\n")
     assert "strings-exp" not in export([say("in.r < 3")])
+
+
+def test_a_cvc5_that_does_not_keep_its_time_limit_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On some scripts it does not look at its clock; nothing but the end of its process ends it."""
+    pytest.importorskip("cvc5")
+    monkeypatch.setattr(smtlib, "_STARTING", 0.0)
+    assert ask_cvc5("(set-logic ALL)\n(check-sat)\n", timeout_ms=1) == "unknown"
+    monkeypatch.undo()
+    assert ask_cvc5("(set-logic ALL)\n(check-sat)\n", timeout_ms=20_000) == "sat"
