@@ -43,6 +43,7 @@ def command(
     from avow import __version__
     from avow.rendering import render, summary, to_json, to_sarif
 
+    paths = tuple(path.parent if path.name == "plan.yaml" else path for path in paths)  # the system that it plans
     found: list[Diagnostic] = []
     files = 0
     for group, group_off in _groups(paths, separately, found):
