@@ -15,6 +15,7 @@ from avow.evidence.obligation import Kind
 from avow.evidence.record import REMARKS
 from avow.language.contract import Contract
 from avow.language.load import check_sources
+from avow.language.sentences import elements_of
 from avow.language.source import Source
 from avow.system.sentences import said_otherwise
 from avow.system.strict_yaml import Piece, read_yaml
@@ -47,13 +48,14 @@ def _of_requirements(
 ) -> Iterator[OpenItem]:
     """What the sentences of requirements say otherwise than their formulas."""
     listed = plan.at("requirements")
+    elements = elements_of(contract.nodes)
     for name, piece in (listed.entries or {}).items() if listed else ():
         text, formula = piece.at("text"), piece.at("formula")
         if text is None or formula is None:
             continue
         claim = next((v.id for v in views if v.obligation.kind is Kind.REQUIREMENT and v.obligation.name == name), "")
         try:
-            told = tuple(said_otherwise(text.text, formula.text, contract, text.span))
+            told = tuple(said_otherwise(text.text, formula.text, contract, elements, text.span))
         except Rejected:
             continue  # of a system taken in: its own report has it
         yield from (_item(d, text.span, claim or name) for d in told if d.code not in off)

@@ -91,10 +91,8 @@ def _comparisons(sentence: str, formula: Term) -> Iterator[Mismatch]:
         if any(b.may_mean(what.signs) for b in about):
             continue
         if about:
-            shown, meaning = (
-                _short(show_term(about[0].term, "rcl")),
-                f"{_IN_WORDS[about[0].sign]} {_plain(about[0].number)}",
-            )
+            shown = _short(show_term(about[0].term, "rcl"))
+            meaning = f"{_IN_WORDS[about[0].sign]} {_plain(about[0].number)}"
             message = f"the sentence says “{what.text}”, the formula `{shown}`, that is, {meaning}"
             yield Mismatch("RCL413", message, _EITHER)
         elif what.in_digits and what.number not in (0, 1) and not any(_same(what, n) for n in numbers):

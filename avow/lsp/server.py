@@ -18,7 +18,8 @@ from avow.language.outline import FileSyntax
 from avow.language.source import Source
 from avow.lsp import answers
 from avow.lsp.answers import Document, StatusLookup, Symbol
-from avow.lsp.surroundings import PLAN, about_plan, companions, file_of
+from avow.lsp.surroundings import about_plan, companions, file_of
+from avow.system.load import PLAN_FILE
 
 _SEVERITIES = {
     Severity.ERROR: types.DiagnosticSeverity.Error,
@@ -70,7 +71,7 @@ def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSer
         waiting = later.pop(uri, None)
         if waiting is not None:
             waiting.cancel()
-        if Path(file).name == PLAN:
+        if Path(file).name == PLAN_FILE:
             publish(uri, Document(file, text, about_plan(file), None, FileSyntax(), ()))
             return ()
         others, off = companions(file, {d.file: d.text for u, d in documents.items() if u != uri})
@@ -80,7 +81,7 @@ def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSer
     def refresh_all(uri: str) -> None:
         """Reads a document again, and those open beside it that use what it declares."""
         files = {Path(f).resolve() for f in refresh(uri)}
-        folder = Path(file_of(uri)).parent if Path(file_of(uri)).name == PLAN else None
+        folder = Path(file_of(uri)).parent if Path(file_of(uri)).name == PLAN_FILE else None
         for other, document in list(documents.items()):
             path = Path(document.file)
             if other != uri and (path.resolve() in files or path.parent == folder):
@@ -99,7 +100,7 @@ def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSer
 
     def changed(params: types.DidChangeTextDocumentParams) -> None:
         uri = params.text_document.uri
-        if Path(file_of(uri)).name == PLAN:
+        if Path(file_of(uri)).name == PLAN_FILE:
             return  # a plan is read from the disk, once it is saved
         pause = len(_text(server, uri)) / CHARACTERS_PER_SECOND
         if pause < NOTICED:

@@ -10,10 +10,8 @@ from pygls.uris import to_fs_path
 from avow.diagnostics import Diagnostic, Rejected
 from avow.language.load import clean_text, read_source
 from avow.language.source import Source
-from avow.system.load import load_system
+from avow.system.load import PLAN_FILE, load_system
 from avow.system.plan_file import read_plan
-
-PLAN = "plan.yaml"
 
 
 def file_of(uri: str) -> str:
@@ -30,10 +28,10 @@ def companions(file: str, texts: Mapping[str, str]) -> tuple[tuple[Source, ...],
     """The other files of the system that a file belongs to, where its folder has a plan that names it, and the codes of
     the lints that the plan switches off. `texts` are documents that are open, which may not be saved yet."""
     path = Path(file)
-    if not is_file(file) or not (path.parent / PLAN).is_file():
+    if not is_file(file) or not (path.parent / PLAN_FILE).is_file():
         return (), frozenset()
     try:
-        plan = read_plan(path.parent / PLAN)[0]
+        plan = read_plan(path.parent / PLAN_FILE)[0]
     except Rejected:
         return (), frozenset()
     names = [f.resolve() for f in plan.contract_files]

@@ -98,31 +98,30 @@ def diagnose(job: Job, setup: Setup, made: Instantiation) -> Iterator[Diagnostic
         for row in setup.rows:
             if row.text in made.unused:
                 yield Diagnostic("AJPF131", f"the row “{row.text}” covers nothing", row.span, Severity.WARNING)
-
     yield from _left_out(job, setup)
 
 
 def _left_out(job: Job, setup: Setup) -> Iterator[Diagnostic]:
     """Instances of the plan's that do not have all of the scenario's domain."""
-    seen = set[str]()
-    for obligation in job.obligations:
-        for term in subterms(job.clause(obligation).formula):
-            for variable in term.variables if isinstance(term, Quantified) else ():
-                name = next((n for n in (variable.name, variable.name.rstrip("'")) if n in setup.instances), None)
-                if name is None or name in seen or not is_index(variable.sort):
-                    continue
-                seen.add(name)
-                domain = domain_of(variable, job.system.plan.scenario) or ()
-                missing = sorted(set(domain) - set(setup.instances[name]))
-                if missing:
-                    shown = ", ".join(map(str, missing[:8])) + (", …" if len(missing) > 8 else "")
-                    yield Diagnostic(
-                        "AJPF133",
-                        f"the instances leave out {name} = {shown}, which the scenario has: nothing is checked there",
-                        job.method.options.at("instances", name),
-                        Severity.WARNING,
-                        hint=f"without `{name}` under `instances`, the scenario's domain is taken",
-                    )
+    formulas = [job.clause(obligation).formula for obligation in job.obligations]
+    bound = (v for f in formulas for t in subterms(f) if isinstance(t, Quantified) for v in t.variables)
+    ours: dict[str, Variable] = {}
+    for variable in filter(lambda v: is_index(v.sort), bound):
+        name = next((n for n in (variable.name, variable.name.rstrip("'")) if n in setup.instances), None)
+        if name is not None:
+            ours.setdefault(name, variable)
+    for name, variable in ours.items():
+        domain = domain_of(variable, job.system.plan.scenario) or ()
+        missing = sorted(set(domain) - set(setup.instances[name]))
+        if missing:
+            shown = ", ".join(map(str, missing[:8])) + (", …" if len(missing) > 8 else "")
+            yield Diagnostic(
+                "AJPF133",
+                f"the instances leave out {name} = {shown}, which the scenario has: nothing is checked there",
+                job.method.options.at("instances", name),
+                Severity.WARNING,
+                hint=f"without `{name}` under `instances`, the scenario's domain is taken",
+            )
 
 
 def _claim(clause: Clause, mapper: Mapper, setup: Setup, keys: set[str]) -> Claim:
