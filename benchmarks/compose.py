@@ -21,20 +21,20 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
+from avow.base.verdict import Verdict  # noqa: E402
 from avow.calculus.composition import compose  # noqa: E402
 from avow.calculus.obligations import composition_obligations, discharge  # noqa: E402
 from avow.calculus.variables import frame  # noqa: E402
+from avow.formulas.formula import conjunction, negation  # noqa: E402
 from avow.language.terms import Term  # noqa: E402
-from avow.logic.formula import conjunction, negation  # noqa: E402
-from avow.logic.solver import z3  # noqa: E402
-from avow.logic.translation import Translator  # noqa: E402
+from avow.solving.translation import Translator  # noqa: E402
+from avow.solving.z3_module import z3  # noqa: E402
 from avow.system.load import load_path  # noqa: E402
 from avow.system.plan import System  # noqa: E402
-from avow.verdict import Verdict  # noqa: E402
 
 
 class Limits:
-    """As `avow.backend.Limits`."""
+    """As `avow.backend_kit.protocol.Limits`."""
 
     seconds = 20.0
     seed = 0

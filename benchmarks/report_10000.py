@@ -10,10 +10,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from assurance.sample import case, evidence, guarantee, node_plan, system
 
-from avow.files import digest
+from avow.base.files import digest
+from avow.base.verdict import Verdict
 from avow.report import LeftOut, formats
 from avow.system.plan import Requirement
-from avow.verdict import Verdict
 
 
 def main() -> None:

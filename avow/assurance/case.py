@@ -34,9 +34,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 
-from avow.assurance.demand import independent
 from avow.assurance.facts import Facts, facts_of_case, facts_of_system
 from avow.assurance.findings import handle
+from avow.assurance.gap import independent
 from avow.assurance.gates import exit_code, gates, suggestion_for
 from avow.assurance.model import (
     Case,
@@ -64,6 +64,7 @@ from avow.assurance.support import (
     requirement_claim_of,
     requirement_support,
 )
+from avow.base.verdict import Link, Verdict
 from avow.evidence.audit import Discrepancy
 from avow.evidence.claims import Standing, judge
 from avow.evidence.ledger import GENESIS, Entry
@@ -71,7 +72,6 @@ from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, best_link, effective, hypotheses, roll_up, weigh
 from avow.system.plan import Requirement, System
-from avow.verdict import Link, Verdict
 
 
 def build_case(

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from avow.assurance.model import Case
+from avow.base.files import write
 from avow.evidence.encoding import Unreadable, encode, plain
 from avow.evidence.encoding import decode as decode_evidence
 from avow.evidence.record import Evidence
-from avow.files import write
 
 SCHEMA = "https://avow.invalid/schemas/case-3"
 """Names the format in ``report.json``; raised when it changes incompatibly."""

@@ -22,7 +22,7 @@ from avow.assurance.model import (
     ToolInfo,
 )
 from avow.assurance.policy import Policy, read_policy
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date
 
-from avow.assurance.demand import shortfall, suggest
 from avow.assurance.facts import Facts
 from avow.assurance.findings import FINDINGS
+from avow.assurance.gap import shortfall, suggest
 from avow.assurance.model import DerivationView, Gate, Grade, Handled, ObligationView, RequirementView, Suggestion
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.evidence.obligation import Kind

@@ -13,12 +13,12 @@ from enum import StrEnum
 
 from avow.assurance.naming import is_advice
 from avow.assurance.policy import Policy
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
+from avow.base.verdict import Link, Verdict
 from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.evidence.status import Status
-from avow.verdict import Link, Verdict
 
 # -- handed in by the pipeline --------------------------------------------------------------------------------------
 

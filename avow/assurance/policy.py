@@ -22,10 +22,10 @@ from typing import Any
 
 import yaml
 
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.verdict import Link
 from avow.evidence.status import Status
 from avow.system.plan import Located
-from avow.verdict import Link
 
 CRITICALITIES = ("high", "medium", "low")
 _GIVEN = tuple(s.value for s in Status if s.supports)

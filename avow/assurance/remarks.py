@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from avow.assurance.model import ObligationView, OpenItem, SourceView
-from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.evidence.obligation import Kind
 from avow.evidence.record import REMARKS
 from avow.language.contract import Contract

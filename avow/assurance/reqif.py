@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import NoReturn
 from xml.parsers import expat
 
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 _MOST_DEPTH = 400
 """Elements within elements: beyond any export, well below what a program's stack bears."""

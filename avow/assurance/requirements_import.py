@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from avow.assurance.reqif import read_objects
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.system.plan import Requirement
 
 _COLUMNS: Mapping[str, tuple[str, ...]] = {

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, DerivationView, Handled, ObligationView, OpenItem, RequirementView
 from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.base.verdict import Link, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
-from avow.verdict import Link, Verdict
 
 _WORST_FIRST = (
     Status.CONTRADICTORY,

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from avow.assurance.facts import Facts
 from avow.assurance.model import Derivation
 from avow.assurance.naming import derivation_claim, is_advice, is_foundation, requirement_claim, sanity_property
+from avow.base.verdict import Link
 from avow.evidence.claims import Claim
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.status import Status, weakest
 from avow.system.plan import Requirement
-from avow.verdict import Link
 
 
 class Names:

@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from avow.calculus.scenario import CannotRun, Point
+from avow.formulas.formula import free_variables
+from avow.formulas.values import FunctionValue, Value
 from avow.language.contract import Clause, Node, Port
 from avow.language.sorts import FunctionSort
 from avow.language.terms import Apply, Iff, Quantified, Quantifier, Role, Term, Variable
-from avow.logic.formula import free_variables
-from avow.logic.models import Model
-from avow.logic.solver import z3
-from avow.logic.translation import Translator, Unsupported
-from avow.logic.values import FunctionValue, Value
+from avow.solving.models import Model
+from avow.solving.translation import Translator, Unsupported
+from avow.solving.z3_module import z3
 
 Values = dict[str, Value]
 

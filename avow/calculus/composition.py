@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from avow.base.verdict import Verdict
 from avow.calculus.derivation import ClauseName, Goal, Settled, SideCondition
 from avow.calculus.discharge import Answers, Bounds, settle
 from avow.calculus.hierarchy import Level, composed_node, level, shown_contract, with_persistence
@@ -14,9 +15,8 @@ from avow.calculus.scenario import world
 from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
 from avow.language.contract import Node
-from avow.system.hierarchy import face, fold, inner_first, leaves, outermost, parents
+from avow.system.folding import face, fold, inner_first, leaves, outermost, parents
 from avow.system.plan import ComposeGoal, Subsystem, System
-from avow.verdict import Verdict
 
 
 @dataclass(slots=True)

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from avow.diagnostics import Diagnostic
+from avow.base.diagnostics import Diagnostic
+from avow.base.verdict import Counterexample, Verdict
 from avow.system.graph import Edge
-from avow.verdict import Counterexample, Verdict
 
 
 class Rule(StrEnum):

@@ -12,15 +12,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
+from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
 from avow.calculus.entailment import implied
 from avow.calculus.induction import Deeper, deeper, steps
 from avow.calculus.repair import Offer, environment, initial_values, offers, providers
 from avow.calculus.variables import Frame
+from avow.formulas.formula import free_variables
 from avow.language.terms import Term
-from avow.logic.formula import free_variables
 from avow.system.graph import components, cycle_in
-from avow.verdict import Verdict
 
 NARROW_MS = 4_000
 

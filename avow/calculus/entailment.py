@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from avow.base.verdict import Verdict
+from avow.formulas.formula import substitute
 from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
-from avow.logic.formula import substitute
-from avow.logic.smt import Entailment, entails
-from avow.verdict import Verdict
+from avow.solving.questions import Entailment, entails
 
 QUICK_MS = 1_500
 """Most side conditions are settled in a fraction of this."""
@@ -22,7 +22,7 @@ _CANDIDATES = 4
 
 
 def implied(hypotheses: Mapping[str, Term], goal: Term, *, timeout_ms: int, seed: int = 0) -> Entailment:
-    """As `avow.logic.smt.entails`: the quick question first, then with witnesses, then at length."""
+    """As `avow.solving.questions.entails`: the quick question first, then with witnesses, then at length."""
     quick = min(QUICK_MS, timeout_ms)
     answer = entails(hypotheses, goal, timeout_ms=quick, seed=seed)
     if answer.verdict is not Verdict.UNKNOWN:

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 
+from avow.base.verdict import Verdict
+from avow.evaluation.evaluate import finite_values
+from avow.formulas.formula import conjunction, disjunction, free_variables, substitute
+from avow.formulas.values import Data, Element, Value
 from avow.language.sorts import BoolSort, DataSort, EnumSort, SetSort, Sort, TupleSort
 from avow.language.terms import Compare, Construct, EnumValue, In, Literal, Not, SetTerm, Term, TupleTerm, Variable
-from avow.logic.evaluate import finite_values
-from avow.logic.formula import conjunction, disjunction, free_variables, substitute
-from avow.logic.smt import entails, solve
-from avow.logic.values import Data, Element, Value
-from avow.verdict import Verdict
+from avow.solving.questions import entails, solve
 
 MOST = 24
 """Values that are tried: each is a question to the solver."""

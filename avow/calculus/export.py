@@ -13,10 +13,10 @@ from dataclasses import replace
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Goal
 from avow.calculus.hierarchy import carried, innermost
+from avow.formulas.formula import free_variables, rename, substitute
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.sorts import FunctionSort
 from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
-from avow.logic.formula import free_variables, rename, substitute
 from avow.system.plan import Endpoint
 
 

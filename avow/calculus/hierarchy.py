@@ -18,11 +18,11 @@ from dataclasses import dataclass, field, replace
 from avow.calculus.derivation import ClauseName, Goal
 from avow.calculus.rules import PERSISTENCE
 from avow.calculus.variables import Frame
+from avow.formulas.formula import conjunction, free_variables, substitute
 from avow.language.contract import Clause, ClauseKind, Node
 from avow.language.printer import show_term
 from avow.language.terms import Implies, Role, Term, Variable
-from avow.logic.formula import conjunction, free_variables, substitute
-from avow.system.hierarchy import Face, Folded
+from avow.system.folding import Face, Folded
 from avow.system.plan import Endpoint
 
 

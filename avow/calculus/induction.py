@@ -11,15 +11,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.entailment import QUICK_MS, implied
 from avow.calculus.variables import Frame
+from avow.formulas.formula import free_variables, rename
+from avow.formulas.values import Value, show
 from avow.language.sorts import FunctionSort
 from avow.language.terms import Role, Term, Variable
-from avow.logic.clock import now
-from avow.logic.formula import free_variables, rename
-from avow.logic.smt import Entailment
-from avow.logic.values import Value, show
-from avow.verdict import Counterexample, Verdict
+from avow.solving.limits import now
+from avow.solving.questions import Entailment
 
 DEEPEST = 3
 """The k of k-induction, at most."""

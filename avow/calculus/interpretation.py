@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from avow.formulas.finite import Ranges
+from avow.formulas.values import Element, FunctionValue, Value
 from avow.language.contract import Node
 from avow.language.sorts import (
     BoolSort,
@@ -16,8 +18,6 @@ from avow.language.sorts import (
     StringSort,
 )
 from avow.language.terms import Variable
-from avow.logic.finite import Ranges
-from avow.logic.values import Element, FunctionValue, Value
 from avow.system.plan import Scenario, System
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from avow.logic.clock import now
+from avow.solving.limits import now
 from avow.system.graph import components
 from avow.system.temporal import Operator, Property, State
 
@@ -137,7 +137,7 @@ def violation(
 ) -> Lasso | None:
     """A run of the graph that breaks the property, or None. Every step must have a successor for a run to count.
 
-    `deadline` is in seconds of `avow.logic.clock.now`; raises TooLong after it.
+    `deadline` is in seconds of `avow.solving.limits.now`; raises TooLong after it.
     """
     negated = normal(formula, positive=False)
 

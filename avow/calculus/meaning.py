@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from avow.base.files import digest as sha256
 from avow.calculus.variables import Frame
-from avow.files import digest as sha256
-from avow.logic.formula import digest, sort_digest
+from avow.formulas.formula import digest, sort_digest
 from avow.system.graph import components
 
 

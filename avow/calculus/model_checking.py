@@ -12,21 +12,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from random import Random
 
-from avow.calculus.answering import Doubts, Stuck
-from avow.calculus.answering import judge as judge_formula
-from avow.calculus.answers import Answer
+from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.discharge import Bounds
 from avow.calculus.ltl import Lasso, TooLong, demands_progress, violation
+from avow.calculus.node_outputs import Doubts, Stuck
+from avow.calculus.node_outputs import judge as judge_formula
 from avow.calculus.open_values import Holds
+from avow.calculus.questions import Answer
 from avow.calculus.scenario import CannotRun, world
 from avow.calculus.transition import Machine, Step, Walk
 from avow.calculus.variables import Frame, system_term
+from avow.formulas.formula import free_variables
+from avow.formulas.values import Value
 from avow.language.terms import Term
-from avow.logic.clock import now
-from avow.logic.formula import free_variables
-from avow.logic.values import Value
+from avow.solving.limits import now
 from avow.system.temporal import Operator, Property, State, Temporal, states_of
-from avow.verdict import Counterexample, Verdict
 
 MAX_STATES = 50_000
 RUNS = 20

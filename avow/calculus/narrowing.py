@@ -12,12 +12,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from avow.calculus.open_values import Holds, Lazy, Point, Undecided, Values, asking, decided, lazy_names, opened
+from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
+from avow.formulas.formula import free_variables
+from avow.formulas.values import Value
 from avow.language.contract import Clause
 from avow.language.sorts import FunctionSort
 from avow.language.terms import And, Apply, Compare, Implies, Role, Term, Variable
-from avow.logic.evaluate import Evaluator, NotEvaluable, compile_term
-from avow.logic.formula import free_variables
-from avow.logic.values import Value
 
 MAX_TRIED = 100_000
 """Partial answers looked at for one question; beyond it, the search is not exhaustive."""

@@ -10,11 +10,11 @@ import html
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from avow.base.verdict import Verdict
 from avow.calculus.derivation import Derivation, Goal, Rule, Settled, SideCondition
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.language.styles import latex_escape
 from avow.system.graph import Edge
-from avow.verdict import Verdict
 
 MAX_NODES_WRITTEN = 40
 """A rule over more nodes is shown in its first and last lines."""

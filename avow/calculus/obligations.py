@@ -10,7 +10,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from avow.calculus import answers
+from avow.base.diagnostics import Span
+from avow.base.files import digest as sha256
+from avow.base.verdict import Outcome
+from avow.calculus import questions
 from avow.calculus.composition import Composition, argument, asked, compose
 from avow.calculus.derivation import ClauseName, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds
@@ -18,20 +21,17 @@ from avow.calculus.hierarchy import innermost
 from avow.calculus.requirements import requirement_question
 from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
 from avow.calculus.variables import Frame
-from avow.diagnostics import Span
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
-from avow.files import digest as sha256
+from avow.formulas.formula import digest
 from avow.language.printer import show_term
-from avow.logic.claims import triggers
-from avow.logic.formula import digest
+from avow.sanity.claims import triggers
 from avow.system.formulas import ports_of
 from avow.system.graph import components
 from avow.system.plan import Endpoint, Requirement, System
-from avow.verdict import Outcome
 
 
 class TimeLimits(Protocol):
-    """What of `avow.backend.Limits` is used here."""
+    """What of `avow.backend_kit.protocol.Limits` is used here."""
 
     @property
     def seconds(self) -> float: ...
@@ -45,7 +45,7 @@ class Task:
     """An obligation, and the question that settles it."""
 
     obligation: Obligation
-    ask: answers.Question
+    ask: questions.Question
 
 
 def composition_obligations(system: System) -> tuple[Obligation, ...]:
@@ -73,7 +73,7 @@ def settle_all(composition: Composition, obligations: Sequence[Obligation], limi
     for obligation in obligations:
         task = tasks.get(obligation.id)
         if task is None:
-            outcomes.append(answers.vanished(obligation.id))
+            outcomes.append(questions.vanished(obligation.id))
             continue
         outcomes.append(task.ask(composition, bounds).outcome(obligation.id))
     return tuple(outcomes)
@@ -106,7 +106,7 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
                 (),
                 finding.span,
             ),
-            answers.RuleQuestion(finding.message),
+            questions.RuleQuestion(finding.message),
         )
     for condition in goal.conditions:
         clause = frame.node(condition.consumer).clause(condition.clause)
@@ -130,7 +130,7 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
                 tuple(dict.fromkeys(map(innermost, (str(condition.about), *givers)))),
                 clause.span,
             ),
-            answers.SideQuestion(goal.name, condition),
+            questions.SideQuestion(goal.name, condition),
         )
     for part in goal.root.walk():
         if part.rule is Rule.R4:
@@ -144,7 +144,7 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
                     tuple(str(c.about) for c in part.side_conditions),
                     span,
                 ),
-                answers.LoopQuestion(goal.name, part.nodes, argument(composition, goal.name, "entered")),
+                questions.LoopQuestion(goal.name, part.nodes, argument(composition, goal.name, "entered")),
             )
     if goal.needs_persistence:
         listed = _listed(goal.nodes)
@@ -161,7 +161,7 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
                     (),
                     span,
                 ),
-                answers.ArgumentQuestion(key, reason, goal.name),
+                questions.ArgumentQuestion(key, reason, goal.name),
             )
 
 
@@ -179,7 +179,7 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
                 (),
                 entry.span,
             ),
-            answers.ArgumentQuestion("because", assumed.because, "environment"),
+            questions.ArgumentQuestion("because", assumed.because, "environment"),
         )
     reasons = {entry.port: entry.because for entry in frame.system.plan.environment}
     for name in dict.fromkeys(ClauseName(*innermost(str(n)).split(".")) for n in composition.whole.root.assumed):
@@ -200,7 +200,7 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
                 (str(name),),
                 clause.span,
             ),
-            answers.ArgumentQuestion("environment", because, "environment"),
+            questions.ArgumentQuestion("environment", because, "environment"),
         )
 
 
@@ -221,7 +221,7 @@ def _start_tasks(composition: Composition) -> Iterator[Task]:
                     (),
                     frame.node(group[0]).span,
                 ),
-                answers.StartQuestion(group),
+                questions.StartQuestion(group),
             )
 
 
@@ -252,7 +252,7 @@ def _joint_tasks(composition: Composition) -> Iterator[Task]:
                         (f"{name}.{clause.name}",),
                         clause.span,
                     ),
-                    answers.JointQuestion(group, name, clause.name),
+                    questions.JointQuestion(group, name, clause.name),
                 )
 
 

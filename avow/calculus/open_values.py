@@ -12,12 +12,12 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
+from avow.evaluation.evaluate import Domains, NotEvaluable, finite_values
+from avow.formulas import values as values_
+from avow.formulas.formula import free_variables
+from avow.formulas.values import Data, FunctionValue, Opaque, Value
 from avow.language.sorts import FunctionSort, SequenceSort
 from avow.language.terms import Term
-from avow.logic import values as values_
-from avow.logic.evaluate import Domains, NotEvaluable, finite_values
-from avow.logic.formula import free_variables
-from avow.logic.values import Data, FunctionValue, Opaque, Value
 
 Values = dict[str, Value]
 Point = tuple[Value, ...]

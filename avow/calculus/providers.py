@@ -11,19 +11,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from avow.base.diagnostics import Severity
+from avow.base.files import digest as sha256
+from avow.base.verdict import Outcome, Verdict
 from avow.calculus.variables import Frame, frame
-from avow.diagnostics import Severity
-from avow.files import digest as sha256
+from avow.formulas.formula import digest
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, Term
-from avow.logic.claims import Claim, Property
-from avow.logic.formula import digest
-from avow.logic.sanity import Bounds, SanityResult, as_outcome, listing
-from avow.logic.smt import solve
+from avow.sanity.analysis import Bounds, SanityResult, as_outcome, listing
+from avow.sanity.claims import Claim, Property
+from avow.solving.questions import solve
 from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint, System
-from avow.verdict import Outcome, Verdict
 
 
 @dataclass(frozen=True, slots=True)

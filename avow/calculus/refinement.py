@@ -11,17 +11,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
+from avow.base.diagnostics import Diagnostic
+from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
-from avow.diagnostics import Diagnostic
+from avow.formulas.formula import rename, sort_digest, transform
 from avow.language.contract import Clause, Node, Port
 from avow.language.printer import show_type
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort, SequenceSort, Sort, TupleSort
 from avow.language.terms import Compare, Literal, Quantified, Term, Variable
-from avow.logic.counterexample import show_values
-from avow.logic.formula import rename, sort_digest, transform
+from avow.solving.counterexample import show_values
 from avow.system.graph import fits
-from avow.verdict import Counterexample, Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def refines(
 def _kept_by_something(
     found: Refinement, concrete: Node, abstract: Node, recast: Callable[[Term], Term], bounds: Bounds
 ) -> Refinement:
-    from avow.logic.realizability import realizable
+    from avow.sanity.realizability import realizable
 
     def mine(ports: tuple[Port, ...]) -> tuple[Variable, ...]:
         return tuple(cast(Variable, recast(port.variable)) for port in ports)

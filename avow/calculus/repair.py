@@ -2,10 +2,11 @@
 
 Looked for are a further guarantee of a provider (in its own ports), a further assumption about the environment's
 inputs, and, at the first step, a condition on an initial value: each the weakest there is, by quantifier elimination
-where the formulas allow that (`avow.logic.eliminate`), or by trying all values where they are few. Where neither does,
-a place that can speak of all that the goal speaks of (by other names, where equations say so) gets the goal itself. An
-offer is checked: with it the goal is proved; it does not contradict what else is known; and of a guarantee it is not
-known that the node could not keep it. The search is bounded in time: that nothing is offered says nothing.
+where the formulas allow that (`avow.solving.quantifier_elimination`), or by trying all values where they are few. Where
+neither does, a place that can speak of all that the goal speaks of (by other names, where equations say so) gets the
+goal itself. An offer is checked: with it the goal is proved; it does not contradict what else is known; and of a
+guarantee it is not known that the node could not keep it. The search is bounded in time: that nothing is offered says
+nothing.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.base.verdict import Verdict
 from avow.calculus.enumeration import enumerated
 from avow.calculus.variables import Frame
+from avow.formulas.formula import conjunction, disjunction, free_variables, rename, substitute
 from avow.language.printer import show_term
 from avow.language.terms import (
     TRUE,
@@ -34,11 +37,9 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.logic.eliminate import eliminable, remedy
-from avow.logic.formula import conjunction, disjunction, free_variables, rename, substitute
-from avow.logic.smt import entails, solve
+from avow.solving.quantifier_elimination import eliminable, remedy
+from avow.solving.questions import entails, solve
 from avow.system.plan import Endpoint
-from avow.verdict import Verdict
 
 SECONDS = 3.0
 """For all the offers to one failed question together; an offer is a service, not part of the answer."""

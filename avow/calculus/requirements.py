@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from avow.calculus.answers import Answer, contracts, environment_claims, would_hold_if
+from avow.base.files import digest as sha256
+from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Phase, Settled
 from avow.calculus.discharge import DEEPER_SECONDS, Bounds
@@ -18,18 +19,17 @@ from avow.calculus.entailment import QUICK_MS, implied
 from avow.calculus.hierarchy import innermost
 from avow.calculus.induction import deeper, steps
 from avow.calculus.model_checking import judge, refuting_run
+from avow.calculus.questions import Answer, contracts, environment_claims, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
 from avow.calculus.variables import Frame, system_term
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
-from avow.files import digest as sha256
+from avow.formulas.formula import digest, free_variables
 from avow.language.contract import ClauseKind
 from avow.language.printer import show_term
 from avow.language.terms import Term
-from avow.logic.formula import digest, free_variables
-from avow.logic.smt import Entailment
+from avow.solving.questions import Entailment
 from avow.system.plan import Requirement
 from avow.system.temporal import Property, State, Temporal, parse_property, parse_state, show_property
-from avow.verdict import Counterexample, Verdict
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
+from avow.base.diagnostics import Diagnostic
 from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
 from avow.calculus.variables import Frame
-from avow.diagnostics import Diagnostic
 from avow.language.contract import Clause
 from avow.language.terms import Role
 from avow.system.formulas import ports_of

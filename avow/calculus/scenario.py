@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 
+from avow.base.diagnostics import Rejected
 from avow.calculus.variables import Frame
-from avow.diagnostics import Rejected
+from avow.evaluation.evaluate import NotEvaluable, evaluate, finite_values
+from avow.formulas.values import Data, FunctionValue, Opaque, Value
 from avow.language.contract import Port
 from avow.language.sorts import (
     BOOL,
@@ -30,8 +32,6 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
-from avow.logic.evaluate import NotEvaluable, evaluate, finite_values
-from avow.logic.values import Data, FunctionValue, Opaque, Value
 from avow.system.names import ports_named
 from avow.system.plan import Scenario
 

@@ -12,17 +12,17 @@ from dataclasses import dataclass, field
 from itertools import product
 from random import Random
 
-from avow.calculus.answering import MAX_ANSWERS, Answerer, Doubts, Stuck, judge, possible
 from avow.calculus.choices import Values, by_variable, search
 from avow.calculus.narrowing import Narrowing, Unknown, forcings
+from avow.calculus.node_outputs import MAX_ANSWERS, Answerer, Doubts, Stuck, judge, possible
 from avow.calculus.open_values import Holds, Undecided, decided, is_open
 from avow.calculus.scenario import CannotRun, World, key
+from avow.formulas.formula import free_variables
+from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
 from avow.language.terms import Role, Term
-from avow.logic.formula import free_variables
-from avow.logic.smt import replay
-from avow.logic.values import Value, show
+from avow.solving.questions import replay
 from avow.system.formulas import initial_condition, ports_of
 from avow.system.graph import components, cycles_in
 from avow.system.plan import Endpoint

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from avow.formulas.formula import free_variables, substitute
 from avow.language.contract import Node
 from avow.language.sorts import Sort
 from avow.language.terms import Role, Term, Variable
-from avow.logic.formula import free_variables, substitute
+from avow.system.folding import own_inputs
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition
 from avow.system.graph import Edge, Graph, dataflow
-from avow.system.hierarchy import own_inputs
 from avow.system.plan import Endpoint, System
 
 SUFFIXES = ("", "@before", "@before@before")

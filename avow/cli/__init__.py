@@ -74,7 +74,7 @@ def _avow() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """The entry point. Bad input ends with located messages and code 2, never with a traceback."""
-    from avow.diagnostics import Rejected
+    from avow.base.diagnostics import Rejected
 
     for stream in (sys.stdout, sys.stderr):  # a sign that the terminal has not, or a file's name that is no text
         if isinstance(stream, io.TextIOWrapper):
@@ -83,7 +83,7 @@ def main(arguments: list[str] | None = None) -> None:
         result: Any = _avow.main(arguments, standalone_mode=False)
         code = result if isinstance(result, int) else 0
     except Rejected as rejected:
-        from avow.rendering import render
+        from avow.base.rendering import render
 
         print(render(rejected.diagnostics), file=sys.stderr)
         code = 2
@@ -93,7 +93,7 @@ def main(arguments: list[str] | None = None) -> None:
         wrong.show()
         code = 2
     except (KeyboardInterrupt, click.Abort):
-        from avow.process import kill_all
+        from avow.base.process import kill_all
 
         kill_all()
         print("interrupted", file=sys.stderr)

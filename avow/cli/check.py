@@ -14,8 +14,8 @@ import click
 from avow.cli.paths import PathArgument
 
 if TYPE_CHECKING:
-    from avow.codes import Code
-    from avow.diagnostics import Diagnostic
+    from avow.base.codes import Code
+    from avow.base.diagnostics import Diagnostic
 
 
 @click.command()
@@ -41,7 +41,7 @@ def command(
     checked too: its names, and what each method's tool says of its options. Code 2 where anything is an error.
     """
     from avow import __version__
-    from avow.rendering import render, summary, to_json, to_sarif
+    from avow.base.rendering import render, summary, to_json, to_sarif
 
     paths = tuple(path.parent if path.name == "plan.yaml" else path for path in paths)  # the system that it plans
     found: list[Diagnostic] = []
@@ -76,11 +76,11 @@ def _explain(found: list[Diagnostic]) -> None:
 
 def _codes(found: list[Diagnostic]) -> Mapping[str, Code]:
     """What is known of codes; of the backends' only where there is one."""
-    from avow.codes_workspace import CORE_CODES
+    from avow.base.codes_workspace import CORE_CODES
 
     if all(d.code in CORE_CODES for d in found):
         return CORE_CODES
-    from avow.registry import every_code
+    from avow.backend_kit.registry import every_code
 
     return every_code()
 
@@ -104,7 +104,7 @@ def _groups(
 
 def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozenset[str]]:
     """The contract files of a system's folder; without a plan, every .rcl file in it."""
-    from avow.diagnostics import Diagnostic, Rejected
+    from avow.base.diagnostics import Diagnostic, Rejected
     from avow.system.plan_file import read_plan
 
     plan_file = folder / "plan.yaml"
@@ -126,7 +126,7 @@ def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozense
 
 def _of_plan(folder: Path) -> Iterator[Diagnostic]:
     """What there is to say of the folder's plan beside its contract files (which are checked already)."""
-    from avow.diagnostics import Rejected
+    from avow.base.diagnostics import Rejected
     from avow.pipeline.check import of_plan
     from avow.system.load import load_system
 
@@ -149,7 +149,7 @@ def _as_told(found: Diagnostic, folder: Path) -> Diagnostic:
 
 def _off(folder: Path) -> frozenset[str]:
     """The lints that the plan beside a file switches off; none where there is no readable plan."""
-    from avow.diagnostics import Rejected
+    from avow.base.diagnostics import Rejected
 
     if not (folder / "plan.yaml").is_file():
         return frozenset()

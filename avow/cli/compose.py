@@ -12,10 +12,10 @@ from avow.cli.paths import PathArgument
 from avow.cli.solver_options import seconds_option, seed_option
 
 if TYPE_CHECKING:
+    from avow.base.verdict import Outcome
     from avow.calculus.composition import Composition
     from avow.calculus.derivation import Goal
     from avow.evidence.obligation import Obligation
-    from avow.verdict import Outcome
 
 
 @click.command()
@@ -42,12 +42,12 @@ def command(
     PATH is a system's folder, its name in this workspace, or an .rcl file (without a plan, names link). Code 1 where a
     side condition is refuted or not inductive, or a loop cannot start, 2 for bad input.
     """
+    from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.verdict import Verdict
     from avow.calculus.composition import compose
     from avow.calculus.obligations import composition_obligations, settle_all
     from avow.cli.workspace import system_folder
-    from avow.diagnostics import Diagnostic, Rejected
     from avow.system.load import load_path
-    from avow.verdict import Verdict
 
     system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
     composition = compose(system)
@@ -61,8 +61,8 @@ def command(
 
     chosen = [goal for goal in composition.goals if not goals or goal.name in goals]
     if as_graph:
-        from avow.system.hierarchy import seen
-        from avow.system.picture import texts
+        from avow.system.folding import seen
+        from avow.system.graph_svg import texts
 
         click.echo(texts(seen(system, composition.frame.graph)))
         return 0
@@ -169,9 +169,9 @@ def _listing(
     from rich.padding import Padding
     from rich.text import Text
 
+    from avow.base.rendering import render
+    from avow.base.verdict import Verdict
     from avow.calculus.notation import write_goal
-    from avow.rendering import render
-    from avow.verdict import Verdict
 
     console = Console(highlight=False)
     levels = (composition.frame_of(goal).graph for goal in goals if goal.name in composition.levels)

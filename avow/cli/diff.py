@@ -69,8 +69,8 @@ def _write(page: str, old: str, new: str | None, changes: list[tuple[str, Change
     """Raises Rejected where the page cannot be written."""
     from pathlib import Path
 
-    from avow.diagnostics import Diagnostic, Rejected
-    from avow.files import write
+    from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.files import write
     from avow.report.comparison import render_comparison
 
     text = render_comparison(old, new or "the workspace as it is", changes)

@@ -12,7 +12,7 @@ import click
 from avow.cli.paths import PathArgument
 
 if TYPE_CHECKING:
-    from avow.diagnostics import Diagnostic
+    from avow.base.diagnostics import Diagnostic
 
 
 @click.command()
@@ -24,12 +24,12 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool) -> int:
 
     PATHS are .rcl files, folders of them, or - for the standard input. A file with a syntax error stays as it is.
     """
-    from avow.diagnostics import Diagnostic, Rejected
-    from avow.files import write
+    from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.files import write
+    from avow.base.rendering import printable, render
     from avow.language.format import format_text
     from avow.language.load import MAX_BYTES, decode, read_source
     from avow.language.source import Source
-    from avow.rendering import printable, render
 
     faults: list[Diagnostic] = []
     changed = 0
@@ -77,7 +77,7 @@ def _show_diff(before: str, after: str, file: str) -> None:
 
 
 def _files(paths: tuple[Path, ...], faults: list[Diagnostic]) -> list[Path]:
-    from avow.diagnostics import Diagnostic
+    from avow.base.diagnostics import Diagnostic
 
     found: dict[Path, None] = {}
     for path in paths:

@@ -29,8 +29,8 @@ def command(directory: Path) -> int:
     """Make DIRECTORY a workspace with one system that verifies. Nothing that exists is overwritten."""
     from importlib import resources
 
-    from avow.diagnostics import Diagnostic, Rejected
-    from avow.files import write
+    from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.files import write
 
     if directory.exists() and any(directory.iterdir()):
         raise Rejected(

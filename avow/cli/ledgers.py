@@ -10,15 +10,15 @@ from pathlib import Path
 from avow.assurance.codec import from_json
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.workspace import Workspace
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.encoding import Unreadable
 from avow.evidence.heads import Anchor, Index, index_path, read_index, stated_heads
 from avow.evidence.ledger import Ledger
 from avow.evidence.signing import Signed, sign, signature_path, verify_signature
 from avow.pipeline.integrity import confirm, discrepancies
-from avow.pipeline.survey import Survey, survey
-from avow.workspace import Workspace
+from avow.pipeline.workload import Survey, survey
 
 
 def ledger_names(place: Workspace, wanted: Sequence[str], anchors: Sequence[Anchor] = ()) -> tuple[str, ...]:

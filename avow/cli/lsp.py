@@ -8,11 +8,11 @@ import click
 @click.command()
 def command() -> int:
     """Serve an editor on standard input and output: diagnostics, hover, definition, outline, formatting."""
-    from avow.diagnostics import Diagnostic, Rejected
+    from avow.base.diagnostics import Diagnostic, Rejected
 
     try:
+        from avow.lsp.clause_status import standing
         from avow.lsp.server import serve
-        from avow.lsp.standing import standing
     except ImportError:
         raise Rejected(
             Diagnostic("CLI010", "the language server needs pygls", hint="pip install 'avow[lsp]'")

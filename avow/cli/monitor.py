@@ -79,7 +79,7 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
 
 def _events(trace: str) -> Iterator[Recorded]:
     from avow.backends.rosmonitoring.traces import read_lines, read_trace
-    from avow.diagnostics import Diagnostic, Rejected
+    from avow.base.diagnostics import Diagnostic, Rejected
 
     if trace != "-":
         return read_trace(Path(trace))

@@ -14,10 +14,10 @@ from avow.cli.solver_options import milliseconds, seconds_option, seed_option
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from avow.base.verdict import Verdict
     from avow.calculus.discharge import Bounds
     from avow.calculus.refinement import Demand, Refinement
     from avow.language.contract import Node
-    from avow.verdict import Verdict
 
 
 @click.command()
@@ -46,9 +46,9 @@ def command(
     Code 1 where it does not, where the solver gave up, or where the answer is vacuous: CONCRETE's guarantees cannot
     be met at some input, and of such a contract everything follows. 2 for bad input.
     """
+    from avow.base.verdict import Verdict
     from avow.calculus.discharge import Bounds
     from avow.calculus.refinement import refines
-    from avow.verdict import Verdict
 
     bounds = Bounds(milliseconds(seconds), seed)
     new, stands = _nodes(concrete, bounds)
@@ -72,14 +72,14 @@ def command(
 
 def _nodes(path: Path, bounds: Bounds) -> tuple[tuple[Node, ...], Verdict]:
     """The nodes to compare, and whether they may be relied on: a derived contract only if its derivation stands."""
+    from avow.base.verdict import Verdict
     from avow.language.load import load_contract
-    from avow.verdict import Verdict
 
     if not path.is_dir():
         return load_contract([path]).nodes, Verdict.PROVED
+    from avow.base.diagnostics import Rejected
     from avow.calculus.composition import compose
     from avow.calculus.export import derived_contract
-    from avow.diagnostics import Rejected
     from avow.system.load import load_system
 
     composition = compose(load_system(path))
@@ -94,7 +94,7 @@ def _pairs(
     new: tuple[Node, ...], old: tuple[Node, ...], asked: str | None, concrete: Path, abstract: Path
 ) -> tuple[list[tuple[Node, Node]], list[str]]:
     """What is compared with what, and what of ABSTRACT has no counterpart. Raises Rejected."""
-    from avow.diagnostics import Diagnostic, Rejected
+    from avow.base.diagnostics import Diagnostic, Rejected
 
     if asked is not None:
         mine, _, theirs = asked.partition("=") if "=" in asked else (asked, "", asked)
@@ -116,7 +116,7 @@ def _pairs(
 
 def _renamed(texts: tuple[str, ...], nodes: list[Node]) -> Mapping[str, str]:
     """Raises Rejected."""
-    from avow.diagnostics import Diagnostic, Rejected
+    from avow.base.diagnostics import Diagnostic, Rejected
 
     ports = {port.name for node in nodes for port in (*node.inputs, *node.outputs)}
     found: dict[str, str] = {}
@@ -173,8 +173,8 @@ def _print(result: Refinement, concrete: str, abstract: str) -> None:
 
 
 def _told(demand: Demand, concrete: str, abstract: str) -> str:
+    from avow.base.verdict import Verdict
     from avow.language.contract import ClauseKind
-    from avow.verdict import Verdict
 
     if demand.verdict is Verdict.PROVED:
         if not demand.vacuous:

@@ -46,10 +46,10 @@ def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
 def _check(folder: object, as_json: bool) -> int:
     from pathlib import Path
 
+    from avow.base.workspace import find_workspace
     from avow.cli.ledgers import read_case
     from avow.evidence.ledger import Ledger
     from avow.report.check import check
-    from avow.workspace import find_workspace
 
     assert isinstance(folder, Path)
     place = find_workspace(folder.resolve()) or find_workspace(Path.cwd().resolve())

@@ -14,9 +14,9 @@ from avow.cli.paths import PathArgument
 from avow.cli.solver_options import milliseconds, seconds_option, seed_option
 
 if TYPE_CHECKING:
+    from avow.base.verdict import Counterexample
     from avow.language.contract import Node
-    from avow.logic.sanity import SanityResult
-    from avow.verdict import Counterexample
+    from avow.sanity.analysis import SanityResult
 
 
 @click.command()
@@ -32,11 +32,11 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
 
     PATH is a system's folder or an .rcl file. Code 1 where something is refuted that is an error, 2 for bad input.
     """
+    from avow.base.diagnostics import Diagnostic, Rejected
     from avow.calculus import providers
     from avow.calculus.interpretation import interpretation, ranges
     from avow.cli.workspace import system_folder
-    from avow.diagnostics import Diagnostic, Rejected
-    from avow.logic.sanity import Bounds, analyse
+    from avow.sanity.analysis import Bounds, analyse
     from avow.system.load import load_path
 
     system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
@@ -105,7 +105,7 @@ def _listing(results: list[SanityResult], everything: bool) -> None:
     from rich.padding import Padding
     from rich.text import Text
 
-    from avow.verdict import Verdict
+    from avow.base.verdict import Verdict
 
     console = Console(highlight=False)
     shown = [r for r in results if everything or (r.verdict is not Verdict.PROVED and not r.because)]

@@ -22,12 +22,12 @@ def command(system: str, seed: int, steps: int | None, as_json: bool, everything
     """
     from random import Random
 
+    from avow.base.diagnostics import Diagnostic, Rejected
     from avow.calculus.scenario import CannotRun, world
     from avow.calculus.transition import Machine
     from avow.calculus.variables import frame
     from avow.cli.workspace import system_folder
-    from avow.diagnostics import Diagnostic, Rejected
-    from avow.logic.values import show
+    from avow.formulas.values import show
     from avow.system.load import load_path
 
     path = Path(system)

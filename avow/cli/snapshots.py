@@ -13,10 +13,10 @@ from pathlib import Path
 from avow import __version__
 from avow.assurance.compare import Snapshot, of_case, of_ledger
 from avow.assurance.model import RunInfo
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.workspace import Workspace
 from avow.cli.ledgers import read_case
-from avow.diagnostics import Diagnostic, Rejected
 from avow.evidence.ledger import Ledger
-from avow.workspace import Workspace
 
 
 def pair(old: str, new: str | None) -> Iterator[tuple[str, Snapshot, Snapshot]]:
@@ -70,7 +70,7 @@ def _checkout(place: Workspace, revision: str, folder: Path) -> None:
 
 def _of_contracts(contracts: Workspace, place: Workspace) -> dict[str, Snapshot]:
     from avow.assurance.case import build_case
-    from avow.pipeline.survey import survey
+    from avow.pipeline.workload import survey
 
     found = {}
     for folder in contracts.systems():

@@ -12,16 +12,16 @@ import click
 from avow.cli.paths import PathArgument
 
 if TYPE_CHECKING:
-    from avow.diagnostics import Diagnostic
+    from avow.base.diagnostics import Diagnostic
     from avow.language.contract import Contract
     from avow.system.plan import System
 
 NOTATIONS = {
     **dict.fromkeys(("rcl", "text", "unicode", "latex", "json"), "avow.language.translate"),
-    "smtlib": "avow.logic.contract_smtlib",
+    "smtlib": "avow.solving.contract_smtlib",
 }
 """Notation → the module with its function ``to_<notation>(contract) -> str``, imported when it is asked for. Further
-notations are those of the backends (`avow.backend.Translates`)."""
+notations are those of the backends (`avow.backend_kit.protocol.Translates`)."""
 
 
 @click.command()
@@ -55,9 +55,9 @@ def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], outp
 def _by_backend(notation: str, paths: tuple[Path, ...], nodes: tuple[str, ...], output: Path | None) -> int:
     from dataclasses import replace
 
-    from avow.diagnostics import Rejected, Severity
-    from avow.registry import translators
-    from avow.rendering import render
+    from avow.backend_kit.registry import translators
+    from avow.base.diagnostics import Rejected, Severity
+    from avow.base.rendering import render
     from avow.system.load import load_bare, load_system
 
     system = load_system(paths[0]) if len(paths) == 1 and paths[0].is_dir() else load_bare(_files(paths))
@@ -89,7 +89,7 @@ def _by_backend(notation: str, paths: tuple[Path, ...], nodes: tuple[str, ...], 
 def _only(contract: Contract, nodes: tuple[str, ...]) -> Contract:
     from dataclasses import replace
 
-    from avow.diagnostics import Diagnostic, Rejected
+    from avow.base.diagnostics import Diagnostic, Rejected
 
     known = [node.name for node in contract.nodes]
     if unknown := [name for name in nodes if name not in known]:
@@ -106,7 +106,7 @@ def _folder(node: str, system: System) -> str:
 
 def _put_all(files: dict[str, str], output: Path | None) -> None:
     """Several files go into a folder; on the terminal, each under its name."""
-    from avow.files import write
+    from avow.base.files import write
 
     if output is None:
         for name, text in files.items():
@@ -122,7 +122,7 @@ def _put_all(files: dict[str, str], output: Path | None) -> None:
 
 
 def _put(text: str, output: Path | None) -> None:
-    from avow.files import write
+    from avow.base.files import write
 
     if output is None:
         click.echo(text, nl=False)
@@ -133,7 +133,7 @@ def _put(text: str, output: Path | None) -> None:
 
 
 def _files(paths: tuple[Path, ...]) -> list[Path]:
-    from avow.diagnostics import Diagnostic, Rejected
+    from avow.base.diagnostics import Diagnostic, Rejected
 
     found: list[Path] = []
     for path in paths:

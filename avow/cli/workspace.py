@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from avow.diagnostics import Diagnostic, Rejected
-from avow.workspace import Workspace, find_workspace
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.workspace import Workspace, find_workspace
 
 
 def workspace(start: Path | None = None) -> Workspace:

@@ -13,11 +13,11 @@ from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 
+from avow.base.files import digest_file
+from avow.base.verdict import Verdict
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, effective
-from avow.files import digest_file
-from avow.verdict import Verdict
 
 
 class Fault(StrEnum):

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from avow.base.verdict import Link
 from avow.evidence.status import Status, weakest_link
-from avow.verdict import Link
 
 
 @dataclass(frozen=True, slots=True)

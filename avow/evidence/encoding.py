@@ -11,8 +11,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from avow.base.verdict import Counterexample, Link, Verdict
 from avow.evidence.record import Evidence
-from avow.verdict import Counterexample, Link, Verdict
 
 
 class Unreadable(Exception):  # noqa: N818 - it says what the text is

@@ -23,9 +23,9 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
+from avow.base.files import digest, read_regular
 from avow.evidence.appending import append, locked
 from avow.evidence.encoding import canonical
-from avow.files import digest, read_regular
 
 GENESIS = "0" * 64
 """What the first record of a chain follows."""

@@ -21,12 +21,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from avow.base.files import digest, read_regular, write
 from avow.evidence.appending import append, locked, open_file
 from avow.evidence.encoding import Unreadable, canonical, decode, encode
 from avow.evidence.heads import GENESIS as GENESIS
 from avow.evidence.heads import Event, index_path, note
 from avow.evidence.record import Evidence
-from avow.files import digest, read_regular, write
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from avow.verdict import Counterexample, Link, Verdict
+from avow.base.verdict import Counterexample, Link, Verdict
 
 RETRY = "retry"
 """Among the details of an answer that the next run must not be content with: what asked for it was cut short."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from avow.diagnostics import Diagnostic, Rejected
-from avow.files import read_regular, write
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import read_regular, write
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey

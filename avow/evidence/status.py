@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import reduce
 
+from avow.base.verdict import Link, Verdict
 from avow.evidence.record import Evidence
-from avow.verdict import Link, Verdict
 
 
 class Status(StrEnum):

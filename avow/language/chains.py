@@ -19,7 +19,7 @@ import functools
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.conversions import widen
 from avow.language.sorts import INTEGER, NATURAL, REAL
 from avow.language.terms import And, Arithmetic, Iff, Implies, Term, Widen

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.conversions import convert
 from avow.language.lexer import Token
 from avow.language.printer import show_sort

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.chains import equivalence, implication
 from avow.language.check_names import BUILTINS
 from avow.language.check_relations import Relations

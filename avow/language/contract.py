@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.sorts import Sort
 from avow.language.terms import Role, Term, Variable
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.check_names import BUILTINS
 from avow.language.checker import Checker
 from avow.language.environment import Environment, did_you_mean

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.contract import Contract
 from avow.language.sorts import DataSort, EnumSort, FunctionSort, SequenceSort, Sort, TupleSort
 from avow.language.terms import Term

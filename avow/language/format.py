@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.flat import flat
 from avow.language.lexer import Token, tokens
 from avow.language.load import clean_text, in_order, unless_torn

@@ -10,8 +10,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from avow.codes import CODES
-from avow.diagnostics import Diagnostic, Severity, Span
+from avow.base.codes import CODES
+from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.language.bracketing import misreadings
 from avow.language.contract import Contract, Node
 from avow.language.lexer import Token

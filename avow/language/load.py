@@ -9,7 +9,7 @@ import stat
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.language.checker import Checker
 from avow.language.contract import Contract, Node
 from avow.language.declarations import Declarations

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.checker import Checker
 from avow.language.contract import Clause, ClauseKind, Node, Port, Topic
 from avow.language.declarations import Declarations

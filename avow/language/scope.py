@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.contract import Node, Port
 from avow.language.environment import Environment
 from avow.language.terms import Role, Variable

@@ -6,7 +6,7 @@ import re
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
 
-from avow.diagnostics import Diagnostic, Severity, Span
+from avow.base.diagnostics import Diagnostic, Severity, Span
 
 MAX_DIAGNOSTICS = 200
 """More than this of one file are of no use to anyone: reading ends there."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from fractions import Fraction
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.sorts import BOOL, DataSort, EnumSort, SequenceSort, SetSort, Sort, TupleSort
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Clause, Contract, Node, Port, Topic
 from avow.language.format import format_text
 from avow.language.latex import to_latex

@@ -9,7 +9,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from avow.diagnostics import Diagnostic, Span
+from avow.base.diagnostics import Diagnostic, Span
 from avow.language.contract import Clause, Contract, Node, Port
 from avow.language.lexer import Token, tokens
 from avow.language.load import check_sources, clean_text

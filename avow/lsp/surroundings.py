@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pygls.uris import to_fs_path
 
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.load import clean_text, read_source
 from avow.language.source import Source
 from avow.system.load import PLAN_FILE, load_system

@@ -15,20 +15,20 @@ from doit.exceptions import TaskError
 
 from avow import __version__
 from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
-from avow.backend import Suits
-from avow.diagnostics import Rejected
+from avow.backend_kit.protocol import Suits
+from avow.backend_kit.registry import backend, names
+from avow.base.diagnostics import Rejected
+from avow.base.files import digest, digest_file, is_intact, write
+from avow.base.workspace import Workspace
 from avow.evidence.continuity import continuity
 from avow.evidence.heads import index_path, read_index
 from avow.evidence.record import RETRY
-from avow.files import digest, digest_file, is_intact, write
 from avow.pipeline import check as checking
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
 from avow.pipeline.results import Result, finished, note, read_result
 from avow.pipeline.run_info import EXPLAIN, Run, seconds_so_far
-from avow.pipeline.survey import Survey
-from avow.registry import backend, names
-from avow.workspace import Workspace
+from avow.pipeline.workload import Survey
 
 
 @dataclass(frozen=True, slots=True)

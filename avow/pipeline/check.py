@@ -9,12 +9,12 @@ from typing import Any
 
 from doit.exceptions import TaskError
 
-from avow.diagnostics import Diagnostic, Rejected, Severity
-from avow.files import digest_file, write
-from avow.pipeline.survey import Survey
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.files import digest_file, write
+from avow.base.workspace import Workspace
 from avow.pipeline.work import COMMON_OPTIONS, ENGINES, method_backend, method_job
+from avow.pipeline.workload import Survey
 from avow.system.plan import Located, Method, System
-from avow.workspace import Workspace
 
 
 def is_current(workspace: Workspace, surveyed: Survey) -> bool:
@@ -102,7 +102,7 @@ def _schema(schema: Mapping[str, Any], options: Located, whole: str) -> Iterable
 
 
 def show(found: Iterable[Diagnostic]) -> None:
-    from avow.rendering import render
+    from avow.base.rendering import render
 
     text = render(tuple(found))
     if text:

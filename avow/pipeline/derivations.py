@@ -5,9 +5,9 @@ from __future__ import annotations
 from avow.assurance.model import Derivation, SideCondition
 from avow.calculus.composition import compose
 from avow.calculus.notation import Written, write_goal
+from avow.system.folding import seen
 from avow.system.graph import dataflow
-from avow.system.hierarchy import seen
-from avow.system.picture import sheet
+from avow.system.graph_svg import sheet
 from avow.system.plan import System
 
 

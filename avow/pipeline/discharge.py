@@ -8,17 +8,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from avow import __version__
-from avow.backend import Report
+from avow.backend_kit.protocol import Report
+from avow.base.files import digest, digest_file, is_intact, write
+from avow.base.verdict import Link, Outcome, Verdict
+from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY, Evidence
-from avow.files import digest, digest_file, is_intact, write
 from avow.pipeline import worker
 from avow.pipeline.export import folder
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
-from avow.verdict import Link, Outcome, Verdict
-from avow.workspace import Workspace
 
 
 @functools.cache

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from avow.backend import Limits, Report
+from avow.backend_kit.protocol import Limits, Report
 from avow.evidence.obligation import Obligation
 from avow.language.contract import Node
 from avow.system.plan import System
@@ -14,8 +14,8 @@ def discharge_sanity(system: System, node: Node, obligations: Sequence[Obligatio
     """Settle sanity claims of one node by the solver."""
     from avow.calculus import providers
     from avow.calculus.interpretation import interpretation, ranges
-    from avow.logic.sanity import Bounds, outcomes
-    from avow.logic.smt import z3_version
+    from avow.sanity.analysis import Bounds, outcomes
+    from avow.solving.questions import z3_version
 
     given = interpretation(node, system.plan.scenario)
     bounds = Bounds(seed=limits.seed)
@@ -29,6 +29,6 @@ def discharge_sanity(system: System, node: Node, obligations: Sequence[Obligatio
 def discharge_composition(system: System, obligations: Sequence[Obligation], limits: Limits) -> Report:
     """Settle side conditions, loops and requirements by the calculus."""
     from avow.calculus.obligations import discharge
-    from avow.logic.smt import z3_version
+    from avow.solving.questions import z3_version
 
     return Report(discharge(system, obligations, limits), "z3", z3_version())

@@ -6,10 +6,10 @@ import json
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from avow.diagnostics import Diagnostic, Rejected
-from avow.files import digest, is_intact, write
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import digest, is_intact, write
+from avow.base.workspace import Workspace
 from avow.pipeline.work import Work, method_backend, method_job, planned_method
-from avow.workspace import Workspace
 
 STAMP = ".export.json"
 

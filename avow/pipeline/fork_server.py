@@ -21,16 +21,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
+from avow.base.process import die_with, kill_tree
 from avow.pipeline import worker
-from avow.process import die_with, kill_tree
 
 PRELOADED = (
     "avow.calculus.interpretation",
     "avow.calculus.obligations",
     "avow.language.load",
-    "avow.logic.claims",
-    "avow.logic.sanity",
-    "avow.logic.smt",
+    "avow.sanity.claims",
+    "avow.sanity.analysis",
+    "avow.solving.questions",
     "avow.pipeline.engines",
     "avow.system.formulas",
 )

@@ -24,8 +24,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from avow import process
-from avow.process import Completed
+from avow.base import process
+from avow.base.process import Completed
 
 WORKER = "avow.pipeline.worker"
 PLAIN = "AVOW_PLAIN_WORKERS"

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
+from avow.backend_kit.registry import backend, names
+from avow.base.workspace import Workspace
 from avow.evidence.audit import Discrepancy, Fault, audit
 from avow.evidence.continuity import began, continuity
 from avow.evidence.heads import Anchor, Event, index_path, note, read_index, stated_heads
 from avow.evidence.ledger import Ledger
-from avow.pipeline.survey import Survey
-from avow.registry import backend, names
-from avow.workspace import Workspace
+from avow.pipeline.workload import Survey
 
 
 def discrepancies(

@@ -1,12 +1,12 @@
 """Hunting hollow evidence: would a method that supports a guarantee notice if the guarantee said something else?
 
-For each guarantee that a method supports, near misses of it (`avow.logic.mutants`) are put in its place, and the
+For each guarantee that a method supports, near misses of it (`avow.sanity.mutants`) are put in its place, and the
 method is run on them. A mutant that it refutes is *killed*, and so is one that a prover, asked in the same way, no
 longer proves. A mutant that could not be judged (no row of a table speaks of it, its trigger was not met, the tool
 failed) is neither killed nor a survivor: not to understand a question is not to see through it. Evidence that no judged
 mutant disturbs supports nothing: it is recorded as vacuous. The score is appended to the ledger with the evidence that
 it is about; methods that a person's judgement guides (reviews, measurements) do not read the formula and have no score.
-Of each survivor it is said at which input and answer it differs from the contract (`avow.logic.survivors`).
+Of each survivor it is said at which input and answer it differs from the contract (`avow.sanity.survivors`).
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from avow.base.verdict import Link, Outcome, Verdict
+from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY, Evidence
-from avow.logic.mutants import Mutant
-from avow.logic.survivors import Difference, difference
 from avow.pipeline import worker
-from avow.pipeline.altered import Altered, chosen
 from avow.pipeline.discharge import ledger_of
+from avow.pipeline.mutant_systems import Altered, chosen
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work, method_backend, planned_method
-from avow.verdict import Link, Outcome, Verdict
-from avow.workspace import Workspace
+from avow.sanity.mutants import Mutant
+from avow.sanity.survivors import Difference, difference
 
 _Task = tuple[Work, Obligation, Evidence]
 

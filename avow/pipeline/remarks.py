@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from avow.backend import Job, Report
-from avow.diagnostics import Diagnostic, Severity, Span
+from avow.backend_kit.protocol import Job, Report
+from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.evidence.record import REMARKS
 
 

@@ -13,11 +13,11 @@ from typing import IO, Any
 
 from doit.reporter import ConsoleReporter
 
-from avow import process
-from avow.files import PART
+from avow.base import process
+from avow.base.files import PART
+from avow.base.workspace import Workspace
 from avow.pipeline import shortcut
 from avow.pipeline.results import exit_code, finished
-from avow.workspace import Workspace
 
 _SILENT = ("verify",)
 """Stages whose result is the final table, not a line of its own."""
@@ -118,7 +118,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
     def _write_index(self) -> None:
         if "avow.pipeline.assess" in sys.modules:  # else nothing was read, so nothing can have changed
             from avow.pipeline.assess import index_is_due, known
-            from avow.pipeline.overview import write_overview
+            from avow.pipeline.index_page import write_overview
 
             try:
                 if index_is_due():

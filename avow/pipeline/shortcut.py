@@ -17,10 +17,10 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 
-from avow.files import write
+from avow.base.files import write
+from avow.base.workspace import Workspace
 from avow.pipeline.results import Result, read_result
 from avow.pipeline.run_info import EXPLAIN, FRESH
-from avow.workspace import Workspace
 
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH)
 _PACKAGE = Path(__file__).parent.parent

@@ -13,15 +13,15 @@ from typing import Any
 
 from doit.exceptions import TaskError
 
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
+from avow.base.workspace import Workspace
 from avow.pipeline import check as checking
 from avow.pipeline import export as exporting
 from avow.pipeline.assess import Assessment, gate, register, report
 from avow.pipeline.discharge import discharge, open_obligations
 from avow.pipeline.run_info import this_run
-from avow.pipeline.survey import Survey, survey, write_obligations
 from avow.pipeline.work import LANGUAGE, Work
-from avow.workspace import Workspace
+from avow.pipeline.workload import Survey, survey, write_obligations
 
 Task = dict[str, Any]
 

@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from avow.base.workspace import Workspace
 from avow.pipeline import shortcut
 from avow.pipeline.reporter import PipelineReporter
 from avow.pipeline.results import note
-from avow.workspace import Workspace
 
 Task = dict[str, Any]
 

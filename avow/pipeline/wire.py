@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from avow.backend import Report
+from avow.backend_kit.protocol import Report
+from avow.base.verdict import Link, Outcome, Verdict
 from avow.evidence.encoding import decode_counterexample, encode_counterexample
-from avow.verdict import Link, Outcome, Verdict
 
 
 def report_to_json(report: Report) -> dict[str, Any]:

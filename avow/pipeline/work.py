@@ -15,15 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from avow import __version__
-from avow.backend import Backend, Job, Limits
-from avow.diagnostics import Diagnostic, Rejected, Severity
+from avow.backend_kit.protocol import Backend, Job, Limits
+from avow.backend_kit.registry import backend
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.files import digest, digest_file
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
-from avow.files import digest, digest_file
+from avow.formulas.formula import node_digest, sort_digest
 from avow.language.contract import Contract, Node
 from avow.language.printer import show_term
-from avow.logic.formula import node_digest, sort_digest
-from avow.pipeline.keys import surroundings
-from avow.registry import backend
+from avow.pipeline.evidence_keys import surroundings
 from avow.system.plan import Method, System
 
 LANGUAGE = "language"
@@ -77,7 +77,7 @@ def language_work(system: System) -> Work:
 def sanity_work(system: System, node: Node) -> Work:
     """Is this node's contract worth verifying? (design: page "Obligations…", kind sanity)"""
     from avow.calculus.providers import provider_claims
-    from avow.logic.claims import claims, node_key
+    from avow.sanity.claims import claims, node_key
 
     meaning = node_key(node)
     of_the_node = [(claim, meaning) for claim in claims(node)]

@@ -15,22 +15,23 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from avow import __version__, process
-from avow.backend import Limits, Report
-from avow.diagnostics import Rejected
+from avow import __version__
+from avow.backend_kit.protocol import Limits, Report
+from avow.base import process
+from avow.base.diagnostics import Rejected
+from avow.base.files import write
+from avow.base.verdict import Outcome, Verdict
+from avow.base.workspace import Workspace
 from avow.evidence.encoding import Unreadable
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
-from avow.files import write
 from avow.pipeline import forks
-from avow.pipeline.altered import Altered, alter
+from avow.pipeline.mutant_systems import Altered, alter
 from avow.pipeline.remarks import remarked
 from avow.pipeline.wire import report_from_json, report_to_json
 from avow.pipeline.work import Work, compose_work, method_backend, method_job, method_work, planned_method, sanity_work
 from avow.system.load import load_system
 from avow.system.plan import System
-from avow.verdict import Outcome, Verdict
-from avow.workspace import Workspace
 
 GRACE = 90.0
 """Seconds above the tool's own limits that a worker gets to load, translate and write."""

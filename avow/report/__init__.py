@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.assurance.model import Case
-from avow.files import digest, write
+from avow.base.files import digest, write
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ def formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
 def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
     from avow.assurance.argument import Element, build_argument
     from avow.assurance.traceability import to_csv, trace
-    from avow.report import exchange, latex, markdown, page, picture, wording
+    from avow.report import argument_svg, exchange, latex, markdown, page, wording
 
     argument = build_argument(case)
 
@@ -73,7 +73,7 @@ def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
     yield "junit.xml", exchange.render_junit(case)
     yield "attestation.jsonl", exchange.render_attestation(case)
     yield "gsn.yaml", exchange.render_gsn(argument, case)
-    yield "gsn.svg", picture.draw(argument, argument.root, link, f"The argument for {case.title}", alone=True)
+    yield "gsn.svg", argument_svg.draw(argument, argument.root, link, f"The argument for {case.title}", alone=True)
     yield "traceability.csv", to_csv(rows)
     yield "traceability.html", page.render_traceability(case, rows)
     yield "report.tex", latex.render_latex(case)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from avow.verdict import Counterexample
+from avow.base.verdict import Counterexample
 
 ANOTHER = " (another)"
 """Ends the name of a second value that the contract allows just as well."""

@@ -12,9 +12,9 @@ from avow.assurance.argument import Argument, Shape
 from avow.assurance.codec import to_json
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import sanity_property, short
+from avow.base.files import digest
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.files import digest
 from avow.report.layout import json_text, yaml_text
 from avow.report.wording import MEANINGS, banner_tone, clean, tone
 

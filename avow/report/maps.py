@@ -14,8 +14,8 @@ from fractions import Fraction
 from markupsafe import Markup, escape
 
 from avow.assurance.model import MapView
+from avow.base.verdict import Counterexample
 from avow.report.example import is_small
-from avow.verdict import Counterexample
 
 _NUMBER = r"[-+−]?\d{1,12}(?:[./]\d{1,12})?"
 _COORDINATES = re.compile(rf"\(\s*({_NUMBER})\s*,\s*({_NUMBER})\s*\)")

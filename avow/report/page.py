@@ -23,9 +23,9 @@ from avow.assurance.traceability import Row
 from avow.assurance.trend import trend
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
-from avow.report import example, picture, source, wording
+from avow.report import argument_svg, example, source, wording
 from avow.report.maps import draw_map
-from avow.report.resting import resting
+from avow.report.support_counts import resting
 from avow.report.wording import history
 
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.WELL_FORMED)
@@ -108,7 +108,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
             line=wording.verdict_line(case),
             style=Markup(asset("style.css")),  # our own files, in the package
             script=Markup(asset("script.js")),
-            arrows=Markup(picture.ARROWS),
+            arrows=Markup(argument_svg.ARROWS),
             views=views,
             known=known,
             on_paper=_ON_PAPER,
@@ -360,11 +360,11 @@ def _pictures(case: Case, argument: Argument) -> list[tuple[str, tuple[Markup, i
     drawn: list[tuple[str, tuple[Markup, int]]] = []
     room = _DRAWN
     for requirement, start in argument.goals:
-        room -= min(picture.LIMIT, len(argument.below(start)))
+        room -= min(argument_svg.LIMIT, len(argument.below(start)))
         if room < 0:
             break
         label = f"Argument for {requirement}, as a goal structure; the same as a list follows"
-        svg = picture.draw(argument, start, link, label)
+        svg = argument_svg.draw(argument, start, link, label)
         tall = _HEIGHT.search(svg)
         drawn.append((requirement, (Markup(svg), int(tall[1]) if tall else 0)))  # escaped in picture.py
     return drawn

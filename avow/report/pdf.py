@@ -10,13 +10,13 @@ from avow.assurance.argument import build_argument
 from avow.assurance.model import Case, ObligationView, SourceView
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
+from avow.base.verdict import Counterexample
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report import example, picture
+from avow.report import argument_svg, example
 from avow.report.maps import map_picture
 from avow.report.source import plain_lines
 from avow.report.wording import MARKS, banner_tone, bound_text, clean, in_lines, protocol, tone, verdict_line, worth
-from avow.verdict import Counterexample
 
 _MOST = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
@@ -139,7 +139,7 @@ def _pictures(case: Case) -> list[dict[str, str]]:
     drawn = []
     for name, start in argument.goals:
         if len(argument.below(start)) <= _MOST_IN_A_PICTURE:
-            svg = picture.draw(argument, start, lambda _: None, name, alone=True)
+            svg = argument_svg.draw(argument, start, lambda _: None, name, alone=True)
             drawn.append({"name": name, "svg": svg.replace("font:12px system-ui,", "font:12px 'Libertinus Serif',")})
     return drawn
 

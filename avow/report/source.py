@@ -16,7 +16,7 @@ from pygments.lexers.data import YamlLexer
 from pygments.token import Comment, Keyword, Name, Number, Operator, String, _TokenType
 
 from avow.assurance.model import Case, ObligationView, SourceView
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.language.pygments_lexer import RclLexer

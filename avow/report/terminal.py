@@ -8,6 +8,7 @@ from rich.table import Table
 
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
+from avow.base.verdict import Counterexample
 from avow.evidence.status import Status
 from avow.report.wording import (
     MARKS,
@@ -22,7 +23,6 @@ from avow.report.wording import (
     tool_command,
     where,
 )
-from avow.verdict import Counterexample
 
 _COLOURS = {"good": "green", "fair": "blue", "open": "yellow", "bad": "red"}
 

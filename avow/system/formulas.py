@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Node
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Term, Variable, children
+from avow.system.folding import holders
 from avow.system.graph import Edge, Graph
-from avow.system.hierarchy import holders
 from avow.system.plan import Endpoint, System
 from avow.system.temporal import parse_property, parse_state
 

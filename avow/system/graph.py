@@ -11,7 +11,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from avow.diagnostics import Diagnostic, Severity, Span
+from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.language.contract import Node, Port
 from avow.language.sorts import INTEGER, NATURAL, Sort
 from avow.system.plan import Connection, Endpoint, System

@@ -12,10 +12,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Contract
+from avow.system.folding import holders, outermost
 from avow.system.graph import Graph, dataflow
-from avow.system.hierarchy import holders, outermost
 from avow.system.plan import Connection, Endpoint, EnvironmentInput, Plan, Subsystem, System
 
 Load = Callable[[Path], System]

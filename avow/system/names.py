@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from avow.diagnostics import Diagnostic, Span
+from avow.base.diagnostics import Diagnostic, Span
 from avow.language.contract import Contract, Node, Port
 from avow.language.sorts import BOOL, FunctionSort
 from avow.system.plan import Plan

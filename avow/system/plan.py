@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.contract import Contract
 
 

@@ -13,8 +13,8 @@ from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
-from avow.diagnostics import Diagnostic, Rejected, Span
-from avow.files import digest
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import digest
 from avow.system.paths import inside
 from avow.system.plan import (
     ComposeGoal,

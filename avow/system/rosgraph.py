@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.system.graph import Graph
 from avow.system.plan import System
 from avow.system.schema import suggest

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from fractions import Fraction
 
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Contract
 from avow.language.load import parse_term
 from avow.language.printer import show_type

@@ -10,7 +10,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from avow.diagnostics import Diagnostic
+from avow.base.diagnostics import Diagnostic
 from avow.system.plan import Located
 from avow.system.strict_yaml import Piece
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from avow.diagnostics import Diagnostic, Severity, Span
+from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.language.contract import Contract
 from avow.language.sentences import differences, elements_of
 from avow.system.plan import System

@@ -15,7 +15,7 @@ from typing import Any
 
 import yaml
 
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.system.plan import Located
 
 MAX_BYTES = 8_000_000

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from avow.diagnostics import Diagnostic, Span
+from avow.base.diagnostics import Diagnostic, Span
 from avow.language.contract import Contract
+from avow.system.folding import leaves, parents
 from avow.system.graph import components, cycle_in
-from avow.system.hierarchy import leaves, parents
 from avow.system.plan import Connection, Endpoint, Plan, Subsystem
 from avow.system.schema import suggest
 

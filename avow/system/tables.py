@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from avow.diagnostics import Diagnostic, Span
+from avow.base.diagnostics import Diagnostic, Span
 from avow.system.plan import Table
 from avow.system.schema import suggest
 from avow.system.strict_yaml import Piece

@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from avow.backend import Job, Limits, Report, Tool
+from avow.backend_kit.protocol import Job, Limits, Report, Tool
 from avow.backends.ajpf.codes import CODES
 from avow.backends.ajpf.schema import SCHEMA
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.verdict import Link, Verdict
 from avow.language.contract import Node
 from avow.system.paths import inside
-from avow.verdict import Link, Verdict
 
 
 class AjpfBackend:

@@ -24,7 +24,7 @@ import jsonschema
 
 from avow.backends.ajpf.parser import parse_fact
 from avow.backends.ajpf.syntax import Struct, show
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.system.plan import Located
 from avow.system.strict_yaml import read_yaml
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 
-from avow.backend import Job
+from avow.backend_kit.protocol import Job
 from avow.backends.ajpf import psl
 from avow.backends.ajpf.checker import Property
 from avow.backends.ajpf.instances import Instantiation

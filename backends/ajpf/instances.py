@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
-from avow.backend import Job
+from avow.backend_kit.protocol import Job
 from avow.backends.ajpf import psl
 from avow.backends.ajpf.checker import Property
 from avow.backends.ajpf.mapping import Mapper, NotCovered, substituted
@@ -18,11 +18,11 @@ from avow.backends.ajpf.psl_parser import instantiate
 from avow.backends.ajpf.reading import Left, read_properties
 from avow.backends.ajpf.scenario import Decider, domain_of, range_of
 from avow.backends.ajpf.shape import MAX_DEPTH, TooComplex, free
-from avow.diagnostics import Diagnostic, Severity, Span
+from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.formulas.traversal import depth, subterms
 from avow.language.contract import Clause
 from avow.language.terms import TRUE, And, Quantified, Quantifier, Term, Variable
 from avow.language.terms import Implies as RclImplies
-from avow.logic.traversal import depth, subterms
 
 MAX_PROPERTIES = 5_000
 

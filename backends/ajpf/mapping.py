@@ -15,12 +15,12 @@ from avow.backends.ajpf.psl import Formula
 from avow.backends.ajpf.psl_parser import Malformed, instantiate
 from avow.backends.ajpf.shape import conjunction, conjuncts, disjunction, free, shape
 from avow.backends.ajpf.tautology import constant
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
+from avow.formulas.formula import substitute
+from avow.formulas.traversal import subterms
 from avow.language.printer import show_term
 from avow.language.sorts import IntegerSort, NaturalSort
 from avow.language.terms import TRUE, And, Literal, Not, Or, Quantified, Quantifier, Role, Term, Variable
-from avow.logic.formula import substitute
-from avow.logic.traversal import subterms
 
 
 class NotCovered(Exception):  # noqa: N818 - it names what happened

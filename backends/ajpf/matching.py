@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from avow.formulas.traversal import rebuild
 from avow.language.sorts import NATURAL, IntegerSort, NaturalSort, Sort
 from avow.language.terms import (
     And,
@@ -19,7 +20,6 @@ from avow.language.terms import (
     Variable,
     children,
 )
-from avow.logic.traversal import rebuild
 
 Binding = Mapping[str, Term]
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import jsonschema
 
-from avow.backend import Job
+from avow.backend_kit.protocol import Job
 from avow.backends.ajpf.environment import Environment, read_environment
 from avow.backends.ajpf.interpreter import Semantics
 from avow.backends.ajpf.mapping import Row
@@ -22,11 +22,11 @@ from avow.backends.ajpf.scenario import domain_of
 from avow.backends.ajpf.schema import SCHEMA
 from avow.backends.ajpf.shape import TooComplex, free, shape
 from avow.backends.ajpf.syntax import Program
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.formulas.traversal import subterms
 from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
 from avow.language.terms import Not, Quantified, Role, Term, Variable
-from avow.logic.traversal import subterms
 from avow.system.paths import inside
 
 COMMON = ("id", "guarantees", "seconds", "megabytes", "seed")

@@ -27,7 +27,7 @@ from avow.backends.ajpf.syntax import (
     is_ground,
     show,
 )
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 MAX_BYTES = 2_000_000
 

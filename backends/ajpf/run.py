@@ -7,7 +7,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from avow.backend import Job, Limits, Report
+from avow.backend_kit.protocol import Job, Limits, Report
 from avow.backends.ajpf import ajpf_tool, spin
 from avow.backends.ajpf.ajpf_tool import Answer, Said
 from avow.backends.ajpf.automaton import TooLarge
@@ -20,9 +20,9 @@ from avow.backends.ajpf.interpreter import Agent
 from avow.backends.ajpf.options import Setup, read
 from avow.backends.ajpf.settle import Frame, Settled, outcome
 from avow.backends.ajpf.words import Wording, explain
-from avow.diagnostics import Rejected
-from avow.files import write
-from avow.verdict import Counterexample, Link, Outcome, Verdict
+from avow.base.diagnostics import Rejected
+from avow.base.files import write
+from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 
 ENGINE = "Avow's own Gwendolen checker"
 GRACE = 0.5

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
-from avow.backend import Job
+from avow.backend_kit.protocol import Job
+from avow.evaluation.evaluate import NotEvaluable, evaluate, free_names
+from avow.formulas.values import Element, FunctionValue, Value
 from avow.language.contract import Node
 from avow.language.sorts import (
     BoolSort,
@@ -18,8 +20,6 @@ from avow.language.sorts import (
     StringSort,
 )
 from avow.language.terms import Role, Term, Variable
-from avow.logic.evaluate import NotEvaluable, evaluate, free_names
-from avow.logic.values import Element, FunctionValue, Value
 from avow.system.plan import Scenario
 
 

@@ -11,8 +11,8 @@ from avow.backends.ajpf.checker import Property
 from avow.backends.ajpf.instances import Claim, Instantiation
 from avow.backends.ajpf.options import Extra, Setup
 from avow.backends.ajpf.tautology import is_valid
+from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evidence.obligation import Obligation
-from avow.verdict import Counterexample, Link, Outcome, Verdict
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from avow.formulas.traversal import depth, rebuild
 from avow.language.sorts import BOOL, INTEGER, NATURAL, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import (
     FALSE,
@@ -32,7 +33,6 @@ from avow.language.terms import (
     Widen,
     children,
 )
-from avow.logic.traversal import depth, rebuild
 
 MAX_DEPTH = 120
 MAX_ITEMS = 256

@@ -13,11 +13,11 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from avow.backend import Tool
+from avow.backend_kit.protocol import Tool
 from avow.backends.ajpf import psl
 from avow.backends.ajpf.checker import Checker, Property
-from avow.files import write
-from avow.process import ToolMissing, run
+from avow.base.files import write
+from avow.base.process import ToolMissing, run
 
 _ERRORS = re.compile(r"errors: (\d+)")
 

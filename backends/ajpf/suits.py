@@ -3,10 +3,10 @@ What compares or computes measured values is a program's affair, and Gwendolen h
 
 from __future__ import annotations
 
+from avow.formulas.traversal import subterms
 from avow.language.contract import Node
 from avow.language.sorts import DataSort, EnumSort, FunctionSort, RealSort, Sort
 from avow.language.terms import Arithmetic, Compare, Negative, Term
-from avow.logic.traversal import subterms
 
 
 def looks_like_an_agent(node: Node) -> bool:

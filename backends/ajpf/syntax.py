@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 
 MAX_DEPTH = 40
 """Terms nested deeper are refused by the parsers, so that every walk over a term may recurse."""

@@ -21,7 +21,7 @@ from avow.backends.ajpf.psl import Formula
 from avow.backends.ajpf.psl_parser import Malformed, index_names, instantiate
 from avow.backends.ajpf.structure import Lasso
 from avow.backends.ajpf.syntax import Struct, Term, show
-from avow.verdict import Counterexample
+from avow.base.verdict import Counterexample
 
 MAX_INDICES = 400
 """Combinations of index values that a row is tried with in each step."""

@@ -10,11 +10,11 @@ import argparse
 import sys
 from pathlib import Path
 
-from avow.backend import Job
+from avow.backend_kit.protocol import Job
 from avow.backends.dafny.modules import generate
 from avow.backends.dafny.printer import NotExpressible
-from avow.diagnostics import Diagnostic, Rejected
-from avow.files import write
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import write
 from avow.system.load import load_system
 from avow.system.paths import inside
 

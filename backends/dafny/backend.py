@@ -7,20 +7,20 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from avow import process
-from avow.backend import Job, Limits, Report, Tool, Translated
+from avow.backend_kit.protocol import Job, Limits, Report, Tool, Translated
 from avow.backends.dafny.codes import CODES
 from avow.backends.dafny.judge import Settled, settle
 from avow.backends.dafny.modules import Generated, generate, lines_map, one_line
 from avow.backends.dafny.printer import NotExpressible
 from avow.backends.dafny.runner import INSTALL, dafny
 from avow.backends.dafny.scanner import Scan, scan
-from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base import process
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.verdict import Link, Outcome, Verdict
 from avow.language.contract import Node
 from avow.system.paths import inside
 from avow.system.plan import System
 from avow.system.schema import suggest
-from avow.verdict import Link, Outcome, Verdict
 
 COMMON = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
 """Options that every method has; they are the pipeline's."""

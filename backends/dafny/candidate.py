@@ -12,11 +12,11 @@ from fractions import Fraction
 
 from avow.backends.dafny.names import Names
 from avow.backends.dafny.printer import Vocabulary
+from avow.formulas.formula import free_variables
+from avow.formulas.values import Value, show
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Variable
-from avow.logic.formula import free_variables
-from avow.logic.values import Value, show
 
 _LINE = re.compile(r"(?P<name>[\w'?]+)#\d+(?:@@\d+)? -> (?P<value>\(- \d+(?:\.\d+)?\)|-?\d+(?:\.\d+)?|true|false)\s*")
 _SHOWN = 3
@@ -70,7 +70,7 @@ def _value(text: str, variable: Variable) -> Value | None:
 
 def _allowed(node: Node, values: Mapping[Variable, Value]) -> bool:
     """Whether no assumption about these inputs alone is known to be false of them."""
-    from avow.logic.smt import replay  # Z3 is slow to import
+    from avow.solving.questions import replay  # Z3 is slow to import
 
     spoken = [a.formula for a in node.assumptions if free_variables(a.formula) <= values.keys()]
     return not spoken or replay(spoken, values, timeout_ms=2_000) is not False

@@ -13,7 +13,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from avow.backends.dafny.names import Names
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
+from avow.formulas.formula import free_variables
+from avow.formulas.traversal import Steps, run
 from avow.language.sorts import (
     REAL,
     BoolSort,
@@ -56,8 +58,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.logic.formula import free_variables
-from avow.logic.traversal import Steps, run
 
 
 class NotExpressible(Exception):  # noqa: N818 - it names what the term is

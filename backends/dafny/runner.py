@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from avow import process
-from avow.backend import Limits, Tool
+from avow.backend_kit.protocol import Limits, Tool
+from avow.backend_kit.tools import find_tool
 from avow.backends.dafny import modern
 from avow.backends.dafny.answer import Complaint, Member, complaints, counted, quiet, read_members
-from avow.tools import find_tool
+from avow.base import process
 
 INSTALL = "apt-get install dafny"
 

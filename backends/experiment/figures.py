@@ -13,7 +13,7 @@ from pathlib import Path
 
 from avow.backends.experiment.quantity import Figure, conversion, figure, show
 from avow.backends.experiment.statistics import Range, greatest_deviation, least_deviation, root
-from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.system.strict_yaml import Piece, read_yaml
 
 _KEYS = ("n", "unit", "mean", "min", "max", "sd", "source", "note")

@@ -11,7 +11,7 @@ from avow.backends.experiment.options import Experiment
 from avow.backends.experiment.quantity import show
 from avow.backends.experiment.runs import Run
 from avow.backends.experiment.statistics import justified, lower_bound, root, runs_needed, upper_bound
-from avow.verdict import Counterexample, Verdict
+from avow.base.verdict import Counterexample, Verdict
 
 SHOWN = 20
 """Failing runs that are spelt out."""

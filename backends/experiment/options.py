@@ -7,10 +7,10 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from avow.backend import Job
+from avow.backend_kit.protocol import Job
 from avow.backends.experiment.expression import Expression, Malformed, parse
 from avow.backends.experiment.quantity import conversion, decimal, figure
-from avow.diagnostics import Diagnostic
+from avow.base.diagnostics import Diagnostic
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Literal, Negative, Term, Widen
 from avow.system.paths import inside

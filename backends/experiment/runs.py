@@ -11,7 +11,7 @@ from pathlib import Path
 from avow.backends.experiment.expression import Expression, Interval
 from avow.backends.experiment.options import ID_COLUMNS
 from avow.backends.experiment.quantity import decimal
-from avow.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 
 MAX_RUNS = 100_000
 MAX_BYTES = 32_000_000

@@ -7,10 +7,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from avow.backend import Job, Limits, Report, Tool
+from avow.backend_kit.protocol import Job, Limits, Report, Tool
 from avow.backends.hoare.codes import CODES
-from avow.diagnostics import Diagnostic, Rejected
-from avow.verdict import Link, Verdict
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.verdict import Link, Verdict
 
 _FILE = {"type": "string", "description": "the program's file, relative to the system's folder"}
 _TABLE = {

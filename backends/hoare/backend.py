@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from avow.backend import Job, Limits, Report
+from avow.backend_kit.protocol import Job, Limits, Report
 from avow.backends.hoare.checker import Checked, check
 from avow.backends.hoare.numbers import other_numbers
 from avow.backends.hoare.outline import outline, show
@@ -17,17 +17,17 @@ from avow.backends.hoare.program import While, statements
 from avow.backends.hoare.triples import Triple, every_run, triples
 from avow.backends.hoare.witness import Breach, breach
 from avow.backends.hoare.wp import Condition, TooLarge, conditions
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.verdict import Counterexample, Link, Outcome, Verdict
+from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evidence.obligation import Obligation
+from avow.formulas.formula import conjunction, free_variables
+from avow.formulas.values import show as show_value
 from avow.language.terms import FALSE, TRUE, Not, Role, Variable
-from avow.logic.evaluate import NotEvaluable, evaluate
-from avow.logic.formula import conjunction, free_variables
-from avow.logic.smt import Entailment, entails, z3_version
-from avow.logic.smtlib import export as smtlib
-from avow.logic.translation import Unsupported
-from avow.logic.values import show as show_value
+from avow.solving.questions import Entailment, entails, z3_version
+from avow.solving.smtlib import export as smtlib
+from avow.solving.translation import Unsupported
 from avow.system.paths import inside
-from avow.verdict import Counterexample, Link, Outcome, Verdict
 
 BRIEFLY = 5.0
 """Seconds for whether the program has an output for every input, where that can only turn `unknown` into `refuted`."""

@@ -35,7 +35,8 @@ from avow.backends.hoare.syntax import (
 )
 from avow.backends.hoare.syntax import Statement as SurfaceStatement
 from avow.backends.hoare.typing import Scope, fit, formula, rejected, suggest, term
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.formulas.formula import free_variables, substitute
 from avow.language.contract import Contract, Node, Port
 from avow.language.printer import show_sort as show
 from avow.language.printer import show_term
@@ -52,7 +53,6 @@ from avow.language.sorts import (
     components,
 )
 from avow.language.terms import Apply, Role, Term, TupleTerm, Variable
-from avow.logic.formula import free_variables, substitute
 
 T = TypeVar("T")
 

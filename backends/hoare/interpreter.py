@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statement, Update, While
 from avow.backends.hoare.wp import defined
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
+from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
+from avow.formulas.values import Data, FunctionValue, Value
 from avow.language.sorts import NATURAL, FunctionSort, Sort
 from avow.language.terms import Term
-from avow.logic.evaluate import Evaluator, NotEvaluable, compile_term
-from avow.logic.values import Data, FunctionValue, Value
 
 _UNDEFINED = "a division by zero, an element that the sequence does not have, or a negative number for a natural one,"
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from lark import Token
 
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 _ENDS = {"ENDIF": "IF", "ENDMATCH": "MATCH", "ENDWHILE": "WHILE"}
 _OPENING = {"(": 1, "[": 1, "{": 1, ")": -1, "]": -1, "}": -1}

@@ -10,12 +10,12 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
 from avow.backends.hoare.program import Assign, If, Program, Update, While, statements
-from avow.diagnostics import Diagnostic, Severity
+from avow.base.diagnostics import Diagnostic, Severity
+from avow.formulas.traversal import subterms
 from avow.language.bounds import bounds, constant
 from avow.language.contract import Clause
 from avow.language.printer import show_number
 from avow.language.terms import Term
-from avow.logic.traversal import subterms
 
 _COMMON = frozenset({Fraction(-1), Fraction(0), Fraction(1)})
 """Numbers that stand in programs for reasons of their own."""

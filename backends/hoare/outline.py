@@ -8,9 +8,9 @@ from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statemen
 from avow.backends.hoare.simplify import simplify
 from avow.backends.hoare.triples import Triple
 from avow.backends.hoare.wp import Conditions, fits, misfits, side_conditions, weakest
+from avow.formulas.formula import conjunction, negation
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, Term
-from avow.logic.formula import conjunction, negation
 
 STEP = "   "
 

@@ -37,7 +37,7 @@ from avow.backends.hoare.syntax import (
     Unary,
     WhileStatement,
 )
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 DEEPEST = 120
 """Nesting beyond which a program is refused: later passes recurse over it."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language.sorts import DataSort, Sort
 from avow.language.terms import Role, Term, Variable
 

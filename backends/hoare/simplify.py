@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
+from avow.formulas.formula import conjunction, disjunction, free_variables
+from avow.formulas.traversal import subterms, transform
 from avow.language.sorts import BOOL
 from avow.language.terms import (
     FALSE,
@@ -27,8 +29,6 @@ from avow.language.terms import (
     Term,
     Widen,
 )
-from avow.logic.formula import conjunction, disjunction, free_variables
-from avow.logic.traversal import subterms, transform
 
 _OPPOSITE = {"<": ">=", ">=": "<", "<=": ">", ">": "<=", "==": "!=", "!=": "=="}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from avow.backends.hoare.checker import Checked
 from avow.backends.hoare.program import Predicate, Reading, variable
 from avow.backends.hoare.simplify import simplify
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evidence.obligation import Obligation
+from avow.formulas.formula import conjunction, free_variables, negation, substitute
+from avow.formulas.traversal import Steps, rebuild, run
 from avow.language.contract import Clause, Node
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort
 from avow.language.terms import (
@@ -33,8 +35,6 @@ from avow.language.terms import (
     Variable,
     children,
 )
-from avow.logic.formula import conjunction, free_variables, negation, substitute
-from avow.logic.traversal import Steps, rebuild, run
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ from avow.backends.hoare.syntax import (
     Tuple,
     Unary,
 )
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.printer import show_sort as show
 from avow.language.sorts import (
     BOOL,

@@ -17,6 +17,11 @@ from avow.backends.hoare.outline import show
 from avow.backends.hoare.program import Assign, If, Match, Program, Statement, Update, While, statements
 from avow.backends.hoare.triples import Triple
 from avow.backends.hoare.wp import Condition
+from avow.evaluation.evaluate import NotEvaluable, evaluate
+from avow.formulas.formula import free_variables, negation
+from avow.formulas.traversal import subterms
+from avow.formulas.values import Element, Value
+from avow.formulas.values import show as show_value
 from avow.language.sorts import INTEGER, NATURAL, REAL, BoolSort, EnumSort, Sort
 from avow.language.terms import (
     Apply,
@@ -31,14 +36,9 @@ from avow.language.terms import (
     Widen,
     children,
 )
-from avow.logic.evaluate import NotEvaluable, evaluate
-from avow.logic.formula import free_variables, negation
-from avow.logic.models import default_value
-from avow.logic.smt import replay, solve
-from avow.logic.translation import Unsupported
-from avow.logic.traversal import subterms
-from avow.logic.values import Element, Value
-from avow.logic.values import show as show_value
+from avow.solving.models import default_value
+from avow.solving.questions import replay, solve
+from avow.solving.translation import Unsupported
 
 _NUMERIC: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
 _TRIED = 300

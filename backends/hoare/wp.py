@@ -12,7 +12,9 @@ from fractions import Fraction
 
 from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statement, Update, While, statements, variable
 from avow.backends.hoare.triples import Triple, rename_bound
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
+from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.traversal import subterms, transform
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SequenceSort, Sort, TupleSort
 from avow.language.terms import (
     TRUE,
@@ -36,8 +38,6 @@ from avow.language.terms import (
     Variable,
     children,
 )
-from avow.logic.formula import conjunction, disjunction, free_variables, negation, substitute
-from avow.logic.traversal import subterms, transform
 
 LARGEST = 50_000
 """Nodes of a formula beyond which a program is too much for this method: branches in sequence double it."""

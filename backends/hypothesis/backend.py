@@ -14,13 +14,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from avow.backend import Job, Limits, Report
+from avow.backend_kit.protocol import Job, Limits, Report
 from avow.backends.hypothesis import export, wire
 from avow.backends.hypothesis.subject import subject
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.process import Completed, ToolMissing, run
+from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation
-from avow.process import Completed, ToolMissing, run
-from avow.verdict import Counterexample, Outcome, Verdict
 
 CONFIDENCE = 0.95
 

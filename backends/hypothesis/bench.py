@@ -26,8 +26,8 @@ from avow.backends.hypothesis.generate import BYTES, Failing, Generator, Impossi
 from avow.backends.hypothesis.judging import Trigger, blamed, guarantee, judged
 from avow.backends.hypothesis.pools import parse_cell, pools
 from avow.backends.hypothesis.process import PATIENCE, Subject, SubjectFailed
+from avow.formulas.values import Value, show
 from avow.language.sorts import BoolSort, FunctionSort, Sort
-from avow.logic.values import Value, show
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
 # and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
+from avow.formulas.values import Data, Element, FunctionValue, Opaque, Value
+from avow.formulas.values import Sequence as SequenceValue
 from avow.language.printer import show_sort
 from avow.language.sorts import (
     BoolSort,
@@ -22,8 +24,6 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
-from avow.logic.values import Data, Element, FunctionValue, Opaque, Value
-from avow.logic.values import Sequence as SequenceValue
 
 
 class Malformed(Exception):  # noqa: N818 - it names what is wrong

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from avow.backend import Job
+from avow.backend_kit.protocol import Job
 from avow.backends.hypothesis import wire
 from avow.backends.hypothesis.subject import SubjectFile
 from avow.language.contract import Clause, Port

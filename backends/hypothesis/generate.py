@@ -18,6 +18,7 @@ from fractions import Fraction
 from typing import Any, TypeVar
 
 from avow.backends.hypothesis.pools import Pools, runs, scenario_runs
+from avow.formulas.values import Data, Element, FunctionValue, Opaque, Sequence, Value
 from avow.language.sorts import (
     STRING,
     BoolSort,
@@ -34,7 +35,6 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
-from avow.logic.values import Data, Element, FunctionValue, Opaque, Sequence, Value
 
 T = TypeVar("T")
 

@@ -8,12 +8,12 @@ from typing import Any
 
 from avow.backends.hypothesis import wire
 from avow.backends.hypothesis.generate import Inputs
+from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
+from avow.evaluation.truth import judge
+from avow.formulas.formula import conjunction, free_variables
+from avow.formulas.values import Value
 from avow.language.printer import show_term
 from avow.language.terms import And, Implies, Not, Or, Quantified, Quantifier, Role, Term, Variable
-from avow.logic.evaluate import Evaluator, NotEvaluable, compile_term
-from avow.logic.formula import conjunction, free_variables
-from avow.logic.judge import judge
-from avow.logic.values import Value
 
 
 @dataclass(slots=True)

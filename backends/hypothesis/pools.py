@@ -9,6 +9,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from avow.evaluation.evaluate import NotEvaluable, evaluate
+from avow.formulas.formula import free_variables
+from avow.formulas.traversal import subterms
+from avow.formulas.values import Element, Value
 from avow.language.sorts import (
     INTEGER,
     NATURAL,
@@ -23,10 +27,6 @@ from avow.language.sorts import (
     Sort,
 )
 from avow.language.terms import Arithmetic, Compare, Literal, Negative, Term, Widen
-from avow.logic.evaluate import NotEvaluable, evaluate
-from avow.logic.formula import free_variables
-from avow.logic.traversal import subterms
-from avow.logic.values import Element, Value
 
 STEP = Fraction(1, 1000)
 """How close to a threshold a value is tried on either side."""

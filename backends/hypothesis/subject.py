@@ -7,8 +7,8 @@ import difflib
 from dataclasses import dataclass
 from pathlib import Path
 
-from avow.backend import Job
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.backend_kit.protocol import Job
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.system.paths import inside
 
 

@@ -7,7 +7,7 @@ from enum import StrEnum
 from fractions import Fraction
 from typing import Any
 
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
 from avow.language import sorts, terms
 from avow.language.sorts import Sort
 from avow.language.terms import Quantifier, Role, Term

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from avow.backends.review.stamp import stamp
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 
 
 def main(arguments: list[str] | None = None) -> int:

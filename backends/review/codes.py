@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from avow.codes import declare, register
+from avow.base.codes import declare, register
 
 CODES = register(
     declare(

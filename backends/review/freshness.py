@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from avow.backends.review.record import Record
-from avow.files import digest_file
+from avow.base.files import digest_file
+from avow.formulas.formula import node_digest
 from avow.language.contract import Node
-from avow.logic.formula import node_digest
 from avow.system.paths import inside
 
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from avow.backends.review.backend import record_name
 from avow.backends.review.freshness import current_file, current_meaning
 from avow.backends.review.record import load, read_record
-from avow.diagnostics import Diagnostic, Rejected, Span
-from avow.files import write
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.files import write
 from avow.language.contract import Node
 from avow.system.load import load_system
 from avow.system.paths import inside
@@ -33,7 +33,7 @@ def stamp(folder: Path, node: str, *, method: str | None = None, renewed: str | 
     `method` tells several reviews of one node apart. `renewed` is the date (ISO) of a renewed review: without it, a
     digest that is there already is never replaced. Raises Rejected.
     """
-    from avow.backend import Job
+    from avow.backend_kit.protocol import Job
 
     system = load_system(folder)
     if node not in [n.name for n in system.contract.nodes]:

@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from avow.backend import Job, Limits, Report, Tool, Translated
+from avow.backend_kit.protocol import Job, Limits, Report, Tool, Translated
 from avow.backends.rosmonitoring.codes import CODES
 from avow.backends.rosmonitoring.schema import SCHEMA
-from avow.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.system.paths import inside
-from avow.verdict import Counterexample, Link, Outcome, Verdict
 
 if TYPE_CHECKING:
     from avow.backends.rosmonitoring.engine import Monitor, Violation

@@ -19,7 +19,9 @@ from avow.backends.rosmonitoring.rules import (
     Previous,
     Rule,
 )
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.evaluation.evaluate import NotEvaluable, evaluate
+from avow.formulas.values import FunctionValue, Value
 from avow.language.contract import Node, Port
 from avow.language.load import parse_term
 from avow.language.sorts import (
@@ -38,8 +40,6 @@ from avow.language.sorts import (
     components,
 )
 from avow.language.terms import Apply, Not, Quantified, Quantifier, Role, Term, Variable
-from avow.logic.evaluate import NotEvaluable, evaluate
-from avow.logic.values import FunctionValue, Value
 from avow.system.graph import Edge, dataflow
 from avow.system.plan import Located, System, Table
 from avow.system.schema import suggest

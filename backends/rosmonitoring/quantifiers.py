@@ -25,6 +25,9 @@ from avow.backends.rosmonitoring.rml import (
     some,
 )
 from avow.backends.rosmonitoring.symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
+from avow.evaluation.disjunctions import Part, alternatives, conjunction
+from avow.evaluation.evaluate import finite_values
+from avow.formulas.renaming import bound_names, rename_apart
 from avow.language.sorts import (
     BOOL,
     BoolSort,
@@ -55,9 +58,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.logic.clausal import Part, alternatives, conjunction
-from avow.logic.evaluate import finite_values
-from avow.logic.renaming import bound_names, rename_apart
 
 LIMIT = 600
 """Comparisons in a condition; a larger one is refused, since it is checked at every event."""

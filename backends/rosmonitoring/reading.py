@@ -8,6 +8,7 @@ from typing import Any
 
 from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact, whole
 from avow.backends.rosmonitoring.rules import Argument, Choice, Fields, Hold, InOrder, Lookup, Path
+from avow.formulas.values import Data, Element, FunctionValue, Sequence, Value
 from avow.language.sorts import (
     BOOL,
     BoolSort,
@@ -23,7 +24,6 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
-from avow.logic.values import Data, Element, FunctionValue, Sequence, Value
 
 Message = Mapping[str, Any]
 Reader = Callable[[Message, Value | None], Value]

@@ -53,11 +53,11 @@ from avow.backends.rosmonitoring.symbols import (
     components,
     constant,
 )
+from avow.evaluation.evaluate import free_names
+from avow.formulas.values import Value
 from avow.language.contract import Clause
 from avow.language.sorts import BoolSort, DataSort, EnumSort, FunctionSort, NaturalSort, Sort, StringSort
 from avow.language.terms import Role
-from avow.logic.evaluate import free_names
-from avow.logic.values import Value
 
 CASES = 64
 """Combinations of constants that one topic's message may have; more are refused."""

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from avow.formulas.values import Value
 from avow.language.terms import Variable
-from avow.logic.values import Value
 
 Path = tuple[str, ...]
 """``("pose", "x")``: a field, and the fields within it."""

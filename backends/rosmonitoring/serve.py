@@ -13,7 +13,7 @@ from typing import Any
 
 from avow.backends.rosmonitoring.session import Session, violation_json
 from avow.backends.rosmonitoring.traces import MAX_LINE, parse_event
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
 
 HOST = "127.0.0.1"
 

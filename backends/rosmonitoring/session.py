@@ -8,7 +8,7 @@ from typing import Any
 
 from avow.backends.rosmonitoring.engine import Fault, Monitor, Tally, Violation
 from avow.backends.rosmonitoring.options import NAME, setup
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import ClauseKind
 from avow.system.plan import System
 from avow.system.schema import suggest

@@ -23,6 +23,7 @@ from avow.backends.rosmonitoring.rml import (
     some,
 )
 from avow.backends.rosmonitoring.rules import Constant, Fields, Hold, InOrder, Previous, Rule
+from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.sorts import (
     BOOL,
     BoolSort,
@@ -34,7 +35,6 @@ from avow.language.sorts import (
     RealSort,
     Sort,
 )
-from avow.logic.values import Data, Element, FunctionValue, Value
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 MAX_LINE = 8_000_000
 """Characters of one event; a longer line is not an event."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from avow.backend import Limits
+from avow.backend_kit.protocol import Limits
+from avow.base.verdict import Outcome
 from avow.pipeline.work import method_backend, method_job
 from avow.system.load import load_system
-from avow.verdict import Outcome
 
 
 def settle(folder: Path, contract: str, method: str, files: Mapping[str, str], node: str = "n") -> dict[str, Outcome]:

@@ -6,9 +6,9 @@ import json
 import shutil
 from pathlib import Path
 
+from avow.base.workspace import Workspace
 from avow.pipeline.export import read_stamp
-from avow.pipeline.survey import Survey, survey, write_obligations
-from avow.workspace import Workspace
+from avow.pipeline.workload import Survey, survey, write_obligations
 
 TEMPLATE = Path(__file__).parents[2] / "avow" / "cli" / "template" / "contracts" / "thermostat"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.verdict import Verdict
+from avow.base.verdict import Verdict
 
 from .settling import settle
 

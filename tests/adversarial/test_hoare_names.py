@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from avow.verdict import Verdict
+from avow.base.verdict import Verdict
 
 from .settling import settle
 

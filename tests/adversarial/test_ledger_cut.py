@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.verdict import Link, Verdict
 from avow.evidence.ledger import Ledger
 from avow.evidence.record import Evidence
-from avow.verdict import Link, Verdict
 
 
 def record(number: int) -> Evidence:

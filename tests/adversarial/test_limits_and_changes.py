@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Verdict
+from avow.base.workspace import Workspace
 from avow.pipeline import worker
-from avow.pipeline.survey import Survey, survey
 from avow.pipeline.work import SANITY
-from avow.verdict import Verdict
-from avow.workspace import Workspace
+from avow.pipeline.workload import Survey, survey
 
 TEMPLATE = Path(__file__).parents[2] / "avow" / "cli" / "template" / "contracts" / "thermostat"
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Limits
+from avow.backend_kit.protocol import Limits
+from avow.base.verdict import Outcome
 from avow.calculus.obligations import discharge, requirement_obligations
 from avow.system.load import load_system
-from avow.verdict import Outcome
 
 
 def node(name: str, source: str, target: str, assume: str, guarantee: str) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from avow.base.workspace import Workspace
 from avow.pipeline import shortcut
 from avow.pipeline.results import Result
-from avow.workspace import Workspace
 
 from .test_exit_codes import run
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Backend, Limits
+from avow.backend_kit.protocol import Backend, Limits
 from avow.backends.ajpf import BACKEND
-from avow.diagnostics import Severity
-from avow.verdict import Link, Verdict
+from avow.base.diagnostics import Severity
+from avow.base.verdict import Link, Verdict
 
 FIXTURES = Path(__file__).parent / "fixtures"
 

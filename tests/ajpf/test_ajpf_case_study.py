@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Limits, Report
+from avow.backend_kit.protocol import Limits, Report
 from avow.backends.ajpf import BACKEND
-from avow.verdict import Outcome, Verdict
+from avow.base.verdict import Outcome, Verdict
 
 REPAIRED = ("remote_inspection", "repaired_method.yaml")
 PUBLISHED = ("remote_inspection_published", "published_method.yaml")

@@ -15,7 +15,7 @@ from avow.backends.ajpf.interpreter import NONE, Agent, Semantics
 from avow.backends.ajpf.parser import parse_fact, parse_program
 from avow.backends.ajpf.psl_parser import Malformed, parse_psl
 from avow.backends.ajpf.syntax import show, show_deed, show_event
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 
 
 def program(plans: str, beliefs: str = "", rules: str = "", goals: str = ""):

@@ -10,13 +10,13 @@ from test_ajpf_ltl import FORMULAS, oracle
 from test_ajpf_ltl import Kripke as Graph
 from test_ajpf_ltl import Not as Negation
 
-from avow.backend import Limits
+from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND
 from avow.backends.ajpf.psl_parser import parse_psl
 from avow.backends.ajpf.tautology import MAX_STEPS, Steps, constant, is_satisfiable, is_valid
-from avow.logic.mutants import mutants
+from avow.base.verdict import Verdict
+from avow.sanity.mutants import mutants
 from avow.system.plan import Scenario
-from avow.verdict import Verdict
 
 
 def settle(job, tmp_path):

@@ -11,6 +11,8 @@ from avow.backends.ajpf.mapping import Mapper, NotCovered, Row, clauses, to_form
 from avow.backends.ajpf.matching import match
 from avow.backends.ajpf.psl_parser import parse_psl
 from avow.backends.ajpf.shape import TooComplex, free, shape
+from avow.evaluation.evaluate import evaluate
+from avow.formulas.values import Element, FunctionValue
 from avow.language.load import check_text, parse_formula
 from avow.language.sorts import BOOL, NATURAL, REAL, EnumSort, FunctionSort
 from avow.language.terms import (
@@ -31,8 +33,6 @@ from avow.language.terms import (
     SetTerm,
     Variable,
 )
-from avow.logic.evaluate import evaluate
-from avow.logic.values import Element, FunctionValue
 
 CONTRACT, PROBLEMS = check_text(
     """

@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from avow.backend import Job, Limits
+from avow.backend_kit.protocol import Job, Limits
 from avow.backends.ajpf import BACKEND
+from avow.base.verdict import Verdict
 from avow.pipeline.work import method_job
 from avow.system.load import load_system
-from avow.verdict import Verdict
 
 RCL = """
 node ag {

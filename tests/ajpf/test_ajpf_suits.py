@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from avow.backend import Suits
+from avow.backend_kit.protocol import Suits
 from avow.backends.ajpf import BACKEND
 from avow.language.load import check_text
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Limits
+from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND, ajpf_tool, spin
 from avow.backends.ajpf.ajpf_tool import Said, judge
-from avow.process import Completed
-from avow.verdict import Verdict
+from avow.base.process import Completed
+from avow.base.verdict import Verdict
 
 RESULTS = "====================================================== results\n"
 HOLDS = RESULTS + "no errors detected\n"

@@ -10,16 +10,16 @@ from typing import Any
 
 from avow.assurance.case import build_case
 from avow.assurance.model import Case, Derivation, MethodInfo, RunInfo, SideCondition, ToolInfo
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
+from avow.base.files import digest
+from avow.base.verdict import Counterexample, Link, Verdict
 from avow.evidence.encoding import canonical, encode
 from avow.evidence.ledger import GENESIS, Entry
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.record import Evidence
-from avow.files import digest
 from avow.language.contract import Clause, ClauseKind, Contract, Node
 from avow.language.terms import TRUE
 from avow.system.plan import EnvironmentInput, Finding, Located, Method, NodePlan, Plan, Requirement, System
-from avow.verdict import Counterexample, Link, Verdict
 
 TODAY = date(2026, 11, 21)
 SPAN = Span("contracts/rover/plan.yaml", 1, 1, 1, 1)

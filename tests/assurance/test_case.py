@@ -26,14 +26,14 @@ from assurance.sample import (
 from avow.assurance.case import conclude_again
 from avow.assurance.codec import case_schema, evidence_schema, from_json, to_json
 from avow.assurance.model import Case, Currency, Derivation, Grade, SideCondition
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
+from avow.base.files import digest
+from avow.base.verdict import Verdict
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.encoding import Unreadable
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
-from avow.files import digest
 from avow.system.plan import Finding, Requirement
-from avow.verdict import Verdict
 
 G = guarantee("n", "g")
 PLANS = [node_plan("n", "low", "hoare", "hypothesis")]

@@ -9,15 +9,15 @@ from typing import Any
 import pytest
 
 from assurance.sample import METHODS, SPAN, TODAY, case, evidence, guarantee, node_plan, obligation, system
-from avow.assurance.demand import independent
+from avow.assurance.gap import independent
 from avow.assurance.model import Case, MethodInfo
 from avow.assurance.policy import costs, profile, profile_names, read_policy, techniques
-from avow.diagnostics import Rejected, Span
+from avow.base.diagnostics import Rejected, Span
+from avow.base.verdict import Link, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.system.plan import Finding, Located, Requirement
-from avow.verdict import Link, Verdict
 
 
 def located(data: Any) -> Located:

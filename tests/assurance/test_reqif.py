@@ -11,7 +11,7 @@ import pytest
 
 from avow.assurance import reqif
 from avow.assurance.requirements_import import read_reqif, read_requirements
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 
 NAMESPACES = 'xmlns="http://www.omg.org/spec/ReqIF/20110401/reqif.xsd" xmlns:xhtml="http://www.w3.org/1999/xhtml"'
 

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from avow.assurance.requirements_import import plan_section, read_csv, read_reqif, read_requirements
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 
 REQIF = b"""<?xml version="1.0" encoding="UTF-8"?>
 <REQ-IF xmlns="http://www.omg.org/spec/ReqIF/20110401/reqif.xsd"><CORE-CONTENT><REQ-IF-CONTENT>

@@ -5,18 +5,18 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from avow.base.verdict import Outcome
 from avow.calculus.composition import Composition, compose
 from avow.calculus.discharge import Answers, Bounds
 from avow.calculus.obligations import composition_obligations, discharge, requirement_obligations
 from avow.system.load import load_system
 from avow.system.plan import System
-from avow.verdict import Outcome
 
 CONTRACTS = Path(__file__).parents[2] / "contracts"
 
 
 class Limits:
-    """As `avow.backend.Limits`."""
+    """As `avow.backend_kit.protocol.Limits`."""
 
     def __init__(self, seconds: float = 20.0, seed: int = 0) -> None:
         self.seconds = seconds

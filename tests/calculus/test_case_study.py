@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.derivation import LoopForm, Rule
 from avow.calculus.notation import write_goal
-from avow.verdict import Verdict
 
 from .case_study import PUBLISHED, PUBLISHED_DELAYED, REPAIRED, SCENARIO
 from .make import case_study, outcomes, settled

@@ -11,16 +11,16 @@ import pytest
 from click.testing import CliRunner
 from jsonschema import Draft202012Validator
 
+from avow.base.process import run
+from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.notation import as_html, write_goal
 from avow.calculus.obligations import composition_obligations, discharge
 from avow.cli.compose import command as compose_command
 from avow.cli.refines import command as refines_command
 from avow.cli.simulate import command as simulate_command
-from avow.process import run
 from avow.system.graph import dataflow
-from avow.system.picture import svg, text
-from avow.verdict import Verdict
+from avow.system.graph_svg import svg, text
 
 from .make import Limits, make, node
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.derivation import Rule
 from avow.cli.compose import command
 from avow.system.load import load_system
 from avow.system.plan import System
-from avow.verdict import Verdict
 
 from .make import make, node, outcomes
 from .test_commands import invoke

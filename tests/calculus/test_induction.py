@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.verdict import Outcome, Verdict
+from avow.base.verdict import Outcome, Verdict
 
 from .make import make, node, outcomes
 
@@ -121,7 +121,7 @@ def router(claim: str) -> str:
 
 def test_a_run_over_the_scenario_refutes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from avow.calculus import requirements
-    from avow.logic.smt import Entailment
+    from avow.solving.questions import Entailment
 
     plan = (
         "connections: [{from: go.at, to: plan.at, delayed: true, initial: 0}]\n"

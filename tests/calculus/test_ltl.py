@@ -11,7 +11,7 @@ import pytest
 from avow.calculus.ltl import TooLong, demands_progress, violation
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Variable
-from avow.logic.clock import now
+from avow.solving.limits import now
 from avow.system.graph import components
 from avow.system.temporal import Operator, Property, State, Temporal
 

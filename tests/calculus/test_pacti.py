@@ -18,10 +18,10 @@ from typing import Any
 
 import pytest
 
+from avow.base.verdict import Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.discharge import Bounds
-from avow.logic.solver import z3
-from avow.verdict import Verdict
+from avow.solving.z3_module import z3
 
 from .make import make, node
 

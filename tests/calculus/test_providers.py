@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from avow.base.verdict import Verdict
 from avow.calculus.providers import provider_claims, settle
 from avow.cli.sanity import command
-from avow.logic.sanity import Bounds, SanityResult
+from avow.sanity.analysis import Bounds, SanityResult
 from avow.system.plan import System
-from avow.verdict import Verdict
 
 from .make import make, node
 

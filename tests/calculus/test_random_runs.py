@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.obligations import composition_obligations, requirement_obligations, settle_all
+from avow.evaluation.evaluate import compile_term
+from avow.formulas.values import Element, FunctionValue, Sequence, Value
 from avow.language.contract import Port
 from avow.language.sorts import BoolSort, EnumSort, FunctionSort, SequenceSort, Sort
-from avow.logic.evaluate import compile_term
-from avow.logic.values import Element, FunctionValue, Sequence, Value
 from avow.system.plan import Endpoint
-from avow.verdict import Outcome, Verdict
 
 from .make import make, node
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.verdict import Verdict
 from avow.calculus.composition import Composition
 from avow.calculus.variables import Frame
-from avow.logic.evaluate import compile_term
+from avow.evaluation.evaluate import compile_term
 from avow.system.plan import Endpoint
-from avow.verdict import Verdict
 
 from .make import make, node, settled
 

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.export import derived_contract
 from avow.calculus.refinement import refines
 from avow.cli.refines import command as refines_command
-from avow.diagnostics import Rejected
 from avow.language.contract import Node
 from avow.language.load import check_text
 from avow.language.translate import to_rcl
 from avow.system.load import load_bare
-from avow.verdict import Verdict
 
 from .case_study import REPAIRED
 from .make import case_study, make, node, settled

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.verdict import Outcome, Verdict
 from avow.cli.compose import command
-from avow.verdict import Outcome, Verdict
 
 from .make import make, node, outcomes
 from .test_commands import invoke

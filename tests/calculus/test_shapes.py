@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import compose
 from avow.calculus.derivation import Rule
 from avow.cli.compose import command
 from avow.system.graph import dataflow
+from avow.system.graph_svg import svg, text
 from avow.system.load import load_system
-from avow.system.picture import svg, text
 from avow.system.rosgraph import account
-from avow.verdict import Outcome, Verdict
 
 from .make import make, node, outcomes
 from .test_commands import invoke

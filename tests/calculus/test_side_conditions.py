@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.derivation import LoopForm, Rule
-from avow.verdict import Verdict
 
 from .make import make, node, outcomes, settled
 

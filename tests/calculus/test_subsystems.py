@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.verdict import Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.derivation import Rule
 from avow.calculus.discharge import Bounds
@@ -14,14 +16,12 @@ from avow.calculus.export import derived_contract
 from avow.calculus.notation import write_goal
 from avow.calculus.obligations import composition_obligations
 from avow.cli.compose import command
-from avow.diagnostics import Diagnostic, Rejected, Severity
 from avow.language.load import check_text
 from avow.language.translate import to_rcl
+from avow.system.folding import seen
 from avow.system.graph import dataflow
-from avow.system.hierarchy import seen
+from avow.system.graph_svg import sheet, texts
 from avow.system.load import load_system
-from avow.system.picture import sheet, texts
-from avow.verdict import Verdict
 
 from .make import make, node, outcomes
 from .test_commands import invoke

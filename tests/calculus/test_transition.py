@@ -7,12 +7,12 @@ from random import Random
 
 import pytest
 
+from avow.base.verdict import Verdict
 from avow.calculus.scenario import CannotRun, world
 from avow.calculus.transition import Machine
 from avow.calculus.variables import frame
-from avow.logic.values import show
+from avow.formulas.values import show
 from avow.system.plan import System
-from avow.verdict import Verdict
 
 from .make import make, node, outcomes
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from avow.codes import CODES, Code, declare, register
-from avow.codes_plan import PLAN_CODES
-from avow.codes_workspace import CORE_CODES, WORKSPACE_CODES, of_backend, page_rows
-from avow.registry import backend, names
+from avow.backend_kit.registry import backend, names
+from avow.base.codes import CODES, Code, declare, register
+from avow.base.codes_plan import PLAN_CODES
+from avow.base.codes_workspace import CORE_CODES, WORKSPACE_CODES, of_backend, page_rows
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "diagnostics.md"

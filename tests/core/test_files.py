@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from avow import files
+from avow.base import files
 
 
 def test_write_says_whether_it_changed_anything(tmp_path: Path) -> None:

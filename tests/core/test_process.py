@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from helpers import alive
 
-from avow import process
+from avow.base import process
 
 
 def test_output_and_code_are_the_tools() -> None:
@@ -42,7 +42,7 @@ def test_a_hanging_tool_is_killed_with_all_that_it_started(tmp_path: Path) -> No
 
 def test_a_tool_does_not_outlive_a_killed_avow(tmp_path: Path) -> None:
     pid_file = tmp_path / "pid"
-    code = f"from avow import process; process.run(['bash', '-c', 'echo $$ > {pid_file}; exec sleep 60'])"
+    code = f"from avow.base import process; process.run(['bash', '-c', 'echo $$ > {pid_file}; exec sleep 60'])"
     avow = subprocess.Popen([sys.executable, "-c", code])
     deadline = time.monotonic() + 20
     while not (pid_file.is_file() and pid_file.read_text().strip()) and time.monotonic() < deadline:

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from avow import registry
+from avow.backend_kit import registry
+from avow.backend_kit.registry import translators
 from avow.backends.rosmonitoring.rml_reader import read
+from avow.base.diagnostics import Rejected
 from avow.cli import main
-from avow.diagnostics import Rejected
-from avow.registry import translators
 
 RCL = """\
 node n {
@@ -119,8 +119,8 @@ def test_a_plugin_of_the_plan_may_offer_a_notation(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (place / "shouting.py").write_text(
-        "from avow.backend import Translated\n"
-        "from avow.verdict import Link, Verdict\n"
+        "from avow.backend_kit.protocol import Translated\n"
+        "from avow.base.verdict import Link, Verdict\n"
         "class Shouting:\n"
         "    name, title, version, green_means = 'shouting', 'loud', '1', ''\n"
         "    strength, link, options_schema = Verdict.TESTED, Link.GUIDED, {}\n"

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from avow.backend import Backend, Job, Limits
+from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backends.dafny import BACKEND
-from avow.verdict import Link, Outcome, Verdict
+from avow.base.verdict import Link, Outcome, Verdict
 
 CONTRACTS = Path(__file__).resolve().parents[2] / "contracts"
 MakeJob = Callable[..., Job]
@@ -88,7 +88,7 @@ def test_a_wrong_implementation_is_not_proved(
 
 
 def test_nothing_is_run_where_dafny_is_missing(make_job: MakeJob, monkeypatch: Any) -> None:
-    from avow.backend import Tool
+    from avow.backend_kit.protocol import Tool
     from avow.backends.dafny import backend
 
     monkeypatch.setattr(backend, "dafny", lambda: Tool("dafny", None, None, "apt-get install dafny"))

@@ -11,18 +11,18 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Job, Limits
+from avow.backend_kit.protocol import Job, Limits
 from avow.backends.dafny import BACKEND
 from avow.backends.dafny.modules import Generated, generate
 from avow.backends.dafny.names import RESERVED, Names, identifier
 from avow.backends.dafny.printer import NotExpressible, Vocabulary, print_clause
 from avow.backends.dafny.runner import verify
+from avow.base.verdict import Verdict
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.load import check_text, load_contract
 from avow.language.sorts import BOOL, INTEGER, REAL, Constructor, DataSort, EnumSort, FunctionSort, OpaqueSort
 from avow.language.terms import FALSE, And, Compare, Literal, Not, Quantified, Quantifier, Role, Term, Variable
-from avow.logic.smt import entails
-from avow.verdict import Verdict
+from avow.solving.questions import entails
 
 MakeJob = Callable[..., Job]
 CONTRACTS = Path(__file__).resolve().parents[2] / "contracts"

@@ -11,13 +11,13 @@ import pytest
 from hypothesis_backend.test_judging_agrees import value
 from rosmonitoring.test_agreement import RCL, formula
 
-from avow.backend import Limits
+from avow.backend_kit.protocol import Limits
 from avow.backends.dafny.modules import generate
 from avow.backends.dafny.runner import verify
+from avow.evaluation.evaluate import evaluate
+from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.load import load_contract
 from avow.language.sorts import REAL, DataSort, EnumSort, FunctionSort, NaturalSort, Sort
-from avow.logic.evaluate import evaluate
-from avow.logic.values import Data, Element, FunctionValue, Value
 
 
 def literal(found: Value, sort: Sort) -> str:

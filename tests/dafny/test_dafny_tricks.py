@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Job, Limits
+from avow.backend_kit.protocol import Job, Limits
 from avow.backends.dafny import BACKEND
 from avow.backends.dafny.scanner import Scan, scan, tokens
-from avow.verdict import Outcome, Verdict
+from avow.base.verdict import Outcome, Verdict
 
 MakeJob = Callable[..., Job]
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from avow import registry
-from avow.codes_workspace import of_backend
-from avow.pipeline.keys import surroundings
+from avow.backend_kit import registry
+from avow.base.codes_workspace import of_backend
+from avow.pipeline.evidence_keys import surroundings
 from avow.pipeline.work import method_job
 from avow.system.load import load_system
 

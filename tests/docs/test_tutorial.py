@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.diagnostics import Rejected
 from avow.cli import main
-from avow.diagnostics import Rejected
-from avow.pipeline.survey import survey
+from avow.pipeline.workload import survey
 
 TUTORIAL = Path(__file__).parent.parent.parent / "docs" / "tutorial.md"
 

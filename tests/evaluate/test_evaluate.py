@@ -8,6 +8,9 @@ from fractions import Fraction
 
 import pytest
 
+from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
+from avow.evaluation.truth import judge
+from avow.formulas.values import Data, Element, FunctionValue, Sequence, Value
 from avow.language.sorts import (
     BOOL,
     INTEGER,
@@ -49,9 +52,6 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.logic.evaluate import NotEvaluable, compile_term, evaluate
-from avow.logic.judge import judge
-from avow.logic.values import Data, Element, FunctionValue, Sequence, Value
 
 COMMAND = DataSort("Command", (Constructor("move", (REAL, REAL)), Constructor("inspect", (NATURAL,))))
 COLOUR = EnumSort("Colour", ("red", "orange", "green"))
@@ -452,7 +452,7 @@ def _random_values(rng: random.Random) -> dict[str, Value]:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_agrees_with_z3_on_random_formulas(seed: int) -> None:
-    from avow.logic.smt import replay
+    from avow.solving.questions import replay
 
     rng = random.Random(seed)
     variables = {"in.p": P, "in.q": Q, "in.h": H, "in.k": K, "in.c": C}

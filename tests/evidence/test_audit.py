@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from assurance.sample import evidence, guarantee, key_of
 
+from avow.base.files import digest, digest_file
+from avow.base.verdict import Verdict
 from avow.evidence.audit import Fault, audit
 from avow.evidence.ledger import Ledger
-from avow.files import digest, digest_file
-from avow.verdict import Verdict
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import os
 import random
 from collections.abc import Mapping, Sequence
 
+from avow.base.verdict import Link
 from avow.evidence.claims import Claim, judge
 from avow.evidence.status import Status
-from avow.verdict import Link
 
 SETS = int(os.environ.get("AVOW_SETS", "400"))
 """How many random sets of claims are judged; 10,000 were, when this was written."""

@@ -15,14 +15,14 @@ from pathlib import Path
 import pytest
 from assurance.sample import evidence
 
+from avow.base.verdict import Verdict
+from avow.base.workspace import Workspace
 from avow.cli import main
 from avow.evidence.audit import Fault
 from avow.evidence.continuity import began, continuity
 from avow.evidence.heads import Anchor, Event, index_path, note, read_index, stated_heads
 from avow.evidence.ledger import Ledger
 from avow.pipeline.integrity import acknowledge, confirm, reported_heads
-from avow.verdict import Verdict
-from avow.workspace import Workspace
 
 TRUE = [evidence("n.a"), evidence("n.b", Verdict.REFUTED)]
 FALSE = [evidence("n.a"), evidence("n.b", Verdict.PROVED)]

@@ -19,11 +19,11 @@ import pytest
 from assurance.sample import chain, evidence
 
 from avow.assurance.codec import evidence_schema
+from avow.base.verdict import Counterexample, Verdict
 from avow.evidence import ledger as module
 from avow.evidence.encoding import Unreadable, decode, encode
 from avow.evidence.ledger import GENESIS, Ledger
 from avow.evidence.record import Evidence
-from avow.verdict import Counterexample, Verdict
 
 
 def some(number: int) -> list[Evidence]:

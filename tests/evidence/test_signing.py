@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from assurance.sample import evidence
 
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 from avow.evidence.ledger import Ledger
 
 pytest.importorskip("cryptography")

@@ -10,9 +10,9 @@ from assurance.sample import evidence
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from avow.base.verdict import Verdict
 from avow.evidence.record import Evidence
 from avow.evidence.status import NOTHING, Status, Weight, effective, hypotheses, join, roll_up, weigh
-from avow.verdict import Verdict
 
 BOUNDED = (Verdict.CHECKED, Verdict.TESTED, Verdict.MONITORED, Verdict.REVIEWED, Verdict.JUSTIFIED)
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from avow.backend import Backend, Limits
+from avow.backend_kit.protocol import Backend, Limits
 from avow.backends.experiment import BACKEND
-from avow.diagnostics import Rejected
-from avow.verdict import Link, Outcome, Verdict
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Link, Outcome, Verdict
 
 ROOT = Path(__file__).resolve().parents[2] / "contracts"
 GOOD: dict[str, Any] = {"data": "runs.csv", "measure": "d", "within": 0.25, "unit": "m"}

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from avow.backend import Job
+from avow.backend_kit.protocol import Job
 from avow.pipeline.work import method_job
 from avow.system.load import load_system
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from avow.backend import Backend, Job, Limits
+from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backends.hoare import BACKEND
-from avow.diagnostics import Rejected
-from avow.verdict import Link, Outcome, Verdict
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Link, Outcome, Verdict
 from hoare.systems import make_job, sensor
 
 GOLDEN = Path(__file__).parent / "golden"

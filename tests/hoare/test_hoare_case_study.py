@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Limits
+from avow.backend_kit.protocol import Limits
 from avow.backends.hoare import BACKEND
-from avow.verdict import Outcome, Verdict
+from avow.base.verdict import Outcome, Verdict
 from hoare.systems import make_job
 
 REPAIRED = "contracts/remote_inspection"

@@ -8,7 +8,7 @@ import pytest
 
 from avow.backends.hoare.parser import DEEPEST, parse_program
 from avow.backends.hoare.syntax import AssignStatement, Binary, IfStatement, MatchStatement, Source, WhileStatement
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
 
 PAPER = """input := radiation_at(i)
 IF (input < 120) THEN 

@@ -18,14 +18,14 @@ from avow.backends.hoare.simplify import simplify
 from avow.backends.hoare.triples import Triple
 from avow.backends.hoare.typing import Scope, formula
 from avow.backends.hoare.wp import Conditions, weakest
-from avow.diagnostics import Span
+from avow.base.diagnostics import Span
+from avow.base.verdict import Verdict
+from avow.evaluation.evaluate import evaluate
+from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.contract import Contract
 from avow.language.load import check_text
 from avow.language.terms import TRUE, Or, Term
-from avow.logic.evaluate import evaluate
-from avow.logic.smt import entails
-from avow.logic.values import Data, Element, FunctionValue, Value
-from avow.verdict import Verdict
+from avow.solving.questions import entails
 
 RCL = """
 context { Colour : {red, orange, green}; Command : { move(INTEGER, INTEGER), inspect(INTEGER), halt };

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Limits
+from avow.backend_kit.protocol import Limits
 from avow.backends.hoare import BACKEND
-from avow.verdict import Verdict
+from avow.base.verdict import Verdict
 from hoare.systems import make_job
 
 WHOLE = "node n { inputs( k : INTEGER ) outputs( x : INTEGER ) topics() guarantee g ( out.x >= 0 ) }"

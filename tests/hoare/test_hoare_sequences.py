@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Limits
+from avow.backend_kit.protocol import Limits
 from avow.backends.hoare import BACKEND
 from avow.backends.hoare.backend import load
 from avow.backends.hoare.interpreter import Machine
-from avow.logic.evaluate import NotEvaluable, evaluate
-from avow.logic.models import default_value
-from avow.logic.values import Element, Sequence
-from avow.verdict import Outcome, Verdict
+from avow.base.verdict import Outcome, Verdict
+from avow.evaluation.evaluate import NotEvaluable, evaluate
+from avow.formulas.values import Element, Sequence
+from avow.solving.models import default_value
 from hoare.systems import make_job
 
 CONTRACT = """

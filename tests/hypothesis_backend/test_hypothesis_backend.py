@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 from hoare.systems import make_job, sensor
 
-from avow.backend import Backend, Job, Limits, Report
+from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.backends.hypothesis import BACKEND
 from avow.backends.hypothesis.backend import failure_bound
-from avow.diagnostics import Rejected
-from avow.verdict import Outcome, Verdict
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Outcome, Verdict
 
 GOLDEN = Path(__file__).parent / "golden"
 

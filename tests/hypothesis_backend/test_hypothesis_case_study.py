@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from hoare.systems import make_job
 
-from avow.backend import Limits
+from avow.backend_kit.protocol import Limits
 from avow.backends.hoare import BACKEND as HOARE
 from avow.backends.hypothesis import BACKEND
+from avow.base.verdict import Outcome, Verdict
 from avow.pipeline.work import method_job
 from avow.system.load import load_system
-from avow.verdict import Outcome, Verdict
 
 SYSTEM = "contracts/remote_inspection"
 

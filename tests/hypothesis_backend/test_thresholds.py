@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from hoare.systems import make_job
 
-from avow.backend import Limits
+from avow.backend_kit.protocol import Limits
 from avow.backends.hypothesis import BACKEND
-from avow.verdict import Verdict
+from avow.base.verdict import Verdict
 
 CONTRACT = """
 context {{ Joint = {{shoulder, elbow, wrist}}; Force : Joint --> REAL; Order : {{ spray(NATURAL), rest }};

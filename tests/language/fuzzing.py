@@ -18,16 +18,16 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from avow.codes import CODES
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.codes import CODES
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.rendering import render, to_json, to_sarif
+from avow.formulas.formula import node_digest
 from avow.language.contract import Contract
 from avow.language.format import format_text
 from avow.language.load import check_text
 from avow.language.source import MAX_DIAGNOSTICS
 from avow.language.translate import FORMATS
-from avow.logic.contract_smtlib import to_smtlib
-from avow.logic.formula import node_digest
-from avow.rendering import render, to_json, to_sarif
+from avow.solving.contract_smtlib import to_smtlib
 
 from .generate import CONTRACT, Formulas, damaged
 

@@ -178,7 +178,7 @@ def test_writing_to_a_device_leaves_it_one(tmp_path: Path) -> None:
     """`-o /dev/null`, as root, must not put a file in its place."""
     import threading
 
-    from avow.files import write
+    from avow.base.files import write
 
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from avow.codes import CODES, FRAME, Code
+from avow.base.codes import CODES, FRAME, Code
+from avow.base.rendering import render
 from avow.language.format import format_text
 from avow.language.load import check_text
-from avow.rendering import render
 
 PAGE = Path(__file__).parents[2] / "docs" / "language.md"
 BLOCK = re.compile(r"^```([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from avow.codes import CODES
+from avow.base.codes import CODES
 from avow.language.load import check_text
 
 FRAME = """\

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 from avow.language.format import WIDTH, format_text
 from avow.language.lexer import Token, tokens
 from avow.language.load import check_text

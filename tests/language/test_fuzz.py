@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 from avow.language.load import check_text, parse_formula
 
 from . import fuzzing

@@ -6,12 +6,12 @@ import time
 
 import pytest
 
+from avow.formulas.formula import node_digest
 from avow.language.format import format_text
 from avow.language.limits import MAX_REFERENCES, sort_extent, term_extent
 from avow.language.load import check_text
 from avow.language.sorts import REAL, DataSort, SequenceSort, TupleSort
 from avow.language.translate import FORMATS
-from avow.logic.formula import node_digest
 
 NODE = "node n { inputs( i : %s ) outputs( o : BOOL ) topics() guarantee( %s ) }"
 

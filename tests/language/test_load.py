@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Contract, Node
 from avow.language.load import check_paths, check_text, load_contract, parse_formula, parse_term
 from avow.language.printer import show_term

@@ -12,11 +12,11 @@ import jsonschema
 import pytest
 from sarif import loader
 
+from avow.base.codes import CODES
+from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.rendering import to_json, to_sarif
 from avow.cli import main
-from avow.codes import CODES
-from avow.diagnostics import Diagnostic, Severity, Span
 from avow.language.load import check_text
-from avow.rendering import to_json, to_sarif
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = json.loads((ROOT / "avow" / "language" / "check.schema.json").read_text("utf-8"))

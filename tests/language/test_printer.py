@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 from avow.language.load import check_text, parse_formula
 from avow.language.printer import show_number, show_sort, show_term, show_type
 from avow.language.sorts import REAL, OpaqueSort

@@ -10,9 +10,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from avow.diagnostics import Diagnostic, Severity, Span
+from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.rendering import render, summary, to_json, to_sarif
 from avow.language.load import check_text
-from avow.rendering import render, summary, to_json, to_sarif
 
 TEXT = "node n {\n\tinputs() outputs(日本 : BOOL, b : BOOL) topics()\n  guarantee( bb )\n}\n"
 

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import pytest
 
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
+from avow.formulas.formula import node_digest
 from avow.language.contract import Contract
 from avow.language.format import format_text
 from avow.language.load import check_text
 from avow.language.translate import FORMATS
-from avow.logic.contract_smtlib import to_smtlib
-from avow.logic.formula import node_digest
+from avow.solving.contract_smtlib import to_smtlib
 
 from .typed import Contracts
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.diagnostics import Diagnostic
+from avow.base.diagnostics import Diagnostic
 from avow.language.english import both_ways, comparisons, is_one_way, mentions
 from avow.language.load import check_paths, check_text
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.diagnostics import Diagnostic
+from avow.base.diagnostics import Diagnostic
 from avow.language.load import check_text, decode
 from avow.language.source import Source
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 from avow.language.contract import Contract
 from avow.language.load import check_text, load_contract
 from avow.language.translate import FORMATS
@@ -90,7 +90,7 @@ def test_latex_is_escaped(root: Path) -> None:
 def test_smtlib_is_accepted_by_z3(root: Path) -> None:
     import z3
 
-    from avow.logic.contract_smtlib import to_smtlib
+    from avow.solving.contract_smtlib import to_smtlib
 
     for contract in contracts(root)[2:]:
         for script in to_smtlib(contract).split("(reset)"):
@@ -101,7 +101,7 @@ def test_smtlib_is_accepted_by_z3(root: Path) -> None:
 def test_smtlib_is_accepted_by_cvc5(root: Path) -> None:
     import cvc5
 
-    from avow.logic.contract_smtlib import to_smtlib
+    from avow.solving.contract_smtlib import to_smtlib
 
     for contract in contracts(root)[2:]:
         solver = cvc5.Solver(cvc5.TermManager())

@@ -32,11 +32,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+from avow.base.verdict import Verdict
 from avow.language.contract import Node
 from avow.language.terms import Term, Variable
-from avow.logic.claims import triggers
-from avow.logic.sanity import SanityResult
-from avow.verdict import Verdict
+from avow.sanity.analysis import SanityResult
+from avow.sanity.claims import triggers
 
 from .enumeration import Enumeration, Values, domain, is_finite
 from .random_contracts import LIMIT

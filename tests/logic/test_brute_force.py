@@ -8,13 +8,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from avow.base.verdict import Verdict
+from avow.formulas.formula import digest, free_variables, normalise
+from avow.formulas.negation_normal_form import push_negations
+from avow.formulas.values import Element, FunctionValue, Value
 from avow.language.terms import Not, Term, Variable
-from avow.logic.formula import digest, free_variables, normalise
-from avow.logic.normal import push_negations
-from avow.logic.realizability import realizable
-from avow.logic.smt import entails, replay, solve
-from avow.logic.values import Element, FunctionValue, Value
-from avow.verdict import Verdict
+from avow.sanity.realizability import realizable
+from avow.solving.questions import entails, replay, solve
 
 from .enumeration import Enumeration, Values, domain
 from .random_formulas import FUNCTION_OUTPUT, INPUTS, OUTPUTS, formulas

@@ -9,9 +9,9 @@ import weakref
 
 import pytest
 
-from avow.logic.checking import check
-from avow.logic.clock import allowed, budget, now, watchdog
-from avow.logic.translation import Translator
+from avow.solving.checking import check
+from avow.solving.limits import allowed, budget, now, watchdog
+from avow.solving.translation import Translator
 
 
 def busy(seconds: float) -> None:

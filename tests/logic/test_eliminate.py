@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from avow.base.verdict import Verdict
+from avow.formulas.formula import conjunction
 from avow.language.terms import And, Iff, Term
-from avow.logic.eliminate import remedy
-from avow.logic.formula import conjunction
-from avow.logic.smt import entails
-from avow.verdict import Verdict
+from avow.solving.quantifier_elimination import remedy
+from avow.solving.questions import entails
 
 from .contracts import contract, formula
 

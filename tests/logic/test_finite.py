@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from avow.base.verdict import Verdict
 from avow.calculus.interpretation import interpretation, ranges
+from avow.formulas.finite import Ranges
+from avow.formulas.traversal import subterms
 from avow.language.sorts import NATURAL
 from avow.language.terms import Quantified
-from avow.logic.finite import Ranges
-from avow.logic.sanity import Bounds, SanityResult, analyse
-from avow.logic.smt import entails
-from avow.logic.traversal import subterms
+from avow.sanity.analysis import Bounds, SanityResult, analyse
+from avow.solving.questions import entails
 from avow.system.load import load_system
-from avow.verdict import Verdict
 
 from .contracts import formula, node
 

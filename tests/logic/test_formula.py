@@ -6,6 +6,19 @@ from fractions import Fraction
 
 import pytest
 
+from avow.formulas.formula import (
+    conjunction,
+    digest,
+    disjunction,
+    free_variables,
+    has_nonlinear,
+    node_digest,
+    normalise,
+    sort_digest,
+    substitute,
+)
+from avow.formulas.negation_normal_form import push_negations
+from avow.formulas.traversal import depth
 from avow.language.sorts import BOOL, REAL, EnumSort, FunctionSort
 from avow.language.terms import (
     TRUE,
@@ -23,19 +36,6 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-from avow.logic.formula import (
-    conjunction,
-    digest,
-    disjunction,
-    free_variables,
-    has_nonlinear,
-    node_digest,
-    normalise,
-    sort_digest,
-    substitute,
-)
-from avow.logic.normal import push_negations
-from avow.logic.traversal import depth
 
 from .contracts import contract, formula, node
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 import z3
 
+from avow.base.verdict import Verdict
 from avow.language.terms import Term
-from avow.logic.smt import Translator, entails
-from avow.verdict import Verdict
+from avow.solving.questions import Translator, entails
 
 from .contracts import contract, formula
 

@@ -13,11 +13,11 @@ from functools import cache
 
 import pytest
 
+from avow.base.verdict import Verdict
 from avow.language.contract import Node
 from avow.language.load import check_text
-from avow.logic.claims import Property
-from avow.logic.sanity import SanityResult, analyse
-from avow.verdict import Verdict
+from avow.sanity.analysis import SanityResult, analyse
+from avow.sanity.claims import Property
 
 from .contracts import node
 from .enumeration import Enumeration

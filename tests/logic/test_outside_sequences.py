@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from avow.logic.evaluate import NotEvaluable, compile_term
-from avow.logic.sanity import Bounds, analyse
-from avow.logic.sequences import defined
-from avow.logic.values import Sequence
-from avow.verdict import Verdict
+from avow.base.verdict import Verdict
+from avow.evaluation.evaluate import NotEvaluable, compile_term
+from avow.formulas.sequences import defined
+from avow.formulas.values import Sequence
+from avow.sanity.analysis import Bounds, analyse
 
 from .contracts import formula, node
 

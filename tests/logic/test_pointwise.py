@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
+from avow.base.verdict import Verdict
+from avow.formulas.pointwise import pointwise
+from avow.formulas.tuples import untupled
 from avow.language.terms import Variable
-from avow.logic.clock import now
-from avow.logic.demands import candidates
-from avow.logic.pointwise import pointwise
-from avow.logic.realizability import realizable
-from avow.logic.tuples import untupled
-from avow.logic.witness import witnesses
-from avow.verdict import Verdict
+from avow.sanity.realizability import realizable
+from avow.sanity.witness_candidates import candidates
+from avow.sanity.witnesses import witnesses
+from avow.solving.limits import now
 
 from .contracts import node
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from avow.logic.sanity import analyse
-from avow.verdict import Verdict
+from avow.base.verdict import Verdict
+from avow.sanity.analysis import analyse
 
 from .contracts import node
 

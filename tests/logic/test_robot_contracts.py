@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import pytest
 
-from avow.logic.sanity import Bounds, SanityResult, analyse
-from avow.verdict import Verdict
+from avow.base.verdict import Verdict
+from avow.sanity.analysis import Bounds, SanityResult, analyse
 
 from .contracts import node
 

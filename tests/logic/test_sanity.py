@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from avow.base.verdict import Verdict
+from avow.formulas.values import FunctionValue
 from avow.language.contract import Node
-from avow.logic.sanity import Bounds, Property, SanityResult, analyse, claims, node_key, outcomes
-from avow.logic.smt import replay, solve
-from avow.logic.values import FunctionValue
-from avow.verdict import Verdict
+from avow.sanity.analysis import Bounds, Property, SanityResult, analyse, claims, node_key, outcomes
+from avow.solving.questions import replay, solve
 
 from .contracts import case_study, contract, node
 
@@ -233,7 +233,7 @@ def test_the_other_published_nodes_are_sound(published: dict[str, dict[str, Sani
 
 def test_an_unrealizable_input_is_really_without_output() -> None:
     bad = bands("120", "250", "guarantee( in.r > 200 -> out.v == low )")
-    from avow.logic.realizability import realizable
+    from avow.sanity.realizability import realizable
 
     ports = [p.variable for p in bad.inputs], [p.variable for p in bad.outputs]
     guarantees = {c.name: c.formula for c in bad.guarantees}

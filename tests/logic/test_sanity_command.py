@@ -11,8 +11,8 @@ import jsonschema
 import pytest
 from click.testing import CliRunner, Result
 
+from avow.base.diagnostics import Rejected
 from avow.cli.sanity import command
-from avow.diagnostics import Rejected
 
 GOOD = """node n { inputs(r : REAL) outputs(v : REAL) topics() assume(in.r >= 0)
   guarantee low (in.r < 5 -> out.v == 1) guarantee high (in.r >= 5 -> out.v == in.r) }"""
@@ -62,7 +62,7 @@ def test_a_bad_contract(tmp_path: Path, root: Path) -> None:
 
 
 def test_every_property_has_its_words_in_the_schema(root: Path) -> None:
-    from avow.logic.claims import Property
+    from avow.sanity.claims import Property
 
     schema = json.loads((root / "docs/schemas/sanity.schema.json").read_text())
     described = schema["$defs"]["result"]["properties"]["property"]

@@ -11,8 +11,8 @@ from collections import Counter
 
 import pytest
 
-from avow.logic.sanity import analyse
-from avow.verdict import Verdict
+from avow.base.verdict import Verdict
+from avow.sanity.analysis import analyse
 
 from .contracts import contract
 from .seeded_contracts import FAULTS, SHAPES, seeded

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from avow.base.verdict import Verdict
 from avow.language.load import check_text
-from avow.logic.sanity import Bounds, analyse
-from avow.verdict import Verdict
+from avow.sanity.analysis import Bounds, analyse
 
 
 def verdict(text: str, claim: str) -> Verdict:

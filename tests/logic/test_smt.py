@@ -8,12 +8,12 @@ from fractions import Fraction
 
 import pytest
 
+from avow.base.verdict import Verdict
+from avow.formulas.values import FunctionValue
 from avow.language.sorts import BOOL, STRING, OpaqueSort
 from avow.language.terms import Compare, Literal, Not, Quantified, Quantifier, Role, Term, Variable
-from avow.logic.counterexample import show_values
-from avow.logic.smt import Entailment, entails, replay, solve
-from avow.logic.values import FunctionValue
-from avow.verdict import Verdict
+from avow.solving.counterexample import show_values
+from avow.solving.questions import Entailment, entails, replay, solve
 
 from .contracts import contract, formula
 
@@ -189,7 +189,7 @@ def test_threads_do_not_meet() -> None:
 
 
 def test_z3_is_imported_only_when_asked() -> None:
-    code = "import sys, avow.logic, avow.cli.sanity, avow.logic.claims; sys.exit('z3' in sys.modules)"
+    code = "import sys, avow.solving, avow.cli.sanity, avow.sanity.claims; sys.exit('z3' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -6,12 +6,12 @@ import pytest
 import z3
 from hypothesis import HealthCheck, given, settings
 
+from avow.formulas.formula import negation
 from avow.language.sorts import NATURAL, REAL, STRING, SequenceSort
 from avow.language.terms import Compare, Length, Literal, Not, Role, Term, Variable
-from avow.logic import smtlib
-from avow.logic.formula import negation
-from avow.logic.smt import solve
-from avow.logic.smtlib import ask_cvc5, export
+from avow.solving import smtlib
+from avow.solving.questions import solve
+from avow.solving.smtlib import ask_cvc5, export
 
 from .contracts import case_study
 from .random_formulas import formulas

@@ -11,13 +11,13 @@ import pytest
 import z3
 from language.generate import CONTRACT, Formulas
 
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Verdict
 from avow.language.contract import Contract
 from avow.language.load import check_text
-from avow.logic.contract_smtlib import to_smtlib
-from avow.logic.sanity import Bounds, Property, analyse
-from avow.logic.smtlib import ask_cvc5, export
-from avow.verdict import Verdict
+from avow.sanity.analysis import Bounds, Property, analyse
+from avow.solving.contract_smtlib import to_smtlib
+from avow.solving.smtlib import ask_cvc5, export
 
 COUNT = int(os.environ.get("AVOW_SMTLIB", "10"))
 SAYS = {Verdict.PROVED: "sat", Verdict.REFUTED: "unsat"}
@@ -47,7 +47,7 @@ def _can_be_said(contract: Contract) -> bool:
 
 
 def _mentions_output(contract: Contract) -> bool:
-    from avow.logic.formula import free_variables
+    from avow.formulas.formula import free_variables
 
     node = contract.nodes[0]
     return any(v.role == "out" for a in node.assumptions for v in free_variables(a.formula))

@@ -10,19 +10,19 @@ from pathlib import Path
 import pytest
 from assurance.sample import RUN, case, evidence, guarantee, node_plan, system
 
+from avow.base.verdict import Outcome, Verdict
+from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.pipeline.discharge import discharge
 from avow.pipeline.mutation import Score, _noticed, hunt
 from avow.pipeline.run_info import Run
-from avow.pipeline.survey import Survey, survey
-from avow.verdict import Outcome, Verdict
-from avow.workspace import Workspace
+from avow.pipeline.workload import Survey, survey
 
 BACKEND = """
-from avow.backend import Report
-from avow.verdict import Link, Outcome, Verdict
+from avow.backend_kit.protocol import Report
+from avow.base.verdict import Link, Outcome, Verdict
 
 class Any:
     name, title, version, green_means = "any", "judges as it is told", "1", ""

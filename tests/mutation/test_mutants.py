@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from avow.formulas.formula import normalise
 from avow.language.contract import Node
 from avow.language.load import check_text
 from avow.language.terms import Term
-from avow.logic.formula import normalise
-from avow.logic.mutants import Mutant, mutants, telling
-from avow.logic.survivors import difference
+from avow.sanity.mutants import Mutant, mutants, telling
+from avow.sanity.survivors import difference
 
 
 def guarantee(formula: str) -> Term:

@@ -19,15 +19,15 @@ from pathlib import Path
 import pytest
 from assurance.sample import evidence
 
+from avow.base.files import write
+from avow.base.verdict import Verdict
+from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger
-from avow.files import write
 from avow.pipeline import assess
 from avow.pipeline.assess import Assessment
 from avow.pipeline.reporter import _sweep
 from avow.pipeline.run_info import Run
-from avow.pipeline.survey import Survey, survey
-from avow.verdict import Verdict
-from avow.workspace import Workspace
+from avow.pipeline.workload import Survey, survey
 
 TEMPLATE = Path(__file__).parents[2] / "avow" / "cli" / "template" / "contracts" / "thermostat"
 TIMES = int(os.environ.get("AVOW_CRASHES", "3"))

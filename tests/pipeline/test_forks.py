@@ -15,19 +15,19 @@ from pathlib import Path
 import pytest
 from helpers import alive
 
-from avow import process
-from avow.backend import Limits, Report
+from avow.backend_kit.protocol import Limits, Report
+from avow.base import process
+from avow.base.verdict import Outcome, Verdict
+from avow.base.workspace import Workspace
 from avow.pipeline import forks, worker
-from avow.pipeline.survey import Survey, survey
-from avow.verdict import Outcome, Verdict
-from avow.workspace import Workspace
+from avow.pipeline.workload import Survey, survey
 
 BACKEND = """
 import os, signal, subprocess, sys, time
 from pathlib import Path
-from avow import process
-from avow.backend import Report
-from avow.verdict import Link, Outcome, Verdict
+from avow.base import process
+from avow.backend_kit.protocol import Report
+from avow.base.verdict import Link, Outcome, Verdict
 
 class Odd:
     name, title, version, green_means = "odd", "does as it is told", "1", ""
@@ -190,8 +190,8 @@ def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
     script = f"""
         from pathlib import Path
         from avow.pipeline import worker
-        from avow.pipeline.survey import survey
-        from avow.workspace import Workspace
+        from avow.pipeline.workload import survey
+        from avow.base.workspace import Workspace
         root = Path({str(odd)!r})
         work = survey(root / "contracts" / "hangs").work("odd")
         worker.run(Workspace(root), work, work.obligations, root)

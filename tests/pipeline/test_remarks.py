@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Report
-from avow.diagnostics import Diagnostic, Severity, Span
+from avow.backend_kit.protocol import Report
+from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.verdict import Outcome, Verdict
 from avow.pipeline.remarks import remarked
 from avow.pipeline.work import method_job
 from avow.system.load import load_system
-from avow.verdict import Outcome, Verdict
 
 CONTRACT = "node n { inputs( r : REAL ) outputs( b : BOOL ) topics() guarantee( b <=> r > 0 ) }\n"
 PLAN = "system: s\ncontract: system.rcl\nnodes:\n  n: {methods: [{hoare: {program: p.imp}}]}\n"

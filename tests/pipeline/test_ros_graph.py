@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from helpers import edit
 
-from avow.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.workspace import Workspace
 from avow.pipeline.check import check, diagnostics, is_current
-from avow.pipeline.survey import Survey, survey
+from avow.pipeline.workload import Survey, survey
 from avow.system.load import load_system
-from avow.workspace import Workspace
 
 SHIPPED = Path(__file__).parents[2] / "contracts" / "remote_inspection"
 GRAPH = "models/rosgraph.dot"

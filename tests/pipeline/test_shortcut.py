@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.workspace import Workspace
 from avow.pipeline import shortcut
 from avow.pipeline.results import Result
 from avow.pipeline.tasks import _wanted
-from avow.workspace import Workspace
 
 RESULT = Result("crane", 0, {"proved": 3}, "CHECKED", "reports/crane/index.html", (("all", True, "fine"),))
 

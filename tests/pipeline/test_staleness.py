@@ -16,16 +16,16 @@ from typing import cast
 import pytest
 from helpers import edit
 
-from avow.backend import Backend, Limits
+from avow.backend_kit.protocol import Backend, Limits
+from avow.backend_kit.registry import backend
+from avow.base.diagnostics import Rejected
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
 from avow.calculus.requirements import FormulaQuestion, TemporalQuestion, requirement_question
-from avow.diagnostics import Rejected
 from avow.pipeline.engines import discharge_sanity
-from avow.pipeline.keys import surroundings
-from avow.pipeline.survey import survey
+from avow.pipeline.evidence_keys import surroundings
 from avow.pipeline.work import catalogue, method_job, planned_method
-from avow.registry import backend
+from avow.pipeline.workload import survey
 from avow.system.load import load_system
 from avow.system.plan import Scenario, System
 
@@ -469,8 +469,8 @@ def test_the_order_of_nodes_and_the_names_of_files_mean_nothing(tmp_path: Path) 
 def test_another_backend_tool_or_solver_reruns_what_it_answered(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    from avow.backend_kit.registry import backend
     from avow.pipeline import work
-    from avow.registry import backend
 
     folder = copied(FERRY, tmp_path)
     before = keys(folder)

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from avow.backend import Limits
-from avow.files import write
+from avow.backend_kit.protocol import Limits
+from avow.base.files import write
+from avow.base.verdict import Outcome, Verdict
 from avow.pipeline.engines import discharge_composition, discharge_sanity
-from avow.pipeline.survey import Survey, survey
 from avow.pipeline.work import Work, method_backend, method_job, planned_method
-from avow.verdict import Outcome, Verdict
+from avow.pipeline.workload import Survey, survey
 
 FERRY = Path(__file__).parent / "fixtures" / "ferry"
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 from assurance.sample import RUN, case, evidence, guarantee, node_plan, obligation, system
 
 from avow.assurance.model import Case, Derivation, SideCondition
+from avow.base.files import digest
+from avow.base.verdict import Counterexample, Verdict
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
-from avow.files import digest
 from avow.system.plan import EnvironmentInput, Finding, Requirement
-from avow.verdict import Counterexample, Verdict
 
 NAME = (
     "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'`{{ 7*7 }}{% raw %}${x}#{x}]]>--><!-- */ "

@@ -16,12 +16,12 @@ from assurance.sample import case, evidence, guarantee, node_plan, obligation, r
 from avow.assurance.argument import build_argument
 from avow.assurance.model import Case
 from avow.assurance.remarks import REMARK
+from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
-from avow.report import formats, picture, wording
+from avow.report import argument_svg, formats, wording
 from avow.report.page import asset, render_index
 from avow.report.pdf import _data as pdf_data
 from avow.system.plan import Finding, Requirement
-from avow.verdict import Verdict
 
 G1, G2 = guarantee("agent", "g1"), guarantee("agent", "g2", line=12)
 SUBJECT = system(
@@ -257,7 +257,7 @@ def test_nothing_that_paper_hides_is_part_of_a_picture() -> None:
     }
     assert hidden  # the rule for filters and the like is there
     argument = build_argument(rover_case())
-    drawn = picture.draw(argument, argument.root, lambda _: None, "all")
+    drawn = argument_svg.draw(argument, argument.root, lambda _: None, "all")
     assert not hidden & {name for names in re.findall(r'class="([^"]*)"', drawn) for name in names.split()}
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from assurance.sample import case, evidence, rover_parts
 
+from avow.base.verdict import Verdict
 from avow.evidence.ledger import Ledger
 from avow.report import render_all
 from avow.report.check import check
-from avow.verdict import Verdict
 
 
 @pytest.fixture(scope="module")

@@ -12,15 +12,15 @@ from assurance.sample import PLAN_TEXT, RCL_TEXT, case, evidence, rover_parts
 from click.testing import CliRunner, Result
 
 from avow.assurance.compare import compare, of_case, of_ledger
+from avow.base.diagnostics import Rejected
+from avow.base.files import digest
+from avow.base.verdict import Verdict
 from avow.cli.audit import command as audit
 from avow.cli.diff import command as diff
 from avow.cli.explain import command as explain
 from avow.cli.report import command as report
-from avow.diagnostics import Rejected
 from avow.evidence.ledger import Ledger
-from avow.files import digest
 from avow.report import render_all
-from avow.verdict import Verdict
 
 
 @pytest.fixture(scope="module")

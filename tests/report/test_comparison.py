@@ -16,12 +16,12 @@ from click.testing import CliRunner
 
 from avow.assurance.compare import ORDER, Change, Snapshot, compare, of_case
 from avow.assurance.model import Case
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Verdict
 from avow.cli.diff import command as diff
-from avow.diagnostics import Rejected
 from avow.evidence.record import Evidence
 from avow.report import render_all
 from avow.report.comparison import render_comparison
-from avow.verdict import Verdict
 from report.hostile import NAME, hostile_case
 from report.test_page import Page
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 from assurance.sample import case, evidence, guarantee, system
 
 from avow.assurance.model import MapView
+from avow.base.verdict import Counterexample, Verdict
 from avow.report import example
 from avow.report.maps import map_picture
 from avow.report.page import render_page
 from avow.report.pdf import _counter
-from avow.verdict import Counterexample, Verdict
 from report.test_page import Page
 
 

@@ -8,10 +8,10 @@ from io import StringIO
 from assurance.sample import case, evidence, guarantee, obligation, system
 from rich.console import Console
 
+from avow.base.verdict import Counterexample, Verdict
 from avow.evidence.obligation import Kind
 from avow.report.terminal import show_obligation
 from avow.system.plan import Finding
-from avow.verdict import Counterexample, Verdict
 
 
 def shown(name: str) -> str:

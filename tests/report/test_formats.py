@@ -21,10 +21,10 @@ from avow.assurance.codec import case_schema
 from avow.assurance.model import Case
 from avow.assurance.traceability import COLUMNS, trace
 from avow.assurance.trend import trend
+from avow.base.verdict import Verdict
 from avow.evidence.status import Status
 from avow.report import LeftOut, formats, render_all, write_index
 from avow.report.latex import latex
-from avow.verdict import Verdict
 from report.hostile import hostile_case
 
 CASES = {"rover": rover_case, "hostile": hostile_case, "empty": lambda: case(system({}), [], [])}

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from avow.assurance.model import MapView
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Counterexample
 from avow.report.maps import draw_map
 from avow.system.load import load_system
-from avow.verdict import Counterexample
 
 MAP = MapView("waypoint", (("0", "0", "0"), ("2.50", "-1", "1"), ("4", "3", "2")), ("inspect",))
 

@@ -16,7 +16,7 @@ from avow.assurance.model import Case
 from avow.assurance.naming import short
 from avow.assurance.traceability import trace
 from avow.evidence.status import Status
-from avow.report import formats, picture, wording
+from avow.report import argument_svg, formats, wording
 from avow.report.page import render_index, render_page, render_traceability
 from report.hostile import hostile_case
 
@@ -184,7 +184,7 @@ def test_boxes_do_not_overlap_and_stay_within_the_picture() -> None:
     found = rover_case()
     argument = build_argument(found)
     for _, start in [*argument.goals, ("all", argument.root)]:
-        svg = picture.draw(argument, start, lambda _: None, "x", alone=True)
+        svg = argument_svg.draw(argument, start, lambda _: None, "x", alone=True)
         boxes = [
             tuple(map(float, m))
             for m in re.findall(
@@ -227,7 +227,7 @@ def test_a_picture_too_large_to_read_says_how_much_it_leaves_out() -> None:
     subject = system({"n": gs}, requirements=[Requirement("R", "t", None, None, ("n",))])
     found = make_case(subject, [guarantee("n", g) for g in gs], [])
     argument = build_argument(found)
-    svg = picture.draw(argument, argument.root, lambda _: None, "x")
+    svg = argument_svg.draw(argument, argument.root, lambda _: None, "x")
     assert "more elements: see gsn.yaml" in svg
 
 

@@ -12,7 +12,7 @@ from assurance.sample import case, guarantee, rover_case, system
 
 from avow.assurance.codec import from_json, to_json
 from avow.assurance.model import Case, SourceView
-from avow.files import digest
+from avow.base.files import digest
 from avow.report import check, source
 from avow.report.markdown import render_markdown
 from avow.report.page import render_page

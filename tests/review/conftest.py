@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from avow.backend import Job
-from avow.diagnostics import Span
+from avow.backend_kit.protocol import Job
+from avow.base.diagnostics import Span
 from avow.evidence.obligation import Kind, Obligation
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.sorts import REAL

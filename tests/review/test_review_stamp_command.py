@@ -10,7 +10,7 @@ import pytest
 from avow.backends.review.__main__ import main
 from avow.backends.review.record import read_record
 from avow.backends.review.stamp import stamp
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 
 PLAN = """\
 system: s

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from avow.backend import Job
+from avow.backend_kit.protocol import Job
 from avow.evidence.obligation import Kind, Obligation
 from avow.system.load import load_system
 from avow.system.plan import System

@@ -10,8 +10,8 @@ import pytest
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
-from avow.diagnostics import Diagnostic
-from avow.logic.values import Data, Element, FunctionValue, Sequence, Value
+from avow.base.diagnostics import Diagnostic
+from avow.formulas.values import Data, Element, FunctionValue, Sequence, Value
 from avow.system.plan import System
 
 RCL = """

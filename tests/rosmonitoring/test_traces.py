@@ -11,7 +11,7 @@ import pytest
 
 from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
 from avow.backends.rosmonitoring.traces import digest_trace, parse_event, read_lines, read_trace
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
 
 
 def test_lines_are_counted_with_blank_ones() -> None:

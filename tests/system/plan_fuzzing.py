@@ -20,9 +20,9 @@ from pathlib import Path
 
 from language.fuzzing import at_most
 
-from avow.diagnostics import Rejected
+from avow.base.diagnostics import Rejected
+from avow.base.rendering import render, to_json, to_sarif
 from avow.language import load as language_load
-from avow.rendering import render, to_json, to_sarif
 from avow.system.load import load_system
 from avow.system.plan import System
 

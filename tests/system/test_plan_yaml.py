@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from avow.diagnostics import Diagnostic, Rejected, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.system.plan import Located
 from avow.system.plan_file import read_plan
 from avow.system.schema import plan_schema, violations

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from avow.codes_plan import PLAN_CODES
-from avow.diagnostics import Diagnostic, Rejected
+from avow.base.codes_plan import PLAN_CODES
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.system.graph import components, cycles_in, dataflow
 from avow.system.load import load_bare, load_path, load_system
 from avow.system.plan import Endpoint, System

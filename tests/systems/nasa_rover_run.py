@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from avow.logic.values import FunctionValue
+from avow.formulas.values import FunctionValue
 
 FOLDER = Path(__file__).parents[2] / "contracts" / "nasa_rover"
 CHARGER = 0

@@ -13,15 +13,15 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.derivation import Phase, Rule
 from avow.calculus.obligations import composition_obligations, requirement_obligations, settle_all
 from avow.cli import simulate
-from avow.logic.evaluate import compile_term
-from avow.logic.values import FunctionValue
+from avow.evaluation.evaluate import compile_term
+from avow.formulas.values import FunctionValue
 from avow.system.load import load_system
 from avow.system.plan import System
-from avow.verdict import Outcome, Verdict
 
 from .nasa_rover_run import (
     AWAY,

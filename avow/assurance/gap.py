@@ -1,0 +1,269 @@
+"""One demand of the policy against one guarantee: is it met, what is lacking, what would close the gap most cheaply."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from datetime import date
+
+from avow.assurance.facts import Facts
+from avow.assurance.model import Currency, EvidenceView, MethodInfo, ObligationView, Suggestion
+from avow.assurance.policy import Demand, Policy, costs
+from avow.base.verdict import Link, Verdict
+from avow.evidence.obligation import Kind
+from avow.evidence.record import Evidence
+from avow.evidence.status import Status, effective, join, link_rank, weigh
+
+_LONG = 160
+"""So much of a tool's own words stands in a suggestion."""
+
+
+def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date) -> str | None:
+    """What a guarantee lacks, in words; None where the demand is met."""
+    if not demand.one_of:
+        return None
+    evidence = [v.entry.evidence for v in view.counting]
+    kept, dropped = [], []
+    persons = _persons(evidence, demand, policy, today)
+    for item in evidence:
+        reason = _disregarded(item, demand, policy, today)
+        if reason is None and effective(item) is Verdict.REVIEWED and len(persons) < demand.reviewers > 1:
+            reason = f"reviewed by {len(persons)}, {demand.reviewers} reviewers are asked"
+        if reason is None:
+            kept.append(item)
+        elif weigh(item).support is not None:
+            dropped.append(f"{item.method}: {reason}")
+    status = join(map(weigh, kept)).status if kept else view.status
+    because = f" ({'; '.join(dropped)})" if dropped else ""
+    if kept == [] and dropped:
+        return f"nothing counts{because}"
+    if status not in demand.one_of:
+        return f"{status}, but {' or '.join(demand.one_of)} is asked{because}"
+    speaking = [item for item in kept if weigh(item).support is not None]
+    number = independent(speaking) if demand.independent else len({item.method for item in speaking})
+    if number < demand.methods:
+        kind = "independent method" if demand.independent else "method"
+        return f"{number} {kind}{'' if number == 1 else 's'}, but {demand.methods} are asked{because}"
+    return None
+
+
+def independent(evidence: Iterable[Evidence]) -> int:
+    """How many items can be chosen that differ pairwise in backend AND in tool: two wrappings of one solver are one.
+
+    This is a maximum matching between backends and tools, with an item for an edge.
+    """
+    edges: dict[str, set[str]] = {}
+    for item in evidence:
+        edges.setdefault(item.backend, set()).add(item.tool)
+    partner: dict[str, str] = {}
+
+    def place(backend: str, tried: set[str]) -> bool:
+        for tool in sorted(edges[backend] - tried):
+            tried.add(tool)
+            if tool not in partner or place(partner[tool], tried):
+                partner[tool] = backend
+                return True
+        return False
+
+    return sum(place(backend, set()) for backend in sorted(edges))
+
+
+def reviewers(evidence: Evidence) -> tuple[str, ...]:
+    """The persons behind a review, as its details name them (``reviewers``, ``reviewer`` or ``who``)."""
+    for key in ("reviewers", "reviewer", "who"):
+        match evidence.details.get(key):
+            case str(name):
+                return (name,)
+            case list() | tuple() as names:
+                return tuple(str(name) for name in names)
+    return ()
+
+
+def _persons(evidence: Iterable[Evidence], demand: Demand, policy: Policy, today: date) -> set[str]:
+    """Whoever reviewed the claim, in one record or in several that each count; a name is one however it is spelled."""
+    return {
+        " ".join(name.casefold().replace(".", " ").split())
+        for item in evidence
+        if weigh(item).support is Status.REVIEWED and _disregarded(item, demand, policy, today) is None
+        for name in reviewers(item)
+    }
+
+
+def age_days(evidence: Evidence, today: date) -> int | None:
+    """Days since the evidence came about: a person's date where the details give one, else the attempt's start."""
+    for text in (evidence.details.get("date"), evidence.started):
+        if isinstance(text, str):
+            try:
+                return (today - date.fromisoformat(text[:10])).days
+            except ValueError:
+                continue
+    return None
+
+
+def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) -> str | None:
+    """Why a supporting item does not count; refutations and failures are never disregarded."""
+    support = weigh(item).support
+    if support is None:
+        return None
+    limit = demand.max_age(support)
+    if limit is not None:
+        age = age_days(item, today)
+        if age is None or age > limit:
+            return f"{'of unknown age' if age is None else f'{age} days old'}, at most {limit} are allowed"
+        if age < 0:
+            return "dated in the future"
+    if effective(item) is Verdict.REVIEWED:
+        people = set(reviewers(item))
+        strangers = people - set(policy.reviewers) if policy.reviewers else set()
+        if strangers:
+            return f"{', '.join(sorted(strangers))} may not review under this policy"
+    elif demand.links and support is not Status.JUSTIFIED and item.link not in demand.links:
+        return f"the link is {item.link}, {' or '.join(demand.links)} is asked"
+    if demand.unconditional and item.hypotheses:
+        return "rests on hypotheses"
+    return None
+
+
+def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Suggestion:
+    """The cheapest step: repair what is wrong, run or install what is planned, else add a method that fits."""
+    match view.status:
+        case Status.REFUTED:
+            return Suggestion(
+                "repair what the counterexample shows, or accept the finding with a dated reason", cost=100
+            )
+        case Status.CONTRADICTORY:
+            return Suggestion(_two_answers(view), cost=100)
+        case Status.ERROR:
+            # the same question is not asked twice: it has to change, or be asked afresh
+            again = f"`avow verify --fresh {facts.system}`"
+            return Suggestion(f"find out why the tool failed (its message and log are with the evidence), then {again}")
+        case Status.VACUOUS if hollow := [v.entry.evidence.method for v in view.counting if _is_score(v)]:
+            return Suggestion(
+                f"find out what `{hollow[0]}` looks at: it says the same of every mutant of the claim", cost=50
+            )
+        case Status.VACUOUS:
+            return Suggestion("give a scenario in which the claim's trigger is met", cost=50)
+        case Status.STALE if expired := _expired(view):
+            return Suggestion(
+                f"renew the {' and the '.join(expired)}: what was given was valid until a day that is past", cost=30
+            )
+        case Status.STALE if view.planned:
+            return Suggestion(
+                f"run `avow verify {facts.system}`: the plan's methods have not answered the claim as it is now"
+            )
+    if demand is None and view.status is Status.JUSTIFIED:
+        return Suggestion(
+            "a person's reason is not enough here: let a contract guarantee it, or take it as a risk under "
+            "`accepted:`, with a name, a date and an expiry",
+            cost=30,
+        )
+    used = _planned(view, facts)
+    by_name = {method.name: method for method in facts.methods}
+    tried = {v.entry.evidence.method for v in view.counting}
+    for method, backend in used.items():
+        info = by_name.get(backend)
+        if info is not None and not info.available:
+            return Suggestion(f"install what `{method}` needs: {info.install}", method)
+        if method not in tried:
+            return Suggestion(f"run `avow verify {facts.system}`: `{method}` has not answered yet", method)
+    if demand is None:
+        if view.obligation.kind is Kind.REQUIREMENT:
+            return Suggestion("add what it rests on under `supported_by`, or state it as a formula", cost=20)
+        if view.obligation.kind is Kind.COMPOSITION and _wants_a_reason(view):
+            return Suggestion(_reason_wanted(view.obligation.name), cost=5)
+        return Suggestion(
+            "narrow the question (a scenario in the plan), raise the time limit, or accept it with a reason", cost=20
+        )
+    new = _new_method(view, demand, used, facts)
+    for item in view.counting:
+        record = item.entry.evidence
+        if record.method in used and record.verdict is Verdict.ERROR:
+            return Suggestion(f"repair what keeps `{record.method}` from answering: {_clipped(record.summary)}", cost=8)
+        if record.method in used and record.verdict is Verdict.UNKNOWN and not record.vacuous:
+            return replace(new, text=f"{new.text}; or see why `{record.method}` gave up: {_clipped(record.summary)}")
+    return new
+
+
+def _clipped(text: str) -> str:
+    return text if len(text) <= _LONG else f"{text[:_LONG].rpartition(' ')[0]} …"
+
+
+def _two_answers(view: ObligationView) -> str:
+    """Of one and the same thing two answers cannot both be right; a model and a trace of the robot may well differ."""
+    records = [item.entry.evidence for item in view.counting]
+    for proof in (r for r in records if effective(r) is Verdict.PROVED):
+        for refutation in (r for r in records if r.verdict is Verdict.REFUTED):
+            read, other = set(proof.inputs), set(refutation.inputs)
+            if read and other and not read & other:
+                proved = f"`{proof.method}` proves it of {_files(read)}"
+                refuted = f"`{refutation.method}` refutes it of {_files(other)}"
+                return f"{proved} and {refuted}: repair what the counterexample shows, or find out which tool is wrong"
+    return "find out which tool is wrong: one proves the claim and another refutes it"
+
+
+def _files(paths: set[str]) -> str:
+    names = sorted(path.rpartition("/")[2] for path in paths)
+    return ", ".join(names[:2]) + (", …" if len(names) > 2 else "")
+
+
+def _is_score(item: EvidenceView) -> bool:
+    return item.entry.evidence.vacuous and "mutation" in item.entry.evidence.details
+
+
+def _expired(view: ObligationView) -> tuple[str, ...]:
+    """The methods whose answers were given until a day that is past, and that have given none since."""
+    return tuple(dict.fromkeys(v.entry.evidence.method for v in view.evidence if v.currency is Currency.EXPIRED))
+
+
+def _wants_a_reason(view: ObligationView) -> bool:
+    """A condition that no tool settles, only a person's reason; the evidence says where it belongs."""
+    return not view.obligation.formula or view.obligation.name.startswith("environment.")
+
+
+def _reason_wanted(name: str) -> str:
+    goal, _, key = name.rpartition(".")
+    if name.startswith("environment."):
+        return "say in the plan's `environment:` what is assumed of the input (assume), and why it may be (because)"
+    return f"give a reason in the plan: `compose: {{{goal}: {{{key.replace('-', '_')}: {{because: …}}}}}}`"
+
+
+def _planned(view: ObligationView, facts: Facts) -> Mapping[str, str]:
+    backends = {
+        method: backend for node in facts.nodes if node.name == view.obligation.node for method, backend in node.methods
+    }
+    return {method: backends.get(method, method) for method, _ in view.planned}
+
+
+def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], facts: Facts) -> Suggestion:
+    strong_enough = view.status in demand.one_of
+    order = costs()
+    node = view.obligation.node
+
+    def fits(info: MethodInfo) -> bool:
+        if info.name in used.values() or node in info.unsuited:
+            return False
+        if demand.links and info.link not in demand.links and info.strength is not Verdict.REVIEWED:
+            return False
+        return strong_enough or Status(info.strength) in demand.one_of
+
+    def dear(info: MethodInfo) -> int:
+        """Persons are dearer than machines, and what must be installed first than what is here."""
+        by_hand = 5 if info.link is Link.GUIDED else 0
+        return order.get(info.strength, 9) + by_hand + (0 if info.available else 5)
+
+    fitting = sorted(
+        (info for info in facts.methods if fits(info)), key=lambda i: (dear(i), -link_rank(i.link), i.name)
+    )
+    if not fitting:
+        wanted = (
+            "a second, independent method" if strong_enough else f"a method that can give {' or '.join(demand.one_of)}"
+        )
+        return Suggestion(f"add {wanted} under nodes.{node}.methods", cost=60)
+    best = fitting[0]
+    install = "" if best.available else f" (first: {best.install})"
+    others = " or ".join(f"`{info.name}`" for info in fitting[1:3])
+    return Suggestion(
+        f"add `{best.name}` under nodes.{node}.methods: {best.title}{install}{f'; or {others}' if others else ''}",
+        best.name,
+        10 + order.get(best.strength, 9),
+    )

@@ -1,0 +1,104 @@
+"""Finds the verification backends: entry points of installed packages, and modules that a plan names."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib
+from collections.abc import Iterable, Mapping
+from importlib.metadata import EntryPoint, entry_points
+
+from avow.backend_kit.protocol import Backend, Translates
+from avow.base.codes import Code
+from avow.base.codes_workspace import CORE_CODES, of_backend
+from avow.base.diagnostics import Diagnostic, Rejected
+
+GROUP = "avow.backends"
+
+
+@functools.cache
+def installed() -> dict[str, EntryPoint]:
+    """Name → entry point; nothing is imported. Raises Rejected where two packages claim one name."""
+    found: dict[str, EntryPoint] = {}
+    for point in entry_points(group=GROUP):
+        other = found.get(point.name)
+        if other is not None and other.value != point.value:
+            raise Rejected(
+                Diagnostic(
+                    "BACKEND001",
+                    f"two installed packages provide a backend named '{point.name}': {other.value} and {point.value}",
+                    hint="uninstall one of them",
+                )
+            )
+        found[point.name] = point
+    return found
+
+
+def names() -> tuple[str, ...]:
+    return tuple(sorted(installed()))
+
+
+@functools.cache
+def backend(name: str, plugins: tuple[str, ...] = ()) -> Backend:
+    """The backend of that name, imported now. Raises Rejected with the reason where it cannot be had."""
+    for plugin in _plugins(plugins):
+        if plugin.name == name:
+            if name in installed():
+                raise Rejected(Diagnostic("BACKEND001", f"a plugin redefines the installed backend '{name}'"))
+            return plugin
+    point = installed().get(name)
+    if point is None:
+        known = ", ".join(sorted({*installed(), *(p.name for p in _plugins(plugins))}))
+        raise Rejected(Diagnostic("BACKEND002", f"there is no backend named '{name}'", hint=f"known: {known}"))
+    try:
+        found = point.load()
+    except Exception as error:
+        broken = Diagnostic("BACKEND003", f"the backend '{name}' ({point.value}) does not load: {error}")
+        raise Rejected(broken) from error
+    return _promise(found, point.value)
+
+
+@functools.cache
+def every_code() -> Mapping[str, Code]:
+    """The diagnostic codes of the core and of every installed backend that loads."""
+    found = dict(CORE_CODES)
+    for name in names():
+        with contextlib.suppress(Rejected):
+            found |= of_backend(backend(name))
+    return found
+
+
+def translators(plugins: tuple[str, ...] = ()) -> dict[str, Translates]:
+    """Notation → the backend that translates into it. A backend that does not load offers none; of two that offer one
+    notation, the first by name has it."""
+    found: dict[str, Translates] = {}
+    offered: list[object] = []
+    for name in names():
+        with contextlib.suppress(Rejected):
+            offered.append(backend(name, plugins))
+    for one in (*offered, *_plugins(plugins)):
+        if isinstance(one, Translates):
+            for notation in one.translations:
+                found.setdefault(notation, one)
+    return found
+
+
+def _plugins(modules: Iterable[str]) -> tuple[Backend, ...]:
+    return tuple(_plugin(module) for module in modules)
+
+
+@functools.cache
+def _plugin(module: str) -> Backend:
+    try:
+        found = importlib.import_module(module).BACKEND
+    except Exception as error:
+        raise Rejected(Diagnostic("BACKEND003", f"the plugin module '{module}' does not load: {error}")) from error
+    return _promise(found, module)
+
+
+def _promise(found: object, where: str) -> Backend:
+    if not isinstance(found, Backend):
+        members = {*Backend.__annotations__, "tools", "check", "files", "export", "discharge"}
+        lacks = ", ".join(sorted(m for m in members if not hasattr(found, m)))
+        raise Rejected(Diagnostic("BACKEND003", f"{where} does not keep the backend protocol: it lacks {lacks}"))
+    return found

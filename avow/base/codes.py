@@ -1,0 +1,389 @@
+"""Every diagnostic code of the language, declared once: what it means, and a text that brings it about.
+
+Numbers: 0xx the file, 1xx the syntax, 2xx names, 3xx sorts, 4xx lints (warnings that can be switched off).
+The tests check every example, and docs/language.md lists every code. The codes of everything else stand in
+`avow.base.codes_workspace` and with the backends; docs/diagnostics.md has them all in one table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from avow.base.diagnostics import Severity
+
+FRAME = """\
+context {{
+  Status  : {{low, high}};
+  Command : {{ go(REAL, REAL), stop }};
+  Marked  : NATURAL --> BOOL;
+}}
+node monitor {{
+  inputs( level : REAL, count : NATURAL, marked : Marked )
+  outputs( status : Status, command : Command )
+  topics( float64 level matches(in.level), int32 count matches(in.count), string marked matches(in.marked),
+          string status matches(out.status), string command matches(out.command) )
+  {clause}
+}}
+"""
+"""Where an example that is only a clause stands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """One thing that can be wrong. `example` is a file, or the clauses of `FRAME`'s node; empty where no text can show
+    it (an unreadable file)."""
+
+    code: str
+    title: str
+    explanation: str
+    example: str = ""
+    severity: Severity = Severity.ERROR
+    remedy: str = ""
+    """What to do; empty where the example or the message says it."""
+
+    @property
+    def text(self) -> str:
+        """The example as a whole file."""
+        if self.example.lstrip().startswith(("assume", "guarantee", "A(", "G(", "// avow")):
+            return FRAME.format(clause=self.example)
+        return self.example
+
+    @property
+    def is_lint(self) -> bool:
+        """Whether a plan's `lints_off` or a comment ``// avow: allow CODE`` can switch it off."""
+        return self.severity is Severity.WARNING
+
+
+def declare(code: str, title: str, explanation: str, remedy: str, *, warning: bool = False) -> Code:
+    """A code whose example is no text of RCL."""
+    return Code(code, title, explanation, "", Severity.WARNING if warning else Severity.ERROR, remedy)
+
+
+def register(*codes: Code) -> dict[str, Code]:
+    """Codes by name, in order. Raises ValueError where one is declared twice."""
+    found: dict[str, Code] = {}
+    for code in codes:
+        if code.code in found:
+            raise ValueError(f"{code.code} is declared twice")
+        found[code.code] = code
+    return found
+
+
+_NODE = "node n {{ inputs({}) outputs({}) topics({}) {} }}"
+
+
+def _node(inputs: str = "", outputs: str = "b : BOOL", topics: str = "", clauses: str = "guarantee(out.b)") -> str:
+    return _NODE.format(inputs, outputs, topics, clauses)
+
+
+_FILE = (
+    Code("RCL001", "no contract", "The file holds neither a context nor a node.", "// nothing yet"),
+    Code("RCL002", "unreadable file", "The file does not exist, is a folder, or may not be read."),
+    Code("RCL003", "file too large", "A file of more than 4 MB, or a million words and signs, is no contract."),
+    Code("RCL004", "not UTF-8", "Contracts are UTF-8; the place is the first byte that cannot be read."),
+    Code("RCL005", "not a text", "The file holds a NUL character.", "node n\0"),
+    Code("RCL006", "too many errors", "Of one file, 200 diagnostics are shown, and then reading ends.", "`1`a" * 210),
+)
+
+_SYNTAX = (
+    Code(
+        "RCL101",
+        "a sign of another notation",
+        "The sign is not RCL; the hint says what is. Reading goes on as if that stood there.",
+        "guarantee(in.level > 0 && out.status == low)",
+    ),
+    Code(
+        "RCL102",
+        "`--` for a comment",
+        "Comments are `// …` to the end of the line, or `/* … */`.",
+        "guarantee(out.status == low) -- always",
+    ),
+    Code("RCL103", "comment not closed", "A `/*` has no `*/`.", "node n { /* to be done"),
+    Code(
+        "RCL104",
+        "string not closed",
+        "A string ends on the line on which it begins.",
+        'guarantee low "It is low ( out.status == low )',
+    ),
+    Code(
+        "RCL105",
+        "no number",
+        "Numbers are whole (`12`) or decimal (`0.25`), without exponent, and of 500 digits at most; names begin with a "
+        "letter.",
+        "guarantee(in.level < 1e6)",
+    ),
+    Code(
+        "RCL106",
+        "no escape",
+        'In a string, a backslash is followed by `\\`, `"`, `n` or `t`.',
+        'guarantee low "C:\\data" (out.status == low)',
+    ),
+    Code("RCL107", "stray characters", "These characters have no place in RCL.", "guarantee(out.status == low §)"),
+    Code(
+        "RCL110",
+        "nested too deeply",
+        "Formulas and types are nested 150 levels deep at most, and no constant or type has more than 20,000 parts "
+        "when all that it names is written out. Chains (`a and b and …`, `1 + 2 + …`) are not nested, however long.",
+        "guarantee(" + "(" * 200 + "TRUE" + ")" * 200 + ")",
+    ),
+    Code(
+        "RCL111",
+        "not a clause",
+        "A file is one `context { … }` and any number of `node NAME { … }`. (`types { … }` and `constants { … }` of "
+        "older files are both `context`.)",
+        "types { A : {a}; }",
+    ),
+    Code("RCL112", "second context", "A file has one context at most.", "context { A : {a}; } context { B : {b}; }"),
+    Code("RCL113", "something else expected", "Something else has to stand here.", "node { }"),
+    Code("RCL114", "empty context", "A context declares at least one type or constant.", "context { }"),
+    Code("RCL115", "bracket not closed", "A `(` or `{` has no partner.", "guarantee( (out.status == low )"),
+    Code(
+        "RCL116",
+        "parts out of order",
+        "The parts of a node stand in this order: inputs, outputs, topics, assumptions, guarantees.",
+        "guarantee(out.status == low) assume(in.level > 0)",
+    ),
+    Code(
+        "RCL117",
+        "part given twice",
+        "A node has one list of inputs, one of outputs, one of topics.",
+        _node() + _node(clauses="guarantee(out.b) inputs()").replace("node n", "node m"),
+    ),
+    Code(
+        "RCL118",
+        "part missing",
+        "A node has inputs, outputs and topics (each may be empty), and at least one guarantee.",
+        "node n { outputs(b : BOOL) topics() guarantee(out.b) }",
+    ),
+    Code(
+        "RCL119",
+        "empty clause",
+        "`assume()` and `guarantee()` need a formula.",
+        "assume() guarantee(out.status == low)",
+    ),
+    Code(
+        "RCL120", "unexpected sign", "The formula, type or list cannot go on like this.", "guarantee(out.status = low)"
+    ),
+    Code(
+        "RCL121",
+        "no chain",
+        "Comparisons can be chained one way: `0 <= r < 120`. `!=` and `in` cannot be part of a chain.",
+        "guarantee(0 <= in.level > 3)",
+    ),
+)
+
+_NAMES = (
+    Code("RCL201", "undeclared name", "Nothing of that name is declared.", "guarantee(out.status == lou)"),
+    Code(
+        "RCL202",
+        "input or output?",
+        "A bare name is allowed where exactly one thing has it: an input or an output, an element or a constant.",
+        _node("b : BOOL", clauses="guarantee(b)"),
+    ),
+    Code(
+        "RCL203",
+        "no such input or output",
+        "The node has no input or output of that name.",
+        "guarantee(in.status == low)",
+    ),
+    Code("RCL204", "not a value", "The name is that of a type or a node.", "guarantee(out.status == Status)"),
+    Code(
+        "RCL205",
+        "another node's variable",
+        "A contract speaks of its own inputs and outputs only; `node.variable` belongs into plans.",
+        "guarantee(other.status == low)",
+    ),
+    Code("RCL206", "no such node", "In a plan's formula, `node.variable` names a node that does not exist."),
+    Code(
+        "RCL207",
+        "name in use",
+        "A quantified variable hides nothing: its name must be new.",
+        "guarantee(forall(level in REAL | level < 3))",
+    ),
+    Code("RCL208", "undeclared type", "The type is not declared.", _node("a : Colour")),
+    Code("RCL209", "built-in name", "`length` is the length of sequences.", "context { length = 3; }"),
+    Code("RCL210", "declared twice", "A type or constant is declared once.", "context { A : {a}; A : {b}; }"),
+    Code("RCL211", "name and element", "A name cannot be both declared and an element.", "context { A : {b}; b = 3; }"),
+    Code(
+        "RCL212", "refers to itself", "A type or constant cannot be part of itself.", "context { A : {nil, cons(A)}; }"
+    ),
+    Code(
+        "RCL213",
+        "shared element",
+        "Elements and constructors are global: two types cannot share one.",
+        "context { A : {red, green}; B : {red, blue}; }",
+    ),
+    Code(
+        "RCL214",
+        "port declared twice",
+        "A node's inputs have different names, and so have its outputs.",
+        _node("a : BOOL, a : REAL"),
+    ),
+    Code(
+        "RCL215",
+        "clause name used twice",
+        "Within a node, every assumption and guarantee has its own name. A clause without one is called A1, "
+        "A2, …, or G1, G2, … by its position.",
+        _node(clauses="guarantee g (out.b) guarantee g (not out.b)"),
+    ),
+    Code(
+        "RCL216",
+        "topic listed twice",
+        "A node lists a topic once, or once for each variable that its messages carry; always with the same type.",
+        _node(topics="bool t, bool t"),
+    ),
+    Code("RCL217", "no ROS type", "A topic has a ROS built-in type, or one of a package.", _node(topics="Bool t")),
+    Code(
+        "RCL218",
+        "matches nothing",
+        "A topic matches an input or output of its node.",
+        _node(topics="bool t matches(out.c)"),
+    ),
+    Code("RCL219", "node declared twice", "Nodes have different names.", _node() + _node()),
+    Code(
+        "RCL220",
+        "quantified constant",
+        "A constant is a value; quantified formulas stand in clauses.",
+        "context { C = (exists(x in REAL | x > 0)); }",
+    ),
+)
+
+_SORTS = (
+    Code("RCL301", "not a formula", "What stands here must be true or false.", "guarantee(in.count)"),
+    Code(
+        "RCL302",
+        "different types",
+        "Only values of one type are compared, or collected in a set. INTEGER and NATURAL widen to REAL.",
+        "guarantee(out.status == in.level)",
+    ),
+    Code("RCL303", "wrong type", "The place asks for another type.", "guarantee(in.marked(in.level))"),
+    Code(
+        "RCL304",
+        "not a function",
+        "Only functions, constructors and sequences are applied.",
+        "guarantee(out.status(3) == low)",
+    ),
+    Code(
+        "RCL305",
+        "wrong number of arguments",
+        "The function or constructor takes another number.",
+        "guarantee(out.command == go(1))",
+    ),
+    Code("RCL306", "type cannot be told", "Nothing says of what type this is.", "guarantee(<> == <>)"),
+    Code("RCL307", "no set", "`in` asks about a set or a sequence.", "guarantee(in.level in REAL)"),
+    Code("RCL308", "no number", "Arithmetic and order are of numbers.", "guarantee(out.status < high)"),
+    Code("RCL309", "division by zero", "The divisor is zero.", "guarantee(in.level / 0 > 1)"),
+    Code(
+        "RCL310",
+        "quantified function",
+        "RCL is first-order: variables range over values.",
+        "guarantee(exists(f in Marked | f(1)))",
+    ),
+)
+
+
+def _lint(code: str, title: str, explanation: str, example: str) -> Code:
+    return Code(code, title, explanation, example, Severity.WARNING)
+
+
+_LINTS = (
+    _lint(
+        "RCL401",
+        "precedence without parentheses",
+        "`and` or `or` stands beside `->` or `<=>` without parentheses, and another bracketing would mean something "
+        "else. The note shows how it is read. Put the parentheses that you mean.",
+        "guarantee(in.level > 0 and in.count > 0 -> out.status == low)",
+    ),
+    _lint("RCL402", "unused input", "No assumption or guarantee speaks of the input.", "guarantee(out.status == low)"),
+    _lint(
+        "RCL403",
+        "unconstrained output",
+        "No guarantee speaks of the output: the node may emit anything there.",
+        "guarantee(out.status == low)",
+    ),
+    _lint(
+        "RCL404",
+        "topic without variable",
+        "The topic matches no input or output, so no monitor can use it.",
+        _node(topics="bool t"),
+    ),
+    _lint("RCL405", "variable without topic", "No topic carries the variable, so no monitor can see it.", _node()),
+    _lint(
+        "RCL406",
+        "two spellings",
+        "Two names differ by a letter or two; perhaps one thing is meant.",
+        _node(topics="nav_plugin/At b matches(out.b)")
+        + _node(topics="nav_plugins/At b matches(out.b)").replace("node n", "node m"),
+    ),
+    _lint(
+        "RCL407",
+        "unused variable",
+        "The formula does not speak of the quantified variable.",
+        "guarantee(forall(i in NATURAL | out.status == low))",
+    ),
+    _lint(
+        "RCL408",
+        "assumption without content",
+        "The types of the inputs make the assumption true.",
+        "assume(in.count >= 0) guarantee(out.status == low)",
+    ),
+    _lint(
+        "RCL409",
+        "bare name in `matches`",
+        "Say whether the input or the output is meant: `matches(in.v)`.",
+        _node(topics="bool b matches(b)"),
+    ),
+    _lint(
+        "RCL410",
+        "nothing to allow",
+        "A comment `avow: allow` names something that is not the code of a lint.",
+        "// avow: allow RCL999\n  guarantee(out.status == low)",
+    ),
+    _lint(
+        "RCL411",
+        "variable on two topics",
+        "Two topics carry the variable, and a monitor reads it from one of them.",
+        _node(topics="bool t matches(out.b), bool u matches(out.b)"),
+    ),
+    _lint(
+        "RCL412",
+        "total function looked up by value",
+        "Functions are total: every place has a number. A formula that asks which arguments have a value uses the "
+        "function as a numbering of some of them; that an argument has none, or that one value is had only once, it "
+        "cannot say. A relation (`REAL x REAL x NATURAL --> BOOL`) can.",
+        _node(
+            "number : REAL x REAL --> NATURAL, i : NATURAL",
+            clauses="guarantee(out.b <=> exists(x, y in REAL | in.number(x, y) == in.i))",
+        ),
+    ),
+    _lint(
+        "RCL413",
+        "sentence and formula compare otherwise",
+        "The sentence says `less than`, `at most`, `between` … and a number; the formula compares with that number the "
+        "other way, or has other numbers. Units are reckoned with (25 cm is 0.25), and so are conditions, which may be "
+        "turned round.",
+        'assume reading "The level is less than or equal to 0" (0 <= in.level) guarantee(out.status == low)',
+    ),
+    _lint(
+        "RCL414",
+        "one way or both ways",
+        "The sentence says `if …`, the formula `<=>`; or the sentence says `exactly when`, the formula `->`.",
+        'guarantee alarm "If the level is above 3, the status is high" (in.level > 3 <=> out.status == high)',
+    ),
+    _lint(
+        "RCL415",
+        "sentence names what the formula does not",
+        "The sentence has the name of an element, and the formula does not speak of it.",
+        'guarantee halt "At a high level it stops" (in.level > 3 -> out.status == high)',
+    ),
+    _lint(
+        "RCL416",
+        "assumption about an output",
+        "What a node assumes is about its inputs: of its own outputs it can only give guarantees. Whoever feeds the "
+        "node cannot see to it.",
+        "assume(out.status == low) guarantee(out.status != high)",
+    ),
+)
+
+CODES: dict[str, Code] = {c.code: c for c in (*_FILE, *_SYNTAX, *_NAMES, *_SORTS, *_LINTS)}
+"""Every code, in order."""

@@ -1,0 +1,138 @@
+"""The diagnostic codes of plans, systems and the calculus: their examples are plans, and stand in tests/system."""
+
+from __future__ import annotations
+
+from avow.base.codes import Code
+from avow.base.diagnostics import Severity
+
+PLAN_CODES: dict[str, Code] = {
+    c.code: c
+    for c in (
+        Code(
+            "PLAN100",
+            "no plan",
+            "There is no system here: neither a plan.yaml nor an .rcl file.",
+            remedy="Give the folder that has the `plan.yaml`.",
+        ),
+        Code(
+            "PLAN101",
+            "not YAML",
+            "The file is not one plain YAML document, or too large, too deep, or empty.",
+            remedy="Write one YAML document without anchors, tags or merge keys; `docs/plan.md` has the form.",
+        ),
+        Code(
+            "PLAN102",
+            "a key",
+            "A key is given twice, is a merge key, or is not plain text.",
+            remedy="Give each key once, as plain text.",
+        ),
+        Code(
+            "PLAN103",
+            "unknown key",
+            "The plan has no such key at this place.",
+            remedy="Use one of the keys in the hint.",
+        ),
+        Code(
+            "PLAN104",
+            "missing key",
+            "A key that is needed here is missing.",
+            remedy="Add the key; `docs/plan.md` says what it means.",
+        ),
+        Code(
+            "PLAN105",
+            "wrong value",
+            "The value has the wrong type or form, or is not one of those allowed.",
+            remedy="Write what the message wants.",
+        ),
+        Code(
+            "PLAN106",
+            "unknown name",
+            "The plan names a node, port or guarantee that the contract does not have.",
+            remedy="Correct the name, or declare it in the contract.",
+        ),
+        Code(
+            "PLAN107",
+            "no such file",
+            "The plan names a file that is not there.",
+            remedy="Correct the path, which is relative to the system's folder, or add the file.",
+        ),
+        Code(
+            "PLAN108",
+            "path outside",
+            "A path leads out of the system's folder.",
+            remedy="Move the file into the folder: evidence covers nothing outside it.",
+        ),
+        Code(
+            "PLAN109",
+            "scenario",
+            "A table, an interpretation or a domain of the scenario cannot be used.",
+            remedy="Correct the place in the `scenario` or its table.",
+        ),
+        Code(
+            "PLAN110",
+            "contradiction",
+            "Two things that the plan says do not go together.",
+            remedy="Decide for one of the two.",
+        ),
+        Code(
+            "PLAN112",
+            "initial value",
+            "An initial value is no value of its output and no formula about it.",
+            remedy="Give a value of the output's type, or a formula about that output only.",
+        ),
+        Code(
+            "PLAN113",
+            "environment",
+            "An environment assumption speaks of more than the environment's inputs.",
+            remedy="Speak only of inputs that no node provides.",
+        ),
+        Code(
+            "PLAN114", "temporal property", "The text is no temporal property.", remedy="Write it as in `docs/plan.md`."
+        ),
+        Code(
+            "PLAN121",
+            "types clash",
+            "An output and the input that it would feed have different types.",
+            remedy="Correct one of the types, or connect other ports.",
+        ),
+        Code(
+            "PLAN122",
+            "several providers",
+            "More than one output could feed an input: a connection has to say which.",
+            remedy="Say under `connections` which output it is.",
+        ),
+        Code(
+            "PLAN123",
+            "start-up deadlock",
+            "Nodes in a loop wait for one another, and no delayed edge has an initial value.",
+            severity=Severity.WARNING,
+            remedy="Give one delayed output of the loop an initial value.",
+        ),
+        Code(
+            "PLAN124",
+            "memory",
+            "A node has an input and an output of one name; it feeds itself only by a connection.",
+            severity=Severity.WARNING,
+            remedy="Connect them if memory is meant; otherwise rename one.",
+        ),
+        Code(
+            "PLAN125",
+            "rule does not fit",
+            "The selected nodes are not connected as the rule wants them.",
+            remedy="Use a rule for this shape, or select other nodes.",
+        ),
+        Code(
+            "PLAN126",
+            "ports do not fit",
+            "A node cannot stand in for another that has other inputs or outputs.",
+            remedy="Give both nodes the same ports.",
+        ),
+        Code(
+            "PLAN127",
+            "ROS graph",
+            "The ROS graph and the plan's account of it do not agree.",
+            remedy="Correct the plan's `model`, or record the graph again.",
+        ),
+    )
+}
+"""Every code of plans and systems, in order."""

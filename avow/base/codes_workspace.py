@@ -1,0 +1,198 @@
+"""The diagnostic codes of everything but the language and plans: backends' registry, policies, requirements, ledgers,
+reports, commands. Each is declared once; `docs/diagnostics.md` lists them, and a test keeps the list in step.
+
+A backend declares the codes of its own in its folder (`codes.py`) and shows them as an attribute `codes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from avow.base.codes import CODES, Code, declare, register
+from avow.base.codes_plan import PLAN_CODES
+
+WORKSPACE_CODES = register(
+    declare(
+        "PLAN090",
+        "name taken",
+        "A method of the plan has the name of one of Avow's own engines, whose evidence it would be mistaken for.",
+        "Give the method another `id`.",
+    ),
+    declare(
+        "BACKEND001",
+        "two backends of one name",
+        "Two installed packages, or a package and a plugin of the plan, claim the same name.",
+        "Uninstall one of them, or rename the plugin's backend.",
+    ),
+    declare(
+        "BACKEND002",
+        "no such backend",
+        "The plan names a backend that is neither installed nor one of its plugins.",
+        "Correct the name (the hint has those there are), or name its module under `plugins`.",
+    ),
+    declare(
+        "BACKEND003",
+        "backend does not load",
+        "Importing the backend failed, or the object lacks a part of the backend protocol.",
+        "Repair it; the message has the reason, and `docs/adding-a-backend.md` the protocol.",
+    ),
+    declare(
+        "BACKEND004",
+        "export leaves its folder",
+        "A backend wants to write a generated file outside the folder that it was given.",
+        "This is a defect of the backend: tell its authors.",
+    ),
+    declare(
+        "POLICY001",
+        "no such profile",
+        "The plan names a policy profile that does not exist.",
+        "Use one of those listed in `docs/policy.md`.",
+    ),
+    declare(
+        "POLICY002",
+        "wrong policy",
+        "A part of the policy has the wrong form, or demands what no method can give.",
+        "Correct the place that the message names; `docs/policy.md` has the form.",
+    ),
+    declare(
+        "POLICY003", "unknown key", "The policy has no such key at this place.", "Use one of the keys in the message."
+    ),
+    declare(
+        "REQS001",
+        "unreadable requirements",
+        "The file of requirements cannot be read, is not UTF-8, or is no CSV.",
+        "Give a CSV file with a header row, or ReqIF.",
+    ),
+    declare(
+        "REQS002",
+        "no requirements",
+        "The file has no rows, no column with the text of the requirements, or no specification objects.",
+        "Name the column as the message says, or export the requirements again.",
+    ),
+    declare(
+        "REQS003",
+        "not acceptable XML",
+        "The ReqIF file is not well formed, or declares a document type or entities, which are never expanded.",
+        "Export it again, without a document type.",
+    ),
+    declare(
+        "REQS004",
+        "wrong requirement",
+        "A requirement has no text, a name that cannot be one, or the name of another.",
+        "Correct the row in the file that it came from.",
+    ),
+    declare(
+        "SMT001",
+        "no SMT-LIB form",
+        "A formula of the node is outside what can be written in SMT-LIB.",
+        "Rewrite the formula that the message names; the other commands do not need this form.",
+    ),
+    declare(
+        "LEDGER001",
+        "unreadable ledger",
+        "The ledger's file exists but cannot be read.",
+        "Check the file's permissions.",
+    ),
+    declare(
+        "LEDGER002",
+        "no such obligation or evidence",
+        "Nothing in the reports has the name that was given.",
+        "Use a name from the hint, or the whole id that the report shows.",
+    ),
+    declare(
+        "SIGN001",
+        "key not made",
+        "The new key's file exists already, or cannot be written. A key is never overwritten.",
+        "Name a file that does not exist.",
+    ),
+    declare(
+        "SIGN002",
+        "nothing to sign",
+        "The ledger has no records, or its chain is damaged; such a ledger is not signed.",
+        "Run `avow verify`; look at the damage with `avow audit`.",
+    ),
+    declare(
+        "SIGN003",
+        "no key",
+        "The file is no ed25519 key in PEM form.",
+        "Give the key that `avow audit --new-key` made, or its `.pub`.",
+    ),
+    declare(
+        "SIGN004",
+        "signing not installed",
+        "Signatures need a package that is not installed.",
+        "`pip install 'avow[signing]'`.",
+    ),
+    declare(
+        "REPORT001",
+        "no report",
+        "There is no report.json where one is needed, or it cannot be read.",
+        "Run `avow verify` first.",
+    ),
+    declare(
+        "REPORT002",
+        "not a report",
+        "The file is no report of this version of Avow.",
+        "Make it again with `avow report`.",
+    ),
+    declare(
+        "DIFF001",
+        "nothing to compare",
+        "What was given is neither a report, nor a ledger, nor a revision that git knows.",
+        "Give a `report.json`, a ledger, or a commit.",
+    ),
+    declare(
+        "DIFF002",
+        "no place for the page",
+        "The page with the changes cannot be written where `--html` says.",
+        "Name a file in a folder that is there and may be written to.",
+    ),
+    declare(
+        "CLI001",
+        "no workspace",
+        "No folder here or above has both a `contracts/` and a `dodo.py`.",
+        "Go to the workspace, or make one with `avow init DIR`.",
+    ),
+    declare("CLI002", "no such system", "The workspace has no system of that name.", "Use a name from the hint."),
+    declare("CLI003", "no such node", "The contract has no node of that name.", "Use a name from the hint."),
+    declare("CLI005", "no such derivation", "The plan has no derivation of that name.", "Use a name from the hint."),
+    declare(
+        "CLI006",
+        "cannot be run",
+        "The system cannot be simulated: the message says what is missing, such as an interpretation or a domain.",
+        "Complete the plan's `scenario`.",
+    ),
+    declare(
+        "CLI007",
+        "folder not empty",
+        "`avow init` writes only into a new or empty folder.",
+        "Name another folder.",
+    ),
+    declare("CLI010", "language server not installed", "`avow lsp` needs pygls.", "`pip install 'avow[lsp]'`."),
+)
+
+CORE_CODES: Mapping[str, Code] = register(*CODES.values(), *PLAN_CODES.values(), *WORKSPACE_CODES.values())
+"""Every code of the core: a backend's own are in its attribute `codes`."""
+
+
+def of_backend(backend: object) -> Mapping[str, Code]:
+    """The codes that a backend declares. The attribute is optional: another's backend may have none."""
+    found = getattr(backend, "codes", None)
+    if not isinstance(found, Mapping):
+        return {}
+    return {name: code for name, code in found.items() if isinstance(code, Code)}
+
+
+def page_rows(codes: Iterable[Code]) -> list[str]:
+    """The rows of the table in `docs/diagnostics.md`. What the language wants, its examples show."""
+    return [
+        f"| {c.code} | {c.severity} | **{c.title}.** {_cell(c.explanation)} | {_cell(c.remedy) or _EXAMPLE} |"
+        for c in codes
+    ]
+
+
+_EXAMPLE = "[see the example](language.md#every-code)"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")

@@ -1,0 +1,56 @@
+"""Places in the user's text, and what Avow has to say about them.
+
+Errors are values: a pass returns (or collects) `Diagnostic`s; text, JSON, SARIF and the language server are printers
+of them. Only at a boundary where nothing more can be done are they raised, together, as `Rejected` (exit code 2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+class Severity(StrEnum):
+    """How much a diagnostic matters: an error stops the stage, a warning does not."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A stretch of text; lines and columns count from 1, the end is exclusive."""
+
+    file: str
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One thing to say about one place. `code` is declared, with its explanation, in `avow.base.codes`."""
+
+    code: str
+    message: str
+    span: Span | None = None
+    severity: Severity = Severity.ERROR
+    hint: str | None = None
+    notes: tuple[tuple[str, Span | None], ...] = field(default=())
+
+    @property
+    def is_error(self) -> bool:
+        return self.severity is Severity.ERROR
+
+
+class Rejected(Exception):  # noqa: N818 - it reads as what happened to the input
+    """Input that cannot be used: carries every diagnostic found, so that all are reported in one go."""
+
+    def __init__(self, *diagnostics: Diagnostic) -> None:
+        super().__init__("; ".join(f"{d.span or '<input>'}: {d.message} [{d.code}]" for d in diagnostics))
+        self.diagnostics = diagnostics

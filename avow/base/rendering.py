@@ -1,0 +1,234 @@
+"""Diagnostics for people (with the source line and a caret under the place), as JSON, and as SARIF 2.1.0.
+
+Everything shown comes from files that nobody vouches for: what is not printable is made visible, never passed on to the
+terminal, and long lines are cut to what surrounds the place.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path, PurePath
+from typing import Any
+from urllib.parse import quote
+
+from avow.base.codes import Code
+from avow.base.codes_workspace import CORE_CODES
+from avow.base.diagnostics import Diagnostic, Severity, Span
+
+_WIDTH = 100
+_TAB = 4
+_READ = 20_000_000
+"""Bytes of a file that are looked at for the lines to show."""
+_COLOURS = {Severity.ERROR: "31", Severity.WARNING: "33", Severity.NOTE: "36"}
+
+
+def render(diagnostics: Iterable[Diagnostic], sources: Mapping[str, str] | None = None, *, colour: bool = False) -> str:
+    """The diagnostics for a terminal, one block each. `sources` maps a file's name to its text; what is not in it is
+    read from the disk where that is possible, and shown without source line where not."""
+    lines = _Lines(dict(sources or {}))
+    return "\n".join(_block(d, lines, colour) for d in diagnostics)
+
+
+def summary(diagnostics: Iterable[Diagnostic]) -> str:
+    """``2 errors, 1 warning``, or ``no errors``."""
+    found = list(diagnostics)
+    parts = []
+    for severity in Severity:
+        count = sum(d.severity is severity for d in found)
+        if count:
+            parts.append(f"{count} {severity}{'' if count == 1 else 's'}")
+    return ", ".join(parts) or "no errors"
+
+
+class _Lines:
+    """Lines of files, read when first asked for."""
+
+    def __init__(self, sources: dict[str, str]) -> None:
+        self._texts = sources
+        self._split: dict[str, list[str]] = {}
+
+    def get(self, file: str, line: int) -> str | None:
+        if file not in self._split:
+            text = self._texts.get(file)
+            if text is None:
+                try:
+                    text = _read(Path(file))
+                except (OSError, ValueError):
+                    text = ""
+            self._split[file] = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        lines = self._split[file]
+        return lines[line - 1] if 0 < line <= len(lines) and any(lines) else None
+
+
+def _read(path: Path) -> str:
+    """A file's text; nothing of what is no file, and might have no end. Raises OSError, ValueError."""
+    if not path.is_file():
+        return ""
+    with path.open("rb") as stream:
+        return stream.read(_READ).decode("utf-8", "replace")
+
+
+def _block(diagnostic: Diagnostic, lines: _Lines, colour: bool) -> str:
+    def paint(text: str, style: str) -> str:
+        return f"\x1b[{style}m{text}\x1b[0m" if colour else text
+
+    tint = _COLOURS[diagnostic.severity]
+    head = paint(f"{diagnostic.severity}[{diagnostic.code}]", f"1;{tint}")
+    out = [f"{head}: {paint(printable(diagnostic.message), '1')}"]
+    span = diagnostic.span
+    margin = " " * (len(str(span.line)) if span is not None else 1)
+    bar = paint("|", "34")
+    if span is not None:
+        out.append(f"{margin}{paint('-->', '34')} {printable(str(span))}")
+        line = lines.get(span.file, span.line)
+        if line is not None:
+            shown, indent, length = _excerpt(line, span)
+            out.append(f"{margin} {bar}")
+            out.append(f"{paint(str(span.line), '34')} {bar} {shown}")
+            out.append(f"{margin} {bar} {' ' * indent}{paint('^' * length, tint)}")
+    if diagnostic.hint:
+        out.append(f"{margin} = {paint('help', '1')}: {printable(diagnostic.hint)}")
+    for text, place in diagnostic.notes:
+        where = f" ({printable(str(place))})" if place is not None else ""
+        out.append(f"{margin} = {paint('note', '1')}: {printable(text)}{where}")
+    return "\n".join(out) + "\n"
+
+
+def printable(text: str) -> str:
+    """The text with every control character, and whatever else would steer a terminal, made visible."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else "\ufffd" for c in text.replace("\t", " ").replace("\n", " "))
+
+
+def _cells(character: str) -> int:
+    """How many columns of a terminal the character takes."""
+    if unicodedata.combining(character):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in "WF" else 1
+
+
+def _excerpt(line: str, span: Span) -> tuple[str, int, int]:
+    """The line as shown, the caret's indentation, and how long it is."""
+    line = line.rstrip("\r\n")
+    start = min(max(span.column - 1, 0), len(line))
+    end = span.end_column - 1 if span.end_line == span.line else len(line)
+    end = max(min(end, len(line)), start + 1)
+    first, last, before, after = 0, len(line), "", ""
+    if len(line) > _WIDTH:
+        first = max(0, start - _WIDTH // 2)
+        last = min(len(line), first + _WIDTH)
+        before, after = ("…" if first else ""), ("…" if last < len(line) else "")
+        end = min(end, last)
+    shown, indent, length = before, len(before), 0
+    for i in range(first, last):
+        character = line[i]
+        piece = " " * _TAB if character == "\t" else printable(character)
+        width = sum(map(_cells, piece))
+        if i < start:
+            indent += width
+        elif i < end:
+            length += width
+        shown += piece
+    return shown + after, indent, max(length, 1)
+
+
+# --- for machines ----------------------------------------------------------------------------------------------------
+
+
+def to_json(diagnostics: Iterable[Diagnostic]) -> dict[str, Any]:
+    """``{"diagnostics": […]}`` as avow/language/check.schema.json describes it."""
+    return {"diagnostics": [_as_json(d) for d in diagnostics]}
+
+
+def _as_json(diagnostic: Diagnostic) -> dict[str, Any]:
+    span = diagnostic.span
+    return {
+        "file": _decoded(span.file) if span else None,
+        "line": span.line if span else None,
+        "column": span.column if span else None,
+        "end_line": span.end_line if span else None,
+        "end_column": span.end_column if span else None,
+        "severity": str(diagnostic.severity),
+        "code": diagnostic.code,
+        "message": _decoded(diagnostic.message),
+        "hint": _decoded(diagnostic.hint) if diagnostic.hint is not None else None,
+    }
+
+
+def _decoded(text: str) -> str:
+    """The text without the lone surrogates that Python has for a file name's bytes: no JSON reader takes those."""
+    return text if text.isascii() else _SURROGATES.sub("\ufffd", text)
+
+
+_SURROGATES = re.compile("[\ud800-\udfff]")
+
+
+def to_sarif(
+    diagnostics: Sequence[Diagnostic], *, version: str = "", codes: Mapping[str, Code] = CORE_CODES
+) -> dict[str, Any]:
+    """A SARIF 2.1.0 log with one run; `codes` describe its rules. Paths are kept as given: relative ones are relative
+    to the working folder."""
+    used = sorted({d.code for d in diagnostics})
+    rules = []
+    for code in used:
+        rule: dict[str, Any] = {"id": code}
+        if code in codes:
+            known = codes[code]
+            rule["shortDescription"] = {"text": known.title}
+            rule["fullDescription"] = {"text": known.explanation}
+            rule["defaultConfiguration"] = {"level": str(known.severity)}
+        rules.append(rule)
+    driver: dict[str, Any] = {"name": "avow", "rules": rules}
+    if version:
+        driver["version"] = version
+    return {
+        "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
+        "version": "2.1.0",
+        "runs": [
+            {
+                "tool": {"driver": driver},
+                "columnKind": "unicodeCodePoints",
+                "results": [_as_result(d, used.index(d.code)) for d in diagnostics],
+            }
+        ],
+    }
+
+
+def _as_result(diagnostic: Diagnostic, rule: int) -> dict[str, Any]:
+    text = diagnostic.message + (f" ({diagnostic.hint})" if diagnostic.hint else "")
+    result: dict[str, Any] = {
+        "ruleId": diagnostic.code,
+        "ruleIndex": rule,
+        "level": str(diagnostic.severity),
+        "message": {"text": _decoded(text)},
+    }
+    if diagnostic.span is not None:
+        result["locations"] = [{"physicalLocation": _location(diagnostic.span)}]
+    related = [
+        {"id": i, "physicalLocation": _location(place), "message": {"text": _decoded(note)}}
+        for i, (note, place) in enumerate(diagnostic.notes, 1)
+        if place is not None
+    ]
+    if related:
+        result["relatedLocations"] = related
+    return result
+
+
+def _location(span: Span) -> dict[str, Any]:
+    path = PurePath(span.file)
+    uri = quote(os.fsencode(path.as_posix()))
+    if path.is_absolute():
+        uri = "file://" + uri
+    return {
+        "artifactLocation": {"uri": uri},
+        "region": {
+            "startLine": max(span.line, 1),
+            "startColumn": max(span.column, 1),
+            "endLine": max(span.end_line, 1),
+            "endColumn": max(span.end_column, 1),
+        },
+    }

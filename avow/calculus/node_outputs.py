@@ -1,0 +1,293 @@
+"""What one node answers: given what it reads, which outputs do its guarantees allow, over the scenario's values?
+
+Relations are found by Z3, a bit for each point at which they may hold; everything else by narrowing. Values that are
+open (`avow.calculus.narrowing`) are asked for only where a clause looks at them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from avow.calculus.choices import MAX_FOUND, Values, by_variable, definition, search
+from avow.calculus.narrowing import Choices, Narrowing, Unknown, forcings
+from avow.calculus.open_values import ANY, Holds, Undecided, is_open, lazy_names, opened
+from avow.calculus.scenario import CannotRun, Point, World, key
+from avow.evaluation.evaluate import NotEvaluable, compile_term
+from avow.formulas.formula import free_variables, substitute
+from avow.formulas.values import FunctionValue, Value, show
+from avow.formulas.values import Sequence as SequenceValue
+from avow.language.contract import Clause, Node, Port
+from avow.language.sorts import BOOL, FunctionSort, SequenceSort
+from avow.language.terms import Role, Term, Variable
+from avow.solving.translation import Translator, Unsupported
+from avow.solving.z3_module import z3
+from avow.system.formulas import ports_of
+
+MAX_ANSWERS = 4_000
+"""Answers of one node to one input; with more, a search is not exhaustive."""
+
+MAX_LENGTH = 4
+"""Sequences of up to so many elements are tried, unless an equation or the scenario gives the sequence."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stuck:
+    """A node to whose inputs no output answers. `genuine`: by its contract, not only among the scenario's values."""
+
+    node: str
+    inputs: tuple[tuple[str, str], ...]
+    clauses: tuple[str, ...]
+    genuine: bool
+
+    def text(self) -> str:
+        given = ", ".join(f"{name} = {value}" for name, value in self.inputs)
+        if not self.genuine:
+            return f"no value of the scenario meets the guarantees of {self.node} at {given}"
+        return f"no output of {self.node} meets {', '.join(self.clauses)} at {given}"
+
+
+class Doubts:
+    """Why what a search finds is less than it seems."""
+
+    def __init__(self) -> None:
+        self.incomplete: set[str] = set()
+        """Why a search is not exhaustive, if it is not."""
+        self.inexact: set[str] = set()
+        """Clauses whose quantifiers could only be taken over the scenario's values."""
+
+
+def judge(world: World, formula: Term, *, finite: bool = False, doubts: Doubts | None = None, about: str = "") -> Holds:
+    """Whether a formula holds: exactly if that can be had, else with quantifiers over the scenario's values (which is
+    noted among the `doubts`). `finite`: over the scenario's values in any case. The result raises Undecided where an
+    open value has to be known first."""
+    # Evaluation takes a free variable of a system for one that has yet to be found, unless it is an input.
+    given = {v: Variable(Role.INPUT, f"={v.name}", v.sort) for v in free_variables(formula) if v.role is Role.BOUND}
+    names = [(v.name, known.qualified) for v, known in given.items()]
+    own = {known.qualified: v.name for v, known in given.items()}
+    closed = substitute(formula, given)
+    try:
+        exact = None if finite else compile_term(closed)
+        bounded = compile_term(closed, domains=world.domains)
+    except NotEvaluable as reason:
+        raise CannotRun(f"a formula cannot be evaluated: {reason.reason}") from None
+    ways = [(exact, lazy_names(closed)), (bounded, lazy_names(closed, world.domains))]
+
+    def holds(found: Mapping[str, Value]) -> bool:
+        values = {**found, **{known: found[name] for name, known in names}} if names else found
+        reason: NotEvaluable | None = None
+        for evaluator, lazy in ways:
+            if evaluator is None:
+                continue
+            asking, wanted = opened(values, lazy) if lazy else (values, [])
+            try:
+                truth = bool(evaluator(asking))
+            except NotEvaluable as stopped:
+                reason = stopped
+                if wanted:
+                    raise Undecided([(own.get(name, name), point) for name, point in wanted]) from None
+                continue
+            if evaluator is bounded and exact is not None and doubts is not None:
+                doubts.inexact.add(about)
+            return truth
+        assert reason is not None
+        raise CannotRun(f"a formula cannot be evaluated: {reason.reason}")
+
+    return holds
+
+
+def possible(world: World, node: str, port: Port) -> Choices:
+    """What an output that is no relation may be."""
+    sort = port.sort
+    try:
+        match sort:
+            case FunctionSort():
+                return Choices(world.results(node, port), "", (FunctionValue({}, ANY),))
+            case SequenceSort(item=item) if world.domain(("out", node), port) is None and sort not in world.domains:
+                shells: tuple[Value, ...] = tuple(SequenceValue((ANY,) * n) for n in range(MAX_LENGTH + 1))
+                unknown = f"the elements of {node}.{port.name} are not known"
+                short = f"sequences of more than {MAX_LENGTH} elements are not tried for {node}.{port.name}"
+                return Choices(world.plain_values(item), unknown, shells, short)
+            case _:
+                return Choices(world.candidates(node, port))
+    except CannotRun as reason:
+        shells = (FunctionValue({}, ANY),) if isinstance(sort, FunctionSort) else None  # type: ignore[assignment]
+        return Choices(None, str(reason), shells)
+
+
+class Answerer:
+    """One node: its clauses compiled, its answers remembered. Raises CannotRun."""
+
+    def __init__(self, world: World, node: Node, seed: int, doubts: Doubts) -> None:
+        self.node, self.world, self.seed, self.doubts = node, world, seed, doubts
+        relations = [p for p in node.outputs if isinstance(p.sort, FunctionSort) and p.sort.result == BOOL]
+        self.defined: list[tuple[Port, tuple[Point, ...], tuple[str, ...], Holds]] = []
+        """Relations that a guarantee defines point by point."""
+        self.searched: list[tuple[Port, tuple[Point, ...]]] = []
+        self.all_relations = [(port, world.points(node.name, port)) for port in relations]
+        for port, points in self.all_relations:
+            found = definition(node.guarantees, port)
+            if found is None:
+                self.searched.append((port, points))
+            else:
+                variables, body = found
+                holds = judge(world, body, doubts=doubts, about=f"{node.name}.{port.name}")
+                self.defined.append((port, points, tuple(v.name for v in variables), holds))
+        self.others = {f"out.{p.name}": p for p in node.outputs if p not in relations}
+        self.choices = {name: possible(world, node.name, port) for name, port in self.others.items()}
+        self.assumptions = tuple((c.name, self._judge(c)) for c in node.assumptions)
+        guarantees = tuple((self._spoken(c), self._judge(c)) for c in node.guarantees)
+        self.narrowing = Narrowing(self.choices, guarantees, forcings(node.guarantees), doubts.incomplete)
+        mentioned = {v.name for c in node.guarantees for v in ports_of(c.formula) if v.role is Role.INPUT}
+        assumed = {v.name for c in node.assumptions for v in ports_of(c.formula)}
+        self.read = tuple(f"in.{p.name}" for p in node.inputs if p.name in mentioned)
+        """Inputs that the guarantees mention."""
+        self.assumed = tuple(f"in.{p.name}" for p in node.inputs if p.name in assumed)
+        """Inputs that the assumptions mention."""
+        self.shapes = self._shapes()
+        """The searched relations that the guarantees allow whatever the inputs; None where that is no help."""
+        self._answers: dict[object, tuple[Values, ...]] = {}
+        self._broken: dict[object, tuple[str, ...]] = {}
+
+    def _judge(self, clause: Clause) -> Holds:
+        about = f"{self.node.name}.{clause.name}"
+        return judge(self.world, clause.formula, doubts=self.doubts, about=about)
+
+    def _spoken(self, clause: Clause) -> frozenset[str]:
+        """The outputs that have to be chosen before the clause is judged."""
+        return frozenset(v.qualified for v in ports_of(clause.formula) if v.qualified in self.others)
+
+    def _shapes(self) -> tuple[Values, ...] | None:
+        """Found once, these need only be held against the other guarantees for each input."""
+        own = {port.variable for port, _ in self.searched}
+        about = [clause.formula for clause in self.node.guarantees if set(ports_of(clause.formula)) <= own]
+        if not self.searched or not about:
+            return None
+        found, complete = search(self.searched, (), about, {}, self.seed)
+        return tuple(found) if complete and len(found) <= MAX_FOUND else None
+
+    # -- answers -------------------------------------------------------------------------------------------------------
+
+    def broken(self, inputs: Values) -> tuple[str, ...]:
+        """The assumptions that do not hold of the inputs. Raises Undecided."""
+        place = tuple([key(inputs[name]) for name in self.assumed])
+        found = self._broken.get(place)
+        if found is None:
+            failed = [clause for clause, holds in self.assumptions if not holds(inputs)]
+            found = self._broken[place] = tuple(f"{self.node.name}.{clause}" for clause in failed)
+        return found
+
+    def answers(self, inputs: Values) -> tuple[tuple[Values, ...], tuple[str, ...]]:
+        """Every output (by port) that meets the guarantees, given the inputs: all of them, where an assumption is
+        broken. And the assumptions that are. Raises Undecided."""
+        broken = self.broken(inputs)
+        index = (bool(broken), *[key(inputs[name]) for name in self.read])
+        found = self._answers.get(index)
+        if found is None:
+            found = self._answers[index] = self._solve(inputs, bool(broken))
+        return found, broken
+
+    def _solve(self, inputs: Values, free: bool) -> tuple[Values, ...]:
+        relations, searched = ({}, self.all_relations) if free else (self._defined(inputs), self.searched)
+        if not searched:
+            return self._narrowed(inputs, relations, free)
+        if self.shapes is not None and not free:
+            return tuple(
+                answer for shape in self.shapes for answer in self._narrowed(inputs, {**relations, **shape}, free)
+            )
+        return self._found_by_z3(inputs, relations, searched, free)
+
+    def _narrowed(self, inputs: Values, relations: Values, free: bool) -> tuple[Values, ...]:
+        """The answers with these relations."""
+        known = {**inputs, **{f"out.{name}": value for name, value in relations.items()}}
+        try:
+            found, complete = self.narrowing.answers(known, MAX_ANSWERS, free=free)
+        except Unknown as unknown:
+            raise CannotRun(str(unknown)) from None
+        if not complete:
+            self.doubts.incomplete.add(f"{self.node.name} has more than {MAX_ANSWERS} answers to one input")
+        return tuple({**relations, **{name[4:]: value for name, value in answer.items()}} for answer in found)
+
+    def _found_by_z3(
+        self, inputs: Values, relations: Values, searched: Sequence[tuple[Port, tuple[Point, ...]]], free: bool
+    ) -> tuple[Values, ...]:
+        """Relations and plain outputs together; or the relations alone, if other outputs cannot be put to Z3 so."""
+        plain = [(port, self.choices[name].values) for name, port in self.others.items()]
+        together = [(port, values) for port, values in plain if values is not None and not _is_lazy(port)]
+        alone = len(together) < len(plain)
+        own = {port.variable for port, _ in searched} | {p.variable for p, *_ in self.defined}
+        constraints = [] if free else [clause.formula for clause in self.node.guarantees]
+        if alone:
+            outputs = {port.variable for port in self.node.outputs}
+            constraints = [f for f in constraints if set(ports_of(f)) & outputs <= own]
+        known = inputs | {f"out.{name}": value for name, value in relations.items()}
+        if any(is_open(known[v.qualified]) for f in constraints for v in ports_of(f) if v.qualified in known):
+            raise CannotRun(f"{self.node.name} has relations to choose after a function that is not known everywhere")
+        spoken = {v for f in constraints for v in ports_of(f)}
+        given = {v: value for v, value in by_variable(self.node, known).items() if v in spoken}
+        answers, complete = search(searched, () if alone else together, constraints, given, self.seed)
+        if not complete:
+            self.doubts.incomplete.add(f"{self.node.name} has more than {MAX_FOUND} answers to one input")
+        if not alone:
+            return tuple({**relations, **answer} for answer in answers)
+        return tuple(found for answer in answers for found in self._narrowed(inputs, {**relations, **answer}, free))
+
+    def _defined(self, inputs: Values) -> Values:
+        """Relations that a guarantee defines point by point, computed."""
+        found: Values = {}
+        for port, points, variables, holds in self.defined:
+            here = [p for p in points if holds(inputs | dict(zip(variables, p, strict=True)))]
+            found[port.name] = FunctionValue(dict.fromkeys(here, True), False)
+        return found
+
+    # -- no answer -----------------------------------------------------------------------------------------------------
+
+    def stuck(self, inputs: Values) -> Stuck:
+        """Is there really no output, or only none in the scenario? Z3 knows the contract without the scenario."""
+        node = self.node
+        shown = tuple((name, show(value)) for name, value in inputs.items() if name in self.read)
+        names = tuple(clause.name for clause in node.guarantees)
+        translator = Translator()
+        solver = z3.Solver(ctx=translator.context)
+        solver.set("timeout", 5_000)
+        try:
+            meanings = {}
+            for variable, value in by_variable(node, inputs).items():
+                if is_open(value):
+                    solver.add(*_known_of(translator, variable, value))
+                else:
+                    meanings[variable] = translator.value(value, variable.sort)
+            solver.add(*translator.background([p.variable for p in node.outputs]))
+            switches = []
+            for clause in node.guarantees:
+                switch = z3.Bool(f"use {clause.name}", translator.context)
+                solver.add(z3.Implies(switch, translator.term(clause.formula, meanings)))
+                switches.append(switch)
+            if solver.check(*switches) == z3.unsat:
+                core = {str(switch) for switch in solver.unsat_core()}
+                needed = tuple(name for name in names if f"use {name}" in core)
+                return Stuck(node.name, shown, needed or names, True)
+        except (Unsupported, z3.Z3Exception):
+            pass
+        return Stuck(node.name, shown, names, False)
+
+
+def _is_lazy(port: Port) -> bool:
+    return isinstance(port.sort, FunctionSort | SequenceSort)
+
+
+def _known_of(translator: Translator, variable: Variable, value: Value) -> list[object]:
+    """What is decided of an open value."""
+    match value, variable.sort:
+        case FunctionValue(table=table), FunctionSort(parameters=parameters, result=result):
+            function = translator.function(variable)
+            return [
+                function(*(translator.value(a, p) for a, p in zip(point, parameters, strict=True)))
+                == translator.value(at, result)
+                for point, at in table.items()
+            ]
+        case SequenceValue(items=items), SequenceSort(item=item):
+            constant = translator.variable(variable)
+            known = [constant[k] == translator.value(x, item) for k, x in enumerate(items) if x is not ANY]
+            return [z3.Length(constant) == len(items), *known]
+    return []

@@ -1,0 +1,333 @@
+"""The questions behind composition obligations, and the answers as outcomes with words for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from avow.base.verdict import Counterexample, Link, Outcome, Verdict
+from avow.calculus.composition import Composition
+from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideCondition
+from avow.calculus.discharge import Bounds, would_hold
+from avow.calculus.entailment import implied
+from avow.calculus.repair import Offer
+from avow.calculus.variables import Frame
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind
+from avow.formulas.formula import negation
+from avow.language.printer import show_term
+from avow.language.terms import Term
+from avow.sanity.claims import triggers
+from avow.solving.questions import solve
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """An `Outcome` before it is known of which obligation."""
+
+    verdict: Verdict
+    summary: str
+    counterexample: Counterexample | None = None
+    hypotheses: tuple[str, ...] = ()
+    bound: dict[str, object] = field(default_factory=dict)
+    details: dict[str, object] = field(default_factory=dict)
+    vacuous: bool = False
+    link: Link = Link.GENERATED
+
+    def outcome(self, obligation: str) -> Outcome:
+        return Outcome(
+            obligation,
+            self.verdict,
+            self.summary,
+            self.counterexample,
+            self.hypotheses,
+            self.bound,
+            self.details,
+            self.link,
+            self.vacuous,
+        )
+
+
+class Question(Protocol):
+    """Settles one obligation."""
+
+    def __call__(self, composition: Composition, bounds: Bounds) -> Answer: ...
+
+
+def vanished(obligation: str) -> Outcome:
+    """The answer to an obligation that the system does not have (any more)."""
+    return Outcome(obligation, Verdict.ERROR, "the system as it stands has no such obligation")
+
+
+# -- side conditions ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class SideQuestion:
+    """Does the consumer's assumption follow?"""
+
+    goal: str
+    condition: SideCondition
+
+    def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
+        goal = composition.goal(self.goal)
+        settled = composition.settled(goal, bounds).settled[self.condition]
+        repairs = would_hold(composition.frame_of(goal), goal, settled) if settled.verdict is not Verdict.PROVED else ()
+        return side_answer(settled, repairs)
+
+
+def side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ...]]] = ()) -> Answer:
+    """A settled side condition in words; `repairs`: what would make its refuted cases hold."""
+    condition = settled.condition
+    details: dict[str, object] = {
+        "consumer": condition.consumer,
+        "clause": condition.clause,
+        "providers": list(condition.providers),
+        "needed": list(settled.needed),
+        "trivial": settled.trivial,
+        "cases": [
+            {
+                "phase": c.phase.value,
+                "verdict": c.verdict.value,
+                "needed": list(c.needed),
+                "engine": c.engine,
+            }
+            for c in settled.cases
+        ],
+    }
+    bad = next((case for case in settled.cases if case.verdict is not Verdict.PROVED), None)
+    if settled.circle:
+        shown = " → ".join((*settled.circle, settled.circle[0]))
+        summary = f"circular: proved only from contracts whose own assumptions rest on it ({shown})"
+        hint = "delay an edge of the cycle and give it an initial value"
+        details["circle"] = list(settled.circle)
+        return Answer(Verdict.REFUTED, f"{summary}; {hint}", Counterexample(explanation=summary), details=details)
+    if bad is None:
+        return Answer(
+            Verdict.PROVED,
+            _why(settled),
+            hypotheses=environment_claims(settled.needed),
+            details=details,
+            vacuous=settled.vacuous,
+        )
+    if bad.verdict is Verdict.REFUTED or bad.counterexample is not None:
+        fails = bad.verdict is not Verdict.REFUTED
+        summary = _induction_fails(condition, bad) if fails else _why_not(condition, bad)
+        summary += "".join(
+            would_hold_if(found, "" if phase is Phase.SAME_STEP else f"at {phase.value} ") for phase, found in repairs
+        )
+        listed = [
+            offer.data("" if phase is Phase.SAME_STEP else phase.value) for phase, found in repairs for offer in found
+        ]
+        details |= {"would_hold_if": listed} if listed else {}
+        details |= {"induction": "fails"} if fails else {}
+        return Answer(bad.verdict, summary, _counterexample(bad, condition), details=details)
+    return Answer(Verdict.UNKNOWN, f"the solver gave up: {bad.reason or 'no reason given'}", details=details)
+
+
+def would_hold_if(found: Sequence[Offer], when: str = "") -> str:
+    """To be put after a refutation's words; nothing where nothing is offered."""
+    return f"; {when}it would hold if {', or if '.join(offer.text for offer in found)}" if found else ""
+
+
+def environment_claims(labels: Sequence[str]) -> tuple[str, ...]:
+    """The obligations of the environment assumptions among some hypotheses."""
+    ports = (label.removeprefix("environment ").split(" ")[0] for label in labels if label.startswith("environment "))
+    return tuple(f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/environment.{port}" for port in dict.fromkeys(ports))
+
+
+def _why(settled: Settled) -> str:
+    if settled.vacuous:
+        return f"holds only because these contradict one another: {', '.join(settled.needed)}"
+    needed = ", ".join(settled.needed)
+    if settled.trivial and not settled.needed:
+        return "holds by the types alone: no guarantee carries it"
+    if settled.trivial:
+        return f"no guarantee carries it: follows from {needed}"
+    if len(settled.cases) > 1:
+        return f"at the first step and, if at one step then at the next: from {needed}"
+    return f"follows from {needed}"
+
+
+def _induction_fails(condition: SideCondition, case: Case) -> str:
+    at = f" at {', '.join(f'{name} = {value}' for name, value in shown)}" if (shown := _few(case)) else ""
+    return (
+        f"not inductive: {condition.about} holds at the first step, but induction fails{at}: that such a step is ever "
+        "reached is not shown"
+    )
+
+
+def _few(case: Case) -> tuple[tuple[str, str], ...]:
+    return case.counterexample.values[:6] if case.counterexample is not None else ()
+
+
+def _why_not(condition: SideCondition, case: Case) -> str:
+    when = "" if case.phase is Phase.SAME_STEP else f" at {case.phase.value}"
+    if case.counterexample is not None and case.counterexample.trace:
+        when = f" at step {len(case.counterexample.trace)} of a run"
+    if not condition.providers:
+        return f"nothing makes {condition.about} hold{when}"
+    return f"{', '.join(condition.providers)} may leave {condition.about} false{when}"
+
+
+def _counterexample(case: Case, condition: SideCondition) -> Counterexample | None:
+    found = case.counterexample
+    if found is None:
+        return None
+    if found.trace:
+        return found
+    if case.verdict is not Verdict.REFUTED:
+        told = f"here induction fails, {condition.about} is false, if such a step is reached (@before: one step before)"
+        return Counterexample(found.values, told)
+    when = "" if case.phase is Phase.SAME_STEP else f" ({case.phase.value}; @before is the value of the step before)"
+    return Counterexample(found.values, f"{condition.about} is false{when}", found.trace, found.loop)
+
+
+@dataclass(frozen=True, slots=True)
+class RuleQuestion:
+    """A rule that the plan names and that does not fit: nothing is left to ask."""
+
+    message: str
+
+    def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
+        return Answer(Verdict.REFUTED, self.message, Counterexample(explanation=self.message))
+
+
+# -- loops and start-up ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class LoopQuestion:
+    """Is R4's missing premise met?"""
+
+    goal: str
+    members: tuple[str, ...]
+    entered: str
+
+    def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
+        answers = composition.settled(composition.goal(self.goal), bounds)
+        loop = next(loop for loop in answers.loops if loop.members == self.members)
+        details: dict[str, object] = {"form": loop.form.value, "cycle": list(loop.cycle)}
+        match loop.form:
+            case LoopForm.BOOTSTRAP | LoopForm.INITIAL:
+                return Answer(Verdict.PROVED, loop.note, details=details)
+            case LoopForm.CIRCULAR:
+                return Answer(Verdict.REFUTED, loop.note, Counterexample(explanation=loop.note), details=details)
+            case _ if self.entered:
+                return Answer(Verdict.JUSTIFIED, self.entered, details=details, link=Link.GUIDED)
+            case _:
+                return Answer(Verdict.UNKNOWN, loop.note, details=details)
+
+
+@dataclass(frozen=True, slots=True)
+class StartQuestion:
+    """Does something come first in the loop?"""
+
+    members: tuple[str, ...]
+
+    def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
+        graph = composition.frame.graph
+        stuck = [cycle for cycle in graph.deadlocks if set(cycle) <= set(self.members)]
+        if stuck:
+            shown = "; ".join(" → ".join((*cycle, cycle[0])) for cycle in stuck)
+            summary = f"start-up deadlock: {shown}: each waits for the one before it"
+            return Answer(
+                Verdict.REFUTED,
+                f"{summary}; declare an edge delayed, with an initial value",
+                Counterexample(explanation=summary),
+                details={"cycles": [list(cycle) for cycle in stuck]},
+            )
+        initials = composition.frame.initials(frozenset(self.members))
+        solution = solve(initials, timeout_ms=bounds.milliseconds, seed=bounds.seed)
+        listed = ", ".join(initials)
+        match solution.status:
+            case "sat":
+                return Answer(Verdict.PROVED, f"delayed edges start it: {listed}", details={"initial": list(initials)})
+            case "unsat":
+                summary = f"no values are as the plan says: {', '.join(solution.core)}"
+                return Answer(Verdict.REFUTED, summary, Counterexample(explanation=summary))
+            case _:
+                return Answer(Verdict.UNKNOWN, f"whether there are such initial values: {solution.reason}")
+
+
+# -- arguments ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ArgumentQuestion:
+    """Has the plan a reason? Nothing more is asked: it is a person's."""
+
+    key: str
+    because: str
+    goal: str
+
+    def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
+        if self.because:
+            return Answer(Verdict.JUSTIFIED, self.because, link=Link.GUIDED)
+        if self.key == "environment":
+            where = "environment: {in.<port>: {assume: …, because: …}}"
+        else:
+            where = f"compose: {{{self.goal}: {{{self.key}: {{because: …}}}}}}"
+        return Answer(
+            Verdict.UNKNOWN,
+            f"the plan gives no reason for it, so that what follows is conditional (to say why: {where})",
+            link=Link.GUIDED,
+        )
+
+
+# -- joint models ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class JointQuestion:
+    """Can the situation that a guarantee is about arise, when all of a circle's guarantees hold at one instant?"""
+
+    members: tuple[str, ...]
+    node: str
+    clause: str
+
+    def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
+        frame = composition.frame
+        hypotheses = {
+            f"{name}.{clause.name}": frame.clause(name, clause.name)
+            for name in self.members
+            for clause in frame.node(name).clauses
+        }
+        hypotheses |= frame.environment()
+        about = f"{self.node}.{self.clause}"
+        shown: list[str] = []
+        for situation in triggers(frame.clause(self.node, self.clause)):
+            answer = implied(hypotheses, negation(situation), timeout_ms=bounds.milliseconds, seed=bounds.seed)
+            details: dict[str, object] = {"needed": list(answer.needed), "situation": show_term(situation)}
+            own = all(label.startswith(f"{self.node}.") for label in answer.needed)
+            if answer.verdict is Verdict.PROVED and own and not answer.vacuous:
+                shown.append("its own contract excludes it already (a sanity finding): composing adds nothing to that")
+                continue
+            if answer.verdict is Verdict.PROVED:
+                carriers = ", ".join(answer.needed) or "the types"
+                if answer.vacuous:
+                    summary = f"the guarantees contradict one another at one instant: {carriers}"
+                else:
+                    summary = f"degenerate: at one instant, {carriers} exclude what {about} is about"
+                hint = "a value of the step before is meant: declare the edge delayed"
+                shape = Counterexample(explanation=summary)
+                return Answer(Verdict.REFUTED, f"{summary}; {hint}", shape, details=details)
+            if answer.verdict is not Verdict.REFUTED:
+                return Answer(Verdict.UNKNOWN, f"the solver gave up: {answer.reason}", details=details)
+            shown.append(answer.counterexample.text() if answer.counterexample else "")
+        return Answer(Verdict.PROVED, f"there is room: {'; '.join(shown)}")
+
+
+# -- hypotheses --------------------------------------------------------------------------------------------------------
+
+
+def contracts(frame: Frame, clauses: Sequence[str], earlier: int = 0) -> dict[str, Term]:
+    """The guarantees named, and all assumptions of their nodes, as labelled hypotheses."""
+    suffix = " one step before" if earlier else ""
+    found: dict[str, Term] = {}
+    for name in clauses:
+        node, _, clause = name.partition(".")
+        for assumption in frame.node(node).assumptions:
+            found[f"{node}.{assumption.name}{suffix}"] = frame.clause(node, assumption.name, earlier)
+        found[f"{node}.{clause}{suffix}"] = frame.clause(node, clause, earlier)
+    return found

@@ -1,0 +1,371 @@
+"""Typed terms as closures over a list of slots, quantifiers apart (`Quantifiers`): evaluation then walks no syntax."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import product
+from typing import Any, Protocol
+
+from avow.evaluation.disjunctions import Part
+from avow.formulas import values
+from avow.formulas.values import Data, Element, FunctionValue, Value
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
+from avow.language.terms import (
+    And,
+    Apply,
+    Arithmetic,
+    Compare,
+    Construct,
+    EnumValue,
+    Iff,
+    Implies,
+    In,
+    Index,
+    Length,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Quantified,
+    SequenceRange,
+    SequenceTerm,
+    SetTerm,
+    Term,
+    TupleTerm,
+    Variable,
+    Widen,
+)
+
+Env = list[Any]
+Code = Callable[[Env], Any]
+Domains = Mapping[Sort, Sequence[Value]]
+
+ENUMERATION_LIMIT = 1_000_000
+"""More values than this are not enumerated: the answer would not come in useful time."""
+
+
+class NotEvaluable(Exception):  # noqa: N818 - it names a state, not a fault
+    """Exact evaluation is impossible here; `reason` is a clause for people: ``division by zero``."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+def finite_values(sort: Sort, domains: Domains | None = None) -> tuple[Value, ...] | None:
+    """Every value of a sort, or None where they are infinitely many, unspecified or too many to enumerate."""
+    if domains and sort in domains:
+        return tuple(domains[sort])
+    match sort:
+        case BoolSort():
+            return (False, True)
+        case EnumSort(members=members):
+            return tuple(Element(member) for member in members)
+        case TupleSort(items=items):
+            return _tuples(items, domains)
+        case DataSort(constructors=constructors):
+            found: list[Value] = []
+            for constructor in constructors:
+                if any(isinstance(p, DataSort) for p in constructor.parameters):
+                    return None
+                arguments = _tuples(constructor.parameters, domains)
+                if arguments is None:
+                    return None
+                found.extend(Data(constructor.name, a) for a in arguments)
+            return tuple(found)
+        case _:
+            return None
+
+
+def _tuples(sorts: Sequence[Sort], domains: Domains | None) -> tuple[tuple[Value, ...], ...] | None:
+    ranges = [finite_values(sort, domains) for sort in sorts]
+    known = [r for r in ranges if r is not None]
+    if len(known) != len(ranges) or math.prod(len(r) for r in known) > ENUMERATION_LIMIT:
+        return None
+    return tuple(product(*known))
+
+
+_NUMERIC: dict[str, Callable[[Any, Any], Any]] = {"+": operator.add, "-": operator.sub, "*": operator.mul}
+_ORDER: dict[str, Callable[[Any, Any], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+
+
+class Candidates(Protocol):
+    """The assignments to some variables that conjoined parts leave possible."""
+
+    @property
+    def bound(self) -> Set[str]:
+        """The variables that the parts bind."""
+        ...
+
+    def solutions(self, env: Env) -> Iterator[NotEvaluable | None]:
+        """Binds the variables in `env` before each yield: None, or why it is open whether the parts hold there."""
+        ...
+
+
+class Quantifiers(Protocol):
+    """How quantifiers are decided. It is handed to the compiler, since the two recurse: a quantifier's body is a term,
+    and a term may hold quantifiers."""
+
+    def code(self, compiler: Compiler, term: Quantified) -> Code:
+        """The closure for a quantified formula, whose variables have slots."""
+        ...
+
+    def candidates(self, compiler: Compiler, parts: Sequence[Part], variables: Sequence[Variable]) -> Candidates: ...
+
+
+@dataclass(slots=True)
+class Compiler:
+    """Slots for the variables of one term, and the closures for its parts. Bound names are unique in the term."""
+
+    domains: Domains
+    quantifiers: Quantifiers
+    free: dict[str, int] = field(default_factory=dict)
+    bound: dict[str, int] = field(default_factory=dict)
+    size: int = 0
+    known: dict[Term, Code] = field(default_factory=dict)
+
+    def slot(self, variable: Variable) -> int:
+        """Where the environment holds the variable; a bound name that no quantifier binds is a free one."""
+        name = variable.qualified
+        if name in self.bound:
+            return self.bound[name]
+        if name not in self.free:
+            self.free[name] = self.new_slot()
+        return self.free[name]
+
+    def bind(self, variable: Variable) -> int:
+        if variable.name not in self.bound:
+            self.bound[variable.name] = self.new_slot()
+        return self.bound[variable.name]
+
+    def new_slot(self) -> int:
+        self.size += 1
+        return self.size - 1
+
+    def code(self, term: Term) -> Code:
+        """The closure for a term; equal terms share one (planning asks for the same part more than once)."""
+        found = self.known.get(term)
+        if found is None:
+            found = self.known[term] = self._code(term)
+        return found
+
+    def _code(self, term: Term) -> Code:
+        match term:
+            case Literal(value=value, sort=sort):
+                constant: Any = Fraction(value) if isinstance(sort, RealSort) and not isinstance(value, str) else value
+                return lambda env: constant
+            case EnumValue(name=name):
+                element = Element(name)
+                return lambda env: element
+            case Variable():
+                return operator.itemgetter(self.slot(term))
+            case Construct(constructor=constructor, arguments=arguments):
+                codes = tuple(map(self.code, arguments))
+                return lambda env: Data(constructor, tuple([c(env) for c in codes]))
+            case TupleTerm(items=items):
+                codes = tuple(map(self.code, items))
+                return lambda env: tuple([c(env) for c in codes])
+            case SequenceTerm(items=items) | SetTerm(items=items):
+                codes = tuple(map(self.code, items))
+                return lambda env: values.Sequence(tuple([c(env) for c in codes]))
+            case Apply():
+                return self._apply(term)
+            case Index():
+                return self._index(term)
+            case Length(sequence=sequence):
+                inner = self.code(sequence)
+                return lambda env: len(inner(env).items)
+            case SequenceRange():
+                return self._range(term)
+            case Widen(term=inside):
+                inner = self.code(inside)
+                return lambda env: Fraction(inner(env))
+            case Negative(term=inside):
+                inner = self.code(inside)
+                return lambda env: -inner(env)
+            case Arithmetic():
+                return self._arithmetic(term)
+            case Compare():
+                return self._compare(term)
+            case In():
+                return self._member(term)
+            case Not(body=body):
+                inner = self.code(body)
+                return lambda env: not inner(env)
+            case And(items=items):
+                return _all(tuple(map(self.code, items)))
+            case Or(items=items):
+                return _any(tuple(map(self.code, items)))
+            case Implies(left=left, right=right):
+                return _any((self.code(Not(left)), self.code(right)))
+            case Iff(left=left, right=right):
+                one, other = self.code(left), self.code(right)
+                return lambda env: one(env) == other(env)
+            case Quantified():
+                for variable in term.variables:
+                    self.bind(variable)
+                return self.quantifiers.code(self, term)
+
+    def _apply(self, term: Apply) -> Code:
+        function = self.code(term.function)
+        codes = tuple(map(self.code, term.arguments))
+        if len(codes) == 1:
+            only = codes[0]
+
+            def one(env: Env) -> Any:
+                value: FunctionValue = function(env)
+                return value.table.get((only(env),), value.default)
+
+            return one
+
+        def many(env: Env) -> Any:
+            value: FunctionValue = function(env)
+            return value.table.get(tuple([c(env) for c in codes]), value.default)
+
+        return many
+
+    def _index(self, term: Index) -> Code:
+        sequence, index = self.code(term.sequence), self.code(term.index)
+
+        def run(env: Env) -> Any:
+            items, at = sequence(env).items, index(env)
+            if not 0 <= at < len(items):
+                raise NotEvaluable(f"position {at} is outside a sequence of length {len(items)}")
+            return items[at]
+
+        return run
+
+    def _range(self, term: SequenceRange) -> Code:
+        low, high = self.code(term.low), self.code(term.high)
+
+        def run(env: Env) -> Any:
+            start, end = low(env), high(env)
+            if end - start >= ENUMERATION_LIMIT:
+                raise NotEvaluable("the sequence is too long to write out")
+            return values.Sequence(tuple(range(start, end + 1)))
+
+        return run
+
+    def _arithmetic(self, term: Arithmetic) -> Code:
+        left, right = self.code(term.left), self.code(term.right)
+        if term.operator == "/":
+
+            def divide(env: Env) -> Any:
+                divisor = right(env)
+                if divisor == 0:
+                    raise NotEvaluable("division by zero")
+                return Fraction(left(env)) / divisor
+
+            return divide
+        act = _NUMERIC[term.operator]
+        return lambda env: act(left(env), right(env))
+
+    def _compare(self, term: Compare) -> Code:
+        left, right = self.code(term.left), self.code(term.right)
+        if term.operator in _ORDER:
+            act = _ORDER[term.operator]
+            return lambda env: act(left(env), right(env))
+        if isinstance(term.left.sort, FunctionSort):
+            ranges = [finite_values(sort) for sort in term.left.sort.parameters]
+            size = None if None in ranges else math.prod(len(r) for r in ranges if r is not None)
+            wanted = term.operator == "=="
+            return lambda env: _same_function(left(env), right(env), size) is wanted
+        if term.operator == "==":
+            return lambda env: left(env) == right(env)
+        return lambda env: left(env) != right(env)
+
+    def _member(self, term: In) -> Code:
+        item = self.code(term.item)
+        match term.collection:
+            case SetTerm(items=items) | SequenceTerm(items=items):
+                codes = tuple(self.code(Compare("==", term.item, each)) for each in items)
+                if all(isinstance(each, EnumValue) for each in items):
+                    names = frozenset(Element(each.name) for each in items if isinstance(each, EnumValue))
+                    return lambda env: item(env) in names
+                return _any(codes)
+            case SequenceRange(low=low, high=high):
+                start, end = self.code(low), self.code(high)
+                return lambda env: start(env) <= item(env) <= end(env)
+            case collection:
+                whole = self.code(collection)
+                return lambda env: item(env) in whole(env).items
+
+
+def _all(codes: tuple[Code, ...]) -> Code:
+    """Conjunction: false as soon as one part is, even where another cannot be evaluated."""
+
+    def run(env: Env) -> bool:
+        doubt: NotEvaluable | None = None
+        for code in codes:
+            try:
+                if not code(env):
+                    return False
+            except NotEvaluable as reason:
+                doubt = doubt or reason
+        if doubt is not None:
+            raise doubt
+        return True
+
+    return run
+
+
+def _any(codes: tuple[Code, ...]) -> Code:
+    """Disjunction: true as soon as one part is, even where another cannot be evaluated."""
+
+    def run(env: Env) -> bool:
+        doubt: NotEvaluable | None = None
+        for code in codes:
+            try:
+                if code(env):
+                    return True
+            except NotEvaluable as reason:
+                doubt = doubt or reason
+        if doubt is not None:
+            raise doubt
+        return False
+
+    return run
+
+
+def _same_function(left: FunctionValue, right: FunctionValue, size: int | None) -> bool:
+    """Extensional equality; `size` is how many points there are, None if infinitely many."""
+    points = left.table.keys() | right.table.keys()
+    if any(left.table.get(p, left.default) != right.table.get(p, right.default) for p in points):
+        return False
+    return left.default == right.default or (size is not None and len(points) >= size)
+
+
+def member_of(sort: Sort, domains: Domains) -> Callable[[Any], bool] | None:
+    """The test that a value found elsewhere lies in a variable's range, or None where every found value does."""
+    if sort in domains:
+        known = frozenset(domains[sort])
+        return lambda value: value in known
+    match sort:
+        case NaturalSort():
+            return lambda value: value.__class__ is int and value >= 0
+        case IntegerSort():
+            return lambda value: value.__class__ is int
+        case RealSort() | StringSort():
+            return None
+        case _:
+            return None

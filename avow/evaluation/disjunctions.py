@@ -1,0 +1,116 @@
+"""A formula as a disjunction of conjunctions, one level at a time: a quantifier searches one conjunction at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from avow.formulas.renaming import bound_names
+from avow.language.sorts import BOOL, FunctionSort
+from avow.language.terms import (
+    And,
+    Compare,
+    Iff,
+    Implies,
+    Literal,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    Term,
+    Variable,
+    children,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A formula that has to be true, or false."""
+
+    term: Term
+    positive: bool
+    names: frozenset[str]
+
+
+def branches(
+    term: Term, positive: bool, variables: tuple[Variable, ...]
+) -> Iterator[tuple[list[Part], tuple[Variable, ...]]]:
+    parts, inner = conjunction(term, positive)
+    variables = (*variables, *inner)
+    options = alternatives(parts[0].term, parts[0].positive) if len(parts) == 1 else None
+    if options is None:
+        yield parts, variables
+    else:
+        for option, truth in options:
+            yield from branches(option, truth, variables)
+
+
+def conjunction(term: Term, positive: bool) -> tuple[list[Part], list[Variable]]:
+    """The conjunction that a formula is, and the variables of the existential quantifiers on the way to its parts."""
+    parts: list[Part] = []
+    variables: list[Variable] = []
+    stack = [(term, positive)]
+    while stack:
+        term, positive = stack.pop()
+        match term:
+            case Not(body=body):
+                stack.append((body, not positive))
+            case And(items=items) if positive:
+                stack.extend((item, True) for item in reversed(items))
+            case Or(items=items) if not positive:
+                stack.extend((item, False) for item in reversed(items))
+            case Implies(left=left, right=right) if not positive:
+                stack.extend(((right, False), (left, True)))
+            case Quantified(quantifier=Quantifier.EXISTS) if positive:
+                variables.extend(term.variables)
+                stack.append((term.body, True))
+            case Quantified(quantifier=Quantifier.FORALL) if not positive:
+                variables.extend(term.variables)
+                stack.append((term.body, False))
+            case Compare(operator="==" | "!=" as operator, left=left, right=Literal(value=bool() as value)):
+                stack.append((left, positive is ((operator == "==") is value)))
+            case Compare(operator="==" | "!=" as operator, left=Literal(value=bool() as value), right=right):
+                stack.append((right, positive is ((operator == "==") is value)))
+            case _:
+                parts.append(Part(term, positive, bound_names(term)))
+    return parts, variables
+
+
+def alternatives(term: Term, positive: bool) -> tuple[tuple[Term, bool], ...] | None:
+    """The sides of a formula that is a disjunction."""
+    match term:
+        case Or(items=items) if positive:
+            return tuple((item, True) for item in items)
+        case And(items=items) if not positive:
+            return tuple((item, False) for item in items)
+        case Implies(left=left, right=right) if positive:
+            return ((left, False), (right, True))
+        case Compare(operator="==" | "!=" as operator) if term.left.sort == BOOL:
+            return alternatives(Iff(term.left, term.right), positive is (operator == "=="))
+        case Iff(left=left, right=right):
+            if positive:
+                return ((And((left, right)), True), (And((Not(left), Not(right))), True))
+            return ((And((left, Not(right))), True), (And((Not(left), right)), True))
+        case _:
+            return None
+
+
+def occurring(parts: Sequence[Part], unbound: set[str]) -> list[Variable]:
+    """The unbound variables that the parts mention."""
+    found: dict[str, Variable] = {}
+    stack: list[Term] = [part.term for part in parts]
+    while stack:
+        term = stack.pop()
+        if isinstance(term, Variable) and term.qualified in unbound:
+            found[term.name] = term
+        stack.extend(children(term))
+    return [found[name] for name in sorted(found)]
+
+
+def relations(term: Term) -> Iterator[Variable]:
+    stack = [term]
+    while stack:
+        term = stack.pop()
+        if isinstance(term, Variable) and isinstance(term.sort, FunctionSort) and term.sort.result == BOOL:
+            yield term
+        stack.extend(children(term))

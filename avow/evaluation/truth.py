@@ -1,0 +1,38 @@
+"""Truth of a formula over concrete values: exact evaluation, and where that cannot answer, the solver."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from avow.evaluation.evaluate import NotEvaluable, evaluate
+from avow.formulas.values import Value
+from avow.language.terms import Role, Term, Variable, children
+
+
+def judge(term: Term, valuation: Mapping[str, Value], *, timeout_ms: int = 5_000) -> bool | None:
+    """Whether the formula holds of the values; None where neither evaluation nor Z3 can tell.
+
+    What lies outside a partial operation (division by zero) is unspecified: True and False hold whatever it yields.
+    """
+    try:
+        return bool(evaluate(term, valuation))
+    except NotEvaluable:
+        pass
+    sorts = _free_sorts(term)
+    if not sorts.keys() <= valuation.keys():
+        return None
+    from avow.solving.questions import replay  # Z3 takes a quarter of a second to load, and is seldom needed here
+
+    return replay([term], {v: valuation[v.qualified] for v in sorts.values()}, timeout_ms=timeout_ms)
+
+
+def _free_sorts(term: Term) -> dict[str, Variable]:
+    """The inputs and outputs that a formula mentions, by qualified name."""
+    found: dict[str, Variable] = {}
+    stack = [term]
+    while stack:
+        term = stack.pop()
+        if isinstance(term, Variable) and term.role is not Role.BOUND:
+            found[term.qualified] = Variable(term.role, term.name, term.sort)
+        stack.extend(children(term))
+    return found

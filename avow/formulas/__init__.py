@@ -1,0 +1,4 @@
+"""Formulas as meanings: normal forms, digests, substitution, traversal, concrete values. Asks no solver.
+
+Front doors: `avow.formulas.formula`, `avow.formulas.traversal`, `avow.formulas.values`.
+"""

@@ -1,0 +1,83 @@
+"""A question within a scenario: quantifiers range over the few values that the scenario gives their sort, and inputs
+take the values that it gives them. What holds then is *checked*, not proved; what fails says nothing by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import product
+from math import prod
+
+from avow.formulas.formula import conjunction, disjunction, negation, substitute
+from avow.formulas.renaming import map_children
+from avow.formulas.values import Element, Value
+from avow.language.sorts import BOOL, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
+from avow.language.terms import Compare, EnumValue, Literal, Quantified, Quantifier, Term, Variable
+
+_MANY = 400
+"""A quantifier over more (combinations of) values stays as it is, and ranges over everything."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ranges:
+    """The finite ranges that a plan's scenario gives to sorts, and to inputs."""
+
+    sorts: Mapping[Sort, Sequence[Value]] = field(default_factory=dict)
+    inputs: Mapping[Variable, Sequence[Value]] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        return bool(self.sorts or self.inputs)
+
+    def assumptions(self, inputs: Sequence[Variable]) -> dict[str, Term]:
+        """That these inputs have the values that the scenario gives them, by labels that no clause can have."""
+        found = {}
+        for variable in inputs:
+            values = self.inputs.get(variable, self.sorts.get(variable.sort, ()))
+            terms = _terms(values, variable.sort)
+            if terms:
+                equal = [Compare("==", variable, term) for term in terms]
+                found[f"scenario {variable.qualified}"] = disjunction(equal)
+        return found
+
+    def within(self, term: Term) -> Term:
+        """The formula with its quantifiers over the scenario's values."""
+        if not isinstance(term, Quantified):
+            return map_children(term, self.within)
+        body = self.within(term.body)
+        few = {v: terms for v in term.variables if (terms := _terms(self.sorts.get(v.sort, ()), v.sort))}
+        rest = tuple(v for v in term.variables if v not in few)
+        if not few or prod(map(len, few.values())) > _MANY or (term.quantifier is Quantifier.UNIQUE and rest):
+            return Quantified(term.quantifier, term.variables, body, term.span)
+        cases = [substitute(body, dict(zip(few, choice, strict=True))) for choice in product(*few.values())]
+        match term.quantifier:
+            case Quantifier.FORALL:
+                return conjunction(Quantified(term.quantifier, rest, c) if rest else c for c in cases)
+            case Quantifier.EXISTS:
+                return disjunction(Quantified(term.quantifier, rest, c) if rest else c for c in cases)
+            case Quantifier.UNIQUE:
+                alone = (
+                    conjunction((case, *(negation(other) for other in cases[:k] + cases[k + 1 :])))
+                    for k, case in enumerate(cases)
+                )
+                return disjunction(alone)
+
+
+def _terms(values: Sequence[Value], sort: Sort) -> list[Term]:
+    """The values as terms; none if one of them has no simple term."""
+    found: list[Term] = []
+    for value in dict.fromkeys(values):
+        match sort, value:
+            case EnumSort(), Element(name=name):
+                found.append(EnumValue(name, sort))
+            case _, bool() if sort == BOOL:
+                found.append(Literal(value, sort))
+            case RealSort(), int() | Fraction():
+                found.append(Literal(Fraction(value), sort))
+            case IntegerSort() | NaturalSort(), int():
+                found.append(Literal(value, sort))
+            case StringSort(), str():
+                found.append(Literal(value, sort))
+            case _:
+                return []
+    return found

@@ -1,0 +1,48 @@
+"""How the guarantees of a file stand, as the ledger of its workspace has it: shown when hovering over them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from avow.base.diagnostics import Rejected
+from avow.base.workspace import find_workspace
+from avow.evidence.ledger import Ledger
+from avow.lsp.answers import StatusLookup
+
+
+def standing(file: str) -> StatusLookup:
+    """The latest verdict of each method on each guarantee of the system that the file belongs to.
+
+    What the ledger holds may be about an older text: finding that out takes more than an editor waits for, so the
+    answer says when the verdict was given. Files outside a workspace have no status.
+    """
+    path = Path(file).resolve()
+    workspace = find_workspace(path.parent)
+    if workspace is None or not path.is_relative_to(workspace.contracts):
+        return lambda node, clause: None
+    system = _system(path.parent)
+    try:
+        entries = Ledger(workspace.ledger(system)).records()
+    except OSError:
+        entries = ()
+    latest: dict[str, dict[str, str]] = {}
+    for entry in entries:
+        evidence = entry.evidence
+        said = f"{evidence.verdict} by {evidence.method} ({evidence.started[:16].replace('T', ' ')})"
+        latest.setdefault(evidence.obligation, {})[evidence.method] = said
+
+    def lookup(node: str, clause: str) -> str | None:
+        found = latest.get(f"{system}/{node}/guarantee/{clause}")
+        return "last time: " + ", ".join(found.values()) if found else None
+
+    return lookup
+
+
+def _system(folder: Path) -> str:
+    """The name of the system in a folder: its plan's, else the folder's."""
+    from avow.system.plan_file import read_plan
+
+    try:
+        return read_plan(folder / "plan.yaml")[0].system
+    except (Rejected, OSError):
+        return folder.name

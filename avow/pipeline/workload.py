@@ -1,0 +1,79 @@
+"""A system as read from its folder, with all that there is to do for it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from avow import __version__
+from avow.base.diagnostics import Rejected
+from avow.base.files import digest, digest_file, write
+from avow.base.workspace import Workspace
+from avow.evidence.obligation import Obligation
+from avow.pipeline.work import Catalogue, Work, catalogue
+from avow.system.load import load_system
+from avow.system.plan import System
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """`digest` is of the plan's and the contract's text: comments count here, as they show in reports."""
+
+    system: System
+    catalogue: Catalogue
+    digest: str
+
+    def work(self, method: str) -> Work:
+        """The first work of that method; for the engines that there is one of. Raises KeyError."""
+        for work in self.catalogue.works:
+            if work.method == method:
+                return work
+        raise KeyError(method)
+
+    @property
+    def keys(self) -> Mapping[tuple[str, str], str]:
+        """(obligation id, method id) → what its answer depends on now."""
+        return {(o.id, work.method): work.keys[o.id] for work in self.catalogue.works for o in work.obligations}
+
+
+def survey(folder: Path) -> Survey | Rejected:
+    """A system that cannot be read is a value here: it must not keep the others from being verified."""
+    try:
+        system = load_system(folder)
+        listed = catalogue(system)
+    except Rejected as rejected:
+        return rejected
+    files = (system.plan.path, *system.plan.contract_files, *system.plan.included)
+    texts = [__version__, *map(digest_file, files)]
+    return Survey(system, listed, digest(json.dumps(texts)))
+
+
+def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False) -> bool:
+    """artifacts/<system>/obligations.json: every claim, with its formula and who settles it. `dry`: is it current?"""
+    methods: dict[str, list[str]] = {}
+    for work in surveyed.catalogue.works:
+        for obligation in work.obligations:
+            methods.setdefault(obligation.id, []).append(work.method)
+    listed = [obligation_json(workspace, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations]
+    text = json.dumps({"system": surveyed.system.name, "obligations": listed}, indent=1, ensure_ascii=False) + "\n"
+    path = workspace.artifacts / surveyed.system.name / "obligations.json"
+    if dry:
+        return path.is_file() and path.read_bytes() == text.encode()
+    return write(path, text)
+
+
+def obligation_json(workspace: Workspace, obligation: Obligation, methods: list[str]) -> dict[str, Any]:
+    span = obligation.span
+    return {
+        "id": obligation.id,
+        "kind": obligation.kind.value,
+        "claim": obligation.claim,
+        "formula": obligation.formula,
+        "digest": obligation.digest,
+        "clauses": list(obligation.clauses),
+        "at": f"{workspace.relative(Path(span.file))}:{span.line}:{span.column}" if span else None,
+        "methods": methods,
+    }

@@ -1,0 +1,486 @@
+"""Is a contract worth verifying? The sanity claims of a node (`avow.sanity.claims`), settled by the solver.
+
+`proved` is always good and `refuted` always bad (see the table in `avow.sanity.claims`). A refutation carries a
+replayed counterexample in the contract's words, or the smallest conflicting sets of clauses, or both. What the solver
+cannot decide stays `unknown`; with a scenario (concrete values of some inputs), a claim about all inputs that stays
+unknown is tried for these values, and if it holds there it is `checked`, and says that it is bounded.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from avow.base.diagnostics import Severity
+from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.formulas.finite import Ranges
+from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.values import Value
+from avow.language.contract import ClauseKind, Contract, Node
+from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
+from avow.language.terms import Compare, Not, Role, Term, Variable
+from avow.sanity.claims import Claim, Property, claims, node_key, triggers
+from avow.sanity.results import Bounds, Patience, SanityResult, as_outcome, listing
+from avow.solving.limits import now
+
+if TYPE_CHECKING:
+    from avow.sanity.conflicts import Conflict
+    from avow.sanity.realizability import Group, Realizability
+
+__all__ = [
+    "Bounds",
+    "Claim",
+    "Property",
+    "SanityResult",
+    "analyse",
+    "as_outcome",
+    "claims",
+    "listing",
+    "node_key",
+    "outcomes",
+]
+
+Given = Mapping[Variable, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class _Finding:
+    verdict: Verdict
+    explanation: str = ""
+    clauses: tuple[str, ...] = ()
+    counterexample: Counterexample | None = None
+    conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
+    because: str | None = None
+    engine: str = "z3"
+    bounded: bool = False
+
+
+def analyse(
+    node: Node,
+    contract: Contract | None = None,
+    *,
+    scenario: Given | None = None,
+    ranges: Ranges | None = None,
+    bounds: Bounds | None = None,
+    wanted: Collection[str] | None = None,
+) -> tuple[SanityResult, ...]:
+    """Settle a node's claims, in their order; with `wanted`, only the claims of these names. `scenario` fixes some
+    inputs, `ranges` says which few values others (and quantified variables) have, where no answer for all is found.
+
+    `contract` is not consulted (formulas are whole); it is accepted so that callers need not know that.
+    """
+    analysis = _Analysis(node, scenario or {}, ranges or Ranges(), bounds or Bounds())
+    results = []
+    for claim in claims(node):
+        if wanted is not None and claim.name not in wanted:
+            continue
+        start = time.monotonic()
+        finding = analysis.settle(claim)
+        results.append(_result(node, claim, finding, time.monotonic() - start))
+    return tuple(results)
+
+
+def outcomes(
+    node: Node,
+    obligations: Mapping[str, str],
+    *,
+    scenario: Given | None = None,
+    ranges: Ranges | None = None,
+    bounds: Bounds | None = None,
+) -> tuple[Outcome, ...]:
+    """For the pipeline: one outcome for each obligation id, given its claim's name (an unknown name is an error)."""
+    wanted = set(obligations.values())
+    found = analyse(node, scenario=scenario, ranges=ranges, bounds=bounds, wanted=wanted)
+    results = {result.name: result for result in found}
+    return tuple(as_outcome(identity, node.name, name, results.get(name)) for identity, name in obligations.items())
+
+
+def _result(node: Node, claim: Claim, finding: _Finding, seconds: float) -> SanityResult:
+    return SanityResult(
+        node.name,
+        claim.about,
+        claim.subject,
+        claim.name,
+        claim.sentence,
+        finding.verdict,
+        claim.severity,
+        finding.clauses,
+        finding.counterexample,
+        finding.explanation,
+        finding.conflicts,
+        finding.because,
+        finding.engine,
+        finding.bounded,
+        seconds,
+        claim.span,
+    )
+
+
+_GLANCE_MS = 300
+"""Whether a contract is consistent is asked for so long; then, whether it is realizable, which says more."""
+
+
+class _Analysis:
+    """One node under analysis. Each claim is settled once, others ask for it."""
+
+    def __init__(self, node: Node, scenario: Given, ranges: Ranges, bounds: Bounds) -> None:
+        self.node = node
+        self.scenario = scenario
+        self.ranges = ranges
+        self.patience = Patience(bounds.milliseconds)
+        self.serious = True
+        self.seed = bounds.seed
+        self.inputs = tuple(port.variable for port in node.inputs)
+        self.outputs = tuple(port.variable for port in node.outputs)
+        self.assumptions = {c.name: c.formula for c in node.assumptions}
+        self.guarantees = {c.name: c.formula for c in node.guarantees}
+        self.known: dict[str, _Finding] = {}
+        self.claims = {claim.name: claim for claim in claims(node)}
+        self.answer: tuple[Realizability, bool] | None = None
+
+    def settle(self, claim: Claim) -> _Finding:
+        if claim.name not in self.known:
+            asked, self.serious = self.serious, claim.severity is Severity.ERROR
+            start, lost = now(), self.patience.lost
+            try:
+                found = self.known[claim.name] = self._settle(claim)
+            finally:
+                self.serious = asked
+            if found.verdict is Verdict.UNKNOWN:
+                self.patience.lost = max(self.patience.lost, lost + now() - start)
+        return self.known[claim.name]
+
+    @property
+    def limit(self) -> int:
+        """Milliseconds for a question of the claim that is being settled."""
+        return self.patience.milliseconds(self.serious)
+
+    def _settle(self, claim: Claim) -> _Finding:
+        subject = claim.subject or ""
+        methods: dict[Property, Callable[[str], _Finding]] = {
+            Property.ASSUMPTIONS_SATISFIABLE: lambda _: self._satisfiable(),
+            Property.CONSISTENT: lambda _: self._consistent(),
+            Property.REALIZABLE: lambda _: self._realizable(),
+            Property.TAUTOLOGY: self._tautology,
+            Property.VACUOUS: self._vacuous,
+            Property.REDUNDANT: self._redundant,
+            Property.UNCONSTRAINED: self._unconstrained,
+            Property.UNDETERMINED: self._undetermined,
+            Property.UNNEEDED: self._unneeded,
+        }
+        return methods[claim.about](subject)
+
+    def _other(self, name: str) -> _Finding:
+        return self.settle(self.claims[name])
+
+    # -- the whole contract --------------------------------------------------------------------------------------------
+
+    def _satisfiable(self) -> _Finding:
+        finding = self._possible(self.assumptions, "no input meets {} together", "no input meets {}")
+        return self._with_all_sets(finding, self.assumptions)
+
+    def _consistent(self) -> _Finding:
+        together = {**self.assumptions, **self.guarantees}
+        texts = ("no inputs and outputs meet {} together", "no inputs and outputs meet {}")
+        finding = self._possible(together, *texts, limit=_GLANCE_MS)
+        if finding.verdict is Verdict.UNKNOWN and self.limit > _GLANCE_MS:
+            answer, bounded = self._realizability()
+            if answer.verdict is Verdict.PROVED and not bounded:
+                allowed = self._other("assumptions-satisfiable")
+                return _Finding(allowed.verdict, allowed.explanation, engine=answer.engine)
+            finding = self._possible(together, *texts)
+        if finding.verdict is Verdict.REFUTED and self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
+            return replace(finding, because="assumptions-satisfiable")
+        return self._with_all_sets(finding, together)
+
+    def _with_all_sets(self, finding: _Finding, formulas: Mapping[str, Term]) -> _Finding:
+        """Where formulas contradict each other, every smallest set of them that does."""
+        from avow.sanity.conflicts import contradictions
+
+        if finding.verdict is not Verdict.REFUTED or not finding.clauses:
+            return finding
+        sets = contradictions(formulas, finding.clauses, timeout_ms=self.patience.full // 2, seed=self.seed)
+        if len(sets) == 1:
+            return finding
+        text = ", nor ".join((finding.explanation, *map(listing, sets[1:])))
+        shown = tuple((s, Counterexample(explanation=f"nothing meets {listing(s)}")) for s in sets)
+        return replace(finding, explanation=text, conflicts=shown)
+
+    def _realizability(self) -> tuple[Realizability, bool]:
+        """The answer, and whether it is about the scenario only."""
+        from avow.sanity.realizability import realizable
+
+        if self.answer is not None:
+            return self.answer
+        start = now()
+
+        def ask(
+            assumptions: Mapping[str, Term], guarantees: Mapping[str, Term], given: Given | None = None
+        ) -> Realizability:
+            limit = 2 * self.patience.milliseconds(serious=True)
+            return realizable(
+                self.inputs,
+                self.outputs,
+                assumptions,
+                guarantees,
+                given=given,
+                timeout_ms=limit,
+                seed=self.seed,
+            )
+
+        answer, bounded = ask(self.assumptions, self.guarantees), False
+        if answer.verdict is Verdict.UNKNOWN and self.scenario:
+            within = ask(self.assumptions, self.guarantees, self.scenario)
+            if within.verdict is not Verdict.UNKNOWN:
+                answer, bounded = within, within.verdict is Verdict.PROVED
+        if answer.verdict is Verdict.UNKNOWN and self.ranges:
+            assumed = {label: self.ranges.within(f) for label, f in self.assumptions.items()}
+            free = [v for v in self.inputs if v not in self.scenario]
+            wanted = {label: self.ranges.within(f) for label, f in self.guarantees.items()}
+            assumed |= self.ranges.assumptions(free)
+            within = ask(assumed, wanted, self.scenario)
+            if within.verdict is Verdict.PROVED and self._some(
+                assumed
+            ):  # a refutation need not be one where quantifiers range over everything
+                needed = tuple(label for label in within.needed if label in self.assumptions)
+                answer, bounded = replace(within, needed=needed), True
+        self.answer = answer, bounded
+        if answer.verdict is Verdict.UNKNOWN:
+            self.patience.lose(now() - start)
+        return self.answer
+
+    def _realizable(self) -> _Finding:
+        from avow.sanity.conflicts import conflicts
+        from avow.sanity.realizability import groups
+
+        answer, bounded = self._realizability()
+        if answer.verdict is Verdict.PROVED:
+            if self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
+                return _Finding(Verdict.PROVED, "vacuously: no input is allowed", because="assumptions-satisfiable")
+            verdict = Verdict.CHECKED if bounded else Verdict.PROVED
+            return _Finding(verdict, _resting(answer.needed), answer.needed, engine=answer.engine, bounded=bounded)
+        if answer.verdict is not Verdict.REFUTED:
+            return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+        found: list[Conflict] = []
+        for group in groups(self.guarantees, self.outputs):
+            at = answer.inputs if tuple(group.guarantees) == answer.group else self._refuting(group)
+            if at is not None:
+                limit = 2 * self.patience.full
+                found += conflicts(self.inputs, group, self.assumptions, at, timeout_ms=limit, seed=self.seed)
+        found.sort(key=lambda conflict: not set(conflict.clauses) <= set(answer.group))
+        listed = tuple((conflict.clauses, conflict.counterexample()) for conflict in found)
+        if not listed:
+            from avow.solving.counterexample import show_values
+
+            shown = Counterexample(show_values(answer.inputs), "no output meets the guarantees here")
+            return _Finding(Verdict.REFUTED, shown.explanation, answer.group, shown, engine=answer.engine)
+        # A conflict between guarantees tells more than one guarantee that cannot be met by itself.
+        clauses, shown = next((pair for pair in listed if len(pair[0]) > 1), listed[0])
+        because = "consistent" if self._other("consistent").verdict is Verdict.REFUTED else None
+        text = f"for some inputs no output meets {listing(clauses)}"
+        return _Finding(Verdict.REFUTED, text, clauses, shown, listed, because, answer.engine)
+
+    def _refuting(self, group: Group) -> Mapping[Variable, Value] | None:
+        """An input for which no output meets these guarantees, which share no output with the others."""
+        from avow.sanity.realizability import realizable
+
+        limit = self.patience.full
+        answer = realizable(
+            self.inputs, group.outputs, self.assumptions, group.guarantees, timeout_ms=limit, seed=self.seed
+        )
+        return answer.inputs if answer.verdict is Verdict.REFUTED else None
+
+    # -- one clause ----------------------------------------------------------------------------------------------------
+
+    def _tautology(self, name: str) -> _Finding:
+        clause = self.node.clause(name)
+        if clause.kind is ClauseKind.ASSUMPTION:
+            return self._fails_somewhere({}, clause.formula, "every input meets it: it assumes nothing", "")
+        finding = self._fails_somewhere(
+            self.assumptions,
+            clause.formula,
+            "it holds of all inputs and outputs: it demands nothing",
+            "it follows from {}: it demands nothing of any output",
+        )
+        if finding.verdict is not Verdict.REFUTED:
+            return finding
+        return replace(finding, because=self._if_refuted("assumptions-satisfiable"))
+
+    def _vacuous(self, name: str) -> _Finding:
+        impossible = []
+        undecided: _Finding | None = None
+        for number, trigger in enumerate(triggers(self.guarantees[name]), start=1):
+            finding = self._possible(
+                {**self.assumptions, "its trigger": trigger}, "{} cannot hold together", "{} cannot hold"
+            )
+            if finding.verdict is Verdict.REFUTED:
+                impossible.append((number, finding))
+            elif finding.verdict is not Verdict.PROVED:
+                undecided = finding
+        if impossible:
+            first = impossible[0][1]
+            empty = self._other("assumptions-satisfiable").verdict is Verdict.REFUTED
+            because = "assumptions-satisfiable" if empty else self._if_refuted(f"tautology-{name}")
+            clauses = tuple(c for c in first.clauses if c in self.assumptions)
+            text = "what it demands is never demanded: its condition cannot come about"
+            return _Finding(
+                Verdict.REFUTED, text + _given(clauses), (name, *clauses), because=because, engine=first.engine
+            )
+        return undecided or _Finding(Verdict.PROVED)
+
+    def _redundant(self, name: str) -> _Finding:
+        kind = self.node.clause(name).kind
+        others = self.assumptions if kind is ClauseKind.ASSUMPTION else {**self.assumptions, **self.guarantees}
+        others = {other: formula for other, formula in others.items() if other != name}
+        formula = self.node.clause(name).formula
+        finding = self._fails_somewhere(others, formula, "it is true by itself", "it follows from {}")
+        if finding.verdict is not Verdict.REFUTED:
+            return finding
+        whole = "assumptions-satisfiable" if kind is ClauseKind.ASSUMPTION else "consistent"
+        return replace(finding, because=self._if_refuted(whole) or self._if_refuted(f"tautology-{name}"))
+
+    def _unneeded(self, name: str) -> _Finding:
+        from avow.sanity.realizability import realizable
+
+        if weaker := self._if_refuted(f"tautology-{name}") or self._if_refuted(f"redundant-{name}"):
+            return _Finding(Verdict.REFUTED, "it rules out nothing that the others do not", (name,), because=weaker)
+        because = self._if_refuted("assumptions-satisfiable")
+        unused = _Finding(Verdict.REFUTED, "every guarantee can be met without it", (name,), because=because)
+        if self._other("realizable").verdict is Verdict.PROVED and name not in self._realizability()[0].needed:
+            return unused
+        # What it rules out is all that there is to ask about: an output for each of these inputs makes it idle.
+        outside = {label: negation(f) if label == name else f for label, f in self.assumptions.items()}
+        answer = realizable(
+            self.inputs,
+            self.outputs,
+            outside,
+            self.guarantees,
+            timeout_ms=2 * self.limit,
+            seed=self.seed,
+            doubtful=True,
+        )
+        match answer.verdict:
+            case Verdict.REFUTED:
+                return _Finding(Verdict.PROVED, engine=answer.engine)
+            case Verdict.PROVED:
+                return replace(unused, engine=answer.engine)
+            case _:
+                return _Finding(Verdict.UNKNOWN, "whether the guarantees could be met without it is open")
+
+    # -- one output ----------------------------------------------------------------------------------------------------
+
+    def _unconstrained(self, name: str) -> _Finding:
+        output = self.node.output(name).variable
+        everything = conjunction(self.guarantees.values())
+        if output not in free_variables(everything):
+            return _Finding(Verdict.REFUTED, f"no guarantee mentions out.{name}")
+        again = Variable(Role.OUTPUT, f"{name} (another)", output.sort)
+        changed = [substitute(f, {output: again}) for f in self.guarantees.values() if output in free_variables(f)]
+        finding = self._possible(
+            {**self.assumptions, **self.guarantees, "another value": disjunction(map(negation, changed))}, "", ""
+        )
+        if finding.verdict is not Verdict.REFUTED:
+            return finding
+        text = f"wherever the guarantees hold, they hold for every other value of out.{name} too"
+        blamed = [f"tautology-{g}" for g, f in self.guarantees.items() if output in free_variables(f)]
+        because = self._if_refuted("consistent") or next((b for b in blamed if self._if_refuted(b)), None)
+        return replace(finding, explanation=text, clauses=(), because=because)
+
+    def _undetermined(self, name: str) -> _Finding:
+        from avow.sanity.realizability import Group, groups
+        from avow.solving.counterexample import show_values
+        from avow.solving.questions import solve
+
+        output = self.node.output(name).variable
+        alone = Group({}, (output,))
+        # Outputs that hang together with this one by shared guarantees may differ too; all others stay the same.
+        group = next((g for g in groups(self.guarantees, self.outputs) if output in g.outputs), alone)
+        again = {v: Variable(Role.OUTPUT, f"{v.name} (another)", v.sort) for v in group.outputs}
+        question = {
+            **self.assumptions,
+            **self.guarantees,
+            **{f"{label} again": substitute(f, again) for label, f in group.guarantees.items()},
+            "different": Not(Compare("==", output, again[output])),
+        }
+        for given in self._attempts():
+            answer = solve(question, timeout_ms=self.limit, seed=self.seed, given=given, shown=False)
+            if answer.status == "unsat" and not given:
+                return _Finding(Verdict.PROVED, engine=answer.engine, because=self._if_refuted("consistent"))
+            if answer.status == "sat":
+                values = {v: value for v, value in {**answer.values, **given}.items() if v.role is not Role.BOUND}
+                text = f"the guarantees allow both values of out.{name}"
+                shown = Counterexample(show_values(values)) if values else None
+                because = self._if_refuted(f"unconstrained-{name}")
+                return _Finding(Verdict.REFUTED, text, counterexample=shown, because=because, engine=answer.engine)
+        if self._by_definitions(question, self.limit // 2):
+            because = self._if_refuted(f"unconstrained-{name}")
+            return _Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name}", because=because)
+        return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+
+    # -- asking --------------------------------------------------------------------------------------------------------
+
+    def _attempts(self) -> tuple[Given, ...]:
+        """Without the scenario first: an answer without it is worth more."""
+        return ({}, self.scenario) if self.scenario else ({},)
+
+    def _some(self, assumed: Mapping[str, Term]) -> bool:
+        """Whether any input of the scenario meets these: without one, nothing has been checked."""
+        from avow.solving.questions import solve
+
+        return solve(assumed, timeout_ms=self.limit, given=self.scenario, shown=False).status == "sat"
+
+    def _if_refuted(self, name: str) -> str | None:
+        return name if name in self.claims and self._other(name).verdict is Verdict.REFUTED else None
+
+    def _possible(self, formulas: Mapping[str, Term], several: str, one: str, limit: int | None = None) -> _Finding:
+        """Can they hold together? If not, the texts say so of the smallest set that cannot."""
+        from avow.solving.questions import solve
+
+        limit = min(limit or self.limit, self.limit)
+        answer = solve(formulas, timeout_ms=limit, seed=self.seed, shown=False)
+        if answer.status == "unknown" and self.scenario:
+            within = solve(formulas, timeout_ms=limit, seed=self.seed, given=self.scenario)
+            # An example in the scenario is an example; that there is none in it proves nothing.
+            answer = within if within.status == "sat" else answer
+        if answer.status == "unknown" and self._by_definitions(formulas, limit // 2):
+            return _Finding(Verdict.PROVED)
+        match answer.status:
+            case "sat":
+                return _Finding(Verdict.PROVED, engine=answer.engine)
+            case "unsat":
+                text = several if len(answer.core) > 1 else one
+                return _Finding(Verdict.REFUTED, text.format(listing(answer.core)), answer.core, engine=answer.engine)
+            case _:
+                return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+
+    def _by_definitions(self, formulas: Mapping[str, Term], limit: int) -> bool:
+        """Whether these hold together, for functions that have no finite table."""
+        from avow.sanity.realizability import possible
+
+        return _are_endless(formulas.values()) and possible(formulas, timeout_ms=limit, seed=self.seed)
+
+    def _fails_somewhere(self, hypotheses: Mapping[str, Term], formula: Term, alone: str, implied: str) -> _Finding:
+        """Is there a case where the hypotheses hold and the formula does not? If not, the texts say so."""
+        finding = self._possible({**hypotheses, "": negation(formula)}, "", "")
+        if finding.verdict is not Verdict.REFUTED:
+            return finding
+        needed = tuple(label for label in finding.clauses if label)
+        text = implied.format(listing(needed)) if needed else alone
+        return replace(finding, explanation=text, clauses=needed)
+
+
+def _are_endless(formulas: Iterable[Term]) -> bool:
+    """Whether they speak of functions that need not have a finite table."""
+    sorts = {v.sort for formula in formulas for v in free_variables(formula)}
+    parameters = {p for sort in sorts if isinstance(sort, FunctionSort) for p in sort.parameters}
+    return any(isinstance(p, RealSort | IntegerSort | NaturalSort) for p in parameters)
+
+
+def _resting(needed: tuple[str, ...]) -> str:
+    return f"given {listing(needed)}" if needed else ""
+
+
+def _given(clauses: tuple[str, ...]) -> str:
+    return f" (given {listing(clauses)})" if clauses else ""

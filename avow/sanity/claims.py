@@ -1,0 +1,236 @@
+"""What is asked of a contract before anything is verified against it: the sanity claims of a node.
+
+Every claim states the *good* thing, whatever the property is called, so that `proved` is always good and `refuted`
+always bad: `vacuous-G1` claims that guarantee G1 is *not* vacuous. Nothing here asks a solver.
+
+| property                 | the claim                                                                | severity |
+|--------------------------|--------------------------------------------------------------------------|----------|
+| assumptions-satisfiable  | the assumptions can hold together                                        | error    |
+| consistent               | some allowed inputs and some outputs meet every guarantee                | error    |
+| realizable               | for all allowed inputs some output meets every guarantee                 | error    |
+| tautology                | the guarantee rules something out that the assumptions allow;            | error    |
+|                          | an assumption rules some input out                                       | note     |
+| vacuous                  | what triggers the guarantee can happen                                   | error    |
+| redundant                | the guarantee (assumption) does not follow from the others               | warning  |
+| unconstrained            | the guarantees exclude some value of the output                          | warning  |
+| undetermined             | the inputs determine the output                                          | note     |
+| unmeetable               | the providers of its inputs leave room for the assumption (asked of a    | error    |
+|                          | whole system: `avow.calculus.providers`)                                 |          |
+| unneeded                 | the assumption rules out inputs for which no output meets the guarantees | note     |
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from avow.base.diagnostics import Severity, Span
+from avow.base.files import digest as text_digest
+from avow.formulas.formula import conjunction, digest, sort_digest
+from avow.language.contract import Clause, ClauseKind, Node, Port
+from avow.language.printer import show_term
+from avow.language.terms import TRUE, And, Implies, Quantified, Quantifier, Term, Variable
+
+
+class Property(StrEnum):
+    """See the module's table."""
+
+    ASSUMPTIONS_SATISFIABLE = "assumptions-satisfiable"
+    CONSISTENT = "consistent"
+    REALIZABLE = "realizable"
+    TAUTOLOGY = "tautology"
+    VACUOUS = "vacuous"
+    REDUNDANT = "redundant"
+    UNCONSTRAINED = "unconstrained"
+    UNDETERMINED = "undetermined"
+    UNNEEDED = "unneeded"
+    UNMEETABLE = "unmeetable"
+
+
+_SEVERITY = {
+    Property.REDUNDANT: Severity.WARNING,
+    Property.UNCONSTRAINED: Severity.WARNING,
+    Property.UNDETERMINED: Severity.NOTE,
+    Property.UNNEEDED: Severity.NOTE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """One claim about one node. `subject` is a clause's name or an output's, where the claim is about one."""
+
+    about: Property
+    subject: str | None
+    sentence: str
+    """The claim, for people."""
+    formula: str
+    """The formula concerned, as people write it."""
+    clauses: tuple[str, ...]
+    """``node.clause`` names that the claim is about."""
+    severity: Severity = Severity.ERROR
+    """How bad it is if the claim is false."""
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """``realizable``, ``vacuous-G1``: stable, and unique in the node."""
+        return str(self.about) if self.subject is None else f"{self.about}-{self.subject}"
+
+
+def claims(node: Node) -> tuple[Claim, ...]:
+    """Every sanity claim of a node, in the order in which they are best read."""
+    assumed, guaranteed = _names(node, node.assumptions), _names(node, node.guarantees)
+    a = show_term(conjunction(c.formula for c in node.assumptions))
+    g = show_term(conjunction(c.formula for c in node.guarantees))
+    ins, outs = (", ".join(p.variable.qualified for p in ports) for ports in (node.inputs, node.outputs))
+    found = [
+        Claim(
+            Property.ASSUMPTIONS_SATISFIABLE,
+            None,
+            f"The assumptions of {node.name} can hold together.",
+            f"∃ {ins} · {a}" if ins else a,
+            assumed,
+            span=node.span,
+        ),
+        Claim(
+            Property.CONSISTENT,
+            None,
+            f"Some allowed inputs of {node.name} and some outputs meet every guarantee.",
+            f"∃ {', '.join(filter(None, (ins, outs)))} · ({a}) ∧ ({g})",
+            assumed + guaranteed,
+            span=node.span,
+        ),
+        Claim(
+            Property.REALIZABLE,
+            None,
+            f"For all inputs that {node.name} assumes, some output meets every guarantee.",
+            f"∀ {ins} · ({a}) → ∃ {outs} · {g}" if ins and outs else f"({a}) → {g}",
+            assumed + guaranteed,
+            span=node.span,
+        ),
+    ]
+    for clause in node.guarantees:
+        found += _of_guarantee(node, clause)
+    found += [claim for port in node.outputs for claim in _of_output(node, port)]
+    for clause in node.assumptions:
+        found += _of_assumption(node, clause)
+    return tuple(found)
+
+
+def node_key(node: Node) -> str:
+    """SHA-256 of all that the answers depend on: clauses by name and meaning, ports by name and sort."""
+    clauses = sorted([str(c.kind), c.name, digest(c.formula)] for c in node.clauses)  # their order means nothing
+    ports = [[p.variable.qualified, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs)]
+    return text_digest(json.dumps([clauses, ports]))
+
+
+def triggers(formula: Term) -> tuple[Term, ...]:
+    """For each conjoined part of a guarantee that demands something only under a condition: that the condition can
+    come about. ``forall(x | P(x) -> (Q(x) -> R))`` gives ``exists(x | P(x) and Q(x))``."""
+    found = []
+    for part in _parts(formula):
+        prefix: list[tuple[Variable, ...] | Term] = []
+        conditional = False
+        while True:
+            if isinstance(part, Quantified) and part.quantifier is Quantifier.FORALL:
+                prefix.append(part.variables)
+                part = part.body
+            elif isinstance(part, Implies):
+                prefix.append(part.left)
+                conditional = True
+                part = part.right
+            else:
+                break
+        if conditional:
+            found.append(_closed(prefix))
+    return tuple(found)
+
+
+def _parts(formula: Term) -> tuple[Term, ...]:
+    found: list[Term] = []
+    stack = [formula]
+    while stack:
+        part = stack.pop()
+        if isinstance(part, And):
+            stack.extend(reversed(part.items))
+        elif isinstance(part, Quantified) and part.quantifier is Quantifier.FORALL and isinstance(part.body, And):
+            stack.extend(Quantified(Quantifier.FORALL, part.variables, item) for item in reversed(part.body.items))
+        else:
+            found.append(part)
+    return tuple(found)
+
+
+def _closed(prefix: list[tuple[Variable, ...] | Term]) -> Term:
+    result: Term = TRUE
+    for level in reversed(prefix):
+        if isinstance(level, tuple):
+            result = Quantified(Quantifier.EXISTS, level, result)
+        else:
+            result = conjunction((level, result))
+    return result
+
+
+def _names(node: Node, clauses: tuple[Clause, ...]) -> tuple[str, ...]:
+    return tuple(f"{node.name}.{clause.name}" for clause in clauses)
+
+
+def _of_guarantee(node: Node, clause: Clause) -> list[Claim]:
+    common = (show_term(clause.formula), _names(node, (clause,)))
+    found = [
+        _claim(Property.TAUTOLOGY, clause, f"Guarantee {clause.name} of {node.name} rules something out.", *common)
+    ]
+    if triggers(clause.formula):
+        sentence = f"What triggers guarantee {clause.name} of {node.name} can happen."
+        found.append(_claim(Property.VACUOUS, clause, sentence, *common))
+    if len(node.guarantees) > 1:
+        sentence = f"Guarantee {clause.name} of {node.name} does not follow from the others."
+        found.append(_claim(Property.REDUNDANT, clause, sentence, *common))
+    return found
+
+
+def _of_assumption(node: Node, clause: Clause) -> list[Claim]:
+    if clause.formula == TRUE:
+        return []
+    common = (show_term(clause.formula), _names(node, (clause,)))
+    found = [
+        _claim(Property.TAUTOLOGY, clause, f"Assumption {clause.name} of {node.name} rules some input out.", *common)
+    ]
+    if len(node.assumptions) > 1:
+        sentence = f"Assumption {clause.name} of {node.name} does not follow from the others."
+        found.append(_claim(Property.REDUNDANT, clause, sentence, *common))
+    sentence = f"Assumption {clause.name} of {node.name} rules out inputs for which no output meets the guarantees."
+    found.append(_claim(Property.UNNEEDED, clause, sentence, *common))
+    return found
+
+
+def _of_output(node: Node, port: Port) -> list[Claim]:
+    formula = show_term(conjunction(c.formula for c in node.guarantees))
+    names = _names(node, node.guarantees)
+    return [
+        Claim(
+            Property.UNCONSTRAINED,
+            port.name,
+            f"The guarantees of {node.name} exclude some value of out.{port.name}.",
+            formula,
+            names,
+            _SEVERITY[Property.UNCONSTRAINED],
+            port.span,
+        ),
+        Claim(
+            Property.UNDETERMINED,
+            port.name,
+            f"The inputs of {node.name} determine out.{port.name}.",
+            formula,
+            names,
+            _SEVERITY[Property.UNDETERMINED],
+            port.span,
+        ),
+    ]
+
+
+def _claim(about: Property, clause: Clause, sentence: str, formula: str, names: tuple[str, ...]) -> Claim:
+    severity = _SEVERITY.get(about, Severity.ERROR)
+    if clause.kind is ClauseKind.ASSUMPTION:
+        severity = Severity.NOTE
+    return Claim(about, clause.name, sentence, formula, names, severity, clause.span)

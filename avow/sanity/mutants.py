@@ -1,0 +1,129 @@
+"""Mutants of a formula: near misses of what a contract says, to see whether the evidence for it would notice.
+
+A method that supports a guarantee and would support its mutants as well says nothing of the guarantee: its evidence is
+hollow. Mutants that follow from the original (a weaker claim) are no test of that, and are left out by `telling`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+from avow.formulas.formula import conjunction, normalise
+from avow.formulas.traversal import rebuild
+from avow.language.sorts import REAL, EnumSort, RealSort
+from avow.language.terms import And, Compare, EnumValue, Implies, Literal, Not, Or, Quantified, Term, children
+
+_FLIPPED = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
+
+
+@dataclass(frozen=True, slots=True)
+class Mutant:
+    """`change` says in words what was done; `formula` is the whole formula, changed in one place."""
+
+    change: str
+    formula: Term
+
+
+def mutants(formula: Term) -> tuple[Mutant, ...]:
+    """Every mutant of a formula, in reading order, each meaning once, the original's meaning not at all."""
+    seen = {normalise(formula)}
+    found = []
+    for mutant in (Mutant("the whole is negated", _negated(formula)), *_everywhere(formula)):
+        meaning = normalise(mutant.formula)
+        if meaning not in seen:
+            seen.add(meaning)
+            found.append(mutant)
+    return tuple(found)
+
+
+def telling(
+    formula: Term, assumptions: tuple[Term, ...], limit: int, timeout_ms: int = 2_000, others: tuple[Term, ...] = ()
+) -> tuple[Mutant, ...]:
+    """Up to `limit` mutants that do not follow from the original under the assumptions, spread over the formula; nor
+    from it and the `others`, the node's further guarantees: what keeps the contract keeps such a mutant."""
+    from avow.base.verdict import Verdict
+    from avow.solving.questions import entails
+
+    kept = [
+        m
+        for m in mutants(formula)
+        if entails((*assumptions, formula), m.formula, timeout_ms=timeout_ms).verdict is Verdict.REFUTED
+        and not (
+            others
+            and entails((*assumptions, *others, formula), m.formula, timeout_ms=timeout_ms).verdict is Verdict.PROVED
+        )
+    ]
+    if len(kept) <= limit:
+        return tuple(kept)
+    return tuple(kept[k * len(kept) // limit] for k in range(limit))
+
+
+def _negated(formula: Term) -> Term:
+    """The negation under the universal quantifiers: ``forall x | not F`` denies the claim everywhere, not somewhere."""
+    if isinstance(formula, Quantified) and formula.quantifier.value == "forall":
+        return Quantified(formula.quantifier, formula.variables, _negated(formula.body), formula.span)
+    if isinstance(formula, Implies):
+        return Implies(formula.left, Not(formula.right), formula.span)
+    return Not(formula)
+
+
+def _everywhere(formula: Term) -> Iterator[Mutant]:
+    """Mutants made at each place, by an explicit stack: formulas may be deep."""
+    stack: list[tuple[Term, Callable[[Term], Term]]] = [(formula, lambda t: t)]
+    while stack:
+        term, put = stack.pop()
+        for change, new in _here(term):
+            yield Mutant(change, put(new))
+        parts = children(term)
+        for place in reversed(range(len(parts))):
+            stack.append((parts[place], _at(term, parts, place, put)))
+
+
+def _at(term: Term, parts: tuple[Term, ...], place: int, put: Callable[[Term], Term]) -> Callable[[Term], Term]:
+    return lambda new: put(rebuild(term, (*parts[:place], new, *parts[place + 1 :])))
+
+
+def _here(term: Term) -> Iterator[tuple[str, Term]]:
+    match term:
+        case Literal(value=bool()) | Literal(value=str()):
+            return
+        case Literal(value=value, sort=sort) if isinstance(value, int | Fraction):
+            step: int | Fraction = max(1, abs(int(value)) // 10)
+            for new in (value + step, value - step):
+                if isinstance(sort, RealSort) or new >= 0 or value < 0:
+                    yield f"{_number(value)} becomes {_number(new)}", _literal(new, term)
+        case EnumValue(name=name, sort=EnumSort(members=members) as sort) if len(members) > 1:
+            other = members[(members.index(name) + 1) % len(members)]
+            yield f"{name} becomes {other}", EnumValue(other, sort, term.span)
+        case Compare(operator=operator, left=left, right=right):
+            flipped = _FLIPPED[operator]
+            yield f"{operator} becomes {flipped}", Compare(flipped, left, right, term.span)
+        case And(items=items) if len(items) > 1:
+            for place in range(len(items)):
+                rest = (*items[:place], *items[place + 1 :])
+                yield f"part {place + 1} of a conjunction is dropped", conjunction(rest)
+        case Or(items=items) if len(items) > 1:
+            for place in range(len(items)):
+                rest = (*items[:place], *items[place + 1 :])
+                yield (
+                    f"part {place + 1} of a disjunction is dropped",
+                    rest[0] if len(rest) == 1 else Or(rest, term.span),
+                )
+        case Not(body=body):
+            yield "a negation is dropped", body
+        case Implies(right=right):  # notices a conclusion that a table maps to what always holds
+            yield "a condition is dropped", right
+        case _:
+            return
+
+
+def _literal(value: int | Fraction, old: Literal) -> Term:
+    if isinstance(old.sort, RealSort):
+        return Literal(Fraction(value), REAL, old.span)
+    return Literal(int(value), old.sort, old.span)
+
+
+def _number(value: int | Fraction) -> str:
+    return str(value)

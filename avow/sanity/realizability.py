@@ -1,0 +1,182 @@
+"""Is a contract realizable: for all inputs that it allows, is there an output that meets every guarantee?
+
+Three ways are tried, in short rounds first, and each answer is sound by itself:
+- the question as it stands, given to the solver (where no output is a function);
+- witnesses (`avow.sanity.witnesses`): if no allowed input defeats them all, the contract is realizable;
+- a search for an input that defeats them all, which counts only when the solver shows, with the input's values put in,
+  that *no* output meets the guarantees there; an output found instead becomes another witness, and the search goes on.
+
+Guarantees that share no output are asked about apart: each group is realizable or the contract is not. Sequences are
+taken for functions, tuples for their items, and functions for their values at a point, where that says the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from avow.base.verdict import Verdict
+from avow.formulas.formula import conjunction, free_variables
+from avow.formulas.pointwise import pointwise
+from avow.formulas.sequences import defined, flatten
+from avow.formulas.tuples import untupled
+from avow.language.sorts import SequenceSort
+from avow.language.terms import Term, Variable
+from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
+from avow.solving.limits import budget, now
+
+__all__ = ["Formulas", "Given", "Group", "Question", "Realizability", "Search", "groups", "possible", "realizable"]
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """Is there, for all `inputs` that meet the assumptions, an output that meets the guarantees? `given` fixes some
+    inputs (a scenario): the answer is then about these only. `doubtful`: there likely is not, and inputs without an
+    output are looked for first."""
+
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    assumptions: Formulas
+    guarantees: Formulas
+    given: Given = field(default_factory=dict)
+    timeout_ms: int = 10_000
+    seed: int = 0
+    doubtful: bool = False
+
+    def group(self, labels: Collection[str]) -> Group:
+        """The group that these guarantees belong to."""
+        return next(g for g in groups(self.guarantees, self.outputs) if set(labels) <= set(g.guarantees))
+
+    def search(self, group: Group, timeout_ms: int) -> Search:
+        return Search(self.inputs, group, self.assumptions, self.given, timeout_ms, self.seed)
+
+
+def realizable(
+    inputs: Sequence[Variable],
+    outputs: Sequence[Variable],
+    assumptions: Formulas,
+    guarantees: Formulas,
+    *,
+    given: Given | None = None,
+    timeout_ms: int = 10_000,
+    seed: int = 0,
+    doubtful: bool = False,
+) -> Realizability:
+    """Decide it: see `Question`."""
+    asked = Question(tuple(inputs), tuple(outputs), assumptions, guarantees, given or {}, timeout_ms, seed, doubtful)
+    start = now()
+    with budget(timeout_ms * _ALTOGETHER):
+        for method in (_with_items, _with_functions):
+            answer = method(asked)
+            if answer is not None:
+                return answer
+        left = max(100, timeout_ms - int((now() - start) * 1000))
+        return _grouped(replace(asked, timeout_ms=left))
+
+
+def possible(formulas: Formulas, *, timeout_ms: int, seed: int = 0) -> bool:
+    """Whether formulas hold together for some values: as the question whether some output meets them, where there are
+    no inputs. It helps where functions are wanted that are no tables, such as ``f(x) = x``. False proves nothing."""
+    wanted = sorted(frozenset().union(*map(free_variables, formulas.values())), key=lambda v: v.qualified)
+    return realizable((), wanted, {}, formulas, timeout_ms=timeout_ms, seed=seed).verdict is Verdict.PROVED
+
+
+_ALTOGETHER = 1.2
+"""The share of the limit for everything that is done, as long as it comes to an end by itself."""
+
+
+def _grouped(asked: Question) -> Realizability:
+    needed: set[str] = set()
+    engines: list[str] = []
+    open_question: Realizability | None = None
+    for group in groups(asked.guarantees, asked.outputs):
+        answer = _at_a_point(asked, group) or asked.search(group, asked.timeout_ms).decide(asked.doubtful)
+        if answer.verdict is Verdict.REFUTED:
+            return answer
+        if answer.verdict is not Verdict.PROVED:
+            open_question = open_question or answer
+        needed |= set(answer.needed)
+        engines.append(answer.engine)
+    if open_question is not None:
+        return open_question
+    ordered = tuple(label for label in asked.assumptions if label in needed)
+    return Realizability(Verdict.PROVED, needed=ordered, engine=", ".join(dict.fromkeys(engines)) or "z3")
+
+
+def _at_a_point(asked: Question, group: Group) -> Realizability | None:
+    """Decide one group with values in the place of functions; None if that is not possible, or not decided."""
+    there = pointwise(group.guarantees, group.outputs)
+    if there is None:
+        return None
+    inputs = (*asked.inputs, *there.point)
+    search = replace(asked, inputs=inputs).search(Group(there.guarantees, there.outputs), asked.timeout_ms // 2)
+    answer = search.decide(asked.doubtful)
+    if answer.verdict is Verdict.UNKNOWN:
+        return None
+    return replace(answer, inputs={v: value for v, value in answer.inputs.items() if v not in there.point})
+
+
+def _with_items(asked: Question) -> Realizability | None:
+    """Decide it with its items in the place of each tuple; None if there are none, or that does not help."""
+    formulas = {(True, label): formula for label, formula in asked.assumptions.items()}
+    formulas |= {(False, label): formula for label, formula in asked.guarantees.items()}
+    apart = untupled(formulas, [v for v in (*asked.inputs, *asked.outputs) if v not in asked.given])
+    if apart is None:
+        return None
+    assumed, wanted = _halves(apart.formulas)
+    answer = realizable(
+        apart.variables(asked.inputs),
+        apart.variables(asked.outputs),
+        assumed,
+        wanted,
+        given=asked.given,
+        timeout_ms=asked.timeout_ms // 2,
+        seed=asked.seed,
+        doubtful=asked.doubtful,
+    )
+    if answer.verdict is not Verdict.REFUTED:
+        return answer if answer.verdict is Verdict.PROVED else None
+    labels = tuple(asked.group(answer.group).guarantees)
+    return replace(answer, inputs=apart.values(asked.inputs, answer.inputs), group=labels)
+
+
+def _with_functions(asked: Question) -> Realizability | None:
+    """Decide it with functions in the place of sequences; None if that is not possible, or does not help.
+
+    An output counts only if no element outside it matters. An input without such an output is then asked about as it
+    stands: some other output may do there.
+    """
+    inputs, outputs = asked.inputs, asked.outputs
+    sequences = [v for v in (*inputs, *outputs) if isinstance(v.sort, SequenceSort) and v not in asked.given]
+    formulas = {(True, label): formula for label, formula in asked.assumptions.items()}
+    formulas |= {
+        (False, label): conjunction((formula, defined(formula, [v for v in outputs if v in sequences])))
+        for label, formula in asked.guarantees.items()
+    }
+    flat = flatten(formulas, sequences) if sequences else None
+    if flat is None:
+        return None
+    assumed, wanted = _halves(flat.formulas)
+    changed = replace(
+        asked,
+        inputs=flat.variables(inputs),
+        outputs=flat.variables(outputs),
+        assumptions=assumed,
+        guarantees=wanted,
+        timeout_ms=asked.timeout_ms // 2,
+    )
+    answer = _grouped(changed)
+    if answer.verdict is Verdict.REFUTED:
+        values = flat.values(answer.inputs)
+        at = None if values is None else {v: values[v] for v in inputs if v in values}
+        limit = asked.timeout_ms // 4
+        return asked.search(asked.group(answer.group), limit).judge(at, limit) if at is not None else None
+    return answer if answer.verdict is Verdict.PROVED else None
+
+
+def _halves(formulas: Mapping[tuple[bool, str], Term]) -> tuple[dict[str, Term], dict[str, Term]]:
+    """Assumptions and guarantees, put together for a change."""
+    assumed, wanted = (
+        {label: formula for (kind, label), formula in formulas.items() if kind is which} for which in (True, False)
+    )
+    return assumed, wanted

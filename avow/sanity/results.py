@@ -1,0 +1,100 @@
+"""Results of the sanity analysis, and the limits on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from avow.base.diagnostics import Severity, Span
+from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.sanity.claims import Property
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Limits on the analysis of a node: milliseconds for one question whose answer makes a contract good or bad (a
+    third of it for warnings and notes; less, the more time went into questions that stayed open), and the solver's
+    seed."""
+
+    milliseconds: int = 3_000
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class SanityResult:
+    """What became of one claim. `subject` is the clause or output that the claim is about, if it is about one."""
+
+    node: str
+    about: Property
+    subject: str | None
+    name: str
+    """``realizable``, ``vacuous-G1``."""
+    claim: str
+    verdict: Verdict
+    severity: Severity
+    clauses: tuple[str, ...] = ()
+    """The clauses that a refutation or a proof rests on (of a conflict: the first one's), without the node's name."""
+    counterexample: Counterexample | None = None
+    explanation: str = ""
+    conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
+    """Every conflict found: a minimal set of clauses that cannot all be met, with an input and what each demands."""
+    because: str | None = None
+    """The name of the result of which this one is a mere consequence."""
+    engine: str = "z3"
+    bounded: bool = False
+    """The answer is about the scenario only."""
+    seconds: float = 0.0
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def fails(self) -> bool:
+        """Whether it is reason enough to call the contract bad."""
+        return self.verdict is Verdict.REFUTED and self.severity is Severity.ERROR
+
+
+@dataclass(slots=True)
+class Patience:
+    """How long one question may take, in milliseconds: less, the more time went into claims that stayed open."""
+
+    full: int
+    lost: float = 0.0
+
+    def lose(self, seconds: float) -> None:
+        self.lost += seconds
+
+    def milliseconds(self, serious: bool) -> int:
+        """What is merely worth knowing is not worth waiting for."""
+        share = 1 / (1 + self.lost * 1000 / self.full)
+        return max(1, int(self.full * share) // (1 if serious else 3))
+
+
+def as_outcome(identity: str, node: str, name: str, result: SanityResult | None) -> Outcome:
+    """A result as the outcome of an obligation; None says that there is no such claim."""
+    if result is None:
+        return Outcome(identity, Verdict.ERROR, f"{node} has no sanity claim named {name}")
+    details: dict[str, object] = {"severity": str(result.severity), "clauses": list(result.clauses)}
+    if result.because:
+        details["because"] = result.because
+    if result.conflicts:
+        details["conflicts"] = [{"clauses": list(c), "counterexample": e.text()} for c, e in result.conflicts]
+    return Outcome(
+        identity,
+        result.verdict,
+        result.explanation or _SUMMARY[result.verdict],
+        result.counterexample,
+        bound={"scenario": True} if result.bounded else {},
+        details=details,
+    )
+
+
+_SUMMARY = {
+    Verdict.PROVED: "proved for all inputs",
+    Verdict.CHECKED: "holds within the scenario",
+    Verdict.REFUTED: "does not hold",
+    Verdict.UNKNOWN: "the solver could not decide it",
+}
+
+
+def listing(labels: Sequence[str]) -> str:
+    """``a, b and c``."""
+    return labels[0] if len(labels) == 1 else f"{', '.join(labels[:-1])} and {labels[-1]}" if labels else "nothing"

@@ -1,0 +1,411 @@
+"""What the guarantees demand of the outputs, and under which conditions: the raw material of witnesses.
+
+See `avow.sanity.witnesses` for what it is for. Nothing here has to be complete or even right for a verdict to be:
+whatever is made of it is proved to work before it counts. Only the `axioms` must be true of suitable `constants` for
+all inputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from avow.formulas.formula import conjunction, free_variables, negation, substitute
+from avow.formulas.negation_normal_form import push_negations
+from avow.formulas.traversal import depth, subterms
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    NATURAL,
+    REAL,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
+    SetSort,
+    Sort,
+)
+from avow.language.terms import (
+    TRUE,
+    And,
+    Apply,
+    Arithmetic,
+    Compare,
+    Iff,
+    Implies,
+    In,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    Role,
+    SequenceRange,
+    SequenceTerm,
+    SetTerm,
+    Term,
+    Variable,
+    Widen,
+)
+
+MAX_DEPTH = 200
+"""Formulas nested deeper are not searched for witnesses (they remain correct to ask about, only harder)."""
+
+_BOUNDS = 4
+"""Half way between so many numbers, each with each, values are looked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """A function by its defining term over `parameters` (role BOUND)."""
+
+    parameters: tuple[Variable, ...]
+    body: Term
+
+
+@dataclass(slots=True)
+class Candidates:
+    """What the guarantees suggest. `axioms` are true of suitable `constants`, whatever the inputs."""
+
+    outputs: tuple[Variable, ...]
+    constants: list[Variable] = field(default_factory=list)
+    axioms: list[Term] = field(default_factory=list)
+    least: list[Term] = field(default_factory=list)
+    """Axioms too, that not every question needs: a natural number that is chosen is the least one that there is."""
+    values: dict[Variable, list[Term]] = field(default_factory=dict)
+    lower: dict[Variable, list[Definition]] = field(default_factory=dict)
+    upper: dict[Variable, list[Definition]] = field(default_factory=dict)
+    branches: dict[Variable, list[tuple[Definition, Term]]] = field(default_factory=dict)
+    chosen: dict[Sort, list[Term]] = field(default_factory=dict)
+    """Constants with an axiom: the likeliest arguments."""
+    blocks: list[tuple[Term, ...]] = field(default_factory=list)
+    """The same, in the groups in which they were chosen."""
+    pool: dict[Sort, list[Term]] = field(default_factory=dict)
+    floors: dict[Term, Variable] = field(default_factory=dict)
+    bounds: dict[Variable, list[Term]] = field(default_factory=dict)
+    """What an output that is a real number is compared with."""
+    effort: int = 200_000
+    """What is left of it, in visits times conditions. `<=>` is read four ways, so a chain of them would double the work
+    with every link; and what is not read is not suggested, which is sound."""
+
+    def mentions(self, term: Term) -> bool:
+        return any(part in self.outputs for part in subterms(term) if isinstance(part, Variable))
+
+
+def candidates(outputs: Sequence[Variable], assumptions: Iterable[Term], guarantees: Iterable[Term]) -> Candidates:
+    """Read the candidates off a contract's formulas."""
+    found = Candidates(tuple(outputs))
+    for formula in assumptions:
+        if depth(formula) <= MAX_DEPTH:
+            _visit(found, push_negations(formula), {}, (), ())
+    for formula in guarantees:
+        if depth(formula) <= MAX_DEPTH:
+            _visit(found, push_negations(formula), {}, (), ())
+    return found
+
+
+# -- reading the guarantees --------------------------------------------------------------------------------------------
+
+
+def _visit(
+    found: Candidates,
+    term: Term,
+    known: Mapping[Variable, Term],
+    conditions: tuple[Term, ...],
+    open_variables: tuple[Variable, ...],
+) -> None:
+    """`term` (negations pushed in) is demanded under `conditions`, for all `open_variables`.
+
+    `known` maps the bound variables on the way to their constants; `conditions` are in the term's own variables.
+    """
+    found.effort -= 1 + len(conditions)
+    if found.effort <= 0:
+        return
+    if not found.mentions(term):
+        if isinstance(term, Quantified) and term.quantifier is not Quantifier.FORALL:
+            inner = _choose(found, term.variables, [term.body], known)
+            _visit(found, term.body, inner, conditions, open_variables)
+        elif isinstance(term, And):
+            for item in term.items:
+                _visit(found, item, known, conditions, open_variables)
+        _remember(found, term, known)
+        return
+    match term:
+        case And(items=items):
+            for item in items:
+                _visit(found, item, known, conditions, open_variables)
+        case Or(items=items):
+            free = tuple(item for item in items if not found.mentions(item))
+            bound = tuple(item for item in items if found.mentions(item))
+            for item in free:
+                _remember(found, item, known)
+            for item in bound:
+                if found.effort <= 0:
+                    break
+                others = tuple(negation(o) for o in bound if o is not item)
+                _visit(found, item, known, (*conditions, *map(negation, free), *others), open_variables)
+        case Implies(left=left, right=right):
+            _visit(found, Or((negation(left), right)), known, conditions, open_variables)
+        case Iff(left=left, right=right):
+            for one, other in ((left, right), (right, left)):
+                _remember(found, other, known)
+                _visit(found, one, known, (*conditions, other), open_variables)
+                _visit(found, push_negations(Not(one)), known, (*conditions, negation(other)), open_variables)
+        case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
+            for item in body.items if isinstance(body, And) else (body,):
+                guards = [negation(o) for o in _alternatives(item) if not found.mentions(o)]
+                inner = _choose(found, variables, guards, known)
+                _visit(found, item, inner, conditions, (*open_variables, *variables))
+        case Quantified(variables=variables, body=body):
+            for item in body.items if isinstance(body, Or) else (body,):
+                parts = item.items if isinstance(item, And) else (item,)
+                guards = [part for part in parts if not found.mentions(part)]
+                inner = _choose(found, variables, guards, known)
+                # The chosen constants stand for the variables in all that follows, definitions too.
+                here = {v: inner[v] for v in variables}
+                replaced = substitute(item, here)
+                _visit(found, replaced, inner, conditions, open_variables)
+        case _:
+            _atom(found, term, known, conditions, open_variables)
+
+
+def _alternatives(term: Term) -> tuple[Term, ...]:
+    match term:
+        case Or(items=items):
+            return items
+        case Implies(left=left, right=right):
+            return (push_negations(Not(left)), *_alternatives(right))
+        case _:
+            return (term,)
+
+
+def _choose(
+    found: Candidates, variables: Sequence[Variable], guards: Sequence[Term], known: Mapping[Variable, Term]
+) -> dict[Variable, Term]:
+    """A constant for each variable, such that the guards hold of them if they hold of anything."""
+    inner = dict(known)
+    fresh = {}
+    for variable in variables:
+        constant = Variable(Role.BOUND, f"{variable.name} ({len(found.constants) + 1})", variable.sort)
+        found.constants.append(constant)
+        fresh[variable] = constant
+    guard = substitute(conjunction(guards), dict(known))
+    if guard != TRUE:
+        chosen = substitute(guard, fresh)
+        found.axioms.append(Implies(Quantified(Quantifier.EXISTS, tuple(variables), guard), chosen))
+        found.blocks.append(tuple(fresh.values()))
+        if [variable.sort for variable in variables] == [NATURAL]:
+            (variable,) = variables
+            smallest = Implies(guard, Compare("<=", fresh[variable], variable))
+            found.least.append(Quantified(Quantifier.FORALL, (variable,), smallest))
+        for constant in fresh.values():
+            found.chosen.setdefault(constant.sort, []).append(constant)
+    else:
+        for constant in fresh.values():
+            _add(found, constant)
+    return {**inner, **fresh}
+
+
+def _remember(found: Candidates, term: Term, known: Mapping[Variable, Term]) -> None:
+    """Keep the ground terms in a term that knows no output: arguments for constructors."""
+    for part in subterms(term):
+        if part.sort == BOOL or isinstance(part, Quantified | SetTerm | SequenceRange) or found.mentions(part):
+            continue
+        if isinstance(part.sort, FunctionSort | SetSort):
+            continue
+        ground = substitute(part, dict(known))
+        if all(v.role is not Role.BOUND or v in found.constants for v in free_variables(ground)):
+            _add(found, ground)
+
+
+def _add(found: Candidates, term: Term) -> None:
+    terms = found.pool.setdefault(term.sort, [])
+    if term not in terms:
+        terms.append(term)
+
+
+def _atom(
+    found: Candidates,
+    term: Term,
+    known: Mapping[Variable, Term],
+    conditions: tuple[Term, ...],
+    open_variables: tuple[Variable, ...],
+) -> None:
+    """An atom or negated atom that knows an output."""
+    positive = not isinstance(term, Not)
+    atom = term.body if isinstance(term, Not) else term
+    match atom:
+        case Apply(function=Variable() as function, arguments=arguments) if function in found.outputs:
+            definition = _definition(found, function, arguments, conditions, open_variables, known)
+            if definition is not None:
+                side = found.lower if positive else found.upper
+                side.setdefault(function, []).append(definition)
+        case Compare(operator=operator, left=left, right=right):
+            for one, other in ((left, right), (right, left)):
+                if isinstance(one, Apply) and one.function in found.outputs and operator == "==":
+                    assert isinstance(one.function, Variable)
+                    _branch(found, one.function, one.arguments, other, conditions, open_variables, known)
+                else:
+                    _suggest(found, one, other, operator, known)
+        case In(item=Variable() as output, collection=SetTerm(items=items) | SequenceTerm(items=items)):
+            for item in items:
+                _suggest(found, output, item, "==", known)
+    for part in subterms(atom):
+        if not found.mentions(part):
+            _remember(found, part, known)
+
+
+def _suggest(found: Candidates, left: Term, right: Term, operator: str, known: Mapping[Variable, Term]) -> None:
+    """From ``left ~ right``, where the left side holds one output: what that output could be."""
+    while not isinstance(left, Variable):
+        match left:
+            case Widen(term=inner) if isinstance(right, Widen):
+                left, right = inner, right.term
+            case Widen(term=inner) if isinstance(right, Literal) and Fraction(right.value).denominator == 1:
+                left, right = inner, Literal(int(Fraction(right.value)), INTEGER)
+            case Widen(term=inner):
+                left, right = inner, _floor(found, right, known)
+            case Negative(term=inner):
+                left, right = inner, Negative(right, right.sort)
+            case Arithmetic(operator="+", left=one, right=other, sort=sort):
+                if found.mentions(one):
+                    left, right = one, Arithmetic("-", right, other, sort)
+                else:
+                    left, right = other, Arithmetic("-", right, one, sort)
+            case Arithmetic(operator="-", left=one, right=other, sort=sort):
+                if found.mentions(one):
+                    left, right = one, Arithmetic("+", right, other, sort)
+                else:
+                    left, right = other, Arithmetic("-", one, right, sort)
+            case Arithmetic(operator="*", left=one, right=other, sort=RealSort() as sort):
+                if found.mentions(one):
+                    left, right = one, Arithmetic("/", right, other, sort)
+                else:
+                    left, right = other, Arithmetic("/", right, one, sort)
+            case Arithmetic(operator="/", left=one, right=other, sort=sort) if found.mentions(one):
+                left, right = one, Arithmetic("*", right, other, sort)
+            case _:
+                return
+    if left not in found.outputs:
+        return
+    value = substitute(right, dict(known))
+    if any(v.role is Role.BOUND and v not in found.constants for v in free_variables(value)):
+        return
+    options = found.values.setdefault(left, [])
+    near = [value]
+    if operator != "==":
+        near += _neighbours(value)
+        near += _halfway(found, left, value)
+    for option in near:
+        if option not in options:
+            options.append(option)
+
+
+def _floor(found: Candidates, value: Term, known: Mapping[Variable, Term]) -> Term:
+    """A constant for the greatest integer not greater than a number: there is one, but RCL has no term for it."""
+    ground = substitute(value, dict(known))
+    if ground not in found.floors:
+        constant = Variable(Role.BOUND, f"floor ({len(found.constants) + 1})", INTEGER)
+        whole = Widen(constant, REAL)
+        next_one = Arithmetic("+", whole, Literal(Fraction(1), REAL), REAL)
+        found.constants.append(constant)
+        found.axioms.append(And((Compare("<=", whole, ground), Compare("<", ground, next_one))))
+        found.floors[ground] = constant
+    return found.floors[ground]
+
+
+def _halfway(found: Candidates, output: Variable, bound: Term) -> list[Term]:
+    """Between two numbers that a number is compared with lies the one half way."""
+    if not isinstance(output.sort, RealSort):
+        return []
+    others = found.bounds.setdefault(output, [])
+    half = Literal(Fraction(1, 2), REAL)
+    sums = [Arithmetic("+", other, bound, REAL) for other in others if other != bound]
+    others.append(bound)
+    del others[_BOUNDS:]
+    return [Arithmetic("*", half, both, REAL) for both in sums]
+
+
+def _neighbours(value: Term) -> list[Term]:
+    if not isinstance(value.sort, IntegerSort | NaturalSort | RealSort):
+        return []
+    one = Literal(Fraction(1), REAL) if isinstance(value.sort, RealSort) else Literal(1, INTEGER)
+    sort = REAL if isinstance(value.sort, RealSort) else INTEGER
+    return [Arithmetic("+", value, one, sort), Arithmetic("-", value, one, sort)]
+
+
+# -- functions ---------------------------------------------------------------------------------------------------------
+
+
+def _definition(
+    found: Candidates,
+    function: Variable,
+    arguments: Sequence[Term],
+    conditions: Sequence[Term],
+    open_variables: Sequence[Variable],
+    known: Mapping[Variable, Term],
+) -> Definition | None:
+    """The arguments at which a demand is made: where the open variables take values that meet the conditions."""
+    sort = function.sort
+    assert isinstance(sort, FunctionSort)
+    if any(function in free_variables(term) for term in (*arguments, *conditions)):
+        return None
+    outer = {v: t for v, t in known.items() if v not in open_variables}
+    conditions = [substitute(condition, outer) for condition in conditions]
+    arguments = [substitute(argument, outer) for argument in arguments]
+    names = {v.name for term in (*arguments, *conditions) for v in subterms(term) if isinstance(v, Variable)}
+    names |= {v.name for v in open_variables}
+    parameters = []
+    for k, parameter_sort in enumerate(sort.parameters):
+        name = f"p{k}"
+        while name in names:
+            name += "'"
+        parameters.append(Variable(Role.BOUND, name, parameter_sort))
+    rest = list(open_variables)
+    equations: list[Term] = []
+    direct: dict[Variable, Term] = {}
+    for parameter, argument in zip(parameters, arguments, strict=True):
+        if isinstance(argument, Variable) and argument in rest and _stands_for(parameter, argument):
+            rest.remove(argument)
+            direct[argument] = parameter
+            if argument.sort != parameter.sort:
+                equations.append(Compare("<=", Literal(0, INTEGER), parameter))
+        else:
+            equations.append(Compare("==", parameter, argument))
+    body = conjunction(substitute(part, direct) for part in (*conditions, *equations))
+    used = [variable for variable in rest if variable in free_variables(body)]
+    if used:
+        body = Quantified(Quantifier.EXISTS, tuple(used), body)
+    return Definition(tuple(parameters), body)
+
+
+def _stands_for(parameter: Variable, argument: Variable) -> bool:
+    """Whether a function's parameter may stand for a variable (an integer for a natural: where it is not negative)."""
+    return argument.sort == parameter.sort or (argument.sort, parameter.sort) == (NATURAL, INTEGER)
+
+
+def _branch(
+    found: Candidates,
+    function: Variable,
+    arguments: Sequence[Term],
+    value: Term,
+    conditions: Sequence[Term],
+    open_variables: Sequence[Variable],
+    known: Mapping[Variable, Term],
+) -> None:
+    """``out.f(arguments) == value`` is demanded under the conditions."""
+    if value.sort == BOOL or function in free_variables(value):
+        return
+    definition = _definition(found, function, arguments, conditions, open_variables, known)
+    if definition is None:
+        return
+    direct: dict[Variable, Term] = {v: t for v, t in known.items() if v not in open_variables}
+    for parameter, argument in zip(definition.parameters, arguments, strict=True):
+        if isinstance(argument, Variable) and argument in open_variables and _stands_for(parameter, argument):
+            direct.setdefault(argument, parameter)
+    result = substitute(value, direct)
+    if any(v in open_variables for v in free_variables(result)):
+        return
+    found.branches.setdefault(function, []).append((definition, result))

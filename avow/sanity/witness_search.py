@@ -1,0 +1,342 @@
+"""The search for the answer about one group of guarantees: is there an output for all inputs?
+
+See `avow.sanity.realizability` for the ways that are tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from avow.base.verdict import Verdict
+from avow.formulas.formula import conjunction, free_variables, negation, substitute
+from avow.formulas.values import Value
+from avow.language.sorts import REAL, FunctionSort
+from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
+from avow.sanity.witness_candidates import Definition, candidates
+from avow.sanity.witnesses import Cases, Fixed, Witness, instantiate, witnesses
+from avow.solving.limits import now
+from avow.solving.questions import Translator, Unsupported, check, entails, replay, search_tables, solve
+from avow.solving.translation import Expr, Meaning
+from avow.solving.z3_module import z3
+
+_PATIENT_MS = 300
+"""From this much time on for one attempt, all that is known of the chosen constants is told."""
+
+_TRIES = 6
+"""So many inputs for which there is an output after all, one after the other, and something else is tried."""
+
+Formulas = Mapping[str, Term]
+Given = Mapping[Variable, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class Realizability:
+    """The answer. `inputs`, if refuted, leave no output; `needed` labels the assumptions that a proof used."""
+
+    verdict: Verdict
+    inputs: Mapping[Variable, Value] = field(default_factory=dict)
+    group: tuple[str, ...] = ()
+    """The guarantees among which the conflict is."""
+    needed: tuple[str, ...] = ()
+    reason: str = ""
+    engine: str = "z3"
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Guarantees that hang together by the outputs that they share."""
+
+    guarantees: Formulas
+    outputs: tuple[Variable, ...]
+
+
+def groups(guarantees: Formulas, outputs: Sequence[Variable]) -> list[Group]:
+    """Guarantees that share outputs, together; each guarantee without outputs by itself."""
+    found: list[tuple[dict[str, Term], set[Variable]]] = []
+    for label, formula in guarantees.items():
+        mentioned = free_variables(formula) & set(outputs)
+        touching = [g for g in found if g[1] & mentioned]
+        merged = {name: f for g in touching for name, f in g[0].items()} | {label: formula}
+        found = [g for g in found if g not in touching]
+        found.append((merged, set(mentioned).union(*(g[1] for g in touching))))
+    return [
+        Group(
+            {label: formula for label, formula in guarantees.items() if label in members}, _ordered(mentioned, outputs)
+        )
+        for members, mentioned in found
+    ]
+
+
+def _ordered(some: set[Variable] | frozenset[Variable], outputs: Sequence[Variable]) -> tuple[Variable, ...]:
+    return tuple(output for output in outputs if output in some)
+
+
+class Search:
+    """One group's question, with the witnesses found so far."""
+
+    def __init__(
+        self, inputs: Sequence[Variable], group: Group, assumptions: Formulas, given: Given, timeout_ms: int, seed: int
+    ) -> None:
+        self.group = group
+        self.assumptions = assumptions
+        self.given = given
+        self.inputs = tuple(v for v in inputs if v not in given)
+        self.deadline = now() + timeout_ms / 1000
+        self.seed = seed
+        self.found = candidates(group.outputs, assumptions.values(), group.guarantees.values())
+        self.witnesses: list[Witness] = witnesses(self.found)
+        self.read = len(self.witnesses)
+        """So many were read off the contract; what follows these are outputs found for single inputs."""
+        self.reason = ""
+
+    def left(self) -> int:
+        return int((self.deadline - now()) * 1000)
+
+    def decide(self, doubtful: bool = False) -> Realizability:
+        try:
+            return self._decide(doubtful)
+        except Unsupported as error:
+            return Realizability(Verdict.UNKNOWN, reason=f"Avow cannot express {error.what} for the solver")
+        except z3.Z3Exception as error:
+            return Realizability(Verdict.UNKNOWN, reason=f"Z3: {error}")
+
+    def _decide(self, doubtful: bool) -> Realizability:
+        if not self.group.outputs:
+            return self._without_outputs()
+        methods: list[Callable[[int], Realizability | None]] = [self._direct, self._strengthened, self._witnessed]
+        if self.inputs:
+            methods.insert(1 if doubtful else 3, self._refute)
+        for limit in (1_000, 4_000) if doubtful else (300, 1_000, 4_000, 10_000):
+            for method in methods:
+                answer = method(max(50, min(limit, self.left())))
+                if answer is not None:
+                    return answer
+                if self.left() <= 0:
+                    return Realizability(Verdict.UNKNOWN, reason=self.reason or "no answer in time")
+        return Realizability(Verdict.UNKNOWN, reason=self.reason or "no answer in time")
+
+    def _without_outputs(self) -> Realizability:
+        goal = conjunction(self.group.guarantees.values())
+        answer = entails(
+            self.assumptions, goal, timeout_ms=self.left(), seed=self.seed, given=self.given, variables=self.inputs
+        )
+        return Realizability(
+            answer.verdict, answer.values, tuple(self.group.guarantees), answer.needed, answer.reason, answer.engine
+        )
+
+    def _direct(self, limit: int) -> Realizability | None:
+        if any(isinstance(output.sort, FunctionSort) for output in self.group.outputs):
+            return None
+        if any(isinstance(v.sort, FunctionSort) for v in self.inputs):
+            limit = max(50, limit // 3)  # an answer comes at once, or mostly not at all
+        bound = {v: Variable(Role.BOUND, f"any {v.name}", v.sort) for v in self.group.outputs}
+        goal = conjunction(self.group.guarantees.values())
+        never = Quantified(Quantifier.FORALL, tuple(bound.values()), negation(substitute(goal, bound)))
+        label = _unused("no output", self.assumptions)
+        answer = solve(
+            {**self.assumptions, label: never},
+            timeout_ms=limit,
+            seed=self.seed,
+            given=self.given,
+            variables=self.inputs,
+        )
+        if answer.status == "unsat":
+            return Realizability(Verdict.PROVED, needed=tuple(c for c in answer.core if c != label), engine="z3")
+        if answer.status == "sat":
+            return self.judge({**answer.values, **self.given}, limit)
+        self.reason = answer.reason
+        return None
+
+    # -- witnesses -----------------------------------------------------------------------------------------------------
+
+    def _witnessed(self, limit: int) -> Realizability | None:
+        return self._prove(list(self.group.guarantees.values()), limit)
+
+    def _strengthened(self, limit: int) -> Realizability | None:
+        whole = list(self.group.guarantees.values())
+        tried = []
+        for wide, few in ((False, 1), (False, 2), (True, None)):
+            stronger = [instantiate(self.found, guarantee, wide=wide) for guarantee in whole]
+            if stronger != whole and (stronger, few) not in tried:
+                tried.append((stronger, few))
+                answer = self._prove(stronger, limit // 3, few)
+                if answer is not None:
+                    return answer
+        return None
+
+    def _prove(self, guarantees: Sequence[Term], limit: int, few: int | None = None) -> Realizability | None:
+        translator = Translator()
+        fixed = self._fixed(translator)
+        facts = self._defeated(translator, guarantees, fixed, few, limit)
+        if limit >= _PATIENT_MS:
+            facts += [translator.term(axiom, fixed) for axiom in self.found.least]
+        facts += translator.background([*self.inputs, *self.found.constants])
+        tracked = [(label, translator.term(formula, fixed)) for label, formula in self.assumptions.items()]
+        answer = check(translator, facts, tracked=tracked, timeout_ms=limit, seed=self.seed)
+        if answer.status == "unsat":
+            return Realizability(Verdict.PROVED, needed=answer.core, engine="z3, by witnesses")
+        self.reason = answer.reason or self.reason
+        return None
+
+    def _defeated(
+        self,
+        translator: Translator,
+        guarantees: Iterable[Term],
+        meanings: Mapping[Variable, Meaning],
+        few: int | None,
+        limit: int,
+    ) -> list[Expr]:
+        """That the constants are as chosen, and no witness meets the guarantees (of those read off the contract, only
+        the first `few` are asked, and no more than can be written down in `limit` ms)."""
+        end = now() + limit / 1000
+        guarantees = list(guarantees)
+        asked = [*self.witnesses[: self.read][:few], *self.witnesses[self.read :]]
+        facts = [translator.term(axiom, meanings) for axiom in self._axioms(asked, guarantees)]
+        for witness in asked:
+            if now() > end:
+                break
+            try:
+                whole = {**meanings, **meanings_of(translator, witness, meanings)}
+            except Unsupported:  # `<1 upto in.n>` as a value: to suggest less is sound
+                continue
+            met = [*translator.background(witness, whole), *(translator.term(g, whole) for g in guarantees)]
+            facts.append(z3.Not(z3.And(met)))
+        return [*facts, *translator.opaque_facts()]
+
+    def _axioms(self, asked: Iterable[Witness], guarantees: Iterable[Term]) -> list[Term]:
+        """What is known of the constants that these mention, and of those that this mentions in its turn."""
+        wanted = frozenset[Variable]().union(*map(free_variables, guarantees), *map(_mentioned, asked))
+        left, found = dict.fromkeys(self.found.axioms), dict[Term, None]()
+        while fresh := [axiom for axiom in left if free_variables(axiom) & wanted & set(self.found.constants)]:
+            for axiom in fresh:
+                wanted |= free_variables(axiom)
+                found[axiom] = left.pop(axiom)
+        return list(found)
+
+    def _fixed(self, translator: Translator) -> dict[Variable, Meaning]:
+        return {variable: translator.value(value, variable.sort) for variable, value in self.given.items()}
+
+    # -- refutation ----------------------------------------------------------------------------------------------------
+
+    def _refute(self, limit: int) -> Realizability | None:
+        # The first candidate is the likeliest: inputs that defeat it mostly defeat all, and are much easier to find.
+        return self.refute((), limit // 2, 1) or self.refute((), limit // 3)
+
+    def refute(self, possible: Sequence[Formulas], limit: int, few: int | None = None) -> Realizability | None:
+        """Inputs without an output, at which each of the `possible` sets of guarantees could be met by itself; None
+        if none are found in `limit` ms. `few`: only so many witnesses are to be defeated from the start."""
+        end = now() + limit / 1000
+        known = len(self.witnesses)
+        while now() < end and (few is None or len(self.witnesses) < known + _TRIES):
+            inputs = self._defeat(self.group.guarantees, possible, int((end - now()) * 1000), few)
+            if inputs is None:
+                return None
+            before = len(self.witnesses)
+            answer = self.judge(inputs, max(100, limit // 2))
+            if answer is not None or len(self.witnesses) == before:
+                return answer
+        return None
+
+    def _defeat(
+        self, guarantees: Formulas, possible: Sequence[Formulas], limit: int, few: int | None
+    ) -> dict[Variable, Value] | None:
+        """Allowed inputs at which no known witness meets the guarantees, though each of the `possible` sets of
+        guarantees can be met; not judged yet."""
+        translator = Translator()
+        fixed = self._fixed(translator)
+        copies = [
+            {v: Variable(Role.OUTPUT, f"{v.name} ({k})", v.sort) for v in self.group.outputs}
+            for k in range(len(possible))
+        ]
+        constants = [*self.inputs, *self.found.constants, *(v for copy in copies for v in copy.values())]
+        ordinary = [v for v in constants if not isinstance(v.sort, FunctionSort)]
+        functions = [v for v in constants if isinstance(v.sort, FunctionSort)]
+
+        def build(meanings: Mapping[Variable, Meaning]) -> list[Expr]:
+            whole = {**fixed, **meanings}
+            facts = [translator.term(formula, whole) for formula in self.assumptions.values()]
+            for copy, formulas in zip(copies, possible, strict=True):
+                facts += [translator.term(substitute(formula, copy), whole) for formula in formulas.values()]
+            return facts + self._defeated(translator, guarantees.values(), whole, few, limit)
+
+        values = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=self.seed)
+        if values is None:
+            return None
+        return {**{v: values[v] for v in self.inputs}, **self.given}
+
+    def judge(self, inputs: Mapping[Variable, Value], limit: int) -> Realizability | None:
+        """Is there no output at these inputs? If there is one, it becomes a witness."""
+        inputs = {v: value for v, value in inputs.items() if v in self.inputs or v in self.given}
+        if not replay(self.assumptions.values(), inputs, timeout_ms=limit):
+            return None
+        answer = solve(
+            self.group.guarantees,
+            timeout_ms=max(limit, 200),
+            seed=self.seed,
+            given=inputs,
+            variables=self.group.outputs,
+        )
+        if answer.status == "unsat":
+            return Realizability(Verdict.REFUTED, inputs, tuple(self.group.guarantees), engine=answer.engine)
+        if answer.status == "sat" and answer.values.keys() >= set(self.group.outputs):
+            witness = {output: Fixed(answer.values[output]) for output in self.group.outputs}
+            if witness not in self.witnesses:
+                self.witnesses.append(witness)
+        return None
+
+
+def meanings_of(
+    translator: Translator, witness: Witness, inputs: Mapping[Variable, Meaning]
+) -> dict[Variable, Meaning]:
+    """The outputs' meanings under a witness."""
+    meanings: dict[Variable, Meaning] = {}
+    for output, value in witness.items():
+        match value:
+            case Fixed():
+                meanings[output] = translator.value(value.value, output.sort)
+            case Definition():
+                continue
+            case _:
+                term = translator.term(value, inputs)
+                meanings[output] = z3.ToReal(term) if output.sort == REAL and z3.is_int(term) else term
+    for output, value in witness.items():
+        if isinstance(value, Definition):
+            meanings[output] = _function(translator, value, {**inputs, **meanings})
+    return meanings
+
+
+def _function(
+    translator: Translator, definition: Definition, meanings: Mapping[Variable, Meaning]
+) -> Callable[..., Expr]:
+    def function(*arguments: Expr) -> Expr:
+        bound = dict(zip(definition.parameters, arguments, strict=True))
+        if not isinstance(definition, Cases):
+            return translator.term(definition.body, meanings, bound)
+        result = translator.term(definition.default, meanings, bound)
+        for condition, value in reversed(definition.cases):
+            result = z3.If(translator.term(condition, meanings, bound), translator.term(value, meanings, bound), result)
+        return result
+
+    return function
+
+
+def _mentioned(witness: Witness) -> frozenset[Variable]:
+    found: frozenset[Variable] = frozenset()
+    for value in witness.values():
+        match value:
+            case Cases(body=body, cases=cases):
+                found = found.union(free_variables(body), *(free_variables(t) for case in cases for t in case))
+            case Definition(body=body):
+                found |= free_variables(body)
+            case Fixed():
+                pass
+            case _:
+                found |= free_variables(value)
+    return found
+
+
+def _unused(label: str, taken: Mapping[str, object]) -> str:
+    while label in taken:
+        label += "!"
+    return label

@@ -1,0 +1,300 @@
+"""Candidate outputs, read off the guarantees: how `realizable` becomes a question that a solver can answer.
+
+"For all inputs some output" is beyond solvers when asked so. But what a guarantee demands usually says what to
+output: `out.c == move(x, y)`, `out.f(x) <=> p(x)`, `t <= out.n`. Here these become *witnesses*: each output gets a term
+over the inputs, or a defining term if it is a function. Quantified variables on the way to the demand become constants,
+one for each, that satisfy the condition under which the demand is made if anything does (Hilbert's epsilon: adding such
+a constant with its axiom excludes no input). If for all inputs allowed at least one witness meets every guarantee, the
+node is realizable; which of them does may depend on the input (an if-then-else that nobody has to write down).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import islice, pairwise, product
+
+from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.negation_normal_form import push_negations
+from avow.formulas.traversal import depth
+from avow.formulas.values import Value
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    REAL,
+    BoolSort,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
+from avow.language.terms import (
+    FALSE,
+    TRUE,
+    And,
+    Apply,
+    Arithmetic,
+    Construct,
+    EnumValue,
+    Literal,
+    Or,
+    Quantified,
+    Quantifier,
+    Role,
+    SequenceTerm,
+    Term,
+    TupleTerm,
+    Variable,
+    Widen,
+)
+from avow.sanity.witness_candidates import MAX_DEPTH, Candidates, Definition
+
+MAX_PER_OUTPUT = 24
+MAX_WITNESSES = 96
+ARGUMENTS = 12
+"""How many terms are tried for one argument of a constructor or one quantified variable."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cases(Definition):
+    """A function by cases: the first whose condition holds, else the default."""
+
+    cases: tuple[tuple[Term, Term], ...] = ()
+
+    @property
+    def default(self) -> Term:
+        return self.body
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """A concrete value."""
+
+    value: Value
+
+
+Meant = Term | Definition | Fixed
+
+Witness = Mapping[Variable, Meant]
+"""A meaning for every output."""
+
+
+def witnesses(found: Candidates) -> list[Witness]:
+    """Combinations of candidates, the likeliest first; at most `MAX_WITNESSES`."""
+    choices: list[list[Term | Definition]] = []
+    for output in found.outputs:
+        if isinstance(output.sort, FunctionSort):
+            choices.append(list(_functions(found, output, output.sort)))
+        else:
+            terms = _unique([*found.values.get(output, ()), *_ground(found, output.sort)])
+            choices.append(list(islice(terms, MAX_PER_OUTPUT)))
+    result = []
+    for combination in islice(product(*choices), MAX_WITNESSES * 4):
+        witness = _resolve(dict(zip(found.outputs, combination, strict=True)), found)
+        if witness is not None and witness not in result:
+            result.append(witness)
+        if len(result) >= MAX_WITNESSES:
+            break
+    return result
+
+
+def instantiate(found: Candidates, guarantee: Term, *, wide: bool = True) -> Term:
+    """A stronger guarantee: `exists` that concern an output are replaced by their instances at known terms; if not
+    `wide`, only at terms that were read together."""
+    if depth(guarantee) > MAX_DEPTH:
+        return guarantee
+    return _instantiate(found, push_negations(guarantee), wide)
+
+
+# -- functions -------------------------------------------------------------------------------------------------------
+
+
+def _functions(found: Candidates, function: Variable, sort: FunctionSort) -> Iterable[Term | Definition]:
+    if sort.result == BOOL:
+        lower, upper = found.lower.get(function, []), found.upper.get(function, [])
+        parameters = tuple(Variable(Role.BOUND, f"p{k}'''", p) for k, p in enumerate(sort.parameters))
+        least = Definition(parameters, disjunction(_at(d, parameters) for d in lower))
+        most = Definition(parameters, conjunction(negation(_at(d, parameters)) for d in upper))
+        yield least
+        yield most
+        if lower and upper:
+            yield Definition(parameters, conjunction((least.body, most.body)))
+        for definition in lower[:4]:
+            yield Definition(parameters, _at(definition, parameters))
+        yield Definition(parameters, FALSE)
+        yield Definition(parameters, TRUE)
+        return
+    parameters = tuple(Variable(Role.BOUND, f"p{k}'''", p) for k, p in enumerate(sort.parameters))
+    yield from _unique_definitions(_partly_applied(found, parameters, sort))
+    branches = found.branches.get(function, [])
+    for default in _ground(found, sort.result)[:8]:
+        cases = tuple(
+            (_at(d, parameters), substitute(v, dict(zip(d.parameters, parameters, strict=True)))) for d, v in branches
+        )
+        yield Cases(parameters, default, cases)
+    if branches:
+        for value in _ground(found, sort.result)[:4]:
+            yield Definition(parameters, value)
+    yield from _rising(found, parameters, sort)
+
+
+def _partly_applied(found: Candidates, parameters: tuple[Variable, ...], sort: FunctionSort) -> Iterable[Definition]:
+    """Functions that are given, with their first arguments fixed as somewhere in the formulas: where an assumption says
+    that there is a way by naming it (``in.way(in.start, in.goal, k)``), a plan may be just that."""
+    count = len(parameters)
+    for term in found.pool.get(sort.result, ()):
+        if not isinstance(term, Apply) or not isinstance(term.function.sort, FunctionSort) or found.mentions(term):
+            continue
+        if len(term.arguments) >= count and term.function.sort.parameters[-count:] == sort.parameters:
+            yield Definition(parameters, replace(term, arguments=(*term.arguments[:-count], *parameters), span=None))
+
+
+def _rising(found: Candidates, parameters: tuple[Variable, ...], sort: FunctionSort) -> Iterable[Definition]:
+    """Functions of a number that are different everywhere, and grow."""
+    numbers = RealSort | IntegerSort | NaturalSort
+    if [isinstance(s, numbers) for s in (*sort.parameters, sort.result)] != [True, True]:
+        return
+    argument: Term = parameters[0]
+    if isinstance(sort.result, RealSort) and isinstance(argument.sort, IntegerSort | NaturalSort):
+        argument = Widen(argument, REAL)
+    if isinstance(argument.sort, RealSort) is not isinstance(sort.result, RealSort):
+        return
+    yield Definition(parameters, argument)
+    whole = REAL if isinstance(sort.result, RealSort) else INTEGER
+    few = [Literal(Fraction(k), REAL) if whole == REAL else Literal(k, INTEGER) for k in (1, 2)]
+    for start in (*few, *_ground(found, sort.result)[:4]):
+        yield Definition(parameters, Arithmetic("+", argument, start, whole))
+
+
+def _unique_definitions(definitions: Iterable[Definition]) -> Iterable[Definition]:
+    seen: list[Definition] = []
+    for definition in definitions:
+        if definition not in seen:
+            seen.append(definition)
+            yield definition
+
+
+def _at(definition: Definition, parameters: Sequence[Variable]) -> Term:
+    return substitute(definition.body, dict(zip(definition.parameters, parameters, strict=True)))
+
+
+# -- ground terms ------------------------------------------------------------------------------------------------------
+
+
+def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
+    """Terms of a sort, without outputs: those seen in the guarantees, and the simplest ones."""
+    seen = [*found.chosen.get(sort, ()), *(term for term in found.pool.get(sort, ()) if not found.mentions(term))]
+    match sort:
+        case BoolSort():
+            return [TRUE, FALSE]
+        case EnumSort(members=members):
+            return list(_unique([*(EnumValue(m, sort) for m in members), *seen]))
+        case NaturalSort():
+            return list(_unique([*seen, Literal(0, sort)]))
+        case IntegerSort():
+            naturals = found.pool.get(NaturalSort(), ())
+            return list(_unique([*seen, *naturals, Literal(0, sort)]))
+        case RealSort():
+            return list(_unique([*seen, Literal(Fraction(0), sort)]))
+        case StringSort():
+            return list(_unique([*seen, Literal("", sort)]))
+        case DataSort(constructors=constructors) if level < 2:
+            made: list[Term] = []
+            for constructor in constructors:
+                pools = [_ground(found, parameter, level + 1) for parameter in constructor.parameters]
+                combinations = sorted(product(*(list(enumerate(pool))[:ARGUMENTS] for pool in pools)), key=_spread)
+                made.extend(
+                    Construct(constructor.name, tuple(term for _, term in combination), sort)
+                    for combination in combinations[:12]
+                )
+            return list(_unique([*seen, *made]))
+        case TupleSort(items=items) if level < 2:
+            pools = [_ground(found, item, level + 1) for item in items]
+            combinations = sorted(product(*(list(enumerate(pool))[:ARGUMENTS] for pool in pools)), key=_spread)
+            return list(_unique([*seen, *(TupleTerm(tuple(t for _, t in c), sort) for c in combinations[:12])]))
+        case SequenceSort():
+            return list(_unique([*seen, SequenceTerm((), sort)]))
+        case OpaqueSort() if not seen:
+            # Nothing in the contract names an element, but the sort is not empty: any constant is one.
+            constant = Variable(Role.BOUND, f"{sort.name} (some)", sort)
+            if constant not in found.constants:
+                found.constants.append(constant)
+            return [constant]
+        case _:
+            return seen
+
+
+def _spread(combination: tuple[tuple[int, Term], ...]) -> tuple[int, int]:
+    """Arguments that were read together (neighbours in the pool) come first: ``move(x, y)`` before ``move(x, x)``."""
+    positions = [position for position, _ in combination]
+    steps = sum(abs(later - earlier - 1) for earlier, later in pairwise(positions))
+    return steps, sum(positions)
+
+
+def _unique(terms: Iterable[Term]) -> Iterable[Term]:
+    seen: list[Term] = []
+    for term in terms:
+        if term not in seen:
+            seen.append(term)
+            yield term
+
+
+def _resolve(choice: Mapping[Variable, Term | Definition], found: Candidates) -> Witness | None:
+    """Put the chosen terms of other outputs where a candidate mentions them; None for a circle."""
+    outputs = set(found.outputs)
+    terms = {output: value for output, value in choice.items() if not isinstance(value, Definition)}
+    mentioned = {output: free_variables(value) & outputs for output, value in terms.items()}
+    done: dict[Variable, Term] = {}
+    while len(done) < len(terms):
+        ready = [output for output in terms if output not in done and mentioned[output] <= done.keys()]
+        if not ready:
+            return None
+        for output in ready:
+            done[output] = substitute(terms[output], {other: done[other] for other in mentioned[output]})
+    terms = done
+    witness: dict[Variable, Meant] = {}
+    for output, value in choice.items():
+        if not isinstance(value, Definition):
+            witness[output] = terms[output]
+            continue
+        parts = (
+            [value.body, *(part for case in value.cases for part in case)] if isinstance(value, Cases) else [value.body]
+        )
+        if any(free_variables(part) & outputs - set(terms) for part in parts):
+            return None  # a function defined by another function that is an output: not tried
+        witness[output] = value
+    return witness
+
+
+def _instantiate(found: Candidates, term: Term, wide: bool) -> Term:
+    match term:
+        case And(items=items):
+            return And(tuple(_instantiate(found, item, wide) for item in items))
+        case Or(items=items):
+            return Or(tuple(_instantiate(found, item, wide) for item in items))
+        case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
+            return Quantified(Quantifier.FORALL, variables, _instantiate(found, body, wide))
+        case Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=body) if found.mentions(body):
+            inner = _instantiate(found, body, wide)
+            places = _places(found, variables, wide)
+            instances = [substitute(inner, dict(zip(variables, place, strict=True))) for place in places]
+            return disjunction(instances) if instances else term
+        case _:
+            return term
+
+
+def _places(found: Candidates, variables: Sequence[Variable], wide: bool) -> list[tuple[Term, ...]]:
+    sorts = [variable.sort for variable in variables]
+    if not wide:
+        return [block for block in found.blocks if [term.sort for term in block] == sorts]
+    pools = [list(enumerate(_ground(found, sort)))[:ARGUMENTS] for sort in sorts]
+    combinations = sorted(product(*pools), key=_spread)[:24]
+    return [tuple(term for _, term in combination) for combination in combinations]

@@ -1,0 +1,233 @@
+"""What would make it hold? The weakest further assumption under which hypotheses imply a goal.
+
+Where an entailment fails, `remedy` eliminates all variables but those that one may assume something about (a node's
+inputs, say) from "the hypotheses imply the goal", and reads the result back as a term of the contract. It works where
+quantifier elimination does: linear arithmetic, enumerations and truth values; no functions, no strings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from avow.base.verdict import Verdict
+from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.negation_normal_form import push_negations
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    REAL,
+    BoolSort,
+    EnumSort,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
+)
+from avow.language.terms import (
+    FALSE,
+    TRUE,
+    And,
+    Arithmetic,
+    Compare,
+    EnumValue,
+    Iff,
+    Implies,
+    Literal,
+    Or,
+    Quantified,
+    Quantifier,
+    Role,
+    Term,
+    Variable,
+    Widen,
+)
+from avow.solving.limits import watchdog
+from avow.solving.questions import entails, solve
+from avow.solving.translation import Expr, Translator, Unsupported
+from avow.solving.z3_module import z3
+
+
+@dataclass(frozen=True, slots=True)
+class Remedy:
+    """An assumption with which the goal follows. `weakest` says that no weaker one about these variables would do."""
+
+    assumption: Term
+    weakest: bool
+
+
+def remedy(
+    hypotheses: Mapping[str, Term], goal: Term, about: Collection[Variable], *, timeout_ms: int = 5_000
+) -> Remedy | None:
+    """The weakest assumption about the variables `about` that makes the hypotheses imply the goal.
+
+    None where there is none (it would contradict the hypotheses), or none can be found or read back in time. What is
+    returned has been checked: with it the goal is proved, and it can hold together with the hypotheses.
+    """
+    whole = Implies(conjunction(hypotheses.values()), goal)
+    others = sorted(free_variables(whole) - frozenset(about), key=lambda v: (v.qualified, repr(v.sort)))
+    if not eliminable(whole):
+        return None
+    renamed = {v: Variable(Role.BOUND, f"any {v.qualified}", v.sort) for v in others}
+    body = substitute(whole, renamed)
+    exact: Term = Quantified(Quantifier.FORALL, tuple(renamed.values()), body) if renamed else body
+    try:
+        raw = _eliminate(exact, timeout_ms)
+    except (Unsupported, z3.Z3Exception, RecursionError):  # what is too deep to be read back is no use to anyone
+        return None
+    if raw is None:
+        return None
+    found = _simplified(raw, hypotheses, goal, timeout_ms)
+    together = {**hypotheses, "the remedy": found}
+    if len(together) == len(hypotheses) or solve(together, timeout_ms=timeout_ms).status != "sat":
+        return None
+    if entails(together, goal, timeout_ms=timeout_ms).verdict is not Verdict.PROVED:
+        return None
+    # Weaker than every assumption that would do, as far as the hypotheses leave a difference.
+    context = [h for h in hypotheses.values() if free_variables(h) <= frozenset(about)]
+    weakest = entails([*context, exact], found, timeout_ms=timeout_ms).verdict is Verdict.PROVED
+    return Remedy(found, weakest)
+
+
+_ELIMINABLE = (BoolSort, RealSort, IntegerSort, NaturalSort, EnumSort)
+
+
+def eliminable(term: Term) -> bool:
+    """Whether all the term's free variables have sorts that `remedy` can do something with."""
+    return all(isinstance(v.sort, _ELIMINABLE) for v in free_variables(term))
+
+
+def _eliminate(formula: Term, timeout_ms: int) -> Term | None:
+    translator = Translator()
+    goal = z3.Goal(ctx=translator.context)
+    goal.add(translator.term(formula))
+    chain = z3.Then(
+        z3.Tactic("simplify", ctx=translator.context),
+        z3.Tactic("qe", ctx=translator.context),
+        z3.Tactic("ctx-simplify", ctx=translator.context),
+        ctx=translator.context,
+    )
+    with watchdog(timeout_ms, translator.context.interrupt):  # Z3's own limit is sometimes missed
+        result = z3.TryFor(chain, timeout_ms)(goal)
+    free = {v.qualified: v for v in free_variables(formula)}
+    reader = _Reader(translator, free)
+    options = [conjunction(reader.formula(expr) for expr in subgoal) for subgoal in result]
+    return push_negations(disjunction(options))
+
+
+def _simplified(term: Term, hypotheses: Mapping[str, Term], goal: Term, timeout_ms: int) -> Term:
+    """Without the parts that the hypotheses make superfluous: alternatives that they exclude or that are stronger than
+    another, conditions that they imply."""
+    known = list(hypotheses.values())
+    limit = min(timeout_ms, 1_000)
+    alternatives = list(term.items) if isinstance(term, Or) else [term]
+    kept: list[Term] = []
+    for alternative in alternatives:
+        parts = list(alternative.items) if isinstance(alternative, And) else [alternative]
+        if solve([*known, *parts], timeout_ms=limit).status == "unsat":
+            continue
+        for part in tuple(parts):
+            rest = [p for p in parts if p is not part]
+            # Weaken an alternative as far as it still does its work.
+            if entails([*known, *rest], goal, timeout_ms=limit).verdict is Verdict.PROVED:
+                parts = rest
+        kept.append(conjunction(parts))
+    for one in tuple(kept):
+        others = [k for k in kept if k is not one]
+        if others and entails([*known, one], disjunction(others), timeout_ms=limit).verdict is Verdict.PROVED:
+            kept = others
+    return disjunction(kept)
+
+
+class _Reader:
+    """Z3 expressions, back to terms. Raises Unsupported for what has no counterpart."""
+
+    def __init__(self, translator: Translator, free: Mapping[str, Variable]) -> None:
+        self.free = free
+        self.members: dict[str, EnumValue] = {}
+        for variable in free.values():
+            if isinstance(variable.sort, EnumSort):
+                datatype = translator.sort(variable.sort)
+                for k, member in enumerate(variable.sort.members):
+                    self.members[datatype.constructor(k).name()] = EnumValue(member, variable.sort)
+
+    def formula(self, expr: Expr) -> Term:
+        parts = expr.children() if z3.is_app(expr) else []
+        if z3.is_true(expr):
+            return TRUE
+        if z3.is_false(expr):
+            return FALSE
+        if z3.is_not(expr):
+            return negation(self.formula(parts[0]))
+        if z3.is_and(expr):
+            return conjunction(map(self.formula, parts))
+        if z3.is_or(expr):
+            return disjunction(map(self.formula, parts))
+        if z3.is_implies(expr):
+            return Implies(self.formula(parts[0]), self.formula(parts[1]))
+        if z3.is_eq(expr) or z3.is_distinct(expr):
+            if z3.is_bool(parts[0]):
+                same: Term = Iff(self.formula(parts[0]), self.formula(parts[1]))
+                return same if z3.is_eq(expr) else negation(same)
+            return self._compare("==" if z3.is_eq(expr) else "!=", expr)
+        for test, operator in ((z3.is_le, "<="), (z3.is_lt, "<"), (z3.is_ge, ">="), (z3.is_gt, ">")):
+            if test(expr):
+                return self._compare(operator, expr)
+        if z3.is_app_of(expr, z3.Z3_OP_DT_IS):
+            member = self.members.get(expr.decl().params()[0].name())
+            if member is not None:
+                return Compare("==", self.term(parts[0]), member)
+        if z3.is_const(expr) and z3.is_bool(expr) and expr.decl().name() in self.free:
+            return self.free[expr.decl().name()]
+        raise Unsupported(f"the condition {expr}")
+
+    def _compare(self, operator: str, expr: Expr) -> Term:
+        left, right = (self.term(part) for part in expr.children())
+        if isinstance(left.sort, RealSort) != isinstance(right.sort, RealSort):
+            left, right = _widened(left), _widened(right)
+        if isinstance(right, Variable) and not isinstance(left, Variable):
+            left, right, operator = right, left, _MIRRORED.get(operator, operator)
+        return Compare(operator, left, right)
+
+    def term(self, expr: Expr) -> Term:
+        if z3.is_int_value(expr):
+            return Literal(int(expr.as_long()), INTEGER)
+        if z3.is_rational_value(expr):
+            return Literal(Fraction(expr.numerator_as_long(), expr.denominator_as_long()), REAL)
+        if z3.is_const(expr):
+            name = expr.decl().name()
+            if name in self.free:
+                return self.free[name]
+            if name in self.members:
+                return self.members[name]
+        if z3.is_to_real(expr):
+            return _widened(self.term(expr.children()[0]))
+        for test, operator in ((z3.is_add, "+"), (z3.is_sub, "-"), (z3.is_mul, "*")):
+            if test(expr):
+                first, *rest = (self.term(part) for part in expr.children())
+                sort = REAL if z3.is_real(expr) else INTEGER
+                for part in rest:
+                    first = _arithmetic(operator, first, part, sort)
+                return first
+        raise Unsupported(f"the term {expr}")
+
+
+_MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+
+
+def _arithmetic(operator: str, left: Term, right: Term, sort: RealSort | IntegerSort) -> Term:
+    if operator == "+" and isinstance(right, Arithmetic) and right.operator == "*" and _is_minus_one(right.left):
+        return Arithmetic("-", left, right.right, sort)
+    return Arithmetic(operator, left, right, sort)
+
+
+def _is_minus_one(term: Term) -> bool:
+    return isinstance(term, Literal) and term.sort != BOOL and term.value == -1
+
+
+def _widened(term: Term) -> Term:
+    if isinstance(term.sort, RealSort):
+        return term
+    if isinstance(term, Literal) and not isinstance(term.value, str):
+        return Literal(Fraction(term.value), REAL)
+    return Widen(term, REAL)

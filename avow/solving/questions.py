@@ -1,0 +1,479 @@
+"""Questions to the solver: satisfiable? entailed? Every answer is bounded in (processor) time, none taken on trust.
+
+`solve` asks whether some formulas hold together, `entails` whether some imply another. A model is shown, and a
+refutation reported, only after it has been replayed: its values put into the formulas, and the result proved true under
+every interpretation of what lies outside partial operations. What cannot be replayed is `unknown`.
+
+A total function over an infinite domain has no finite description in general; where the solver finds no model,
+functions with finitely many exceptions (a table and a default) are tried: what is found among them is a model.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+
+from avow.base.verdict import Counterexample, Verdict
+from avow.formulas.formula import conjunction, free_variables, negation
+from avow.formulas.sequences import defined, flatten
+from avow.formulas.traversal import subterms
+from avow.formulas.values import FunctionValue, Value
+from avow.language.sorts import (
+    BOOL,
+    FunctionSort,
+    OpaqueSort,
+    SequenceSort,
+    Sort,
+    components,
+)
+from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
+from avow.solving.checking import (
+    DEFAULT_TIMEOUT_MS,
+    Answer,
+    Engine,
+    Status,
+    check,
+    with_small_numbers,
+    z3_version,
+)
+from avow.solving.counterexample import show_values
+from avow.solving.limits import allowed, budget, now
+from avow.solving.models import Model
+from avow.solving.translation import Expr, Meaning, Translator, Unsupported
+from avow.solving.z3_module import z3
+
+__all__ = [
+    "Answer",
+    "Entailment",
+    "Model",
+    "Solution",
+    "Translator",
+    "Unsupported",
+    "check",
+    "entails",
+    "replay",
+    "search_tables",
+    "solve",
+    "z3_version",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """The answer to one question about terms. `values`, with `sat`, have been replayed.
+
+    `core` (with `unsat`) are the labels of a minimal set of formulas that conflict.
+    """
+
+    status: Status
+    values: Mapping[Variable, Value] = field(default_factory=dict)
+    core: tuple[str, ...] = ()
+    reason: str = ""
+    engine: str = "z3"
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Entailment:
+    """Whether hypotheses imply a goal. `needed` are the labels of the hypotheses that a proof rests on: without any,
+    the goal is true by itself; `vacuous` says that the hypotheses contradict each other."""
+
+    verdict: Verdict
+    counterexample: Counterexample | None = None
+    values: Mapping[Variable, Value] = field(default_factory=dict)
+    needed: tuple[str, ...] = ()
+    vacuous: bool = False
+    reason: str = ""
+    engine: str = "z3"
+    seconds: float = 0.0
+
+
+# -- terms -------------------------------------------------------------------------------------------------------------
+
+
+def solve(
+    formulas: Mapping[str, Term] | Iterable[Term],
+    *,
+    timeout_ms: int = DEFAULT_TIMEOUT_MS,
+    seed: int = 0,
+    variables: Iterable[Variable] = (),
+    given: Mapping[Variable, Value] | None = None,
+    shown: bool = True,
+) -> Solution:
+    """Can all formulas hold together? With labels, `unsat` names a minimal conflicting set of them.
+
+    `variables` are further variables whose values are wanted; `given` fixes the values of some. Unsupported constructs,
+    time-outs and models that cannot be replayed are `unknown`, with the reason. If the values need not be `shown`, then
+    they may be missing: polynomials can be solved by numbers that have no exact decimal.
+    """
+    start = time.monotonic()
+    labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
+    free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
+    with budget(timeout_ms * _ALTOGETHER):
+        try:
+            solution = _within_bounds(labelled, free, given or {}, timeout_ms, seed) or _solve(
+                Translator(), labelled, free, given or {}, timeout_ms, seed
+            )
+        except Unsupported as error:
+            solution = Solution("unknown", reason=f"Avow cannot express {error.what} for the solver")
+        except z3.Z3Exception as error:
+            solution = Solution("unknown", reason=f"Z3: {error}")
+        if solution.status == "unknown" and not shown and _has_solution(labelled, free, given or {}, timeout_ms, seed):
+            solution = Solution("sat")
+        patient = solution.status == "unknown" and not given and timeout_ms >= _PATIENT_MS
+        if patient and allowed(timeout_ms):
+            solution = _second_opinion(labelled, timeout_ms) or solution
+    return Solution(
+        solution.status,
+        solution.values,
+        solution.core,
+        solution.reason,
+        solution.engine,
+        time.monotonic() - start,
+    )
+
+
+def entails(
+    hypotheses: Mapping[str, Term] | Iterable[Term],
+    goal: Term,
+    *,
+    timeout_ms: int = DEFAULT_TIMEOUT_MS,
+    seed: int = 0,
+    variables: Iterable[Variable] = (),
+    given: Mapping[Variable, Value] | None = None,
+) -> Entailment:
+    """Do the hypotheses imply the goal, for all values of the free variables?"""
+    labelled = (
+        dict(hypotheses) if isinstance(hypotheses, Mapping) else {f"H{k}": h for k, h in enumerate(hypotheses, start=1)}
+    )
+    denied = "the goal is false"
+    while denied in labelled:
+        denied += "!"
+    asked = {**labelled, denied: negation(goal)}
+    solution = solve(asked, timeout_ms=timeout_ms, seed=seed, variables=variables, given=given)
+    reason, engine, seconds = solution.reason, solution.engine, solution.seconds
+    match solution.status:
+        case "unsat":
+            needed = tuple(label for label in solution.core if label != denied)
+            vacuous = bool(solution.core) and denied not in solution.core
+            return Entailment(Verdict.PROVED, needed=needed, vacuous=vacuous, engine=engine, seconds=seconds)
+        case "sat":
+            shown = Counterexample(show_values(solution.values))
+            return Entailment(Verdict.REFUTED, shown, solution.values, engine=engine, seconds=seconds)
+        case _:
+            return Entailment(Verdict.UNKNOWN, reason=reason, engine=engine, seconds=seconds)
+
+
+def replay(
+    formulas: Iterable[Term],
+    values: Mapping[Variable, Value],
+    *,
+    timeout_ms: int = 5_000,
+    beside: Translator | None = None,
+) -> bool | None:
+    """Do the formulas hold of these values, whatever partial operations yield outside their domains?
+
+    True only if that is proved; False if some formula is proved false; None if neither could be shown. An unspecified
+    sort has the elements that the values name, and up to three more if the formulas hold only then. A translator of the
+    same formulas, if there is one, lends its context.
+    """
+    formulas = tuple(formulas)
+    unspecified = sorted({sort for f in formulas for sort in _opaque_sorts(f)}, key=lambda sort: sort.name)
+    try:
+        for more in range(4 if unspecified else 1):
+            found = _replay(Translator(beside), formulas, values, unspecified, more, timeout_ms)
+            if found or not unspecified:
+                return found
+    except (Unsupported, z3.Z3Exception):
+        pass
+    return None
+
+
+def _replay(
+    translator: Translator,
+    formulas: Sequence[Term],
+    values: Mapping[Variable, Value],
+    unspecified: Sequence[OpaqueSort],
+    more: int,
+    timeout_ms: int,
+) -> bool | None:
+    meanings = {variable: translator.value(value, variable.sort) for variable, value in values.items()}
+    for sort in unspecified:
+        translator.add_elements(sort, more)
+    facts = [*translator.background(values, meanings), *(translator.term(f, meanings) for f in formulas)]
+    known = translator.opaque_facts()
+    whole = z3.And(facts) if facts else translator.true()
+    denied = [*known, z3.Not(whole)]
+    attempts: tuple[tuple[Engine, int], ...] = (
+        ("smt", min(500, timeout_ms)),
+        ("qsat", timeout_ms),
+        ("smt", timeout_ms),
+    )
+    for engine, limit in attempts:
+        status = check(translator, denied, timeout_ms=limit, engine=engine).status
+        if status == "unsat":
+            return True
+        if status == "sat":
+            break
+    if check(translator, [*known, whole], timeout_ms=timeout_ms).status == "unsat":
+        return False
+    return None
+
+
+def _opaque_sorts(formula: Term) -> set[OpaqueSort]:
+    """The unspecified sorts that a formula's terms and bound variables have, or have as parts."""
+    sorts: dict[Sort, None] = {}
+    for part in subterms(formula):
+        sorts[part.sort] = None
+        if isinstance(part, Quantified):
+            sorts.update((variable.sort, None) for variable in part.variables)
+    return {sort for sort in components(*sorts) if isinstance(sort, OpaqueSort)}
+
+
+_ROUNDS = ((0.025, 0.1), (0.1, 0.2), (0.275, 0.3))
+"""Parts of the time allowed, for the solver's own methods and for functions as tables: short rounds of different
+methods before any gets long."""
+
+_GLANCE_MS = 30
+"""Where there are functions, the solver's own methods answer at once or mostly not at all; then tables are tried."""
+
+_ALTOGETHER = 1.3
+"""The share of the limit for everything that is done to answer one question, replays of what is found included."""
+
+_PATIENT_MS = 1_500
+"""From this much time on, another solver is worth its start."""
+
+
+def _solve(
+    translator: Translator,
+    labelled: Mapping[str, Term],
+    free: frozenset[Variable],
+    given: Mapping[Variable, Value],
+    timeout_ms: int,
+    seed: int,
+) -> Solution:
+    fixed = {variable: translator.value(value, variable.sort) for variable, value in given.items()}
+    free = free - set(fixed)
+    tracked = [(label, translator.term(formula, fixed)) for label, formula in labelled.items()]
+    background = [*translator.background(free), *translator.opaque_facts()]
+    ordinary = [v for v in free if not isinstance(v.sort, FunctionSort)]
+    functions = [v for v in free if isinstance(v.sort, FunctionSort)]
+
+    whole = [*background, *(expr for _, expr in tracked)]
+    numbers = [translator.variable(v) for v in ordinary]
+
+    def build(meanings: Mapping[Variable, Meaning]) -> list[Expr]:
+        parts = [translator.term(formula, {**fixed, **meanings}) for formula in labelled.values()]
+        return [*translator.opaque_facts(), *parts]
+
+    reason = ""
+    for plain, tables in _ROUNDS:
+        limit = max(1, int(timeout_ms * plain))
+        if functions and plain == _ROUNDS[0][0]:
+            limit = min(limit, _GLANCE_MS)
+        answer = check(translator, background, timeout_ms=limit, seed=seed, tracked=tracked)
+        if answer.status == "unsat":
+            return Solution("unsat", core=answer.core)
+        answer = with_small_numbers(translator, whole, numbers, answer, seed=seed)
+        if answer.model is not None:
+            values = _read(answer.model, free)
+            simple = values is not None and all(_is_simple(value) for value in values.values())
+            if values is not None and simple and replay(labelled.values(), {**values, **given}, beside=translator):
+                return Solution("sat", values)
+        reason = answer.reason
+        if not functions:
+            limit = max(1, int(timeout_ms * tables))
+            answer = check(translator, background, timeout_ms=limit, tracked=tracked, engine="qsat")
+            if answer.status == "unsat":
+                return Solution("unsat", core=answer.core, engine="z3, qsat")
+            answer = with_small_numbers(translator, whole, numbers, answer, seed=seed)
+            values = _read(answer.model, free) if answer.model is not None else None
+            if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
+                return Solution("sat", values, engine="z3, qsat")
+        if functions:
+            limit = max(1, int(timeout_ms * tables))
+            found = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=seed)
+            if found is not None and replay(labelled.values(), {**found, **given}, beside=translator):
+                return Solution("sat", found, engine="z3, functions as tables")
+        if answer.model is not None:
+            values = _read(answer.model, free)
+            if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
+                return Solution("sat", values)
+            reason = "the solver's model could not be replayed"
+    return Solution("unknown", reason=reason or "no answer in time")
+
+
+def _within_bounds(
+    labelled: Mapping[str, Term],
+    free: frozenset[Variable],
+    given: Mapping[Variable, Value],
+    timeout_ms: int,
+    seed: int,
+) -> Solution | None:
+    """Where there are sequences or divisions: values for which nothing outside a sequence matters, and no division by
+    zero. Sequences are asked about as functions; if these formulas contradict one another, so do the original ones."""
+    if not any(_is_partial(formula) for formula in labelled.values()):
+        return None
+    inside = conjunction(map(defined, labelled.values()))
+    sequences = [v for v in free if isinstance(v.sort, SequenceSort) and v not in given]
+    flat = flatten({**labelled, _INSIDE: inside}, sequences)
+    formulas = dict(flat.formulas if flat else {**labelled, _INSIDE: inside})
+    variables = frozenset(flat.variables(free) if flat else free)
+    translator = Translator()
+    found = _solve(translator, formulas, variables, given, timeout_ms // 3, seed)
+    if found.status == "sat":
+        values = flat.values(found.values) if flat else found.values
+        if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
+            return Solution("sat", values, engine=found.engine)
+    if flat is None:
+        return None
+    del formulas[_INSIDE]
+    anywhere = _solve(Translator(), formulas, variables, given, timeout_ms // 3, seed)
+    return anywhere if anywhere.status == "unsat" else None
+
+
+_INSIDE = "within the bounds"
+
+
+def _has_solution(
+    labelled: Mapping[str, Term],
+    free: frozenset[Variable],
+    given: Mapping[Variable, Value],
+    timeout_ms: int,
+    seed: int,
+) -> bool:
+    """Whether formulas without quantifiers, functions and partial operations hold together: there, what the solver
+    finds is a solution even if it cannot be written down."""
+    parts = [part for formula in labelled.values() for part in subterms(formula)]
+    if any(isinstance(part, Quantified | Apply) for part in parts) or any(map(_is_partial, labelled.values())):
+        return False
+    if any(isinstance(v.sort, FunctionSort | OpaqueSort) for v in free):
+        return False
+    try:
+        translator = Translator()
+        fixed = {variable: translator.value(value, variable.sort) for variable, value in given.items()}
+        facts = [translator.term(formula, fixed) for formula in labelled.values()]
+        asked = [*translator.background(free - set(fixed)), *facts]
+        return check(translator, asked, timeout_ms=timeout_ms, seed=seed).status == "sat"
+    except (Unsupported, z3.Z3Exception):
+        return False
+
+
+def _is_partial(formula: Term) -> bool:
+    """Whether sequences or divisions occur."""
+    return any(
+        isinstance(part.sort, SequenceSort) or (isinstance(part, Arithmetic) and part.operator == "/")
+        for part in subterms(formula)
+    )
+
+
+def _is_simple(value: Value) -> bool:
+    return not isinstance(value, FunctionValue) or (len(value.table) <= 1 and value.default is not True)
+
+
+_TABLES = ((0, True), (1, True), (2, True), (3, True), (1, False), (2, False))
+"""How many exceptions the functions may have, and whether relations are false elsewhere: the simplest first."""
+
+
+def search_tables(
+    translator: Translator,
+    build: Callable[[Mapping[Variable, Meaning]], list[Expr]],
+    ordinary: Iterable[Variable],
+    functions: Iterable[Variable],
+    *,
+    timeout_ms: int,
+    seed: int = 0,
+) -> dict[Variable, Value] | None:
+    """Values of the variables for which what `build` makes of the functions' meanings is satisfiable, with functions
+    that are tables of few entries. A best effort: None proves nothing, and what is found wants replaying."""
+    ordinary, functions = tuple(ordinary), sorted(functions, key=lambda v: v.qualified)
+    deadline = now() + timeout_ms / 1000
+    for tried, (size, sparse) in enumerate(_TABLES if functions else _TABLES[:1]):
+        left = (deadline - now()) * 1000
+        if left < 1:
+            return None
+        limit = max(min(120, max(50, timeout_ms)), int(left / min(3, len(_TABLES) - tried)))
+        values = _with_tables(translator, build, ordinary, functions, size, sparse, limit, seed)
+        if values is not None:
+            return values
+    return None
+
+
+def _read(model: Model, free: Iterable[Variable]) -> dict[Variable, Value] | None:
+    try:
+        return model.values(free)
+    except Unsupported:
+        return None
+
+
+def _with_tables(
+    translator: Translator,
+    build: Callable[[Mapping[Variable, Meaning]], list[Expr]],
+    ordinary: Sequence[Variable],
+    functions: Sequence[Variable],
+    size: int,
+    sparse: bool,
+    timeout_ms: int,
+    seed: int,
+) -> dict[Variable, Value] | None:
+    """A model in which every function has at most `size` exceptions; a `sparse` relation is false but at these."""
+    meanings: dict[Variable, Meaning] = {}
+    parts: dict[Variable, tuple[list[tuple[list[Expr], Expr]], Expr]] = {}
+    facts: list[Expr] = []
+    for variable in functions:
+        sort = variable.sort
+        assert isinstance(sort, FunctionSort)
+        points = []
+        for _ in range(size):
+            point = [translator.fresh("p", parameter) for parameter in sort.parameters]
+            value = translator.fresh("v", sort.result)
+            facts.extend(
+                m for p, s in zip(point, sort.parameters, strict=True) if (m := translator.member(s, p)) is not None
+            )
+            points.append((point, value))
+        falsity = sort.result == BOOL and sparse
+        default = z3.BoolVal(False, translator.context) if falsity else translator.fresh("d", sort.result)
+        results = [value for _, value in points] + ([] if falsity else [default])
+        facts.extend(m for r in results if (m := translator.member(sort.result, r)) is not None)
+        meanings[variable] = translator.table(points, default)
+        parts[variable] = (points, default)
+    facts.extend(translator.background(ordinary))
+    facts.extend(build(meanings))
+    # The usual engine first: its numbers are smaller.
+    answer = check(translator, facts, timeout_ms=timeout_ms // 3, seed=seed)
+    if answer.status == "unknown":
+        answer = check(translator, facts, timeout_ms=timeout_ms * 2 // 3, engine="qsat")
+    numbers = [translator.variable(v) for v in ordinary]
+    for points, default in parts.values():
+        numbers += [default, *(e for point, value in points for e in (*point, value))]
+    model = with_small_numbers(translator, facts, numbers, answer, seed=seed).model
+    if model is None:
+        return None
+    try:
+        values = model.values(ordinary)
+        for variable, (points, default) in parts.items():
+            sort = variable.sort
+            assert isinstance(sort, FunctionSort)
+            rest = model.read(default, sort.result)
+            table: dict[tuple[Value, ...], Value] = {}
+            for point, value in points:
+                at = tuple(model.read(p, s) for p, s in zip(point, sort.parameters, strict=True))
+                table.setdefault(at, model.read(value, sort.result))
+            values[variable] = FunctionValue({at: v for at, v in table.items() if v != rest}, rest)
+    except Unsupported:
+        return None
+    return values
+
+
+def _second_opinion(labelled: Mapping[str, Term], timeout_ms: int) -> Solution | None:
+    """cvc5, if it is installed: only its `unsat` counts, since its models are not read."""
+    from avow.solving import smtlib
+
+    try:
+        script = smtlib.export(labelled)
+    except Unsupported:
+        return None
+    answer = smtlib.ask_cvc5(script, timeout_ms=timeout_ms)
+    return Solution("unsat", core=tuple(labelled), engine="cvc5") if answer == "unsat" else None

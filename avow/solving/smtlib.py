@@ -1,0 +1,86 @@
+"""Questions as SMT-LIB 2.6 text, for another solver, for a reader, and for the archive.
+
+The text is Z3's own printing of the one translation, with what is Z3's dialect in it put in the standard's words.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
+
+from avow.base import process
+from avow.formulas.formula import free_variables
+from avow.language.terms import Term
+from avow.solving.translation import Translator
+from avow.solving.z3_module import z3
+
+_STARTING = 2.0
+"""Seconds that cvc5's process may take beyond the limit of the question."""
+
+
+def export(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") -> str:
+    """A script that asks whether the formulas hold together; each is named by its label. Raises Unsupported."""
+    labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
+    translator = Translator()
+    free = frozenset(v for formula in labelled.values() for v in free_variables(formula))
+    background = translator.background(free)
+    named = [(label, translator.term(formula)) for label, formula in labelled.items()]
+    solver = z3.Solver(ctx=translator.context)
+    solver.add(*background, *(expr for _, expr in named))
+    # Z3 prints declarations first; the assertions are printed one by one, so that each can bear its name.
+    declarations = _ASSERTION.split(solver.sexpr(), maxsplit=1)[0].strip()
+    lines = [f"; {_harmless(line)}" for line in comment.splitlines()]
+    lines += ["(set-logic ALL)", *_in_order(declarations)]
+    lines += [f"(assert {expr.sexpr()})" for expr in background]
+    lines += [f"(assert (! {expr.sexpr()} :named |clause {_harmless(label)}|))" for label, expr in named]
+    script = _quoted("\n".join([*lines, "(check-sat)", ""]))
+    # An option in the script itself would be an error to Z3.
+    return f"; cvc5 reads sequences with --strings-exp\n{script}" if "(seq." in script else script
+
+
+_ASSERTION = re.compile(r"^\(assert\s", re.MULTILINE)  # not the element of a type that is called `assert`
+_PIECE = re.compile(r'\|[^|]*\||"(?:[^"]|"")*"|;[^\n]*|[^\s()|";]+')
+
+
+_COMMAND = re.compile(r"^\(", re.MULTILINE)
+_DECLARED = re.compile(r"\(declare-(?:sort |datatypes \(\()(\|[^|]*\||[^\s()]+)")
+
+
+def _in_order(declarations: str) -> list[str]:
+    """The declarations, each after those of the sorts that it speaks of. (Z3 forgets sequences of sequences.)"""
+    text = _quoted(declarations)
+    starts = [m.start() for m in _COMMAND.finditer(text)]
+    waiting = [text[a:b].strip() for a, b in pairwise([*starts, len(text)])]
+    names = {line: m[1] for line in waiting if (m := _DECLARED.match(line))}
+    made: list[str] = []
+    while waiting:
+        missing = {names[line] for line in waiting if line in names}
+        ready = [line for line in waiting if not (missing - {names.get(line)}) & set(_PIECE.findall(line))]
+        made += ready or waiting  # in a circle there is no order; RCL's types have none
+        waiting = [line for line in waiting if line not in ready] if ready else []
+    return made
+
+
+def _quoted(script: str) -> str:
+    """The script with bars around each symbol that needs them. (Z3 prints what a datatype declares without.)"""
+    return _PIECE.sub(lambda m: f"|{m[0]}|" if "'" in m[0] and m[0][0] not in '|";' else m[0], script)
+
+
+def _harmless(text: str) -> str:
+    """Text for a comment or a quoted symbol: no bars, backslashes or line ends."""
+    return "".join(c if c.isprintable() and c not in "|\\" else "?" for c in text)
+
+
+def ask_cvc5(script: str, *, timeout_ms: int = 10_000) -> str | None:
+    """cvc5's answer to a script (``unknown`` where it takes longer), or None where the package is not installed or
+    cannot read the script."""
+    if importlib.util.find_spec("cvc5") is None:
+        return None
+    command = (sys.executable, "-P", "-m", "avow.solving.cvc5_process", str(timeout_ms))
+    done = process.run(command, seconds=timeout_ms / 1000 + _STARTING, stdin=script)
+    if done.timed_out:
+        return "unknown"
+    return done.stdout.strip() or None
