@@ -63,6 +63,7 @@ from avow.assurance.support import (
     open_conditions,
     requirement_claim_of,
     requirement_support,
+    supposition_claims,
 )
 from avow.base.verdict import Link, Verdict
 from avow.evidence.audit import Discrepancy
@@ -70,7 +71,7 @@ from avow.evidence.claims import Standing, judge
 from avow.evidence.ledger import GENESIS, Entry
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import Evidence
-from avow.evidence.status import Status, best_link, effective, hypotheses, roll_up, weigh
+from avow.evidence.status import Status, behind, best_link, effective, roll_up, weigh
 from avow.system.plan import Requirement, System
 
 
@@ -130,10 +131,11 @@ def conclude(facts: Facts) -> Case:
         *handle("accepted", facts.accepted, facts.obligations, statuses, counting, facts.today),
     )
     names = Names(facts)
+    resting = {o.id: behind(e.evidence for e in counting[o.id]) for o in facts.obligations}
     claims = [
-        obligation_claim(o, statuses[o.id], _hypotheses(counting[o.id]), _link(counting[o.id]), names)
-        for o in facts.obligations
+        obligation_claim(o, statuses[o.id], *resting[o.id], _link(counting[o.id]), names) for o in facts.obligations
     ]
+    claims += supposition_claims((h for o in facts.obligations for h in resting[o.id][0]), findings)
     claims += [requirement_claim_of(r, names, statuses) for r in facts.requirements]
     claims += derivation_claims(facts, names)
     standings = judge(claims)
@@ -269,10 +271,6 @@ def _has_expired(record: Evidence, today: date) -> bool:
 def _is_hollow(record: Evidence) -> bool:
     """Whether it is a score that says that the method notices no mutant."""
     return record.vacuous and "mutation" in record.details and record.verdict.supports
-
-
-def _hypotheses(entries: tuple[Entry, ...]) -> tuple[str, ...]:
-    return hypotheses(e.evidence for e in entries)
 
 
 def _link(entries: tuple[Entry, ...]) -> Link | None:

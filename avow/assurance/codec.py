@@ -19,7 +19,7 @@ from typing import Any
 
 from avow.assurance.model import Case
 from avow.base.files import write
-from avow.evidence.encoding import Unreadable, encode, plain
+from avow.evidence.encoding import LATER, Unreadable, encode, plain
 from avow.evidence.encoding import decode as decode_evidence
 from avow.evidence.record import Evidence
 
@@ -45,6 +45,8 @@ def case_schema() -> dict[str, Any]:
     """The JSON schema (2020-12) of ``report.json``."""
     definitions: dict[str, Any] = {}
     _schema(Case, definitions)
+    record = definitions["Evidence"]
+    record["required"] = [name for name in record["required"] if name not in LATER]
     body = definitions.pop("Case")
     body["properties"] = {"schema": {"const": SCHEMA}, **body["properties"]}
     body["required"] = ["schema", *body["required"]]
@@ -61,6 +63,8 @@ def evidence_schema() -> dict[str, Any]:
     """The JSON schema (2020-12) of one line of the ledger."""
     definitions: dict[str, Any] = {}
     _schema(Evidence, definitions)
+    record = definitions["Evidence"]
+    record["required"] = [name for name in record["required"] if name not in LATER]
     mark = {"type": "string", "pattern": "^[0-9a-f]{64}$"}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -57,7 +57,7 @@ def _match(
     matched = tuple(
         obligation.id
         for obligation in obligations
-        if _names(finding.obligation, obligation)
+        if matches(finding.obligation, obligation.local_id)
         and _status(finding, obligation.id, statuses, counting) == finding.verdict
     )
     last_day = expiry(finding)
@@ -75,9 +75,10 @@ def _match(
     )
 
 
-def _names(pattern: str, obligation: Obligation) -> bool:
+def matches(pattern: str, name: str) -> bool:
+    """Whether a finding's pattern is about the obligation of that id (without the system)."""
     # only * and ? are wild: an id may hold a bracket, which fnmatch would read as a set
-    return fnmatch.fnmatchcase(obligation.local_id, pattern.replace("[", "[[]"))
+    return fnmatch.fnmatchcase(name, pattern.replace("[", "[[]"))
 
 
 def _status(

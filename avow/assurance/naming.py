@@ -23,10 +23,12 @@ def derivation_claim(name: str) -> str:
 
 
 def short(claim: str) -> str:
-    """``agent.low`` for a guarantee, ``REQ1``, ``D1``, else the id without the system."""
+    """``agent.low`` for a guarantee, ``REQ1``, ``D1``, else the id without the system (a supposition has none)."""
     kind, colon, name = claim.partition(":")
     if colon and kind in ("requirement", "derivation"):
         return name
+    if colon and kind == "supposition":
+        return name.partition(":")[0]
     parts = claim.split("/", 3)
     if len(parts) != 4:
         return claim

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from avow.assurance.facts import Facts
-from avow.assurance.model import Derivation
+from avow.assurance.findings import matches
+from avow.assurance.model import Derivation, Handled
 from avow.assurance.naming import derivation_claim, is_advice, is_foundation, requirement_claim, sanity_property
-from avow.base.verdict import Link
+from avow.base.verdict import Hypothesis, HypothesisKind, Link
 from avow.evidence.claims import Claim
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.status import Status, weakest
@@ -60,6 +61,18 @@ class Names:
         """The obligation that a hypothesis names, whole or without the system; None where it is just a sentence."""
         return text if text in self.obligations else self.local.get(text)
 
+    def discharging(self, hypothesis: Hypothesis) -> str | None:
+        """The claim that says what a hypothesis says; None where none does. A claim of the same name that says
+        something else is not it; of several that say it, the one of that name is meant."""
+        if hypothesis.kind is HypothesisKind.SUPPOSITION:
+            return supposition_claim(hypothesis)
+        place = hypothesis.name.split("/")[:2]
+        saying = [
+            o for o in self.obligations.values() if o.digest == hypothesis.digest and o.local_id.split("/")[:2] == place
+        ]
+        named = [o for o in saying if o.local_id == hypothesis.name]
+        return next((o.id for o in (*named, *saying)), None)
+
     def every_guarantee(self) -> tuple[str, ...]:
         return tuple(name for names in self.guarantees.values() for name in names)
 
@@ -69,17 +82,44 @@ def _belongs(obligation: str, requirement: str) -> bool:
     return obligation == requirement or (rest != obligation and not (rest[0].isalnum() or rest[0] == "_"))
 
 
+def supposition_claim(hypothesis: Hypothesis) -> str:
+    """One for each thing supposed, whatever rests on it."""
+    return f"supposition:{hypothesis.name}:{hypothesis.digest[:12]}"
+
+
+def supposition_claims(hypotheses: Iterable[Hypothesis], accepted: Iterable[Handled]) -> Iterable[Claim]:
+    """What a person has to accept: justified where somebody has (``accepted: {obligation: agent/supposition/…, verdict:
+    missing, …}``) and still does, else missing."""
+    taken = [f.pattern for f in accepted if f.how == "accepted" and f.verdict == Status.MISSING and not f.expired]
+    found = {h: None for h in hypotheses if h.kind is HypothesisKind.SUPPOSITION}
+    for hypothesis in found:
+        given = any(matches(pattern, hypothesis.name) for pattern in taken)
+        status = Status.JUSTIFIED if given else Status.MISSING
+        yield Claim(supposition_claim(hypothesis), status, link=Link.GUIDED if given else None)
+
+
 def obligation_claim(
-    obligation: Obligation, status: Status, hypotheses: Sequence[str], link: Link | None, names: Names
+    obligation: Obligation,
+    status: Status,
+    rests_on: Sequence[Hypothesis],
+    hypotheses: Sequence[str],
+    link: Link | None,
+    names: Names,
 ) -> Claim:
     """An obligation stands on its evidence; a guarantee also on its node's contract being worth verifying; and either
-    on those claims that its evidence names as hypotheses."""
+    on what its evidence rests on. A hypothesis that no claim of the case discharges is an error."""
     rests: list[str] = []
     if obligation.kind is Kind.GUARANTEE:
         rests += names.foundation.get(obligation.node, [])
         rests += names.vacuity.get(f"{obligation.node}.{obligation.name}", [])
     elif obligation.kind is Kind.REQUIREMENT:
         rests += [names.clause[clause] for clause in obligation.clauses if clause in names.clause]
+    for hypothesis in rests_on:
+        found = names.discharging(hypothesis)
+        if found is None:
+            status = weakest((status, Status.ERROR)) or Status.ERROR
+        else:
+            rests.append(found)
     open_hypotheses = []
     for text in hypotheses:
         claim = names.obligation_named(text)

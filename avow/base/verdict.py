@@ -82,12 +82,37 @@ class Counterexample:
         return ": ".join(part for part in (values, self.explanation) if part)
 
 
+class HypothesisKind(StrEnum):
+    """What else an answer rests on."""
+
+    CLAIM = "claim"
+    """Another obligation of the case: `name` is its id without the system, `digest` that of what it says."""
+    SUPPOSITION = "supposition"
+    """What no tool shows and a person has to accept, by name: ``agent/supposition/termination``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """Something that an answer rests on, and that the case has to discharge.
+
+    It is identified by kind and `digest` (SHA-256 of what is supposed), never by its wording: a claim of the case that
+    says something else does not discharge it, whatever it is called.
+    """
+
+    kind: HypothesisKind
+    name: str
+    digest: str
+    text: str = field(default="", compare=False)
+    """For people."""
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What a method says of one obligation; the core makes an evidence record of it.
 
     `obligation` is the obligation's id. `bound` holds what limits the answer (cases, states, confidence, seed…),
-    `hypotheses` what the answer rests on without having shown it, `details` anything else worth keeping (JSON values).
+    `rests_on` what the answer rests on and the case has to discharge, `hypotheses` remarks in words on what it supposes
+    besides, `details` anything else worth keeping (JSON values).
     """
 
     obligation: str
@@ -100,3 +125,4 @@ class Outcome:
     link: Link | None = None
     vacuous: bool = False
     """The claim held, but its trigger was never met: it supports nothing."""
+    rests_on: tuple[Hypothesis, ...] = ()

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from avow.base.verdict import Counterexample, Link, Verdict
+from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Link, Verdict
 from avow.evidence.record import Evidence
 
 
@@ -45,6 +45,7 @@ def plain(value: object) -> Any:
 
 def encode(evidence: Evidence) -> dict[str, Any]:
     """A record as plain JSON data."""
+    later = {"rests_on": encode_hypotheses(evidence.rests_on)} if evidence.rests_on else {}
     return {
         "obligation": evidence.obligation,
         "obligation_digest": evidence.obligation_digest,
@@ -68,13 +69,14 @@ def encode(evidence: Evidence) -> dict[str, Any]:
         "details": plain(evidence.details),
         "vacuous": evidence.vacuous,
         "run": evidence.run,
+        **later,
     }
 
 
 def decode(data: object) -> Evidence:
     """The record that plain JSON data stands for. Raises Unreadable where a field is missing, unknown or ill-typed."""
     fields = _mapping(data, "a record")
-    missing, extra = _FIELDS - fields.keys(), fields.keys() - _FIELDS
+    missing, extra = _FIELDS - LATER - fields.keys(), fields.keys() - _FIELDS
     if missing or extra:
         raise Unreadable(f"fields missing: {sorted(missing)}, unknown: {sorted(extra)}")
     try:
@@ -104,6 +106,7 @@ def decode(data: object) -> Evidence:
         details=_mapping(fields["details"], "details"),
         vacuous=_flag(fields["vacuous"]),
         run=_text(fields, "run"),
+        rests_on=decode_hypotheses(fields.get("rests_on", [])),
     )
 
 
@@ -135,7 +138,28 @@ def decode_counterexample(data: object) -> Counterexample | None:
     )
 
 
+def encode_hypotheses(hypotheses: tuple[Hypothesis, ...]) -> list[dict[str, str]]:
+    return [{"kind": str(h.kind), "name": h.name, "digest": h.digest, "text": h.text} for h in hypotheses]
+
+
+def decode_hypotheses(data: object) -> tuple[Hypothesis, ...]:
+    """Raises Unreadable."""
+    found = []
+    for item in _sequence(data, "rests_on"):
+        fields = _mapping(item, "a hypothesis")
+        if fields.keys() != {"kind", "name", "digest", "text"}:
+            raise Unreadable("a hypothesis has kind, name, digest and text")
+        try:
+            kind = HypothesisKind(_text(fields, "kind"))
+        except ValueError as error:
+            raise Unreadable(str(error)) from error
+        found.append(Hypothesis(kind, _text(fields, "name"), _text(fields, "digest"), _text(fields, "text")))
+    return tuple(found)
+
+
 _FIELDS = frozenset(Evidence.__slots__)
+LATER = frozenset({"rests_on"})
+"""Fields that records of earlier versions do not have, and that are not written where they are empty."""
 
 
 def _mapping(data: object, what: str) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from avow.base.verdict import Counterexample, Link, Verdict
+from avow.base.verdict import Counterexample, Hypothesis, Link, Verdict
 
 RETRY = "retry"
 """Among the details of an answer that the next run must not be content with: what asked for it was cut short."""
@@ -52,3 +52,5 @@ class Evidence:
     vacuous: bool = False
     run: str = ""
     """Id of the run that produced it."""
+    rests_on: tuple[Hypothesis, ...] = ()
+    """What the answer rests on: claims of the case, and suppositions that a person has to accept."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import reduce
 
-from avow.base.verdict import Link, Verdict
+from avow.base.verdict import Hypothesis, Link, Verdict
 from avow.evidence.record import Evidence
 
 
@@ -143,12 +143,16 @@ def roll_up(current: Iterable[Evidence], *, outdated: bool = False) -> Status:
     return (weight.join(OUTDATED) if outdated else weight).status
 
 
-def hypotheses(current: Iterable[Evidence]) -> tuple[str, ...]:
-    """What the status rests on without its having been shown: the fewest hypotheses among the items that give it."""
+def behind(current: Iterable[Evidence]) -> tuple[tuple[Hypothesis, ...], tuple[str, ...]]:
+    """What the status rests on, and supposes in words: of the item among those that give it that supposes least."""
     items = tuple(current)
     support = join(map(weigh, items)).support
-    giving = [tuple(sorted(set(e.hypotheses))) for e in items if support and weigh(e).support is support]
-    return min(giving, key=lambda h: (len(h), h), default=())
+    found = [
+        (tuple(sorted(set(e.rests_on), key=lambda h: (h.kind, h.name, h.digest))), tuple(sorted(set(e.hypotheses))))
+        for e in items
+        if support and weigh(e).support is support
+    ]
+    return min(found, key=lambda pair: (sum(map(len, pair)), pair[1], repr(pair[0])), default=((), ()))
 
 
 def _greater(one: Status | None, other: Status | None) -> Status | None:

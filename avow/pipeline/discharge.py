@@ -85,6 +85,7 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
                 details=outcome.details,
                 vacuous=outcome.vacuous,
                 run=run.id,
+                rests_on=outcome.rests_on,
             )
         )
     ledger_of(workspace.ledger(work.system.name)).append_all(records)

@@ -6,7 +6,12 @@ from typing import Any
 
 from avow.backend_kit.protocol import Report
 from avow.base.verdict import Link, Outcome, Verdict
-from avow.evidence.encoding import decode_counterexample, encode_counterexample
+from avow.evidence.encoding import (
+    decode_counterexample,
+    decode_hypotheses,
+    encode_counterexample,
+    encode_hypotheses,
+)
 
 
 def report_to_json(report: Report) -> dict[str, Any]:
@@ -40,6 +45,7 @@ def outcome_to_json(outcome: Outcome) -> dict[str, Any]:
         "details": outcome.details,
         "link": outcome.link.value if outcome.link else None,
         "vacuous": outcome.vacuous,
+        "rests_on": encode_hypotheses(outcome.rests_on),
     }
 
 
@@ -54,4 +60,5 @@ def outcome_from_json(data: dict[str, Any]) -> Outcome:
         data["details"],
         Link(data["link"]) if data["link"] else None,
         data["vacuous"],
+        decode_hypotheses(data["rests_on"]),
     )

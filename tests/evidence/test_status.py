@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from avow.base.verdict import Verdict
 from avow.evidence.record import Evidence
-from avow.evidence.status import NOTHING, Status, Weight, effective, hypotheses, join, roll_up, weigh
+from avow.evidence.status import NOTHING, Status, Weight, behind, effective, join, roll_up, weigh
 
 BOUNDED = (Verdict.CHECKED, Verdict.TESTED, Verdict.MONITORED, Verdict.REVIEWED, Verdict.JUSTIFIED)
 
@@ -67,7 +67,7 @@ def test_join_is_a_semilattice(some: list[Evidence], one: Evidence, other: Evide
 def test_deleting_an_item_is_never_having_had_it(some: list[Evidence], at: int) -> None:
     rest = [e for number, e in enumerate(some) if number != at]
     assert roll_up(rest) is join([weigh(e) for e in rest]).status
-    assert hypotheses(rest) == hypotheses(list(reversed(rest)))
+    assert behind(rest) == behind(list(reversed(rest)))
 
 
 @pytest.mark.parametrize("strength", BOUNDED)
@@ -104,9 +104,9 @@ def test_hypotheses_are_those_of_the_least_demanding_best_item() -> None:
     with_two = evidence("n.g", hypotheses=("a", "b"))
     with_one = evidence("n.g", method="dafny", hypotheses=("c",))
     tested = evidence("n.g", Verdict.TESTED, "hypothesis")
-    assert hypotheses([with_two, with_one, tested]) == ("c",)
-    assert hypotheses([with_two, evidence("n.g", method="ajpf", strength=Verdict.PROVED)]) == ()
-    assert hypotheses([evidence("n.g", Verdict.UNKNOWN, hypotheses=("a",))]) == ()
+    assert behind([with_two, with_one, tested])[1] == ("c",)
+    assert behind([with_two, evidence("n.g", method="ajpf", strength=Verdict.PROVED)])[1] == ()
+    assert behind([evidence("n.g", Verdict.UNKNOWN, hypotheses=("a",))])[1] == ()
 
 
 def test_a_weight_cannot_forget_a_refutation() -> None:

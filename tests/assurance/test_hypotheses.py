@@ -1,0 +1,60 @@
+"""What an answer rests on is discharged by what it says, never by its name; what nobody discharges is an error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from assurance.sample import rover_case
+from avow.assurance.case import conclude
+from avow.assurance.facts import Facts, facts_of_case
+from avow.base.verdict import Hypothesis, HypothesisKind, Verdict
+from avow.evidence.ledger import Entry
+from avow.evidence.status import Status
+from avow.system.plan import Finding
+
+CLAIM = HypothesisKind.CLAIM
+
+
+def resting(facts: Facts, at: str, *hypotheses: Hypothesis) -> Facts:
+    """The facts, where the proof of one obligation rests on something."""
+
+    def change(entry: Entry) -> Entry:
+        if entry.evidence.obligation != at:
+            return entry
+        return replace(entry, evidence=replace(entry.evidence, rests_on=hypotheses))
+
+    return replace(facts, entries=tuple(map(change, facts.entries)))
+
+
+def proved(facts: Facts) -> str:
+    case = conclude(facts)
+    return next(v.id for v in case.obligations if v.standing is Status.PROVED and v.obligation.kind == "guarantee")
+
+
+def test_by_meaning() -> None:
+    facts = facts_of_case(rover_case())
+    at = proved(facts)
+    other = next(o for o in facts.obligations if o.id != at and o.kind == "guarantee")
+    for name, digest, status in (
+        (other.local_id, other.digest, None),
+        (other.local_id, "0" * 64, Status.ERROR),
+        (other.local_id.rsplit("/", 1)[0] + "/renamed", other.digest, None),
+        ("nobody/guarantee/nothing", other.digest, Status.ERROR),
+    ):
+        view = conclude(resting(facts, at, Hypothesis(CLAIM, name, digest))).obligation(at)
+        if status is None:
+            assert other.id in view.rests_on
+        else:
+            assert view.standing is status
+
+
+def test_a_supposition_wants_a_person() -> None:
+    facts = facts_of_case(rover_case())
+    at = proved(facts)
+    ends = Hypothesis(HypothesisKind.SUPPOSITION, "agent/supposition/termination", "1" * 64, "the loop ends")
+    facts = resting(facts, at, ends)
+    assert conclude(facts).obligation(at).standing is Status.UNSUPPORTED
+    taken = Finding("agent/supposition/*", Verdict.REFUTED, "seen", "A. Person", facts.today.isoformat())
+    assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
+    taken = replace(taken, verdict="missing")
+    assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.JUSTIFIED
