@@ -1,7 +1,8 @@
 """The verification backends, one folder each; found by the core through the entry-point group ``avow.backends``.
 
-The folder stands at the top level and is reached as ``avow.backends`` through a symbolic link, so that nothing
-called plain ``backends`` is ever importable: two copies of one module would be two different backends.
+The folder stands at the top level and is the package `avow.backends`: in a wheel by its place, in a checkout through
+`avow/backends/__init__.py`. Nothing called plain ``backends`` is ever importable: two copies of one module would be two
+different backends. Within its folder a backend imports itself relatively, and the core as ``avow.…``.
 """
 
 if __name__ != "avow.backends":

@@ -38,6 +38,9 @@ COMMANDS = {
 }
 """Name → one line of help. The module of that name in this package holds the click command `command`."""
 
+_OF_BACKENDS = {"monitor": "avow.backends.rosmonitoring.command", "review": "avow.backends.review.command"}
+"""Commands that belong to a backend → the module that holds them."""
+
 
 class _Lazy(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -46,7 +49,7 @@ class _Lazy(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        command = importlib.import_module(f"avow.cli.{cmd_name}").command
+        command = importlib.import_module(_OF_BACKENDS.get(cmd_name, f"avow.cli.{cmd_name}")).command
         assert isinstance(command, click.Command)
         return command
 

@@ -35,8 +35,8 @@ def command(
     """
     from pathlib import Path
 
+    from avow.base.workspace import workspace
     from avow.cli.ledgers import audit_index, audit_system, ledger_names, outside_heads, sign_all
-    from avow.cli.workspace import workspace
     from avow.pipeline.integrity import reported_heads
 
     if new_key:

@@ -44,9 +44,9 @@ def command(
     """
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.verdict import Verdict
+    from avow.base.workspace import system_folder
     from avow.calculus.composition import compose
     from avow.calculus.obligations import composition_obligations, settle_all
-    from avow.cli.workspace import system_folder
     from avow.system.load import load_path
 
     system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))

@@ -16,8 +16,8 @@ def command(name: str, as_json: bool) -> int:
     ID is an obligation's id, whole (system/node/kind/name) or in part, or a guarantee as node.name.
     """
     from avow.assurance.codec import to_json
+    from avow.base.workspace import workspace
     from avow.cli.ledgers import find_claim, reported_cases, unreported
-    from avow.cli.workspace import workspace
 
     place = workspace()
     cases_here = reported_cases(place)

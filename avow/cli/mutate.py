@@ -20,7 +20,7 @@ def command(system: str, method: str | None, node: str | None, limit: int, jobs:
     import os
 
     from avow.base.diagnostics import Rejected
-    from avow.cli.workspace import system_folder, workspace
+    from avow.base.workspace import system_folder, workspace
     from avow.pipeline.mutation import hunt
     from avow.pipeline.run_info import this_run
     from avow.pipeline.workload import survey

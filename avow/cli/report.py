@@ -28,7 +28,7 @@ def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
         return _check(Path(folder), as_json)
     import os
 
-    from avow.cli.workspace import require_systems, workspace
+    from avow.base.workspace import require_systems, workspace
 
     place = workspace()
     require_systems(place, systems)

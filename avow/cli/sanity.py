@@ -33,9 +33,9 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     PATH is a system's folder or an .rcl file. Code 1 where something is refuted that is an error, 2 for bad input.
     """
     from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.workspace import system_folder
     from avow.calculus import providers
     from avow.calculus.interpretation import interpretation, ranges
-    from avow.cli.workspace import system_folder
     from avow.sanity.analysis import Bounds, analyse
     from avow.system.load import load_path
 

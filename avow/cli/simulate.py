@@ -23,10 +23,10 @@ def command(system: str, seed: int, steps: int | None, as_json: bool, everything
     from random import Random
 
     from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.workspace import system_folder
     from avow.calculus.scenario import CannotRun, world
     from avow.calculus.transition import Machine
     from avow.calculus.variables import frame
-    from avow.cli.workspace import system_folder
     from avow.formulas.values import show
     from avow.system.load import load_path
 

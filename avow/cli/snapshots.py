@@ -41,7 +41,7 @@ def snapshots(name: str | None) -> dict[str, Snapshot]:
     if path is not None and (path.is_file() or (path / "report.json").is_file()):
         case = read_case(path)
         return {case.system: of_case(case)}
-    from avow.cli.workspace import workspace
+    from avow.base.workspace import workspace
 
     place = workspace()
     if name is None:

@@ -16,7 +16,7 @@ import click
 )
 def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool) -> int:
     """Verify every system under contracts/, or only SYSTEMS (their names)."""
-    from avow.cli.workspace import require_systems, workspace
+    from avow.base.workspace import require_systems, workspace
     from avow.pipeline.run_info import EXPLAIN, FRESH
 
     place = workspace()

@@ -17,13 +17,15 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 
+import avow.backends
 from avow.base.files import write
 from avow.base.workspace import Workspace
 from avow.pipeline.results import Result, read_result
 from avow.pipeline.run_info import EXPLAIN, FRESH
 
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH)
-_PACKAGE = Path(__file__).parent.parent
+_CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
+"""Avow's own code, wherever it is installed."""
 
 _begun: dict[Path, str] = {}
 """Workspace → what the sources were before this process read them."""
@@ -77,7 +79,7 @@ def _sources(workspace: Workspace) -> str:
     environment = [(name, os.environ.get(name)) for name in _ENVIRONMENT]
     today = str(datetime.now().astimezone().date())
     digest.update(json.dumps([environment, today, sys.version, sys.executable, sys.path]).encode())
-    _add_files(digest, workspace.contracts, _PACKAGE, _PACKAGE.parent / "backends")
+    _add_files(digest, workspace.contracts, *_CODE)
     for name in dict.fromkeys([*os.environ.get("PATH", "").split(os.pathsep), *sys.path]):
         digest.update(f"{name} {_mark(name) if Path(name).is_dir() else ''}\n".encode("utf-8", "surrogateescape"))
     return digest.hexdigest()
@@ -101,14 +103,9 @@ def _files(folder: Path) -> Iterator[str]:
                 if entry.is_dir(follow_symlinks=False):
                     stack.append(entry.path)
                 elif entry.is_dir():
-                    if not _is_backends(entry.path):
-                        raise OSError(f"{entry.path} leads elsewhere")
+                    raise OSError(f"{entry.path} leads elsewhere")
                 else:
                     yield f"{entry.path} {_mark(entry.path)}\n"
-
-
-def _is_backends(path: str) -> bool:
-    return Path(path) == _PACKAGE / "backends"
 
 
 def _mark(path: str) -> str:

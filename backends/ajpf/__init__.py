@@ -1,5 +1,5 @@
 """The AJPF backend (see `docs/backends/ajpf.md`)."""
 
-from avow.backends.ajpf.backend import AjpfBackend
+from .backend import AjpfBackend
 
 BACKEND = AjpfBackend()

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from avow.backends.ajpf.psl import (
+from .psl import (
     Always,
     And,
     Atom,

@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job, Limits, Report, Tool
-from avow.backends.ajpf.codes import CODES
-from avow.backends.ajpf.schema import SCHEMA
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
 from avow.language.contract import Node
 from avow.system.paths import inside
+
+from .codes import CODES
+from .schema import SCHEMA
 
 
 class AjpfBackend:
@@ -37,19 +38,19 @@ class AjpfBackend:
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        from avow.backends.ajpf import ajpf_tool, spin
+        from . import ajpf_tool, spin
 
         return (ajpf_tool.tool(), spin.tool())
 
     def suits(self, node: Node) -> bool:
-        from avow.backends.ajpf.suits import looks_like_an_agent
+        from .suits import looks_like_an_agent
 
         return looks_like_an_agent(node)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
-        from avow.backends.ajpf.instances import diagnose, instances
-        from avow.backends.ajpf.options import read
-        from avow.backends.ajpf.vocabulary import unknown_words
+        from .instances import diagnose, instances
+        from .options import read
+        from .vocabulary import unknown_words
 
         try:
             setup = read(job)
@@ -62,14 +63,14 @@ class AjpfBackend:
         return tuple(path for name in names if (path := inside(job.root, name)) is not None)
 
     def export(self, job: Job) -> Mapping[str, str]:
-        from avow.backends.ajpf.files import export_files
-        from avow.backends.ajpf.instances import instances
-        from avow.backends.ajpf.options import read
+        from .files import export_files
+        from .instances import instances
+        from .options import read
 
         setup = read(job)
         return export_files(job, setup, instances(job, setup))
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
-        from avow.backends.ajpf.run import settle
+        from .run import settle
 
         return settle(job, folder, limits, self.version)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 
-from avow.backends.ajpf.syntax import Bindings, Condition, Rule, Struct, Term, Var, apply, unify, variables
+from .syntax import Bindings, Condition, Rule, Struct, Term, Var, apply, unify, variables
 
 MAX_RULE_DEPTH = 60
 

@@ -6,13 +6,13 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from avow.backends.ajpf.automaton import Automaton, build, compiled
-from avow.backends.ajpf.explore import Graph
-from avow.backends.ajpf.interpreter import NONE, Agent, Frame, State
-from avow.backends.ajpf.psl import Atom, Formula, Modality, Not, atoms, conjunction
-from avow.backends.ajpf.structure import Fair, Kripke, Lasso, components, find_lasso, reduce
-from avow.backends.ajpf.syntax import DeedKind, Sign, Struct, Term, Var, unify
-from avow.backends.ajpf.tautology import is_valid
+from .automaton import Automaton, build, compiled
+from .explore import Graph
+from .interpreter import NONE, Agent, Frame, State
+from .psl import Atom, Formula, Modality, Not, atoms, conjunction
+from .structure import Fair, Kripke, Lasso, components, find_lasso, reduce
+from .syntax import DeedKind, Sign, Struct, Term, Var, unify
+from .tautology import is_valid
 
 
 class OutOfTime(Exception):  # noqa: N818 - it names a state, not a fault

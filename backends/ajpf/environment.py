@@ -22,11 +22,12 @@ from typing import Any
 
 import jsonschema
 
-from avow.backends.ajpf.parser import parse_fact
-from avow.backends.ajpf.syntax import Struct, show
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.system.plan import Located
 from avow.system.strict_yaml import read_yaml
+
+from .parser import parse_fact
+from .syntax import Struct, show
 
 NOTHING = "nothing"
 KEEP = "keep"

@@ -8,8 +8,8 @@ from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from avow.backends.ajpf.beliefs import TooDeep
-from avow.backends.ajpf.interpreter import Agent, State
+from .beliefs import TooDeep
+from .interpreter import Agent, State
 
 MAX_STATES = 2_000_000
 

@@ -7,10 +7,11 @@ import json
 from collections.abc import Iterable, Mapping
 
 from avow.backend_kit.protocol import Job
-from avow.backends.ajpf import psl
-from avow.backends.ajpf.checker import Property
-from avow.backends.ajpf.instances import Instantiation
-from avow.backends.ajpf.options import Setup
+
+from . import psl
+from .checker import Property
+from .instances import Instantiation
+from .options import Setup
 
 BUILDER = "gwendolen.GwendolenMASBuilder"
 TARGET = "ail.util.AJPF_w_AIL"

@@ -9,20 +9,21 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 from avow.backend_kit.protocol import Job
-from avow.backends.ajpf import psl
-from avow.backends.ajpf.checker import Property
-from avow.backends.ajpf.mapping import Mapper, NotCovered, substituted
-from avow.backends.ajpf.options import Extra, Setup, is_index
-from avow.backends.ajpf.psl import Always, Eventually, Formula, Implies
-from avow.backends.ajpf.psl_parser import instantiate
-from avow.backends.ajpf.reading import Left, read_properties
-from avow.backends.ajpf.scenario import Decider, domain_of, range_of
-from avow.backends.ajpf.shape import MAX_DEPTH, TooComplex, free
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.formulas.traversal import depth, subterms
 from avow.language.contract import Clause
 from avow.language.terms import TRUE, And, Quantified, Quantifier, Term, Variable
 from avow.language.terms import Implies as RclImplies
+
+from . import psl
+from .checker import Property
+from .mapping import Mapper, NotCovered, substituted
+from .options import Extra, Setup, is_index
+from .psl import Always, Eventually, Formula, Implies
+from .psl_parser import instantiate
+from .reading import Left, read_properties
+from .scenario import Decider, domain_of, range_of
+from .shape import MAX_DEPTH, TooComplex, free
 
 MAX_PROPERTIES = 5_000
 

@@ -19,9 +19,9 @@ from enum import StrEnum
 from functools import cache
 from typing import Generic, NamedTuple, TypeVar
 
-from avow.backends.ajpf.beliefs import Beliefs, Reasoner, rename_term
-from avow.backends.ajpf.environment import Choice, Environment
-from avow.backends.ajpf.syntax import (
+from .beliefs import Beliefs, Reasoner, rename_term
+from .environment import Choice, Environment
+from .syntax import (
     Bindings,
     Deed,
     DeedKind,

@@ -9,18 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from avow.backends.ajpf import psl
-from avow.backends.ajpf.matching import Binding, choose, match
-from avow.backends.ajpf.psl import Formula
-from avow.backends.ajpf.psl_parser import Malformed, instantiate
-from avow.backends.ajpf.shape import conjunction, conjuncts, disjunction, free, shape
-from avow.backends.ajpf.tautology import constant
 from avow.base.diagnostics import Span
 from avow.formulas.formula import substitute
 from avow.formulas.traversal import subterms
 from avow.language.printer import show_term
 from avow.language.sorts import IntegerSort, NaturalSort
 from avow.language.terms import TRUE, And, Literal, Not, Or, Quantified, Quantifier, Role, Term, Variable
+
+from . import psl
+from .matching import Binding, choose, match
+from .psl import Formula
+from .psl_parser import Malformed, instantiate
+from .shape import conjunction, conjuncts, disjunction, free, shape
+from .tautology import constant
 
 
 class NotCovered(Exception):  # noqa: N818 - it names what happened

@@ -12,22 +12,23 @@ from typing import Any
 import jsonschema
 
 from avow.backend_kit.protocol import Job
-from avow.backends.ajpf.environment import Environment, read_environment
-from avow.backends.ajpf.interpreter import Semantics
-from avow.backends.ajpf.mapping import Row
-from avow.backends.ajpf.parser import read_program
-from avow.backends.ajpf.psl import AGENT_NAME, KEYWORDS, Formula, Modality, atoms
-from avow.backends.ajpf.psl_parser import Malformed, index_names, instantiate, parse_psl
-from avow.backends.ajpf.scenario import domain_of
-from avow.backends.ajpf.schema import SCHEMA
-from avow.backends.ajpf.shape import TooComplex, free, shape
-from avow.backends.ajpf.syntax import Program
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.formulas.traversal import subterms
 from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
 from avow.language.terms import Not, Quantified, Role, Term, Variable
 from avow.system.paths import inside
+
+from .environment import Environment, read_environment
+from .interpreter import Semantics
+from .mapping import Row
+from .parser import read_program
+from .psl import AGENT_NAME, KEYWORDS, Formula, Modality, atoms
+from .psl_parser import Malformed, index_names, instantiate, parse_psl
+from .scenario import domain_of
+from .schema import SCHEMA
+from .shape import TooComplex, free, shape
+from .syntax import Program
 
 COMMON = ("id", "guarantees", "seconds", "megabytes", "seed")
 """Options that belong to every method; the core reads them."""

@@ -10,7 +10,9 @@ from typing import Any
 from lark import Lark, Token, Transformer, UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken, v_args
 from lark.exceptions import VisitError
 
-from avow.backends.ajpf.syntax import (
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+
+from .syntax import (
     MAX_DEPTH,
     Condition,
     Deed,
@@ -27,7 +29,6 @@ from avow.backends.ajpf.syntax import (
     is_ground,
     show,
 )
-from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 MAX_BYTES = 2_000_000
 

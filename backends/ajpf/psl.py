@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
-from avow.backends.ajpf.syntax import Struct, Term, Var
+from .syntax import Struct, Term, Var
 
 KEYWORDS = frozenset({"A", "E", "U", "R", "B", "G", "F", "I", "D", "P", "T", "ItD"})
 """Words of the language: an agent may not be called so."""

@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from avow.backends.ajpf.psl import (
+from .psl import (
     AGENT_NAME,
     FALSE,
     KEYWORDS,
@@ -27,7 +27,7 @@ from avow.backends.ajpf.psl import (
     Until,
     atoms,
 )
-from avow.backends.ajpf.syntax import Struct, Term, Var
+from .syntax import Struct, Term, Var
 
 MAX_LENGTH = 20_000
 MAX_NESTING = 60

@@ -10,15 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from avow.backends.ajpf import psl
-from avow.backends.ajpf.checker import Property
-from avow.backends.ajpf.mapping import Mapped, Mapper, NotCovered, Unit, clauses, to_formula
-from avow.backends.ajpf.matching import match
-from avow.backends.ajpf.options import Extra
-from avow.backends.ajpf.psl import Always, Eventually, Formula, Implies
-from avow.backends.ajpf.shape import free, shape
 from avow.language.printer import show_term
 from avow.language.terms import FALSE, Quantified, Quantifier, Term, Variable
+
+from . import psl
+from .checker import Property
+from .mapping import Mapped, Mapper, NotCovered, Unit, clauses, to_formula
+from .matching import match
+from .options import Extra
+from .psl import Always, Eventually, Formula, Implies
+from .shape import free, shape
 
 MAX_ALTERNATIVES = 8
 

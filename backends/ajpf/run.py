@@ -8,21 +8,22 @@ from dataclasses import replace
 from pathlib import Path
 
 from avow.backend_kit.protocol import Job, Limits, Report
-from avow.backends.ajpf import ajpf_tool, spin
-from avow.backends.ajpf.ajpf_tool import Answer, Said
-from avow.backends.ajpf.automaton import TooLarge
-from avow.backends.ajpf.beliefs import TooDeep
-from avow.backends.ajpf.checker import Checker, OutOfTime, Property, needs_fine_steps
-from avow.backends.ajpf.explore import explore
-from avow.backends.ajpf.files import ail_file, jpf_file
-from avow.backends.ajpf.instances import Instantiation, instances
-from avow.backends.ajpf.interpreter import Agent
-from avow.backends.ajpf.options import Setup, read
-from avow.backends.ajpf.settle import Frame, Settled, outcome
-from avow.backends.ajpf.words import Wording, explain
 from avow.base.diagnostics import Rejected
 from avow.base.files import write
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
+
+from . import ajpf_tool, spin
+from .ajpf_tool import Answer, Said
+from .automaton import TooLarge
+from .beliefs import TooDeep
+from .checker import Checker, OutOfTime, Property, needs_fine_steps
+from .explore import explore
+from .files import ail_file, jpf_file
+from .instances import Instantiation, instances
+from .interpreter import Agent
+from .options import Setup, read
+from .settle import Frame, Settled, outcome
+from .words import Wording, explain
 
 ENGINE = "Avow's own Gwendolen checker"
 GRACE = 0.5

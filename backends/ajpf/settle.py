@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from avow.backends.ajpf import psl
-from avow.backends.ajpf.automaton import TooLarge
-from avow.backends.ajpf.checker import Property
-from avow.backends.ajpf.instances import Claim, Instantiation
-from avow.backends.ajpf.options import Extra, Setup
-from avow.backends.ajpf.tautology import is_valid
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evidence.obligation import Obligation
+
+from . import psl
+from .automaton import TooLarge
+from .checker import Property
+from .instances import Claim, Instantiation
+from .options import Extra, Setup
+from .tautology import is_valid
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from avow.backend_kit.protocol import Tool
-from avow.backends.ajpf import psl
-from avow.backends.ajpf.checker import Checker, Property
 from avow.base.files import write
 from avow.base.process import ToolMissing, run
+
+from . import psl
+from .checker import Checker, Property
 
 _ERRORS = re.compile(r"errors: (\d+)")
 

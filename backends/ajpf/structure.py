@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from avow.backends.ajpf.automaton import Automaton
+from .automaton import Automaton
 
 Successors = Callable[[int], Sequence[int]]
 

@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import combinations, permutations
 
-from avow.backends.ajpf import psl
-from avow.backends.ajpf.automaton import build
-from avow.backends.ajpf.psl import Atom, Formula, Modality
-from avow.backends.ajpf.structure import components
-from avow.backends.ajpf.syntax import Term, Var
+from . import psl
+from .automaton import build
+from .psl import Atom, Formula, Modality
+from .structure import components
+from .syntax import Term, Var
 
 MAX_STEPS = 4_000
 """Cases that are looked at, in all, before a formula is taken for one that depends on the agent."""

@@ -6,11 +6,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from avow.backend_kit.protocol import Job
-from avow.backends.ajpf import psl
-from avow.backends.ajpf.options import Setup
-from avow.backends.ajpf.psl import Modality
-from avow.backends.ajpf.syntax import DeedKind, Struct, Term
 from avow.base.diagnostics import Diagnostic, Severity, Span
+
+from . import psl
+from .options import Setup
+from .psl import Modality
+from .syntax import DeedKind, Struct, Term
 
 _Word = tuple[str, int]
 _KINDS = {

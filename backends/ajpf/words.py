@@ -11,17 +11,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from avow.backends.ajpf import psl
-from avow.backends.ajpf.automaton import compiled
-from avow.backends.ajpf.checker import Property, label_states
-from avow.backends.ajpf.explore import Graph
-from avow.backends.ajpf.interpreter import NONE, State
-from avow.backends.ajpf.mapping import Row
-from avow.backends.ajpf.psl import Formula
-from avow.backends.ajpf.psl_parser import Malformed, index_names, instantiate
-from avow.backends.ajpf.structure import Lasso
-from avow.backends.ajpf.syntax import Struct, Term, show
 from avow.base.verdict import Counterexample
+
+from . import psl
+from .automaton import compiled
+from .checker import Property, label_states
+from .explore import Graph
+from .interpreter import NONE, State
+from .mapping import Row
+from .psl import Formula
+from .psl_parser import Malformed, index_names, instantiate
+from .structure import Lasso
+from .syntax import Struct, Term, show
 
 MAX_INDICES = 400
 """Combinations of index values that a row is tried with in each step."""

@@ -1,5 +1,5 @@
 """The Dafny backend (see `docs/backends/dafny.md`)."""
 
-from avow.backends.dafny.backend import DafnyBackend
+from .backend import DafnyBackend
 
 BACKEND = DafnyBackend()

@@ -11,12 +11,13 @@ import sys
 from pathlib import Path
 
 from avow.backend_kit.protocol import Job
-from avow.backends.dafny.modules import generate
-from avow.backends.dafny.printer import NotExpressible
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
 from avow.system.load import load_system
 from avow.system.paths import inside
+
+from .modules import generate
+from .printer import NotExpressible
 
 
 def write_skeleton(folder: Path, node: str, *, method: str | None = None) -> Path:

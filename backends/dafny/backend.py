@@ -8,12 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job, Limits, Report, Tool, Translated
-from avow.backends.dafny.codes import CODES
-from avow.backends.dafny.judge import Settled, settle
-from avow.backends.dafny.modules import Generated, generate, lines_map, one_line
-from avow.backends.dafny.printer import NotExpressible
-from avow.backends.dafny.runner import INSTALL, dafny
-from avow.backends.dafny.scanner import Scan, scan
 from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.verdict import Link, Outcome, Verdict
@@ -21,6 +15,13 @@ from avow.language.contract import Node
 from avow.system.paths import inside
 from avow.system.plan import System
 from avow.system.schema import suggest
+
+from .codes import CODES
+from .judge import Settled, settle
+from .modules import Generated, generate, lines_map, one_line
+from .printer import NotExpressible
+from .runner import INSTALL, dafny
+from .scanner import Scan, scan
 
 COMMON = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
 """Options that every method has; they are the pipeline's."""

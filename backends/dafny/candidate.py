@@ -10,13 +10,14 @@ import re
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
-from avow.backends.dafny.names import Names
-from avow.backends.dafny.printer import Vocabulary
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Variable
+
+from .names import Names
+from .printer import Vocabulary
 
 _LINE = re.compile(r"(?P<name>[\w'?]+)#\d+(?:@@\d+)? -> (?P<value>\(- \d+(?:\.\d+)?\)|-?\d+(?:\.\d+)?|true|false)\s*")
 _SHOWN = 3

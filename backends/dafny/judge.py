@@ -12,13 +12,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from avow.backend_kit.protocol import Limits
-from avow.backends.dafny.answer import Member
-from avow.backends.dafny.candidate import candidates
-from avow.backends.dafny.modules import Generated
-from avow.backends.dafny.runner import Audit, Run, audit, verify
-from avow.backends.dafny.scanner import Scan
 from avow.base.verdict import Verdict
 from avow.language.contract import Node
+
+from .answer import Member
+from .candidate import candidates
+from .modules import Generated
+from .runner import Audit, Run, audit, verify
+from .scanner import Scan
 
 _FINISHED = re.compile(r"Dafny program verifier finished with (\d+) verified, (\d+) errors?(.*)")
 _SHOWN = 6

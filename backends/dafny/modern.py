@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from avow.backends.dafny.answer import Complaint, Failure, Member
+from .answer import Complaint, Failure, Member
 
 LOG = "answer.csv"
 LENIENT = "--allow-warnings"

@@ -6,12 +6,13 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from avow.backends.dafny.names import Names, file_stem, identifier
-from avow.backends.dafny.printer import NotExpressible, Predicate, Vocabulary, call, print_clause, sort_text
 from avow.formulas.formula import free_variables
 from avow.language.contract import Clause, Node
 from avow.language.sorts import DataSort, EnumSort, OpaqueSort
 from avow.language.terms import Variable
+
+from .names import Names, file_stem, identifier
+from .printer import NotExpressible, Predicate, Vocabulary, call, print_clause, sort_text
 
 _MODULE = 'module {:options "--function-syntax:3"}'
 """Ignored by 2.3; makes `predicate` ghost in 4.x, as it is in 2.3."""

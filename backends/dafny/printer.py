@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from avow.backends.dafny.names import Names
 from avow.base.diagnostics import Span
 from avow.formulas.formula import free_variables
 from avow.formulas.traversal import Steps, run
@@ -58,6 +57,8 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+
+from .names import Names
 
 
 class NotExpressible(Exception):  # noqa: N818 - it names what the term is

@@ -13,9 +13,10 @@ from pathlib import Path
 
 from avow.backend_kit.protocol import Limits, Tool
 from avow.backend_kit.tools import find_tool
-from avow.backends.dafny import modern
-from avow.backends.dafny.answer import Complaint, Member, complaints, counted, quiet, read_members
 from avow.base import process
+
+from . import modern
+from .answer import Complaint, Member, complaints, counted, quiet, read_members
 
 INSTALL = "apt-get install dafny"
 

@@ -1,5 +1,5 @@
 """The experiment backend (see `docs/backends/experiment.md`)."""
 
-from avow.backends.experiment.backend import ExperimentBackend
+from .backend import ExperimentBackend
 
 BACKEND = ExperimentBackend()

@@ -8,15 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job, Limits, Report, Tool
-from avow.backends.experiment.codes import CODES
-from avow.backends.experiment.figures import Figures, read_figures
-from avow.backends.experiment.judge import Judgement, judge_figures, judge_runs
-from avow.backends.experiment.options import SCHEMA, Experiment, read
-from avow.backends.experiment.quantity import show
-from avow.backends.experiment.runs import Runs, read_runs
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.system.paths import inside
+
+from .codes import CODES
+from .figures import Figures, read_figures
+from .judge import Judgement, judge_figures, judge_runs
+from .options import SCHEMA, Experiment, read
+from .quantity import show
+from .runs import Runs, read_runs
 
 
 class ExperimentBackend:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from avow.backends.experiment.statistics import root
+from .statistics import root
 
 MAX_LENGTH = 500
 """Characters; a sum of so many terms is still far from Python's recursion limit."""

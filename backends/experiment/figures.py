@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from avow.backends.experiment.quantity import Figure, conversion, figure, show
-from avow.backends.experiment.statistics import Range, greatest_deviation, least_deviation, root
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.system.strict_yaml import Piece, read_yaml
+
+from .quantity import Figure, conversion, figure, show
+from .statistics import Range, greatest_deviation, least_deviation, root
 
 _KEYS = ("n", "unit", "mean", "min", "max", "sd", "source", "note")
 

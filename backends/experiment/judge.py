@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from avow.backends.experiment.figures import Figures, contradictions, failures
-from avow.backends.experiment.options import Experiment
-from avow.backends.experiment.quantity import show
-from avow.backends.experiment.runs import Run
-from avow.backends.experiment.statistics import justified, lower_bound, root, runs_needed, upper_bound
 from avow.base.verdict import Counterexample, Verdict
+
+from .figures import Figures, contradictions, failures
+from .options import Experiment
+from .quantity import show
+from .runs import Run
+from .statistics import justified, lower_bound, root, runs_needed, upper_bound
 
 SHOWN = 20
 """Failing runs that are spelt out."""

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job
-from avow.backends.experiment.expression import Expression, Malformed, parse
-from avow.backends.experiment.quantity import conversion, decimal, figure
 from avow.base.diagnostics import Diagnostic
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Literal, Negative, Term, Widen
 from avow.system.paths import inside
 from avow.system.schema import suggest
+
+from .expression import Expression, Malformed, parse
+from .quantity import conversion, decimal, figure
 
 COMMON = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
 """Options that every method has; they are the pipeline's."""

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from fractions import Fraction
 
-from avow.backends.experiment.statistics import Range
+from .statistics import Range
 
 UNITS: dict[str, tuple[str, Fraction]] = {
     "": ("number", Fraction(1)),

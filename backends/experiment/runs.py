@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from avow.backends.experiment.expression import Expression, Interval
-from avow.backends.experiment.options import ID_COLUMNS
-from avow.backends.experiment.quantity import decimal
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+
+from .expression import Expression, Interval
+from .options import ID_COLUMNS
+from .quantity import decimal
 
 MAX_RUNS = 100_000
 MAX_BYTES = 32_000_000

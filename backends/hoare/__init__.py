@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job, Limits, Report, Tool
-from avow.backends.hoare.codes import CODES
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
+
+from .codes import CODES
 
 _FILE = {"type": "string", "description": "the program's file, relative to the system's folder"}
 _TABLE = {
@@ -48,12 +49,12 @@ class Hoare:
         return (Tool("z3", metadata.version("z3-solver"), None, "pip install z3-solver", optional=False),)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
-        from avow.backends.hoare.backend import problems
+        from .backend import problems
 
         return problems(job)
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        from avow.backends.hoare.backend import program_file
+        from .backend import program_file
 
         try:
             return (program_file(job),)
@@ -61,12 +62,12 @@ class Hoare:
             return ()
 
     def export(self, job: Job) -> Mapping[str, str]:
-        from avow.backends.hoare.backend import files
+        from .backend import files
 
         return files(job)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
-        from avow.backends.hoare.backend import settle
+        from .backend import settle
 
         return settle(job, limits)
 

@@ -9,14 +9,6 @@ from functools import cached_property
 from pathlib import Path
 
 from avow.backend_kit.protocol import Job, Limits, Report
-from avow.backends.hoare.checker import Checked, check
-from avow.backends.hoare.numbers import other_numbers
-from avow.backends.hoare.outline import outline, show
-from avow.backends.hoare.parser import parse_program
-from avow.backends.hoare.program import While, statements
-from avow.backends.hoare.triples import Triple, every_run, triples
-from avow.backends.hoare.witness import Breach, breach
-from avow.backends.hoare.wp import Condition, TooLarge, conditions
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
@@ -28,6 +20,15 @@ from avow.solving.questions import Entailment, entails, z3_version
 from avow.solving.smtlib import export as smtlib
 from avow.solving.translation import Unsupported
 from avow.system.paths import inside
+
+from .checker import Checked, check
+from .numbers import other_numbers
+from .outline import outline, show
+from .parser import parse_program
+from .program import While, statements
+from .triples import Triple, every_run, triples
+from .witness import Breach, breach
+from .wp import Condition, TooLarge, conditions
 
 BRIEFLY = 5.0
 """Seconds for whether the program has an output for every input, where that can only turn `unknown` into `refuted`."""

@@ -6,35 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from avow.backends.hoare.names import UNKNOWN, Names, assignments, expect, spread, vocabulary
-from avow.backends.hoare.parser import parse_expression
-from avow.backends.hoare.program import (
-    Assign,
-    Block,
-    If,
-    Match,
-    Predicate,
-    Program,
-    Reading,
-    Skip,
-    Statement,
-    Update,
-    While,
-    variable,
-)
-from avow.backends.hoare.syntax import (
-    AssignStatement,
-    Call,
-    Expression,
-    IfStatement,
-    MatchStatement,
-    Name,
-    SkipStatement,
-    Source,
-    WhileStatement,
-)
-from avow.backends.hoare.syntax import Statement as SurfaceStatement
-from avow.backends.hoare.typing import Scope, fit, formula, rejected, suggest, term
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.formulas.formula import free_variables, substitute
 from avow.language.contract import Contract, Node, Port
@@ -53,6 +24,36 @@ from avow.language.sorts import (
     components,
 )
 from avow.language.terms import Apply, Role, Term, TupleTerm, Variable
+
+from .names import UNKNOWN, Names, assignments, expect, spread, vocabulary
+from .parser import parse_expression
+from .program import (
+    Assign,
+    Block,
+    If,
+    Match,
+    Predicate,
+    Program,
+    Reading,
+    Skip,
+    Statement,
+    Update,
+    While,
+    variable,
+)
+from .syntax import (
+    AssignStatement,
+    Call,
+    Expression,
+    IfStatement,
+    MatchStatement,
+    Name,
+    SkipStatement,
+    Source,
+    WhileStatement,
+)
+from .syntax import Statement as SurfaceStatement
+from .typing import Scope, fit, formula, rejected, suggest, term
 
 T = TypeVar("T")
 

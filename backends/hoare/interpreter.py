@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statement, Update, While
-from avow.backends.hoare.wp import defined
 from avow.base.diagnostics import Span
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.formulas.values import Data, FunctionValue, Value
 from avow.language.sorts import NATURAL, FunctionSort, Sort
 from avow.language.terms import Term
+
+from .program import Assign, Block, If, Match, Skip, Statement, Update, While
+from .wp import defined
 
 _UNDEFINED = "a division by zero, an element that the sequence does not have, or a negative number for a natural one,"
 

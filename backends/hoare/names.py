@@ -8,7 +8,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from avow.backends.hoare.syntax import (
+from avow.language.contract import Contract, Node
+from avow.language.sorts import (
+    BOOL,
+    INTEGER,
+    NATURAL,
+    REAL,
+    STRING,
+    Constructor,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    OpaqueSort,
+    SequenceSort,
+    Sort,
+    TupleSort,
+    components,
+)
+from avow.language.terms import EnumValue, Term
+
+from .syntax import (
     AssignStatement,
     Binary,
     Call,
@@ -29,24 +48,6 @@ from avow.backends.hoare.syntax import (
     Unary,
     WhileStatement,
 )
-from avow.language.contract import Contract, Node
-from avow.language.sorts import (
-    BOOL,
-    INTEGER,
-    NATURAL,
-    REAL,
-    STRING,
-    Constructor,
-    DataSort,
-    EnumSort,
-    FunctionSort,
-    OpaqueSort,
-    SequenceSort,
-    Sort,
-    TupleSort,
-    components,
-)
-from avow.language.terms import EnumValue, Term
 
 _NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
 _ARITHMETIC = frozenset("+-*/")

@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
-from avow.backends.hoare.program import Assign, If, Program, Update, While, statements
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.formulas.traversal import subterms
 from avow.language.bounds import bounds, constant
 from avow.language.contract import Clause
 from avow.language.printer import show_number
 from avow.language.terms import Term
+
+from .program import Assign, If, Program, Update, While, statements
 
 _COMMON = frozenset({Fraction(-1), Fraction(0), Fraction(1)})
 """Numbers that stand in programs for reasons of their own."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statement, Update, While
-from avow.backends.hoare.simplify import simplify
-from avow.backends.hoare.triples import Triple
-from avow.backends.hoare.wp import Conditions, fits, misfits, side_conditions, weakest
 from avow.formulas.formula import conjunction, negation
 from avow.language.printer import show_term
 from avow.language.terms import TRUE, Term
+
+from .program import Assign, Block, If, Match, Skip, Statement, Update, While
+from .simplify import simplify
+from .triples import Triple
+from .wp import Conditions, fits, misfits, side_conditions, weakest
 
 STEP = "   "
 

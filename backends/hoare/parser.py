@@ -13,8 +13,10 @@ from lark import Lark, Token, v_args
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken, VisitError
 from lark.visitors import Transformer_NonRecursive
 
-from avow.backends.hoare.layout import Layout, span_of
-from avow.backends.hoare.syntax import (
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+
+from .layout import Layout, span_of
+from .syntax import (
     AssignStatement,
     Binary,
     Call,
@@ -37,7 +39,6 @@ from avow.backends.hoare.syntax import (
     Unary,
     WhileStatement,
 )
-from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 DEEPEST = 120
 """Nesting beyond which a program is refused: later passes recurse over it."""

@@ -10,9 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from avow.backends.hoare.checker import Checked
-from avow.backends.hoare.program import Predicate, Reading, variable
-from avow.backends.hoare.simplify import simplify
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evidence.obligation import Obligation
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
@@ -35,6 +32,10 @@ from avow.language.terms import (
     Variable,
     children,
 )
+
+from .checker import Checked
+from .program import Predicate, Reading, variable
+from .simplify import simplify
 
 
 @dataclass(frozen=True, slots=True)

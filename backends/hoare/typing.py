@@ -7,24 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from avow.backends.hoare.names import UNKNOWN, Names, join
-from avow.backends.hoare.program import variable
-from avow.backends.hoare.syntax import (
-    Binary,
-    Call,
-    Chain,
-    Expression,
-    Inside,
-    Member,
-    Name,
-    Number,
-    Quantification,
-    Sequence,
-    Text,
-    Truth,
-    Tuple,
-    Unary,
-)
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.printer import show_sort as show
 from avow.language.sorts import (
@@ -63,6 +45,25 @@ from avow.language.terms import (
     TupleTerm,
     Variable,
     Widen,
+)
+
+from .names import UNKNOWN, Names, join
+from .program import variable
+from .syntax import (
+    Binary,
+    Call,
+    Chain,
+    Expression,
+    Inside,
+    Member,
+    Name,
+    Number,
+    Quantification,
+    Sequence,
+    Text,
+    Truth,
+    Tuple,
+    Unary,
 )
 
 _NUMERIC = (NATURAL, INTEGER, REAL)

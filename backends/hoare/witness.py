@@ -12,11 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from avow.backends.hoare.interpreter import Fault, Machine, NoEnd, State
-from avow.backends.hoare.outline import show
-from avow.backends.hoare.program import Assign, If, Match, Program, Statement, Update, While, statements
-from avow.backends.hoare.triples import Triple
-from avow.backends.hoare.wp import Condition
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables, negation
 from avow.formulas.traversal import subterms
@@ -39,6 +34,12 @@ from avow.language.terms import (
 from avow.solving.models import default_value
 from avow.solving.questions import replay, solve
 from avow.solving.translation import Unsupported
+
+from .interpreter import Fault, Machine, NoEnd, State
+from .outline import show
+from .program import Assign, If, Match, Program, Statement, Update, While, statements
+from .triples import Triple
+from .wp import Condition
 
 _NUMERIC: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
 _TRIED = 300

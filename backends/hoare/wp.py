@@ -10,8 +10,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from avow.backends.hoare.program import Assign, Block, If, Match, Skip, Statement, Update, While, statements, variable
-from avow.backends.hoare.triples import Triple, rename_bound
 from avow.base.diagnostics import Span
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.traversal import subterms, transform
@@ -38,6 +36,9 @@ from avow.language.terms import (
     Variable,
     children,
 )
+
+from .program import Assign, Block, If, Match, Skip, Statement, Update, While, statements, variable
+from .triples import Triple, rename_bound
 
 LARGEST = 50_000
 """Nodes of a formula beyond which a program is too much for this method: branches in sequence double it."""

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job, Limits, Report, Tool
-from avow.backends.hypothesis.codes import CODES
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
+
+from .codes import CODES
 
 _SUBJECT = {
     "type": "string",
@@ -48,12 +49,12 @@ class HypothesisBackend:
         return (Tool("hypothesis", version, None, "pip install hypothesis", optional=False),)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
-        from avow.backends.hypothesis.backend import problems
+        from .backend import problems
 
         return problems(job)
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        from avow.backends.hypothesis.subject import locate, modules
+        from .subject import locate, modules
 
         try:
             return modules(locate(job).path)
@@ -61,12 +62,12 @@ class HypothesisBackend:
             return ()
 
     def export(self, job: Job) -> Mapping[str, str]:
-        from avow.backends.hypothesis.backend import files
+        from .backend import files
 
         return files(job)
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
-        from avow.backends.hypothesis.backend import settle
+        from .backend import settle
 
         return settle(job, folder, limits)
 

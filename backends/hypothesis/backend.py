@@ -15,12 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job, Limits, Report
-from avow.backends.hypothesis import export, wire
-from avow.backends.hypothesis.subject import subject
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.process import Completed, ToolMissing, run
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation
+
+from . import export, wire
+from .subject import subject
 
 CONFIDENCE = 0.95
 

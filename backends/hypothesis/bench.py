@@ -20,14 +20,15 @@ from hypothesis import strategies as st
 from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 from hypothesis.internal.conjecture import providers
 
-from avow.backends.hypothesis import wire
-from avow.backends.hypothesis.convention import Malformed, outputs
-from avow.backends.hypothesis.generate import BYTES, Failing, Generator, Impossible, Inputs, Source
-from avow.backends.hypothesis.judging import Trigger, blamed, guarantee, judged
-from avow.backends.hypothesis.pools import parse_cell, pools
-from avow.backends.hypothesis.process import PATIENCE, Subject, SubjectFailed
 from avow.formulas.values import Value, show
 from avow.language.sorts import BoolSort, FunctionSort, Sort
+
+from . import wire
+from .convention import Malformed, outputs
+from .generate import BYTES, Failing, Generator, Impossible, Inputs, Source
+from .judging import Trigger, blamed, guarantee, judged
+from .pools import parse_cell, pools
+from .process import PATIENCE, Subject, SubjectFailed
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
 # and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from avow.backend_kit.protocol import Job
-from avow.backends.hypothesis import wire
-from avow.backends.hypothesis.subject import SubjectFile
 from avow.language.contract import Clause, Port
 from avow.language.printer import show_sort, show_term
+
+from . import wire
+from .subject import SubjectFile
 
 DATA = "contract.json"
 

@@ -17,7 +17,6 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, TypeVar
 
-from avow.backends.hypothesis.pools import Pools, runs, scenario_runs
 from avow.formulas.values import Data, Element, FunctionValue, Opaque, Sequence, Value
 from avow.language.sorts import (
     STRING,
@@ -35,6 +34,8 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+
+from .pools import Pools, runs, scenario_runs
 
 T = TypeVar("T")
 

@@ -6,14 +6,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from avow.backends.hypothesis import wire
-from avow.backends.hypothesis.generate import Inputs
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.evaluation.truth import judge
 from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.values import Value
 from avow.language.printer import show_term
 from avow.language.terms import And, Implies, Not, Or, Quantified, Quantifier, Role, Term, Variable
+
+from . import wire
+from .generate import Inputs
 
 
 @dataclass(slots=True)

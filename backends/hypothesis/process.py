@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from avow.backends.hypothesis.convention import sent
-from avow.backends.hypothesis.generate import Inputs
+from .convention import sent
+from .generate import Inputs
 
 PATIENCE = 10.0
 """Seconds that a subject may take for one answer."""

@@ -1,5 +1,5 @@
 """The review backend (see `docs/backends/review.md`)."""
 
-from avow.backends.review.backend import ReviewBackend
+from .backend import ReviewBackend
 
 BACKEND = ReviewBackend()

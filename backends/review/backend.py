@@ -8,14 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Job, Limits, Report, Tool
-from avow.backends.review.codes import CODES
-from avow.backends.review.freshness import current_meaning, stale_clause, stale_files
-from avow.backends.review.record import CONCLUSIONS, Judged, Record, read_record
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evidence.obligation import Obligation
 from avow.system.paths import inside
 from avow.system.schema import suggest
+
+from .codes import CODES
+from .freshness import current_meaning, stale_clause, stale_files
+from .record import CONCLUSIONS, Judged, Record, read_record
 
 COMMON = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
 """Options that every method has; they are the pipeline's."""

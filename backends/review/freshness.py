@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from avow.backends.review.record import Record
 from avow.base.files import digest_file
 from avow.formulas.formula import node_digest
 from avow.language.contract import Node
 from avow.system.paths import inside
+
+from .record import Record
 
 
 def current_meaning(node: Node, clause: str) -> str:

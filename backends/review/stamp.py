@@ -12,9 +12,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from avow.backends.review.backend import record_name
-from avow.backends.review.freshness import current_file, current_meaning
-from avow.backends.review.record import load, read_record
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import write
 from avow.language.contract import Node
@@ -22,6 +19,10 @@ from avow.system.load import load_system
 from avow.system.paths import inside
 from avow.system.plan import Method
 from avow.system.strict_yaml import Piece
+
+from .backend import record_name
+from .freshness import current_file, current_meaning
+from .record import load, read_record
 
 _BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 _PLAIN = re.compile(r"[\w./-]+", re.ASCII)

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from avow.backends.rosmonitoring.backend import RosMonitoringBackend
+from .backend import RosMonitoringBackend
 
 BACKEND = RosMonitoringBackend()

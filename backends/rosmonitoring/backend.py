@@ -9,18 +9,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from avow.backend_kit.protocol import Job, Limits, Report, Tool, Translated
-from avow.backends.rosmonitoring.codes import CODES
-from avow.backends.rosmonitoring.schema import SCHEMA
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.system.paths import inside
 
+from .codes import CODES
+from .schema import SCHEMA
+
 if TYPE_CHECKING:
-    from avow.backends.rosmonitoring.engine import Monitor, Violation
-    from avow.backends.rosmonitoring.options import Setup
     from avow.evidence.obligation import Obligation
     from avow.language.contract import Node
     from avow.system.plan import System
+
+    from .engine import Monitor, Violation
+    from .options import Setup
 
 KEPT = 200
 """Violations of one trace that are written to the log; all are counted."""
@@ -47,7 +49,7 @@ class RosMonitoringBackend:
         return ()
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
-        from avow.backends.rosmonitoring.options import setup
+        from .options import setup
 
         found, faults = setup(job.system, job.node, job.method.options)
         problems = list(faults)
@@ -79,9 +81,9 @@ class RosMonitoringBackend:
         return tuple(found)
 
     def export(self, job: Job) -> Mapping[str, str]:
-        from avow.backends.rosmonitoring.configuration import configuration, identifier
-        from avow.backends.rosmonitoring.options import setup
-        from avow.backends.rosmonitoring.rml_translate import translate
+        from .configuration import configuration, identifier
+        from .options import setup
+        from .rml_translate import translate
 
         found, faults = setup(job.system, job.node, job.method.options)
         if faults:
@@ -101,9 +103,9 @@ class RosMonitoringBackend:
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:
         """The node's guarantees as one RML specification, by the mapping of the plan's first method of this backend."""
-        from avow.backends.rosmonitoring.configuration import identifier
-        from avow.backends.rosmonitoring.options import setup
-        from avow.backends.rosmonitoring.rml_translate import translate
+        from .configuration import identifier
+        from .options import setup
+        from .rml_translate import translate
 
         options = next((m.options for m in system.plan.node(node.name).methods if m.backend == self.name), None)
         found, faults = setup(system, node, options)
@@ -121,7 +123,8 @@ class RosMonitoringBackend:
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         from avow import __version__
-        from avow.backends.rosmonitoring.options import setup
+
+        from .options import setup
 
         found, faults = setup(job.system, job.node, job.method.options)
         if faults:
@@ -133,7 +136,7 @@ class RosMonitoringBackend:
         if not _traces(job):
             outcomes = tuple(_without_trace(job, found, refused, o) for o in job.obligations)
             return Report(outcomes, "avow monitor", __version__)
-        from avow.backends.rosmonitoring.engine import Monitor
+        from .engine import Monitor
 
         deadline = time.monotonic() + limits.seconds
         runs: list[_Run] = []
@@ -148,7 +151,7 @@ class RosMonitoringBackend:
 
 
 def _refused(job: Job, found: Setup) -> dict[str, str]:
-    from avow.backends.rosmonitoring.rml_translate import translate
+    from .rml_translate import translate
 
     return translate(found, [job.clause(o) for o in job.obligations]).refused
 
@@ -191,8 +194,8 @@ class _Run:
 
 
 def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
-    from avow.backends.rosmonitoring.engine import Fault
-    from avow.backends.rosmonitoring.traces import digest_trace, read_trace
+    from .engine import Fault
+    from .traces import digest_trace, read_trace
 
     run = _Run(name, monitor)
     path = inside(job.root, name)
@@ -220,7 +223,7 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
 
 
 def _outcome(obligation: str, name: str, runs: list[_Run]) -> Outcome:
-    from avow.backends.rosmonitoring.engine import Fault
+    from .engine import Fault
 
     tallies = [run.monitor.tallies[name] for run in runs]
     judged = sum(t.judged for t in tallies)

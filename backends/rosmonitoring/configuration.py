@@ -9,8 +9,8 @@ from typing import Any
 
 import yaml
 
-from avow.backends.rosmonitoring.options import Setup, same_topic
-from avow.backends.rosmonitoring.rules import Choice, Fields, InOrder
+from .options import Setup, same_topic
+from .rules import Choice, Fields, InOrder
 
 _ESCAPE = re.compile(r"[^A-Za-z0-9_]|_(?=x[0-9a-f]+_)")
 

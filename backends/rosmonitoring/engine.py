@@ -13,15 +13,16 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
-from avow.backends.rosmonitoring.options import Setup, same_topic
-from avow.backends.rosmonitoring.reading import MappingError, Reader, reader
-from avow.backends.rosmonitoring.rules import Choice, Constant, Fields, Hold, InOrder, Previous
 from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
 from avow.evaluation.truth import judge
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.terms import Implies, Quantified, Quantifier, Role, Term, Variable
+
+from .numbers import Decimal, NotANumber, exact
+from .options import Setup, same_topic
+from .reading import MappingError, Reader, reader
+from .rules import Choice, Constant, Fields, Hold, InOrder, Previous
 
 
 class Fault(StrEnum):

@@ -6,19 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from avow.backends.rosmonitoring.reading import MappingError, convert, from_text
-from avow.backends.rosmonitoring.rules import (
-    Argument,
-    Choice,
-    Constant,
-    Fields,
-    Hold,
-    InOrder,
-    Lookup,
-    Path,
-    Previous,
-    Rule,
-)
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import FunctionValue, Value
@@ -43,6 +30,20 @@ from avow.language.terms import Apply, Not, Quantified, Quantifier, Role, Term, 
 from avow.system.graph import Edge, dataflow
 from avow.system.plan import Located, System, Table
 from avow.system.schema import suggest
+
+from .reading import MappingError, convert, from_text
+from .rules import (
+    Argument,
+    Choice,
+    Constant,
+    Fields,
+    Hold,
+    InOrder,
+    Lookup,
+    Path,
+    Previous,
+    Rule,
+)
 
 NAME = "rosmonitoring"
 

@@ -11,20 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from avow.backends.rosmonitoring.rml import (
-    FALSE,
-    Calculation,
-    Condition,
-    NotRml,
-    Number,
-    Numeric,
-    compare,
-    every,
-    opposite,
-    size,
-    some,
-)
-from avow.backends.rosmonitoring.symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
 from avow.evaluation.disjunctions import Part, alternatives, conjunction
 from avow.evaluation.evaluate import finite_values
 from avow.formulas.renaming import bound_names, rename_apart
@@ -58,6 +44,21 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+
+from .rml import (
+    FALSE,
+    Calculation,
+    Condition,
+    NotRml,
+    Number,
+    Numeric,
+    compare,
+    every,
+    opposite,
+    size,
+    some,
+)
+from .symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
 
 LIMIT = 600
 """Comparisons in a condition; a larger one is refused, since it is checked at every event."""

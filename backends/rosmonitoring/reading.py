@@ -6,8 +6,6 @@ from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
-from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact, whole
-from avow.backends.rosmonitoring.rules import Argument, Choice, Fields, Hold, InOrder, Lookup, Path
 from avow.formulas.values import Data, Element, FunctionValue, Sequence, Value
 from avow.language.sorts import (
     BOOL,
@@ -24,6 +22,9 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+
+from .numbers import Decimal, NotANumber, exact, whole
+from .rules import Argument, Choice, Fields, Hold, InOrder, Lookup, Path
 
 Message = Mapping[str, Any]
 Reader = Callable[[Message, Value | None], Value]

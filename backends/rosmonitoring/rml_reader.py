@@ -10,7 +10,7 @@ from typing import Any
 
 import lark
 
-from avow.backends.rosmonitoring.rml import KEYWORDS
+from .rml import KEYWORDS
 
 PREDECLARED = frozenset(("any", "none"))
 

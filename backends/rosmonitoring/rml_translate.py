@@ -14,9 +14,15 @@ from fractions import Fraction
 from itertools import product
 from pathlib import PurePath
 
-from avow.backends.rosmonitoring.options import Setup, same_topic
-from avow.backends.rosmonitoring.quantifiers import Eliminator
-from avow.backends.rosmonitoring.rml import (
+from avow.evaluation.evaluate import free_names
+from avow.formulas.values import Value
+from avow.language.contract import Clause
+from avow.language.sorts import BoolSort, DataSort, EnumSort, FunctionSort, NaturalSort, Sort, StringSort
+from avow.language.terms import Role
+
+from .options import Setup, same_topic
+from .quantifiers import Eliminator
+from .rml import (
     FALSE,
     TRUE,
     Calculation,
@@ -41,8 +47,8 @@ from avow.backends.rosmonitoring.rml import (
     string,
     write,
 )
-from avow.backends.rosmonitoring.rules import Choice, Constant, Fields, Lookup, Path, Previous, Rule
-from avow.backends.rosmonitoring.symbols import (
+from .rules import Choice, Constant, Fields, Lookup, Path, Previous, Rule
+from .symbols import (
     Points,
     Scalar,
     Symbol,
@@ -53,11 +59,6 @@ from avow.backends.rosmonitoring.symbols import (
     components,
     constant,
 )
-from avow.evaluation.evaluate import free_names
-from avow.formulas.values import Value
-from avow.language.contract import Clause
-from avow.language.sorts import BoolSort, DataSort, EnumSort, FunctionSort, NaturalSort, Sort, StringSort
-from avow.language.terms import Role
 
 CASES = 64
 """Combinations of constants that one topic's message may have; more are refused."""

@@ -11,9 +11,10 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from avow.backends.rosmonitoring.session import Session, violation_json
-from avow.backends.rosmonitoring.traces import MAX_LINE, parse_event
 from avow.base.diagnostics import Diagnostic, Rejected
+
+from .session import Session, violation_json
+from .traces import MAX_LINE, parse_event
 
 HOST = "127.0.0.1"
 

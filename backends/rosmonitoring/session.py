@@ -6,12 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from avow.backends.rosmonitoring.engine import Fault, Monitor, Tally, Violation
-from avow.backends.rosmonitoring.options import NAME, setup
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import ClauseKind
 from avow.system.plan import System
 from avow.system.schema import suggest
+
+from .engine import Fault, Monitor, Tally, Violation
+from .options import NAME, setup
 
 
 @dataclass(slots=True)

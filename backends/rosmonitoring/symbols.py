@@ -10,19 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from avow.backends.rosmonitoring.rml import (
-    TRUE,
-    Comparison,
-    Condition,
-    Name,
-    NotRml,
-    Number,
-    Numeric,
-    compare,
-    every,
-    some,
-)
-from avow.backends.rosmonitoring.rules import Constant, Fields, Hold, InOrder, Previous, Rule
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.sorts import (
     BOOL,
@@ -35,6 +22,20 @@ from avow.language.sorts import (
     RealSort,
     Sort,
 )
+
+from .rml import (
+    TRUE,
+    Comparison,
+    Condition,
+    Name,
+    NotRml,
+    Number,
+    Numeric,
+    compare,
+    every,
+    some,
+)
+from .rules import Constant, Fields, Hold, InOrder, Previous, Rule
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+
+from .numbers import Decimal, NotANumber, exact
 
 MAX_LINE = 8_000_000
 """Characters of one event; a longer line is not an event."""

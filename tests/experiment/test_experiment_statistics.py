@@ -7,9 +7,6 @@ from fractions import Fraction
 from math import comb
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
 from avow.backends.experiment.statistics import (
     Range,
     greatest_deviation,
@@ -21,6 +18,8 @@ from avow.backends.experiment.statistics import (
     tail,
     upper_bound,
 )
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 CONFIDENCE = Fraction(95, 100)
 

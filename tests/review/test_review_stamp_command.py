@@ -6,10 +6,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-
 from avow.backends.review.__main__ import main
 from avow.backends.review.record import read_record
 from avow.backends.review.stamp import stamp
+
 from avow.base.diagnostics import Rejected
 
 PLAN = """\

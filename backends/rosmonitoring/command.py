@@ -13,9 +13,10 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from avow.backends.rosmonitoring.session import Session
-    from avow.backends.rosmonitoring.traces import Recorded
     from avow.system.plan import System
+
+    from .session import Session
+    from .traces import Recorded
 
 SHOWN = 50
 """Violations shown without --all."""
@@ -36,7 +37,7 @@ def command(
     TRACE is JSON lines in ROSMonitoring's shape, a ROS 1 or ROS 2 bag, or - for standard input. Code 1 where something
     was broken or nothing could be judged, 2 where an input cannot be used.
     """
-    from avow.cli.workspace import system_folder
+    from avow.base.workspace import system_folder
     from avow.system.load import load_system
 
     loaded = load_system(system_folder(system))
@@ -51,8 +52,8 @@ def command(
 
 
 def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, show_all: bool) -> int:
-    from avow.backends.rosmonitoring.session import session, violation_json
-    from avow.backends.rosmonitoring.traces import digest_trace
+    from .session import session, violation_json
+    from .traces import digest_trace
 
     running = session(system, nodes)
     shown: list[dict[str, Any]] = []
@@ -78,8 +79,9 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
 
 
 def _events(trace: str) -> Iterator[Recorded]:
-    from avow.backends.rosmonitoring.traces import read_lines, read_trace
     from avow.base.diagnostics import Diagnostic, Rejected
+
+    from .traces import read_lines, read_trace
 
     if trace != "-":
         return read_trace(Path(trace))
@@ -119,8 +121,8 @@ def _print_summary(running: Session) -> None:
 
 
 def _serve(system: System, nodes: tuple[str, ...], port: int) -> None:
-    from avow.backends.rosmonitoring.serve import HOST, serve
-    from avow.backends.rosmonitoring.session import session
+    from .serve import HOST, serve
+    from .session import session
 
     session(system, nodes)  # a fault of the plan is told now, not at the first connection
 

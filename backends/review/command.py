@@ -17,8 +17,9 @@ def command() -> None:
 @click.option("--renewed", metavar="DATE", help="Everything that changed was read again on this date.")
 def stamp(system: str, node: str, method: str | None, renewed: str | None) -> int:
     """Fill the digests in that the review of NODE in SYSTEM lacks. Never refreshes one by habit: see --renewed."""
-    from avow.backends.review.stamp import stamp as fill
-    from avow.cli.workspace import system_folder
+    from avow.base.workspace import system_folder
+
+    from .stamp import stamp as fill
 
     said = fill(system_folder(system), node, method=method, renewed=renewed)
     click.echo("\n".join(said) or "nothing to stamp: every digest is as it should be")
