@@ -21,7 +21,6 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from avow.backends.rosmonitoring.session import Session, session  # noqa: E402
 from avow.backends.rosmonitoring.traces import parse_event  # noqa: E402
-
 from avow.system.load import load_system  # noqa: E402
 
 TRACE = ROOT / "contracts/remote_inspection/traces/nominal.jsonl"

@@ -42,16 +42,19 @@ _OF_BACKENDS = {"monitor": "avow.backends.rosmonitoring.command", "review": "avo
 """Commands that belong to a backend → the module that holds them."""
 
 
+def command(name: str) -> click.Command:
+    """The command of that name in `COMMANDS`, imported now."""
+    found = importlib.import_module(_OF_BACKENDS.get(name, f"avow.cli.{name}")).command
+    assert isinstance(found, click.Command)
+    return found
+
+
 class _Lazy(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        command = importlib.import_module(_OF_BACKENDS.get(cmd_name, f"avow.cli.{cmd_name}")).command
-        assert isinstance(command, click.Command)
-        return command
+        return command(cmd_name) if cmd_name in COMMANDS else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         # from the table, so that `avow --help` imports no command

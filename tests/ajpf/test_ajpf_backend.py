@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
-from avow.backends.ajpf import BACKEND
 
 from avow.backend_kit.protocol import Backend, Limits
+from avow.backends.ajpf import BACKEND
 from avow.base.diagnostics import Severity
 from avow.base.verdict import Link, Verdict
 

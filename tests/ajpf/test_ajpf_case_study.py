@@ -8,9 +8,9 @@ import textwrap
 from pathlib import Path
 
 import pytest
-from avow.backends.ajpf import BACKEND
 
 from avow.backend_kit.protocol import Limits, Report
+from avow.backends.ajpf import BACKEND
 from avow.base.verdict import Outcome, Verdict
 
 REPAIRED = ("remote_inspection", "repaired_method.yaml")

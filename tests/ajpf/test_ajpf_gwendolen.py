@@ -5,6 +5,9 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from avow.backends.ajpf.checker import Checker, Property, needs_fine_steps
 from avow.backends.ajpf.environment import Environment, read_environment
 from avow.backends.ajpf.explore import explore
@@ -12,9 +15,6 @@ from avow.backends.ajpf.interpreter import NONE, Agent, Semantics
 from avow.backends.ajpf.parser import parse_fact, parse_program
 from avow.backends.ajpf.psl_parser import Malformed, parse_psl
 from avow.backends.ajpf.syntax import show, show_deed, show_event
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
 from avow.base.diagnostics import Rejected
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from avow.backends.ajpf import BACKEND
-from avow.backends.ajpf.psl_parser import parse_psl
-from avow.backends.ajpf.tautology import MAX_STEPS, Steps, constant, is_satisfiable, is_valid
 from hypothesis import HealthCheck, given, settings
 from test_ajpf_ltl import FORMULAS, oracle
 from test_ajpf_ltl import Kripke as Graph
 from test_ajpf_ltl import Not as Negation
 
 from avow.backend_kit.protocol import Limits
+from avow.backends.ajpf import BACKEND
+from avow.backends.ajpf.psl_parser import parse_psl
+from avow.backends.ajpf.tautology import MAX_STEPS, Steps, constant, is_satisfiable, is_valid
 from avow.base.verdict import Verdict
 from avow.sanity.mutants import mutants
 from avow.system.plan import Scenario

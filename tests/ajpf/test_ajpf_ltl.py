@@ -10,6 +10,9 @@ from __future__ import annotations
 from itertools import product
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
 from avow.backends.ajpf.automaton import build, compiled
 from avow.backends.ajpf.psl import (
     FALSE,
@@ -28,8 +31,6 @@ from avow.backends.ajpf.psl import (
 )
 from avow.backends.ajpf.structure import Fair, Kripke, find_lasso, reduce
 from avow.backends.ajpf.syntax import Struct
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 P, Q = (Atom(Modality.BELIEVES, "ag", Struct(name)) for name in "pq")
 PLACES = {P: 0, Q: 1}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from avow.backends.ajpf import psl
 from avow.backends.ajpf.mapping import Mapper, NotCovered, Row, clauses, to_formula
 from avow.backends.ajpf.matching import match
 from avow.backends.ajpf.psl_parser import parse_psl
 from avow.backends.ajpf.shape import TooComplex, free, shape
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
 from avow.evaluation.evaluate import evaluate
 from avow.formulas.values import Element, FunctionValue
 from avow.language.load import check_text, parse_formula

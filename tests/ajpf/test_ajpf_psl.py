@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from avow.backends.ajpf.psl import (
     FALSE,
     TRUE,
@@ -22,8 +25,6 @@ from avow.backends.ajpf.psl import (
 )
 from avow.backends.ajpf.psl_parser import Malformed, instantiate, parse_psl
 from avow.backends.ajpf.syntax import Struct, Var
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 P, Q, R = (Atom(Modality.BELIEVES, "ag", Struct(name)) for name in "pqr")
 

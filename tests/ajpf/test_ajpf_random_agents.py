@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 import yaml
-from avow.backends.ajpf import BACKEND
 
 from avow.backend_kit.protocol import Job, Limits
+from avow.backends.ajpf import BACKEND
 from avow.base.verdict import Verdict
 from avow.pipeline.work import method_job
 from avow.system.load import load_system

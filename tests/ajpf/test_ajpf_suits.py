@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from avow.backends.ajpf import BACKEND
 
 from avow.backend_kit.protocol import Suits
+from avow.backends.ajpf import BACKEND
 from avow.language.load import check_text
 
 HEAD = "context { Command : {go(REAL, REAL), stop}; Map : NATURAL --> BOOL; Dose : NATURAL --> REAL; } "

@@ -6,10 +6,10 @@ import os
 from pathlib import Path
 
 import pytest
-from avow.backends.ajpf import BACKEND, ajpf_tool, spin
-from avow.backends.ajpf.ajpf_tool import Said, judge
 
 from avow.backend_kit.protocol import Limits
+from avow.backends.ajpf import BACKEND, ajpf_tool, spin
+from avow.backends.ajpf.ajpf_tool import Said, judge
 from avow.base.process import Completed
 from avow.base.verdict import Verdict
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND, psl
 from avow.backends.ajpf.instances import instances
 from avow.backends.ajpf.options import read
 from avow.backends.ajpf.psl_parser import parse_psl
 from avow.backends.ajpf.words import Wording
-
-from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Counterexample
 
 FIXTURES = Path(__file__).parent / "fixtures"

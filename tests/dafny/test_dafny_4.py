@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from avow.backends.dafny import BACKEND, modern
-from avow.backends.dafny.runner import has_commands
 from test_dafny_tricks import CONTRACT, GOOD
 
 from avow.backend_kit.protocol import Job, Limits
 from avow.backend_kit.tools import find_tool
+from avow.backends.dafny import BACKEND, modern
+from avow.backends.dafny.runner import has_commands
 from avow.base.verdict import Outcome, Verdict
 
 MakeJob = Callable[..., Job]

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from avow.backends.dafny import BACKEND
 
 from avow.backend_kit.protocol import Backend, Job, Limits
+from avow.backends.dafny import BACKEND
 from avow.base.verdict import Link, Outcome, Verdict
 
 CONTRACTS = Path(__file__).resolve().parents[2] / "contracts"
@@ -88,9 +88,8 @@ def test_a_wrong_implementation_is_not_proved(
 
 
 def test_nothing_is_run_where_dafny_is_missing(make_job: MakeJob, monkeypatch: Any) -> None:
-    from avow.backends.dafny import backend
-
     from avow.backend_kit.protocol import Tool
+    from avow.backends.dafny import backend
 
     monkeypatch.setattr(backend, "dafny", lambda: Tool("dafny", None, None, "apt-get install dafny"))
     job = job_for(make_job, "remote_inspection", "radiationSensor", "models/radiation_sensor_impl.dfy")

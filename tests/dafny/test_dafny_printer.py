@@ -10,13 +10,13 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+
+from avow.backend_kit.protocol import Job, Limits
 from avow.backends.dafny import BACKEND
 from avow.backends.dafny.modules import Generated, generate
 from avow.backends.dafny.names import RESERVED, Names, identifier
 from avow.backends.dafny.printer import NotExpressible, Vocabulary, print_clause
 from avow.backends.dafny.runner import verify
-
-from avow.backend_kit.protocol import Job, Limits
 from avow.base.verdict import Verdict
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.load import check_text, load_contract

@@ -8,12 +8,12 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from avow.backends.dafny.modules import generate
-from avow.backends.dafny.runner import verify
 from hypothesis_backend.test_judging_agrees import value
 from rosmonitoring.test_agreement import RCL, formula
 
 from avow.backend_kit.protocol import Limits
+from avow.backends.dafny.modules import generate
+from avow.backends.dafny.runner import verify
 from avow.evaluation.evaluate import evaluate
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.load import load_contract

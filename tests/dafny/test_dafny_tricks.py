@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from avow.backends.dafny import BACKEND
-from avow.backends.dafny.scanner import Scan, scan, tokens
 
 from avow.backend_kit.protocol import Job, Limits
+from avow.backends.dafny import BACKEND
+from avow.backends.dafny.scanner import Scan, scan, tokens
 from avow.base.verdict import Outcome, Verdict
 
 MakeJob = Callable[..., Job]

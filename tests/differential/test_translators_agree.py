@@ -18,15 +18,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hoare.systems import make_job
+
+from avow.backend_kit.protocol import Job, Limits
 from avow.backends.dafny import BACKEND as DAFNY
 from avow.backends.hoare import BACKEND as HOARE
 from avow.backends.hypothesis import BACKEND as HYPOTHESIS
 from avow.backends.rosmonitoring.engine import Fault, Monitor
 from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.traces import parse_event
-from hoare.systems import make_job
-
-from avow.backend_kit.protocol import Job, Limits
 from avow.base.verdict import Verdict
 from avow.language.load import check_text
 from differential.contracts import Contract, Writer

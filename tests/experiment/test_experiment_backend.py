@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from avow.backends.experiment import BACKEND
 
 from avow.backend_kit.protocol import Backend, Limits
+from avow.backends.experiment import BACKEND
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Link, Outcome, Verdict
 

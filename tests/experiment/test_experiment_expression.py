@@ -3,10 +3,11 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
-from avow.backends.experiment.expression import Interval, Malformed, parse
-from avow.backends.experiment.quantity import conversion, decimal, figure, show
 from hypothesis import given
 from hypothesis import strategies as st
+
+from avow.backends.experiment.expression import Interval, Malformed, parse
+from avow.backends.experiment.quantity import conversion, decimal, figure, show
 
 
 def at(text: str, **columns: float | str) -> Interval:

@@ -7,6 +7,9 @@ from fractions import Fraction
 from math import comb
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from avow.backends.experiment.statistics import (
     Range,
     greatest_deviation,
@@ -18,8 +21,6 @@ from avow.backends.experiment.statistics import (
     tail,
     upper_bound,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 CONFIDENCE = Fraction(95, 100)
 

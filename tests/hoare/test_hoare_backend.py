@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from avow.backends.hoare import BACKEND
 
 from avow.backend_kit.protocol import Backend, Job, Limits
+from avow.backends.hoare import BACKEND
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Link, Outcome, Verdict
 from hoare.systems import make_job, sensor

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from avow.backends.hoare import BACKEND
 
 from avow.backend_kit.protocol import Limits
+from avow.backends.hoare import BACKEND
 from avow.base.verdict import Outcome, Verdict
 from hoare.systems import make_job
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
+
 from avow.backends.hoare.parser import DEEPEST, parse_program
 from avow.backends.hoare.syntax import AssignStatement, Binary, IfStatement, MatchStatement, Source, WhileStatement
-
 from avow.base.diagnostics import Diagnostic, Rejected
 
 PAPER = """input := radiation_at(i)

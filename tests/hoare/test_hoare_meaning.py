@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 
 import pytest
+
 from avow.backends.hoare import wp
 from avow.backends.hoare.checker import Checked, check
 from avow.backends.hoare.interpreter import Fault, Machine
@@ -17,7 +18,6 @@ from avow.backends.hoare.simplify import simplify
 from avow.backends.hoare.triples import Triple
 from avow.backends.hoare.typing import Scope, formula
 from avow.backends.hoare.wp import Conditions, weakest
-
 from avow.base.diagnostics import Span
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import evaluate

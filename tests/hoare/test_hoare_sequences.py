@@ -7,11 +7,11 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+
+from avow.backend_kit.protocol import Limits
 from avow.backends.hoare import BACKEND
 from avow.backends.hoare.backend import load
 from avow.backends.hoare.interpreter import Machine
-
-from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Outcome, Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import Element, Sequence

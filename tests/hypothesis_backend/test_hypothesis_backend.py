@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from avow.backends.hypothesis import BACKEND
-from avow.backends.hypothesis.backend import failure_bound
 from hoare.systems import make_job, sensor
 
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
+from avow.backends.hypothesis import BACKEND
+from avow.backends.hypothesis.backend import failure_bound
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Outcome, Verdict
 

@@ -7,11 +7,11 @@ import random
 from pathlib import Path
 
 import pytest
-from avow.backends.hoare import BACKEND as HOARE
-from avow.backends.hypothesis import BACKEND
 from hoare.systems import make_job
 
 from avow.backend_kit.protocol import Limits
+from avow.backends.hoare import BACKEND as HOARE
+from avow.backends.hypothesis import BACKEND
 from avow.base.verdict import Outcome, Verdict
 from avow.pipeline.work import method_job
 from avow.system.load import load_system

@@ -12,11 +12,11 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from avow.backends.hypothesis import wire
-from avow.backends.hypothesis.judging import judged
 from rosmonitoring.conftest import make_system
 from rosmonitoring.test_agreement import MAPPING, NATURALS, RCL, REALS, formula, truth
 
+from avow.backends.hypothesis import wire
+from avow.backends.hypothesis.judging import judged
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.sorts import BOOL, REAL, DataSort, EnumSort, FunctionSort

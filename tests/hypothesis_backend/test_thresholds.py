@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from avow.backends.hypothesis import BACKEND
 from hoare.systems import make_job
 
 from avow.backend_kit.protocol import Limits
+from avow.backends.hypothesis import BACKEND
 from avow.base.verdict import Verdict
 
 CONTRACT = """

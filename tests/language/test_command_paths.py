@@ -12,6 +12,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
+import avow.cli
 from avow.cli import COMMANDS, main
 
 GOOD = "node n { inputs( a : REAL ) outputs( b : BOOL ) topics() guarantee( b <=> a > 0 ) }\n"
@@ -114,9 +115,7 @@ def paths_of(command: click.Command) -> list[str]:
 def test_no_command_takes_an_empty_argument_for_the_current_folder(
     name: str, place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    import importlib
-
-    command = importlib.import_module(f"avow.cli.{name}").command
+    command = avow.cli.command(name)
     wanted = paths_of(command)
     if not wanted:
         pytest.skip("takes no argument")

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 import yaml
-from avow.backends.review import BACKEND
-from avow.backends.review.record import read_record
-from avow.backends.review.stamp import stamp_record
 from helpers import edit
 
 from avow.backend_kit.protocol import Backend, Job, Limits
+from avow.backends.review import BACKEND
+from avow.backends.review.record import read_record
+from avow.backends.review.stamp import stamp_record
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.language.contract import Node

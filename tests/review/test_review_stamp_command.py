@@ -6,10 +6,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from avow.backends.review.__main__ import main
+
+import avow.cli
 from avow.backends.review.record import read_record
 from avow.backends.review.stamp import stamp
-
 from avow.base.diagnostics import Rejected
 
 PLAN = """\
@@ -41,6 +41,14 @@ def folder(tmp_path: Path) -> Path:
     for name in ("review.yaml", "other.yaml"):
         (tmp_path / name).write_text(RECORD)
     return tmp_path
+
+
+def main(arguments: list[str]) -> int:
+    """``avow review stamp …``, with its exit code."""
+    with pytest.raises(SystemExit) as left:
+        avow.cli.main(["review", "stamp", *arguments])
+    assert isinstance(left.value.code, int)
+    return left.value.code
 
 
 def test_one_of_two_reviews_is_stamped(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,11 +14,11 @@ from itertools import product
 from typing import Any
 
 import pytest
+
 from avow.backends.rosmonitoring.engine import Fault, Monitor
 from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.rml_interpreter import Interpreter
 from avow.backends.rosmonitoring.rml_translate import translate
-
 from avow.language.sorts import NaturalSort
 from avow.language.terms import (
     And,

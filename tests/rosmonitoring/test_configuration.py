@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 import yaml
+
 from avow.backends.rosmonitoring.configuration import configuration, dotted_type, identifier, problems
 from avow.backends.rosmonitoring.options import setup
-
 from avow.system.plan import System
 
 

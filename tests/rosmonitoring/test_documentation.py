@@ -7,6 +7,7 @@ from pathlib import Path
 
 import jsonschema
 import yaml
+
 from avow.backends.rosmonitoring import BACKEND
 
 PAGE = (Path(__file__).parents[2] / "docs" / "backends" / "rosmonitoring.md").read_text(encoding="utf-8")

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+
 from avow.backends.rosmonitoring.engine import Fault, Monitor, Violation
 from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.session import session
-
 from avow.system.plan import System
 
 from .conftest import CASE

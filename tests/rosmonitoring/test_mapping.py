@@ -7,9 +7,9 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
-
 from avow.base.diagnostics import Diagnostic
 from avow.formulas.values import Data, Element, FunctionValue, Sequence, Value
 from avow.system.plan import System

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from avow.backends.rosmonitoring.serve import answer, serve
 from avow.backends.rosmonitoring.session import session
-
 from avow.system.plan import System
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from avow.backends.rosmonitoring.numbers import Decimal, NotANumber, exact
 from avow.backends.rosmonitoring.traces import digest_trace, parse_event, read_lines, read_trace
-
 from avow.base.diagnostics import Rejected
 
 
