@@ -17,7 +17,7 @@ from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopFor
 from avow.calculus.entailment import implied
 from avow.calculus.induction import Deeper, deeper, steps
 from avow.calculus.repair import Offer, environment, initial_values, offers, providers
-from avow.calculus.variables import Frame
+from avow.calculus.variables import Facts, Frame, closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
 from avow.system.graph import components, cycle_in
@@ -124,14 +124,15 @@ class _Solver:
         direct = [p for p in condition.providers if p in allowed]
         last: Settled | None = None
         attempts = list(self.attempts(condition, direct, allowed))
+        if (close := self.close(condition, *attempts[0])) is not None:
+            return close
         for number, (same, before) in enumerate(attempts):
             # Only the widest question is worth the whole time: what a narrower one cannot settle, that may.
             patience = self.bounds.milliseconds
             if number < len(attempts) - 1:
                 patience = min(patience, NARROW_MS)
 
-            split = bool(before) or condition.delayed
-            phases = (Phase.INITIAL, Phase.LATER) if split else (Phase.SAME_STEP,)
+            phases = _phases(condition, before)
             cases = tuple(self.case(condition, phase, same, before, number > 0, patience) for phase in phases)
             answer = _settled(condition, cases)
             if answer.verdict is Verdict.PROVED:
@@ -139,6 +140,38 @@ class _Solver:
             last = answer  # only the widest hypotheses refute: narrower ones may just have left something out
         assert last is not None
         return self.by_itself(condition, *attempts[-1]) or self.deeper(condition, last, *attempts[-1])
+
+    def close(self, condition: SideCondition, same: tuple[str, ...], before: tuple[str, ...]) -> Settled | None:
+        """A proof from what speaks of the goal's variables alone, if there is one. A provider of a thousand consumers
+        guarantees a thousand things, of which each consumer needs a few."""
+        cases: list[Case] = []
+        for phase in _phases(condition, before):
+            goal, parts = (
+                self.frame.clause(condition.consumer, condition.clause),
+                self.parts(condition, phase, same, before),
+            )
+            hypotheses = closest(parts, goal)
+            if len(hypotheses) == sum(len(part.terms) for part in parts):
+                return None  # these are all: the first attempt asks just that
+            case = self.ask(phase, hypotheses, goal, min(self.bounds.milliseconds, NARROW_MS))
+            if case.verdict is not Verdict.PROVED:
+                return None
+            cases.append(case)
+        return _settled(condition, tuple(cases))
+
+    def parts(
+        self, condition: SideCondition, phase: Phase, same: tuple[str, ...], before: tuple[str, ...]
+    ) -> list[Facts]:
+        """All that may be used in a phase."""
+        found = [self.frame.promised(node) for node in same]
+        if phase is Phase.LATER:
+            found += [self.frame.promised(node, 1) for node in before]
+        found += [self.frame.surroundings(), indexed(self.own(condition.consumer))]
+        if phase is Phase.LATER:
+            found.append(self.frame.surroundings(1))
+        elif phase is Phase.INITIAL:
+            found.append(self.frame.beginnings(self.selected))
+        return found
 
     def by_itself(self, condition: SideCondition, same: tuple[str, ...], before: tuple[str, ...]) -> Settled | None:
         """Where a node feeds itself at the same step, and what it guarantees would show what it assumes: circular."""
@@ -148,7 +181,7 @@ class _Solver:
         guaranteed = {
             f"{consumer}.{g.name}": self.frame.clause(consumer, g.name) for g in self.frame.node(consumer).guarantees
         }
-        phases = (Phase.INITIAL, Phase.LATER) if before or condition.delayed else (Phase.SAME_STEP,)
+        phases = _phases(condition, before)
         cases = tuple(self.case(condition, phase, same, before, True, NARROW_MS, guaranteed) for phase in phases)
         answer = _settled(condition, cases)
         if answer.verdict is not Verdict.PROVED:
@@ -238,7 +271,9 @@ class _Solver:
         more: Mapping[str, Term] | None = None,
     ) -> Case:
         hypotheses, goal = self.question(condition, phase, same, before, wide)
-        hypotheses |= more or {}
+        return self.ask(phase, hypotheses | dict(more or {}), goal, patience)
+
+    def ask(self, phase: Phase, hypotheses: Hypotheses, goal: Term, patience: int) -> Case:
         answer = implied(hypotheses, goal, timeout_ms=patience, seed=self.bounds.seed)
         return Case(
             phase,
@@ -277,6 +312,10 @@ class _Solver:
             for node in nodes
             for clause in self.frame.node(node).clauses
         }
+
+
+def _phases(condition: SideCondition, before: tuple[str, ...]) -> tuple[Phase, ...]:
+    return (Phase.INITIAL, Phase.LATER) if before or condition.delayed else (Phase.SAME_STEP,)
 
 
 def _about(facts: Hypotheses, terms: Iterable[Term], *, direct: bool) -> Hypotheses:

@@ -6,8 +6,9 @@ Pure generation here (`composition_obligations`, `requirement_obligations`); the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Protocol
 
 from avow.base.diagnostics import Span
@@ -59,6 +60,11 @@ def requirement_obligations(system: System) -> tuple[Obligation, ...]:
     return tuple(task.obligation for task in _requirements(compose(system)))
 
 
+def all_obligations(composition: Composition) -> tuple[Obligation, ...]:
+    """Both, of derivations that are made already."""
+    return tuple(task.obligation for task in (*_tasks(composition), *_requirements(composition)))
+
+
 def discharge(system: System, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
     """Settle obligations made by the two functions above, one outcome for each, in their order."""
     return settle_all(compose(system), obligations, limits)
@@ -108,15 +114,15 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
             ),
             questions.RuleQuestion(finding.message),
         )
+    given = {name: _given(frame, name) for condition in goal.conditions for name in condition.providers}
     for condition in goal.conditions:
         clause = frame.node(condition.consumer).clause(condition.clause)
-        givers = [f"{name}.{g.name}" for name in condition.providers for g in frame.node(name).guarantees]
         yield Task(
             _obligation(
                 frame.system,
                 f"{goal.name}.{condition.consumer}.{condition.clause}",
                 f"{goal.name}: {_sources(condition)} what {condition.consumer} assumes in {condition.clause}",
-                _implication(frame, condition),
+                _implication(frame, condition, given),
                 sha256(
                     "side\n"
                     + "\n".join(
@@ -127,7 +133,11 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
                         ]
                     )
                 ),
-                tuple(dict.fromkeys(map(innermost, (str(condition.about), *givers)))),
+                tuple(
+                    dict.fromkeys(
+                        (innermost(str(condition.about)), *chain(*(given[p].guarantees for p in condition.providers)))
+                    )
+                ),
                 clause.span,
             ),
             questions.SideQuestion(goal.name, condition),
@@ -319,11 +329,27 @@ def _sources(condition: SideCondition) -> str:
     return "the environment gives" if condition.environment else "it is always so,"
 
 
-def _implication(frame: Frame, condition: SideCondition) -> str:
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """A provider's names, made once for all its consumers."""
+
+    guarantees: tuple[str, ...]
+    """Innermost names."""
+    clauses: str
+    """Of all clauses, as one conjunction."""
+
+
+def _given(frame: Frame, name: str) -> _Given:
+    node = frame.node(name)
+    names = tuple(innermost(f"{name}.{g.name}") for g in node.guarantees)
+    return _Given(names, " ∧ ".join(f"{name}.{c.name}" for c in node.clauses))
+
+
+def _implication(frame: Frame, condition: SideCondition, given: Mapping[str, _Given]) -> str:
     goal = show_term(frame.clause(condition.consumer, condition.clause))
-    given = [f"{p}.{c.name}" for p in condition.providers for c in frame.node(p).clauses]
-    given += [f"environment {port}" for port in condition.environment]
-    return f"{' ∧ '.join(given)} ⇒ {goal}" if given else goal
+    parts = [text for p in condition.providers if (text := given[p].clauses)]
+    parts += [f"environment {port}" for port in condition.environment]
+    return f"{' ∧ '.join(parts)} ⇒ {goal}" if parts else goal
 
 
 def _listed(names: Sequence[str]) -> str:

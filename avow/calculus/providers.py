@@ -10,20 +10,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 from avow.base.diagnostics import Severity
 from avow.base.files import digest as sha256
 from avow.base.verdict import Outcome, Verdict
-from avow.calculus.variables import Frame, frame
-from avow.formulas.formula import digest
+from avow.calculus.variables import Frame
+from avow.formulas.formula import digest, free_variables
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
-from avow.language.terms import TRUE, Term
+from avow.language.terms import TRUE, Term, Variable
 from avow.sanity.analysis import Bounds, SanityResult, as_outcome, listing
 from avow.sanity.claims import Claim, Property
 from avow.solving.questions import solve
 from avow.system.formulas import ports_of
-from avow.system.plan import Endpoint, System
+from avow.system.plan import Endpoint
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +36,19 @@ class ProviderClaim:
     """SHA-256 of the assumption, the providers' contracts and what the plan assumes of the environment."""
     clause: str
     """The assumption's name."""
-    formulas: Mapping[str, Term]
-    """The assumption and all that is promised of its inputs, by ``node.clause``."""
-    providers: tuple[str, ...]
+    assumed: Mapping[str, Term]
+    """The assumption, and what the plan assumes of the environment that bears on it, by label."""
+    promised: tuple[Mapping[str, Term], ...]
+    """The contracts of the providers of its inputs, each by ``node.clause``."""
+
+    @property
+    def formulas(self) -> dict[str, Term]:
+        """All that is to hold together."""
+        return dict(chain.from_iterable(part.items() for part in (self.assumed, *self.promised)))
 
 
-def provider_claims(system: System, node: Node) -> tuple[ProviderClaim, ...]:
-    """A claim for each assumption of a node that says something of a connected input. Raises Rejected where the plan's
-    formulas are wrong."""
-    if not node.assumptions:
-        return ()
-    whole = frame(system)
+def provider_claims(whole: Frame, node: Node) -> tuple[ProviderClaim, ...]:
+    """A claim for each assumption of a node that says something of a connected input."""
     found = (_claim(whole, node, clause) for clause in node.assumptions if clause.formula != TRUE)
     return tuple(claim for claim in found if claim is not None)
 
@@ -72,13 +75,10 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
     if not edges:
         return None
     about = f"{node.name}.{clause.name}"
-    formulas = {about: whole.clause(node.name, clause.name)}
-    for edge in edges:
-        provider, earlier = edge.source.node, 1 if edge.delayed else 0
-        for given in whole.node(provider).clauses:
-            formulas.setdefault(_label(provider, given, earlier), whole.clause(provider, given.name, earlier))
-    formulas |= whole.environment()
-    providers = tuple(dict.fromkeys(edge.source.node for edge in edges))
+    given = {(e.source.node, int(e.delayed)): whole.promised(e.source.node, int(e.delayed)) for e in edges}
+    goal = whole.clause(node.name, clause.name)
+    assumed = {about: goal} | _bearing(whole, free_variables(goal).union(*(p.speaking for p in given.values())))
+    providers = tuple(dict.fromkeys(provider for provider, _ in given))
     names = " and ".join(providers)
     verb = "guarantees" if len(providers) == 1 else "guarantee"
     claim = Claim(
@@ -90,12 +90,22 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
         Severity.ERROR,
         clause.span,
     )
-    meaning = sha256("\n".join(["providers", *sorted(f"{label} {digest(f)}" for label, f in formulas.items())]))
-    return ProviderClaim(claim, meaning, clause.name, formulas, providers)
+    meanings = sorted(f"{label} {digest(fact)}" for label, fact in assumed.items())
+    meaning = sha256("\n".join(["providers", *meanings, *sorted(p.digest for p in given.values())]))
+    return ProviderClaim(claim, meaning, clause.name, assumed, tuple(p.terms for p in given.values()))
 
 
-def _label(provider: str, clause: Clause, earlier: int) -> str:
-    return f"{provider}.{clause.name}" + (" one step before" if earlier else "")
+def _bearing(whole: Frame, spoken: frozenset[Variable]) -> dict[str, Term]:
+    """What the plan assumes of the environment and is tied to some variables, directly or by another such assumption.
+    What is not cannot exclude anything here."""
+    left = {label: (fact, free_variables(fact)) for label, fact in whole.environment().items()}
+    found: dict[str, Term] = {}
+    known = set(spoken)
+    while near := [label for label, (_, variables) in left.items() if not variables.isdisjoint(known)]:
+        for label in near:
+            found[label], variables = left.pop(label)
+            known |= variables
+    return found
 
 
 def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:

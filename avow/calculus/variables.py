@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from avow.formulas.formula import free_variables, substitute
+from avow.base.files import digest as sha256
+from avow.formulas.formula import digest, free_variables, substitute
 from avow.language.contract import Node
 from avow.language.sorts import Sort
 from avow.language.terms import Role, Term, Variable
@@ -20,6 +21,55 @@ from avow.system.plan import Endpoint, System
 
 SUFFIXES = ("", "@before", "@before@before")
 """Now, one step earlier, two steps earlier."""
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """Labelled facts, found by the variables that they speak of."""
+
+    terms: Mapping[str, Term]
+    variables: Mapping[str, frozenset[Variable]]
+    speaking: Mapping[Variable, tuple[str, ...]]
+    """Variable → the labels of the facts that speak of it."""
+    rarest: Mapping[Variable, tuple[str, ...]]
+    """Variable → the labels of those of which it is the variable that the fewest others speak of."""
+    digest: str
+    """SHA-256 of labels and meanings."""
+
+
+def indexed(facts: Mapping[str, Term]) -> Facts:
+    """The facts with their index."""
+    variables = {label: free_variables(fact) for label, fact in facts.items()}
+    speaking: dict[Variable, list[str]] = {}
+    for label, spoken in variables.items():
+        for variable in spoken:
+            speaking.setdefault(variable, []).append(label)
+    rarest: dict[Variable, list[str]] = {}
+    for label, spoken in variables.items():
+        if spoken:
+            rarest.setdefault(min(spoken, key=lambda v: len(speaking[v])), []).append(label)
+    meaning = sha256("\n".join(sorted(f"{label} {digest(fact)}" for label, fact in facts.items())))
+    return Facts(facts, variables, _frozen(speaking), _frozen(rarest), meaning)
+
+
+def _frozen(lists: Mapping[Variable, list[str]]) -> dict[Variable, tuple[str, ...]]:
+    return {variable: tuple(labels) for variable, labels in lists.items()}
+
+
+def closest(parts: Iterable[Facts], goal: Term) -> dict[str, Term]:
+    """The facts that share a variable with the goal, and then those *all* of whose variables occur in these: bounds of
+    what the first speak of. To share one is not enough there: one step further, everything would come in."""
+    parts = tuple(parts)
+    spoken = free_variables(goal)
+    direct = [{label for variable in spoken for label in part.speaking.get(variable, ())} for part in parts]
+    known = spoken.union(
+        *(part.variables[label] for part, labels in zip(parts, direct, strict=True) for label in labels)
+    )
+    found: dict[str, Term] = {}
+    for part, labels in zip(parts, direct, strict=True):
+        bounds = {label for v in known for label in part.rarest.get(v, ()) if part.variables[label] <= known}
+        found.update((label, part.terms[label]) for label in sorted(labels | bounds))
+    return found
 
 
 @dataclass(slots=True)
@@ -37,6 +87,7 @@ class Frame:
     _nodes: dict[str, Node] = field(default_factory=dict)
     _mappings: dict[tuple[str, int], Mapping[Variable, Term]] = field(default_factory=dict)
     _terms: dict[tuple[str, str, int], Term] = field(default_factory=dict)
+    _facts: dict[tuple[str | frozenset[str], int], Facts] = field(default_factory=dict)
     _environment: dict[int, dict[str, Term]] = field(default_factory=dict)
     _initials: dict[str, tuple[tuple[str, Term], ...]] | None = None
 
@@ -48,8 +99,39 @@ class Frame:
         key = (node, clause, earlier)
         if key not in self._terms:
             formula = self.node(node).clause(clause).formula
-            self._terms[key] = substitute(formula, self.mapping(node, earlier))
+            mapping = self.mapping(node, earlier)
+            spoken = free_variables(formula)  # of many ports, a clause speaks of few
+            self._terms[key] = substitute(formula, {v: mapping[v] for v in spoken if v in mapping})
         return self._terms[key]
+
+    def promised(self, node: str, earlier: int = 0) -> Facts:
+        """All that a node's contract says, `earlier` steps ago, labelled ``navigation.somewhere``."""
+        key = (node, earlier)
+        if key not in self._facts:
+            suffix = " one step before" if earlier else ""
+            self._facts[key] = indexed(
+                {
+                    f"{node}.{clause.name}{suffix}": self.clause(node, clause.name, earlier)
+                    for clause in self.node(node).clauses
+                }
+            )
+        return self._facts[key]
+
+    def surroundings(self, earlier: int = 0) -> Facts:
+        """As `environment`."""
+        key = (frozenset[str](), earlier)
+        if key not in self._facts:
+            self._facts[key] = indexed(self.environment(earlier))
+        return self._facts[key]
+
+    def beginnings(self, nodes: frozenset[str]) -> Facts:
+        """As `initials`."""
+        key = (nodes, 1)
+        if not nodes:
+            return indexed({})
+        if key not in self._facts:
+            self._facts[key] = indexed(self.initials(nodes))
+        return self._facts[key]
 
     def mapping(self, node: str, earlier: int = 0) -> Mapping[Variable, Term]:
         """A node's ports in system-level variables."""

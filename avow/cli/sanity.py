@@ -36,6 +36,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     from avow.base.workspace import system_folder
     from avow.calculus import providers
     from avow.calculus.interpretation import interpretation, ranges
+    from avow.calculus.variables import frame
     from avow.sanity.analysis import Bounds, analyse
     from avow.system.load import load_path
 
@@ -48,9 +49,11 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     def settle(node: Node) -> tuple[SanityResult, ...]:
         scenario = interpretation(node, system.plan.scenario)
         own = analyse(node, system.contract, scenario=scenario, ranges=ranges(system, node), bounds=bounds)
-        return own + providers.settle(providers.provider_claims(system, node), node, bounds)
+        return own + providers.settle(linked[node.name], node, bounds)
 
+    whole = frame(system)
     chosen = [node for node in system.contract.nodes if not nodes or node.name in nodes]
+    linked = {node.name: providers.provider_claims(whole, node) for node in chosen}
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # Z3 lets other threads run while it searches
         results = [result for found in pool.map(settle, chosen) for result in found]
     if as_json:

@@ -14,12 +14,13 @@ def discharge_sanity(system: System, node: Node, obligations: Sequence[Obligatio
     """Settle sanity claims of one node by the solver."""
     from avow.calculus import providers
     from avow.calculus.interpretation import interpretation, ranges
+    from avow.calculus.variables import frame
     from avow.sanity.analysis import Bounds, outcomes
     from avow.solving.questions import z3_version
 
     given = interpretation(node, system.plan.scenario)
     bounds = Bounds(seed=limits.seed)
-    linked = {asked.claim.name: asked for asked in providers.provider_claims(system, node)}
+    linked = {asked.claim.name: asked for asked in providers.provider_claims(frame(system), node)}
     own = {o.id: o.name for o in obligations if o.name not in linked}
     found = outcomes(node, own, scenario=given, ranges=ranges(system, node), bounds=bounds)
     found += providers.outcomes(node, {o.id: linked[o.name] for o in obligations if o.name in linked}, bounds)

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from avow import __version__
 from avow.backend_kit.protocol import Backend, Job, Limits
@@ -25,6 +25,10 @@ from avow.language.contract import Contract, Node
 from avow.language.printer import show_term
 from avow.pipeline.evidence_keys import surroundings
 from avow.system.plan import Method, System
+
+if TYPE_CHECKING:
+    from avow.calculus.composition import Composition
+    from avow.calculus.variables import Frame
 
 LANGUAGE = "language"
 SANITY = "sanity"
@@ -74,14 +78,15 @@ def language_work(system: System) -> Work:
     return _work(system, SYSTEM_LEVEL, LANGUAGE, (obligation,), __version__)
 
 
-def sanity_work(system: System, node: Node) -> Work:
-    """Is this node's contract worth verifying? (design: page "Obligations…", kind sanity)"""
+def sanity_work(whole: Frame, node: Node) -> Work:
+    """Is this node's contract worth verifying? `whole` is its system's frame: made once for all nodes."""
     from avow.calculus.providers import provider_claims
     from avow.sanity.claims import claims, node_key
 
+    system = whole.system
     meaning = node_key(node)
     of_the_node = [(claim, meaning) for claim in claims(node)]
-    of_its_providers = [(asked.claim, asked.digest) for asked in provider_claims(system, node)]
+    of_its_providers = [(asked.claim, asked.digest) for asked in provider_claims(whole, node)]
     obligations = tuple(
         Obligation(
             system.name,
@@ -100,11 +105,12 @@ def sanity_work(system: System, node: Node) -> Work:
     return _work(system, node.name, SANITY, obligations, _z3_version(), _scenario(system))
 
 
-def compose_work(system: System) -> Work:
+def compose_work(composition: Composition) -> Work:
     """The calculus' side conditions, start-up and persistence, and the requirements that have a formula."""
-    from avow.calculus.obligations import composition_obligations, requirement_obligations
+    from avow.calculus.obligations import all_obligations
 
-    obligations = (*composition_obligations(system), *requirement_obligations(system))
+    system = composition.frame.system
+    obligations = all_obligations(composition)
     return _work(system, SYSTEM_LEVEL, COMPOSE, obligations, _z3_version(), _scenario(system))
 
 
@@ -202,11 +208,14 @@ class Catalogue:
 
 
 def catalogue(system: System) -> Catalogue:
-    """Raises Rejected for an unknown backend."""
+    """Raises Rejected for an unknown backend, and where the plan's formulas are wrong."""
+    from avow.calculus.composition import compose
+
+    composition = compose(system)
     works = (
         language_work(system),
-        *(sanity_work(system, node) for node in system.contract.nodes),
-        compose_work(system),
+        *(sanity_work(composition.frame, node) for node in system.contract.nodes),
+        compose_work(composition),
         *method_works(system),
     )
     guarantees = (guarantee(system, node, c.name) for node in system.contract.nodes for c in node.guarantees)

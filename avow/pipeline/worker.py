@@ -22,6 +22,8 @@ from avow.base.diagnostics import Rejected
 from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
+from avow.calculus.composition import compose
+from avow.calculus.variables import frame
 from avow.evidence.encoding import Unreadable
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
@@ -158,9 +160,9 @@ def _work(request: dict[str, Any], system: System) -> Work:
     """Raises KeyError for a node or method that there is not any more."""
     match request["engine"]:
         case "sanity":
-            return sanity_work(system, system.contract.node(request["node"]))
+            return sanity_work(frame(system), system.contract.node(request["node"]))
         case "compose":
-            return compose_work(system)
+            return compose_work(compose(system))
         case _:
             node = system.contract.node(request["node"])
             for method in system.plan.node(node.name).methods:

@@ -112,7 +112,7 @@ def claims(node: Node) -> tuple[Claim, ...]:
     ]
     for clause in node.guarantees:
         found += _of_guarantee(node, clause)
-    found += [claim for port in node.outputs for claim in _of_output(node, port)]
+    found += [claim for port in node.outputs for claim in _of_output(node, port, g, guaranteed)]
     for clause in node.assumptions:
         found += _of_assumption(node, clause)
     return tuple(found)
@@ -204,9 +204,8 @@ def _of_assumption(node: Node, clause: Clause) -> list[Claim]:
     return found
 
 
-def _of_output(node: Node, port: Port) -> list[Claim]:
-    formula = show_term(conjunction(c.formula for c in node.guarantees))
-    names = _names(node, node.guarantees)
+def _of_output(node: Node, port: Port, formula: str, names: tuple[str, ...]) -> list[Claim]:
+    """`formula` and `names` are those of all guarantees."""
     return [
         Claim(
             Property.UNCONSTRAINED,

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from avow.base.verdict import Verdict
 from avow.calculus.providers import provider_claims, settle
+from avow.calculus.variables import frame
 from avow.cli.sanity import command
 from avow.sanity.analysis import Bounds, SanityResult
 from avow.system.plan import System
@@ -21,7 +22,7 @@ PLANT = node("plant", "", "level : REAL, flow : REAL", "G low: out.level <= 10",
 
 def found(system: System, name: str) -> dict[str, SanityResult]:
     of = system.contract.node(name)
-    return {r.name: r for r in settle(provider_claims(system, of), of, Bounds())}
+    return {r.name: r for r in settle(provider_claims(frame(system), of), of, Bounds())}
 
 
 @pytest.mark.parametrize(
