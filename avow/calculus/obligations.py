@@ -114,7 +114,8 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
             ),
             questions.RuleQuestion(finding.message),
         )
-    given = {name: _given(frame, name) for condition in goal.conditions for name in condition.providers}
+    providers = dict.fromkeys(name for condition in goal.conditions for name in condition.providers)
+    given = {name: _given(frame, name) for name in providers}
     for condition in goal.conditions:
         clause = frame.node(condition.consumer).clause(condition.clause)
         yield Task(

@@ -1,0 +1,64 @@
+"""What is done for each node of a system costs four times as much for four times as many nodes, and little more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from avow.backend_kit.protocol import Limits
+from avow.base.verdict import Verdict
+from avow.calculus.obligations import composition_obligations, discharge
+from avow.calculus.variables import closest, indexed
+from avow.formulas.formula import free_variables
+from avow.language.sorts import INTEGER
+from avow.language.terms import Compare, Literal, Role, Variable
+from avow.pipeline.work import catalogue
+from avow.system.load import load_path
+from avow.system.plan import System
+
+from .made import chain, fan, seconds
+
+
+def made(folder: Path, text: str) -> System:
+    path = folder / "system.rcl"
+    path.write_text(text)
+    return load_path(path)
+
+
+def compose(system: System) -> None:
+    found = discharge(system, composition_obligations(system), Limits(seconds=20))
+    open_ = [o.obligation for o in found if o.verdict is not Verdict.PROVED]
+    assert all(name.endswith(("one-output", "environment.root.a0")) for name in open_), open_
+
+
+@pytest.mark.parametrize("shape", [chain, fan])
+@pytest.mark.parametrize(
+    ("work", "few"), [(catalogue, 75), pytest.param(compose, 100, marks=pytest.mark.slow)], ids=["catalogue", "compose"]
+)
+def test_four_times_the_nodes_cost_at_most_five_times(
+    tmp_path: Path, shape: Callable[[int], str], work: Callable[[System], object], few: int
+) -> None:
+    small, large = made(tmp_path, shape(few)), made(tmp_path, shape(4 * few))
+    work(small)  # what is done once in a process
+    assert seconds(lambda: work(large)) <= 5 * seconds(lambda: work(small))
+
+
+def at_least(name: str, least: int) -> Compare:
+    return Compare("<=", Literal(least, INTEGER), Variable(Role.BOUND, name, INTEGER))
+
+
+def below(one: str, other: str) -> Compare:
+    return Compare("<=", Variable(Role.BOUND, one, INTEGER), Variable(Role.BOUND, other, INTEGER))
+
+
+def test_the_closest_facts_are_those_about_the_goal_and_bounds_of_what_these_speak_of() -> None:
+    facts = {"a": below("x", "y"), "b": at_least("x", 0), "c": below("x", "z"), "d": at_least("z", 0)}
+    goal = at_least("y", 0)
+    assert list(closest([indexed(facts)], goal)) == ["a", "b"]
+    split = [indexed({k: v}) for k, v in facts.items()]
+    assert sorted(closest(split, goal)) == ["a", "b"]
+    for part in split:
+        (fact,) = part.terms.values()
+        assert set(part.speaking) == set(free_variables(fact))
