@@ -35,12 +35,13 @@ def fan(count: int) -> str:
     return root + "".join(leaves)
 
 
-def seconds(work: Callable[[], object], rounds: int = 2) -> float:
-    """Processor time of this thread: the least of several rounds."""
-    times = []
+def seconds(*works: Callable[[], object], rounds: int = 3) -> list[float]:
+    """Processor time of this thread for each: the least of several rounds, in which they take turns."""
+    times: list[list[float]] = [[] for _ in works]
     for _ in range(rounds):
-        gc.collect()
-        start = time.thread_time()
-        work()
-        times.append(time.thread_time() - start)
-    return min(times)
+        for work, found in zip(works, times, strict=True):
+            gc.collect()
+            start = time.thread_time()
+            work()
+            found.append(time.thread_time() - start)
+    return [min(found) for found in times]
