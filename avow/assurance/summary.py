@@ -16,6 +16,7 @@ _WORST_FIRST = (
     Status.REFUTED,
     Status.CIRCULAR,
     Status.VACUOUS,
+    Status.PARTIAL,
     Status.ERROR,
     Status.UNKNOWN,
     Status.NOT_RUN,

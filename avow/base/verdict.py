@@ -24,6 +24,9 @@ class Verdict(StrEnum):
     """By a person who said what was read and concluded."""
     JUSTIFIED = "justified"
     """A person's dated reason, in place of evidence."""
+    PARTIAL = "partial"
+    """Partial correctness: proved of every run that ends, while no one has shown that all of them do. It supports
+    nothing by itself."""
     REFUTED = "refuted"
     """The claim is false: a counterexample is attached."""
     UNKNOWN = "unknown"

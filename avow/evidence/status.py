@@ -17,7 +17,7 @@ from avow.evidence.record import Evidence
 
 
 class Status(StrEnum):
-    """Where a claim stands. The first ten words are the verdicts' own; the others are only ever computed."""
+    """Where a claim stands. A verdict has the status of its name; the other words are only ever computed."""
 
     PROVED = "proved"
     CHECKED = "checked"
@@ -27,6 +27,8 @@ class Status(StrEnum):
     JUSTIFIED = "justified"
     LINKED = "linked"
     """A claim in prose: a person says that what stands below it, which holds, amounts to it."""
+    PARTIAL = "partial"
+    """Proved of every run that ends; that the runs end is not shown, and nobody has taken it upon himself."""
     VACUOUS = "vacuous"
     """Evidence whose trigger was never met: it supports nothing."""
     UNKNOWN = "unknown"

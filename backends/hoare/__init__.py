@@ -22,19 +22,32 @@ _TABLE = {
 }
 
 
+_TERMINATION = {
+    "type": "object",
+    "description": "a person's word that the program's loops without a VARIANT end",
+    "properties": {
+        "because": {"type": "string", "minLength": 1, "description": "why they end"},
+        "who": {"type": "string", "minLength": 1, "description": "who says so"},
+        "until": {"type": "string", "format": "date", "description": "the last day on which that is accepted"},
+    },
+    "required": ["because", "who", "until"],
+    "additionalProperties": False,
+}
+
+
 class Hoare:
     """See `docs/backends/hoare.md`."""
 
     name = "hoare"
     title = "Hoare triples from the guarantee, proved of an imperative program by weakest preconditions"
-    version = "3"
+    version = "4"
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False
     link = Link.GENERATED
     options_schema: Mapping[str, Any] = {
         "type": "object",
-        "properties": {"program": _FILE, "variables": _TABLE},
+        "properties": {"program": _FILE, "variables": _TABLE, "termination": _TERMINATION},
         "required": ["program"],
         "additionalProperties": False,
     }
@@ -42,7 +55,7 @@ class Hoare:
     green_means = (
         "Every run of the program that starts in an input allowed by the assumptions ends in outputs that meet the "
         "guarantee. It is about the program as written in the imperative language, over exact numbers, and says "
-        "nothing of how the robot's own code was made from it; without a VARIANT it takes for granted that a loop ends."
+        "nothing of how the robot's own code was made from it. Without a VARIANT for each loop, it is never given."
     )
 
     def tools(self) -> tuple[Tool, ...]:

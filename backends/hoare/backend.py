@@ -22,16 +22,25 @@ from avow.solving.translation import Unsupported
 from avow.system.paths import inside
 
 from .checker import Checked, check
+from .endless import endless_run
 from .numbers import other_numbers
 from .outline import outline, show
 from .parser import parse_program
-from .program import While, statements
+from .program import Program, While, has_loops, statements
 from .triples import Triple, every_run, triples
 from .witness import Breach, breach
 from .wp import Condition, TooLarge, conditions
 
 BRIEFLY = 5.0
 """Seconds for whether the program has an output for every input, where that can only turn `unknown` into `refuted`."""
+
+GIVEN = frozenset({Verdict.PROVED, Verdict.PARTIAL, Verdict.JUSTIFIED})
+"""What an obligation whose triples are proved gets: whether its loops are shown to end makes the difference."""
+
+SEARCHED = 8_000
+"""Milliseconds for an input on which the program never ends."""
+
+UNFAITHFUL = "Avow's simplified triple does not say what the contract's formulas say: a fault of Avow, please report it"
 
 
 @dataclass(frozen=True)
@@ -56,9 +65,10 @@ class Work:
         """What any guarantee needs besides its own triples: that the program runs, whatever the input."""
         return every_run(self.job.node, self.checked)
 
-    def run_conditions(self) -> tuple[Condition, ...]:
-        """Its conditions, without those that say nothing. Raises TooLarge."""
-        return tuple(c for c in conditions(self.every_run, self.checked.program.body) if c.goal != TRUE)
+
+def run_conditions(triple: Triple, program: Program) -> tuple[Condition, ...]:
+    """The conditions of a triple, without those that say nothing. Raises TooLarge."""
+    return tuple(c for c in conditions(triple, program.body) if c.goal != TRUE)
 
 
 def load(job: Job) -> Work:
@@ -126,6 +136,9 @@ def files(job: Job) -> Mapping[str, str]:
     for found in all_triples.values():
         for triple in found:
             made[f"{_stem(triple)}.hoare"] = _triple_text(triple, work)
+            if triple.fidelity != TRUE:
+                same = Condition("fidelity", (), triple.fidelity, "the triple says what the contract's formulas say")
+                made[f"{_stem(triple)}.fidelity.smt2"] = _script(triple, same)
             try:
                 made[f"{_stem(triple)}.outline.txt"] = outline(triple, work.checked.program.body)
                 for condition in conditions(triple, work.checked.program.body):
@@ -133,7 +146,7 @@ def files(job: Job) -> Mapping[str, str]:
             except (TooLarge, RecursionError) as error:
                 made[f"{_stem(triple)}.outline.txt"] = f"no outline: {error}\n"
     try:
-        for condition in work.run_conditions():
+        for condition in run_conditions(work.every_run, work.checked.program):
             made[f"every-run.{condition.name}.smt2"] = _script(work.every_run, condition)
     except (TooLarge, RecursionError):
         pass  # each triple's outline says so
@@ -175,16 +188,16 @@ def settle(job: Job, limits: Limits) -> Report:
         return Report(failed, "weakest preconditions", version)
     logs: dict[str, str] = {}
     outcomes = tuple(_obligation(o, found[o.id], work, limits, logs) for o in job.obligations)
-    open_ = {o.verdict for o in outcomes} & {Verdict.PROVED, Verdict.UNKNOWN}
+    open_ = {o.verdict for o in outcomes} & {*GIVEN, Verdict.UNKNOWN}
     if open_:
         # where nothing is proved that would rest on it, it is worth a look but not the time of another guarantee
-        seconds = limits.seconds if Verdict.PROVED in open_ else min(limits.seconds, BRIEFLY)
+        seconds = limits.seconds if open_ & GIVEN else min(limits.seconds, BRIEFLY)
         running = _every_run(work, replace(limits, seconds=seconds))
         logs["every-run.log"] = f"{running.verdict} - {running.why}\n"
         if running.verdict is Verdict.REFUTED:  # it settles also what the guarantee's own triples leave open
-            worse = {Verdict.PROVED, Verdict.UNKNOWN}
+            worse = {*GIVEN, Verdict.UNKNOWN}
         else:
-            worse = {Verdict.PROVED} if running.verdict is not Verdict.PROVED else set()
+            worse = set(GIVEN) if running.verdict is not Verdict.PROVED else set()
         outcomes = tuple(_stopped(o, running, work) if o.verdict in worse else o for o in outcomes)
     return Report(outcomes, "weakest preconditions", version, logs=logs)
 
@@ -234,11 +247,21 @@ def _obligation(
     summary = f"{len(settled)} Hoare triple(s) proved: {count} verification condition(s)"
     if vacuous:
         summary += f"; but {settled[0].vacuous}"
+    endings = _termination(work)
+    accepted = Accepted.of(work.job) if endings else None
+    verdict = Verdict.PROVED
+    if accepted is not None:
+        verdict = Verdict.JUSTIFIED
+        summary = f"partial correctness, {summary}; {accepted.text}"
+        details |= {"who": accepted.who, "valid_until": accepted.until}
+    elif endings:
+        verdict = Verdict.PARTIAL
+        summary = f"partial correctness, {summary}; not shown: {'; '.join(endings)}"
     return Outcome(
         obligation.id,
-        Verdict.PROVED,
+        verdict,
         summary,
-        hypotheses=(*work.checked.reading.hypotheses, *_termination(work)),
+        hypotheses=(*work.checked.reading.hypotheses, *endings),
         details=details,
         link=link,
         vacuous=vacuous,
@@ -246,12 +269,21 @@ def _obligation(
 
 
 def _every_run(work: Work, limits: Limits) -> Settled:
-    """Whether the program runs to its end (or on, in loops without a variant) on every input that is allowed."""
+    """Whether the program runs to its end on every input that is allowed. Where a loop has no variant, or one that is
+    not shown to fall, an input on which it never ends is looked for: that is none to be content with either."""
     triple, deadline = work.every_run, time.monotonic() + limits.seconds
+    program = work.checked.program
+    unfaithful = _unfaithful(triple, deadline, limits)
+    if unfaithful is Verdict.REFUTED:
+        return Settled(triple, Verdict.ERROR, UNFAITHFUL)
+    if unfaithful is not None:
+        triple = triple.as_stated
     try:
-        wanted = work.run_conditions()
+        wanted = run_conditions(triple, program)
         failed = [c for c in wanted if not _holds(c, deadline, limits)]
-        shown = breach(triple, work.checked.program, failed, max(1000, _left(deadline))) if failed else None
+        shown = breach(triple, program, failed, max(1000, _left(deadline))) if failed else None
+        if shown is None and (_termination(work) or (failed and has_loops(program))):
+            shown = endless_run(triple, program, max(1000, min(_left(deadline), SEARCHED)))
     except TooLarge as error:
         return Settled(triple, Verdict.UNKNOWN, str(error))
     except RecursionError:
@@ -277,6 +309,26 @@ def _stopped(outcome: Outcome, running: Settled, work: Work) -> Outcome:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Accepted:
+    """A person's word, in the plan, that a program's loops end."""
+
+    because: str
+    who: str
+    until: str
+
+    @classmethod
+    def of(cls, job: Job) -> Accepted | None:
+        match job.options.get("termination"):
+            case {"because": because, "who": who, "until": until}:
+                return cls(str(because), str(who), str(until))
+        return None
+
+    @property
+    def text(self) -> str:
+        return f"that its loops end {self.who} accepts until {self.until}: {self.because}"
+
+
 def _termination(work: Work) -> tuple[str, ...]:
     """Loops without a variant: the triple is about runs that end."""
     return tuple(
@@ -293,8 +345,21 @@ def _guarded(triple: Triple, work: Work, limits: Limits, deadline: float) -> Set
         return Settled(triple, Verdict.UNKNOWN, "its formulas are nested too deeply for this method")
 
 
+def _unfaithful(triple: Triple, deadline: float, limits: Limits) -> Verdict | None:
+    """None where the triple is shown to claim what the contract's own formulas claim; else what the solver says."""
+    if triple.fidelity == TRUE:
+        return None
+    answer = entails([], triple.fidelity, timeout_ms=min(5000, _left(deadline)), seed=limits.seed)
+    return None if answer.verdict is Verdict.PROVED else answer.verdict
+
+
 def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Settled:
     program = work.checked.program
+    unfaithful = _unfaithful(triple, deadline, limits)
+    if unfaithful is Verdict.REFUTED:
+        return Settled(triple, Verdict.ERROR, UNFAITHFUL)
+    if unfaithful is not None:
+        triple = triple.as_stated
     try:
         wanted = conditions(triple, program.body)
     except TooLarge as error:

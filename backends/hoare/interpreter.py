@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -19,11 +20,27 @@ _UNDEFINED = "a division by zero, an element that the sequence does not have, or
 STEPS = 5_000
 """Statements after which a run is given up."""
 
+_HEADS = 4
+"""So many of a loop's last states are told of a run that was given up."""
+
 State = dict[str, Value]
 
 
 class NoEnd(Exception):  # noqa: N818 - it names a state
-    """The program has not ended within `STEPS`."""
+    """The program has not ended within `STEPS`. `loop` is the innermost loop that it was in, and `heads` are the last
+    states in which its test was found true."""
+
+    def __init__(self) -> None:
+        super().__init__("no end")
+        self.loop: While | None = None
+        self.heads: tuple[State, ...] = ()
+
+
+class Endless(Exception):  # noqa: N818 - it names a state
+    """The program never ends: a loop's test is met in the same state twice."""
+
+    def __init__(self, loop: While) -> None:
+        super().__init__(f"the loop at line {loop.span.line} comes back to the same state for ever")
 
 
 class Fault(Exception):  # noqa: N818 - it names a state
@@ -44,7 +61,7 @@ class Machine:
     compiled: dict[int, tuple[Term, Evaluator]] = field(default_factory=dict)
 
     def run(self, body: Block, start: Mapping[str, Value]) -> State:
-        """The last state. Raises NoEnd, Fault, or NotEvaluable."""
+        """The last state. Raises NoEnd, Endless, Fault, or NotEvaluable."""
         self.steps = 0
         state: State = dict(start)
         self._block(body, state)
@@ -98,11 +115,30 @@ class Machine:
                     state.pop(variable.name, None)
                     if variable.name in outer:
                         state[variable.name] = outer[variable.name]
-            case While(condition=condition, body=body):
-                while self._compute(condition, state, at):
-                    self.steps += 1
-                    self._ended()
-                    self._block(body, state)
+            case While():
+                self._loop(statement, state)
+
+    def _loop(self, loop: While, state: State) -> None:
+        """Brent's search for a circle: the state is held against one that is taken anew after 1, 2, 4… rounds. What a
+        round does depends on nothing but the state, so that one met twice is met for ever."""
+        held, rounds, power = dict(state), 0, 1
+        heads: deque[State] = deque(maxlen=_HEADS)
+        try:
+            while self._compute(loop.condition, state, loop.span):
+                heads.append(dict(state))
+                self.steps += 1
+                self._ended()
+                self._block(loop.body, state)
+                if state == held:
+                    self.endless += 1
+                    raise Endless(loop)
+                rounds += 1
+                if rounds == power:
+                    held, rounds, power = dict(state), 0, 2 * power
+        except NoEnd as no_end:
+            if no_end.loop is None:
+                no_end.loop, no_end.heads = loop, tuple(heads)
+            raise
 
     def _compute(self, term: Term, state: State, at: Span) -> Value:
         safe = defined(term)
@@ -117,4 +153,4 @@ class Machine:
         return value
 
 
-__all__ = ["Fault", "Machine", "NoEnd", "NotEvaluable", "State"]
+__all__ = ["Endless", "Fault", "Machine", "NoEnd", "NotEvaluable", "State"]

@@ -125,5 +125,9 @@ def statements(block: Block) -> Iterator[Statement]:
                 pass
 
 
+def has_loops(program: Program) -> bool:
+    return any(isinstance(s, While) for s in statements(program.body))
+
+
 def variable(name: str, sort: Sort) -> Variable:
     return Variable(Role.BOUND, name, sort)

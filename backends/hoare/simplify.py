@@ -1,6 +1,7 @@
-"""Formulas made shorter, with the same meaning: so that a proof outline reads as a person would write it.
+"""Formulas made shorter, with the same meaning: so that triples and proof outlines read as a person would write them.
 
-Verification conditions do not rest on this: the solver gets them as they come.
+No proof rests on this: that a triple means what the contract's own formulas mean is asked of the solver at every run
+(`Triple.fidelity`).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from avow.language.terms import (
     Not,
     Or,
     Quantified,
+    Quantifier,
     SetTerm,
     Term,
     Widen,
@@ -76,12 +78,14 @@ def _step(term: Term) -> Term:
             return term
         case Compare():
             return _compare(term)
-        case Quantified(body=body) if body in (TRUE, FALSE):
-            return body  # no sort is empty
+        case Quantified(quantifier=Quantifier.UNIQUE, body=body):
+            return (
+                FALSE if body == FALSE else term
+            )  # of what always holds there is one only where the sort has one value
         case Quantified(quantifier=quantifier, variables=variables, body=body, span=span):
-            used = free_variables(body)
+            used = free_variables(body)  # no sort is empty
             kept = tuple(v for v in variables if v in used)
-            if quantifier == "exists_unique" or len(kept) == len(variables):
+            if len(kept) == len(variables):
                 return term
             return Quantified(quantifier, kept, body, span) if kept else body
         case In(item=item, collection=SetTerm(items=items)):

@@ -8,7 +8,7 @@ between outputs and inputs two.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evidence.obligation import Obligation
@@ -39,6 +39,17 @@ from .simplify import simplify
 
 
 @dataclass(frozen=True, slots=True)
+class Stated:
+    """A triple's formulas as the contract has them, before anything was simplified. `fixed` are the constants of outer
+    quantifiers that an equation of `pre` determined and that the simplified triple no longer has, each with its value
+    in terms of those after it."""
+
+    pre: Term
+    post: Term
+    fixed: tuple[tuple[Variable, Term], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Triple:
     """{pre} program {post}. `pre` is over inputs and ghosts, which the program does not change."""
 
@@ -49,6 +60,28 @@ class Triple:
     post: Term
     ghosts: tuple[tuple[Variable, Variable], ...]
     """(variable, its ghost): also part of the precondition, as equations."""
+    stated: Stated | None = None
+    """What it was simplified from; None where it is as the contract has it."""
+
+    @property
+    def as_stated(self) -> Triple:
+        """The triple of the contract's own formulas: what is to be proved."""
+        return self if self.stated is None else replace(self, pre=self.stated.pre, post=self.stated.post, stated=None)
+
+    @property
+    def fidelity(self) -> Term:
+        """What must be valid for the simplified triple to claim what the stated one claims, no less and no more. The
+        program changes nothing that `pre` speaks of, so that the precondition still holds at the end."""
+        if self.stated is None or self.stated == Stated(self.pre, self.post):
+            return TRUE
+        was, fixed = self.stated, [equation(c, value) for c, value in self.stated.fixed]
+        return conjunction(
+            (
+                Implies(was.pre, conjunction((*fixed, self.pre))),
+                Implies(conjunction((*fixed, self.pre)), was.pre),
+                Implies(was.pre, Iff(was.post, self.post)),
+            )
+        )
 
     @property
     def full_pre(self) -> Term:
@@ -56,7 +89,7 @@ class Triple:
         return conjunction((*(equation(v, g) for v, g in self.ghosts), self.pre))
 
 
-def equation(one: Variable, other: Variable) -> Term:
+def equation(one: Term, other: Term) -> Term:
     if one.sort.__class__.__name__ == "BoolSort":
         return Iff(one, other)
     return Compare("==", one, other)
@@ -68,17 +101,16 @@ def triples(obligation: Obligation, clause: Clause, node: Node, checked: Checked
     names = set(checked.program.names)
     assumed = [translate(a, checked.reading, names) for a in node.assumptions]
     parts = tuple(_split(rename_bound(clause.formula, names)))
-    found: dict[tuple[Term, Term], None] = {}
+    found: dict[tuple[Term, Term, Stated], None] = {}
     for outer, conditions, consequent in parts:
         goal = translate_formula(consequent, checked.reading, clause)
         read = [translate_formula(c, checked.reading, clause) for c in conditions]
-        pre, post = _solved(outer, (*assumed, *read), goal)
-        found.setdefault((pre, post))
+        found.setdefault(_solved(outer, (*assumed, *read), goal))
     ghosts = tuple(sorted(checked.program.ghosts.items(), key=lambda pair: pair[0].name))
     count = len(found)
     return tuple(
-        Triple(clause.name if count == 1 else f"{clause.name}.{k}", obligation.id, pre, post, ghosts)
-        for k, (pre, post) in enumerate(found, start=1)
+        Triple(clause.name if count == 1 else f"{clause.name}.{k}", obligation.id, pre, post, ghosts, stated)
+        for k, (pre, post, stated) in enumerate(found, start=1)
     )
 
 
@@ -89,7 +121,8 @@ def every_run(node: Node, checked: Checked) -> Triple:
     names = set(checked.program.names)
     assumed = [translate(a, checked.reading, names) for a in node.assumptions]
     ghosts = tuple(sorted(checked.program.ghosts.items(), key=lambda pair: pair[0].name))
-    return Triple("every-run", "", simplify(conjunction(assumed)), TRUE, ghosts)
+    stated = Stated(conjunction(assumed), TRUE)
+    return Triple("every-run", "", simplify(stated.pre), TRUE, ghosts, stated)
 
 
 # -- the guarantee, taken apart ----------------------------------------------------------------------------------------
@@ -240,17 +273,19 @@ def _missing(port: Variable, clause: Clause) -> Diagnostic:
 # -- constants that an equation determines -----------------------------------------------------------------------------
 
 
-def _solved(outer: tuple[Variable, ...], hypotheses: tuple[Term, ...], goal: Term) -> tuple[Term, Term]:
+def _solved(outer: tuple[Variable, ...], hypotheses: tuple[Term, ...], goal: Term) -> tuple[Term, Term, Stated]:
     """Simplify, and put away constants of outer quantifiers that an equation determines (the one-point rule)."""
-    pre, post = simplify(conjunction(hypotheses)), simplify(goal)
+    was_pre = conjunction(hypotheses)
+    pre, post, fixed = simplify(was_pre), simplify(goal), list[tuple[Variable, Term]]()
     for constant in outer:
         for part in _conjuncts(pre):
             value = _determined(constant, part)
             if value is not None:
                 pre = simplify(substitute(pre, {constant: value}))
                 post = simplify(substitute(post, {constant: value}))
+                fixed.append((constant, value))
                 break
-    return pre, post
+    return pre, post, Stated(was_pre, goal, tuple(fixed))
 
 
 def _conjuncts(term: Term) -> tuple[Term, ...]:

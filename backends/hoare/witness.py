@@ -5,9 +5,6 @@ Simple numbers are tried first: those between the thresholds that program and tr
 
 from __future__ import annotations
 
-import itertools
-import math
-import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,9 +12,9 @@ from fractions import Fraction
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables, negation
 from avow.formulas.traversal import subterms
-from avow.formulas.values import Element, Value
+from avow.formulas.values import Value
 from avow.formulas.values import show as show_value
-from avow.language.sorts import INTEGER, NATURAL, REAL, BoolSort, EnumSort, Sort
+from avow.language.sorts import REAL, Sort
 from avow.language.terms import (
     Apply,
     Arithmetic,
@@ -31,19 +28,14 @@ from avow.language.terms import (
     Widen,
     children,
 )
-from avow.solving.models import default_value
 from avow.solving.questions import replay, solve
-from avow.solving.translation import Unsupported
 
-from .interpreter import Fault, Machine, NoEnd, State
+from .guesses import NUMERIC, expressions, filled, fits, guesses, numbers, starting_from
+from .interpreter import Endless, Fault, Machine, NoEnd, State
 from .outline import show
-from .program import Assign, If, Match, Program, Statement, Update, While, statements
+from .program import Assign, Program, Update, has_loops, statements
 from .triples import Triple
 from .wp import Condition
-
-_NUMERIC: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
-_TRIED = 300
-"""Inputs tried where the solver does not lead to one (programs with loops)."""
 
 _ENDLESS = 3
 """Runs without an end after which no more inputs are tried."""
@@ -61,7 +53,7 @@ class Breach:
 def breach(triple: Triple, program: Program, failed: Sequence[Condition], milliseconds: int) -> Breach | None:
     """Such a run, or None where none was found. Every answer has been replayed."""
     machine = Machine()
-    wanted = _variables(triple, program)
+    wanted = starting_from(triple, program)
     for condition in failed:
         if condition.name != "pre":
             continue
@@ -69,8 +61,8 @@ def breach(triple: Triple, program: Program, failed: Sequence[Condition], millis
             found = _shown(triple, program, machine, values)
             if found is not None:
                 return found
-    if any(isinstance(s, While) for s in statements(program.body)):
-        for values in _guesses(triple, program, wanted):
+    if has_loops(program):
+        for values in guesses(triple, program, wanted):
             found = _shown(triple, program, machine, values)
             if found is not None:
                 return found
@@ -79,25 +71,19 @@ def breach(triple: Triple, program: Program, failed: Sequence[Condition], millis
     return None
 
 
-def _variables(triple: Triple, program: Program) -> tuple[Variable, ...]:
-    free = free_variables(triple.full_pre) | free_variables(triple.post)
-    return tuple(sorted({*free, *program.state, *program.ghosts.values()}, key=lambda v: v.name))
-
-
 def _shown(triple: Triple, program: Program, machine: Machine, values: Mapping[Variable, Value]) -> Breach | None:
-    """Run the program on the values; a breach if the precondition holds of them and the postcondition fails."""
-    start: State = {v.name: value for v, value in values.items()}
-    for variable, ghost in program.ghosts.items():
-        start[ghost.name] = start[variable.name]
-    if not _holds(triple.pre, values, start):
+    """Run the program on the values; a breach if the precondition holds of them and the postcondition fails: those that
+    the contract states."""
+    start = first_state(triple, program, values)
+    if start is None:
         return None
     try:
         end = machine.run(program.body, start)
     except Fault as fault:
         return Breach(start, None, f"the program asks for {fault}")
-    except (NoEnd, NotEvaluable):
+    except (Endless, NoEnd, NotEvaluable):
         return None
-    if not _holds(negation(triple.post), values, end):
+    if not _holds(negation(triple.as_stated.post), end):
         return None
     last = {s.target for s in statements(program.body) if isinstance(s, Assign | Update)}
     outcome = ", ".join(
@@ -107,7 +93,21 @@ def _shown(triple: Triple, program: Program, machine: Machine, values: Mapping[V
     return Breach(start, end, f"{show(triple.post)} is demanded; the program ends with {outcome or 'it false'}")
 
 
-def _holds(term: Term, values: Mapping[Variable, Value], state: Mapping[str, Value]) -> bool:
+def first_state(triple: Triple, program: Program, values: Mapping[Variable, Value]) -> State | None:
+    """The program's first state on these values, with the ghosts and the constants that simplifying put away; None
+    where it is not certain that the stated precondition holds of them."""
+    start: State = {v.name: value for v, value in values.items()}
+    try:
+        for variable, ghost in program.ghosts.items():
+            start[ghost.name] = start[variable.name]
+        for constant, value in reversed(triple.stated.fixed if triple.stated else ()):
+            start[constant.name] = evaluate(value, start)
+    except (KeyError, NotEvaluable):
+        return None
+    return start if _holds(triple.as_stated.pre, start) else None
+
+
+def _holds(term: Term, state: Mapping[str, Value]) -> bool:
     """Whether a formula certainly holds in a state."""
     try:
         return evaluate(term, state) is True
@@ -125,7 +125,7 @@ def _models(
     """The solver's inputs: first with every number a simple one, then as they come."""
     formulas: list[Term] = [*condition.hypotheses, Not(condition.goal)]
     fixed: list[Term] = []
-    between, at = _numbers((*formulas, *_expressions(program)))
+    between, at = numbers((*formulas, *expressions(program)))
     for term in _observed(formulas, program):
         for pool in (between, at):
             choice = _one_of(term, pool)
@@ -141,44 +141,7 @@ def _models(
     for extra in ([fixed] if fixed else []) + [[]]:
         found = solve([*formulas, *extra], timeout_ms=milliseconds)
         if found.status == "sat":
-            yield _filled(found.values, wanted)
-
-
-def _guesses(triple: Triple, program: Program, wanted: tuple[Variable, ...]) -> Iterator[dict[Variable, Value]]:
-    """From an input that meets the precondition: all small points, or a sample of them (the same one every time)."""
-    between, at = _numbers((triple.full_pre, triple.post, *_expressions(program)))
-    small = sorted({*between, *at, *map(Fraction, range(8)), Fraction(-1)})
-    pools: dict[Variable, list[Value]] = {}
-    for variable in wanted:
-        if variable in program.ghosts.values():
-            continue
-        match variable.sort:
-            case EnumSort(members=members):
-                pools[variable] = [Element(m) for m in members]
-            case BoolSort():
-                pools[variable] = [False, True]
-            case sort if sort in _NUMERIC:
-                pools[variable] = [_stored(n, sort) for n in small if _fits(n, sort)]
-    found = solve([triple.full_pre], timeout_ms=1000)
-    base = _filled(found.values if found.status == "sat" else {}, wanted)
-    yield base
-    points: Iterable[tuple[Value, ...]] = itertools.product(*pools.values())
-    if math.prod(map(len, pools.values())) > _TRIED:
-        rng = random.Random(0)
-        points = (tuple(rng.choice(pool) for pool in pools.values()) for _ in range(_TRIED))
-    for point in points:
-        yield {**base, **dict(zip(pools, point, strict=True))}
-
-
-def _filled(values: Mapping[Variable, Value], wanted: Iterable[Variable]) -> dict[Variable, Value]:
-    filled = dict(values)
-    for variable in wanted:
-        if variable not in filled:
-            try:
-                filled[variable] = default_value(variable.sort)
-            except Unsupported:  # a sort without values that can be written: the evaluation will say so
-                continue
-    return filled
+            yield filled(found.values, wanted)
 
 
 def _observed(formulas: Sequence[Term], program: Program) -> list[Term]:
@@ -193,64 +156,14 @@ def _observed(formulas: Sequence[Term], program: Program) -> list[Term]:
                 stack.extend(children(part))
             is_application = isinstance(part, Apply) and all(isinstance(a, Variable) for a in part.arguments)
             named = isinstance(part, Variable) or is_application
-            if named and part.sort in _NUMERIC and free_variables(part) <= inputs:
+            if named and part.sort in NUMERIC and free_variables(part) <= inputs:
                 found.setdefault(part)
     return list(found)[:4]
 
 
-def _expressions(program: Program) -> tuple[Term, ...]:
-    return tuple(term for statement in statements(program.body) for term in _terms(statement))
-
-
-def _terms(statement: Statement) -> tuple[Term, ...]:
-    match statement:
-        case Assign(value=value):
-            return (value,)
-        case Update(arguments=arguments, value=value):
-            return (*arguments, value)
-        case If(condition=condition) | While(condition=condition):
-            return (condition,)
-        case Match(subject=subject):
-            return (subject,)
-        case _:
-            return ()
-
-
-def _numbers(terms: Iterable[Term]) -> tuple[list[Fraction], list[Fraction]]:
-    """Simple numbers between the constants of some terms and beyond them, and the constants themselves."""
-    constants = {
-        Fraction(part.value)
-        for term in terms
-        for part in subterms(term)
-        if isinstance(part, Literal) and part.sort in _NUMERIC and not isinstance(part.value, str)
-    }
-    ordered = sorted(constants)
-    between = [simplest_between(a, b) for a, b in itertools.pairwise(ordered)]
-    outside = [ordered[0] - 1, ordered[-1] + 1] if ordered else []
-    return [*between, *outside], [*ordered, Fraction(0), Fraction(1)]
-
-
-def simplest_between(low: Fraction, high: Fraction) -> Fraction:
-    """A number near the middle that is easy to read: the middle rounded as far as it stays well inside."""
-    middle = (low + high) / 2
-    for step in (100, 50, 10, 5, 1):
-        rounded = Fraction(round(middle / step) * step)
-        if low < rounded < high and abs(rounded - middle) * 5 <= high - low:
-            return rounded
-    return middle
-
-
 def _one_of(term: Term, pool: Iterable[Fraction]) -> Term | None:
-    choices = tuple(Compare("==", term, _literal(n, term.sort)) for n in pool if _fits(n, term.sort))
+    choices = tuple(Compare("==", term, _literal(n, term.sort)) for n in pool if fits(n, term.sort))
     return Or(choices) if choices else None
-
-
-def _fits(number: Fraction, sort: Sort) -> bool:
-    return sort == REAL or (number.denominator == 1 and (sort == INTEGER or number >= 0))
-
-
-def _stored(number: Fraction, sort: Sort) -> Value:
-    return number if sort == REAL else int(number)
 
 
 def _literal(number: Fraction, sort: Sort) -> Literal:
@@ -265,4 +178,4 @@ def _value(term: Term, values: Mapping[Variable, Value]) -> Fraction | None:
     return Fraction(value) if isinstance(value, int | Fraction) else None
 
 
-__all__ = ["Breach", "breach", "simplest_between"]
+__all__ = ["Breach", "breach", "first_state"]

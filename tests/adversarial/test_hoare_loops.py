@@ -1,4 +1,4 @@
-"""A loop without a variant may be assumed to end, but not where it is known never to."""
+"""A loop without a variant leaves partial correctness, and a refutation where some run of it never ends."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ CONTRACT = "node n { inputs( k : NATURAL ) outputs( m : NATURAL ) topics() guara
 @pytest.mark.parametrize(
     ("loop", "verdict"),
     [
-        ("WHILE TRUE INVARIANT TRUE DO\n   m := 0\n", Verdict.UNKNOWN),
-        ("WHILE m < k + 1 INVARIANT m == 0 DO\n   m := 0\n", Verdict.UNKNOWN),
-        ("WHILE m < k INVARIANT m <= k DO\n   m := m + 1\n", Verdict.PROVED),
+        ("WHILE TRUE INVARIANT TRUE DO\n   m := 0\n", Verdict.REFUTED),
+        ("WHILE m < k + 1 INVARIANT m == 0 DO\n   m := 0\n", Verdict.REFUTED),
+        ("WHILE m < k INVARIANT m <= k DO\n   m := m + 1\n", Verdict.PARTIAL),
+        ("WHILE m < k INVARIANT m <= k VARIANT k - m DO\n   m := m + 1\n", Verdict.PROVED),
     ],
 )
 def test_a_loop_that_never_ends_proves_nothing(tmp_path: Path, loop: str, verdict: Verdict) -> None:
