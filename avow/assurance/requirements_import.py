@@ -17,6 +17,7 @@ from pathlib import Path
 from avow.assurance.reqif import read_objects
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.system.plan import Requirement
+from avow.system.strict_yaml import read_yaml
 
 _COLUMNS: Mapping[str, tuple[str, ...]] = {
     "id": ("id", "requirement", "requirement id", "identifier", "key", "req", "reqif.foreignid", "object identifier"),
@@ -104,7 +105,9 @@ def _no_text(data: bytes, file: str) -> str:
 
 
 def plan_section(requirements: Iterable[Requirement]) -> str:
-    """The ``requirements:`` section of a plan.yaml; every text is quoted."""
+    """The ``requirements:`` section of a plan.yaml; every text is quoted. It is read once more before it is given out:
+    raises Rejected where a requirement would not read back as it is."""
+    requirements = tuple(requirements)
     lines = ["requirements:"]
     for r in requirements:
         parts = [f"text: {_quoted(r.text)}"]
@@ -112,7 +115,23 @@ def plan_section(requirements: Iterable[Requirement]) -> str:
         parts += [f"temporal: {_quoted(r.temporal)}"] if r.temporal else []
         parts += [f"supported_by: [{', '.join(map(_quoted, r.supported_by))}]"]
         lines += [f"  {_quoted(r.id)}:", *(f"    {part}" for part in parts)]
-    return "\n".join(lines) + "\n"
+    text = "\n".join(lines) + "\n"
+    try:
+        read = read_yaml(text.encode("utf-8", "surrogatepass"), "requirements")[0].at("requirements")
+    except Rejected:
+        read = None
+    again = (read.entries or {}) if read is not None else {}
+    lost = [r for r in requirements if r.id not in again or again[r.id].data != _content(r)]
+    if lost or len(again) != len(requirements):
+        message = "as a section of a plan, requirement '{}' does not read back as it is"
+        raise Rejected(*(Diagnostic("REQS005", message.format(r.id), r.span) for r in lost or requirements[:1]))
+    return text
+
+
+def _content(requirement: Requirement) -> dict[str, object]:
+    """What the section of a plan says of a requirement."""
+    said = {"text": requirement.text, "formula": requirement.formula, "temporal": requirement.temporal}
+    return {**{k: v for k, v in said.items() if v or k == "text"}, "supported_by": list(requirement.supported_by)}
 
 
 def _requirements(rows: Iterable[tuple[int, Mapping[str, str]]], file: str) -> tuple[Requirement, ...]:

@@ -83,6 +83,12 @@ _FILE = (
     Code("RCL004", "not UTF-8", "Contracts are UTF-8; the place is the first byte that cannot be read."),
     Code("RCL005", "not a text", "The file holds a NUL character.", "node n\0"),
     Code("RCL006", "too many errors", "Of one file, 200 diagnostics are shown, and then reading ends.", "`1`a" * 210),
+    Code(
+        "RCL007",
+        "layout would change the contract",
+        "`avow fmt` reads once more what it is about to write; this part would not be the same, so the file stays as "
+        "it is. That is a defect of Avow: tell its authors; a comment inside a part keeps its own layout.",
+    ),
 )
 
 _SYNTAX = (

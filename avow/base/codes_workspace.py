@@ -82,6 +82,12 @@ WORKSPACE_CODES = register(
         "Correct the row in the file that it came from.",
     ),
     declare(
+        "REQS005",
+        "section does not read back",
+        "Written as a section of a plan and read again, a requirement would not be the same; nothing is written.",
+        "Remove unusual characters from its text in the file that it came from, and tell Avow's authors.",
+    ),
+    declare(
         "SMT001",
         "no SMT-LIB form",
         "A formula of the node is outside what can be written in SMT-LIB.",

@@ -12,9 +12,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from avow.language.syntax import Tree
+from avow.language.syntax import (
+    Connective,
+    Negation,
+    Parentheses,
+    Sign,
+    Syntax,
+    TermSyntax,
+    Truth,
+    children,
+)
 
-_SIGNS = {"and": "and", "or": "or", "implies": "->", "iff": "<=>"}
 _EXHAUSTIVE = 10
 """Up to this many letters every assignment is tried, else `_SAMPLES` of them."""
 _SAMPLES = 2000
@@ -35,13 +43,13 @@ class Misreading:
     end: int
 
 
-def misreadings(formula: Tree, text: str) -> Iterator[Misreading]:
+def misreadings(formula: TermSyntax, text: str) -> Iterator[Misreading]:
     """Every place in the formula where another bracketing means something else."""
-    stack = [formula]
+    stack: list[Syntax] = [formula]
     while stack:
         tree = stack.pop()
-        if tree.kind not in _SIGNS:
-            stack.extend(p for p in reversed(tree.parts) if isinstance(p, Tree))
+        if not isinstance(tree, Connective):
+            stack.extend(reversed(children(tree)))
             continue
         operands, operators = _flat(tree)
         stack.extend(reversed(operands))
@@ -51,20 +59,19 @@ def misreadings(formula: Tree, text: str) -> Iterator[Misreading]:
             yield Misreading(mixed, tight, _bracketed(tree, text), tree.start, tree.end)
 
 
-def _flat(tree: Tree) -> tuple[list[Tree], list[str]]:
+def _flat(tree: Connective) -> tuple[list[TermSyntax], list[str]]:
     """The operands and the operators between them, of a formula without its (invisible) brackets."""
-    operands: list[Tree] = []
+    operands: list[TermSyntax] = []
     operators: list[str] = []
-    stack: list[Tree | str] = [tree]
+    stack: list[TermSyntax | Sign] = [tree]
     while stack:
         part = stack.pop()
-        if isinstance(part, str):
+        if isinstance(part, Sign):
             operators.append(part)
-        elif part.kind in _SIGNS:
-            sign = _SIGNS[part.kind]
-            for i, inner in enumerate(reversed(part.parts)):
+        elif isinstance(part, Connective):
+            for i, inner in enumerate(reversed(part.items)):
                 if i:
-                    stack.append(sign)
+                    stack.append(part.sign)
                 stack.append(inner)
         else:
             operands.append(part)
@@ -78,7 +85,7 @@ _LEVELS: dict[_Way, tuple[str, ...]] = {
 }
 
 
-def _differ(operands: list[Tree], operators: list[str], text: str) -> bool:
+def _differ(operands: list[TermSyntax], operators: list[str], text: str) -> bool:
     letters: dict[str, int] = {}
     atoms = [_literal(o, text, letters) for o in operands]
     for values in _assignments(len(letters), len(operators)):
@@ -88,14 +95,14 @@ def _differ(operands: list[Tree], operators: list[str], text: str) -> bool:
     return False
 
 
-def _literal(tree: Tree, text: str, letters: dict[str, int]) -> tuple[int | None, bool, bool]:
+def _literal(tree: TermSyntax, text: str, letters: dict[str, int]) -> tuple[int | None, bool, bool]:
     """A letter and whether it is negated; or, without letter, a truth value."""
     negated = False
-    while tree.kind in ("parenthesised", "not"):
-        negated ^= tree.kind == "not"
-        tree = tree.parts[0]
-    if tree.kind == "truth":
-        return None, False, (tree.parts[0] == "TRUE") != negated
+    while isinstance(tree, Parentheses | Negation):
+        negated ^= isinstance(tree, Negation)
+        tree = tree.body
+    if isinstance(tree, Truth):
+        return None, False, tree.value != negated
     key = " ".join(text[tree.start : tree.end].split())
     return letters.setdefault(key, len(letters)), negated, False
 
@@ -140,24 +147,24 @@ def _reduce(values: list[bool], signs: list[str], level: str) -> tuple[list[bool
     return (out[::-1], left[::-1]) if level == "->" else (out, left)
 
 
-def _bracketed(tree: Tree, text: str, among: int = 1) -> str:
+def _bracketed(tree: Connective, text: str, among: int = 1) -> str:
     """The formula as it is read, with parentheses around what binds tighter. `among`: so many others stand around."""
     most = max(2, _SHOWN // among)
-    left_out = len(tree.parts) - most
+    left_out = len(tree.items) - most
     parts = []
-    for part in tree.parts if left_out <= 0 else (*tree.parts[: most - 1], tree.parts[-1]):
-        if part.kind in _SIGNS:
-            parts.append(f"({_bracketed(part, text, min(len(tree.parts), most) * among)})")
+    for part in tree.items if left_out <= 0 else (*tree.items[: most - 1], tree.items[-1]):
+        if isinstance(part, Connective):
+            parts.append(f"({_bracketed(part, text, min(len(tree.items), most) * among)})")
         else:
             parts.append(_shortened(text[part.start : part.end]))
     if left_out > 0:
         parts.insert(-1, "…")
-    sign = f" {_SIGNS[tree.kind]} "
-    if tree.kind != "implies":
+    sign = f" {tree.sign} "
+    if tree.sign is not Sign.IMPLIES:
         return sign.join(parts)
     shown = parts[-1]
-    for i, part in enumerate(reversed(parts[:-1])):
-        shown = f"{part}{sign}({shown})" if i else f"{part}{sign}{shown}"
+    for i, before in enumerate(reversed(parts[:-1])):
+        shown = f"{before}{sign}({shown})" if i else f"{before}{sign}{shown}"
     return shown
 
 

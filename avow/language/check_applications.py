@@ -18,7 +18,18 @@ from avow.language.sorts import (
     Sort,
     TupleSort,
 )
-from avow.language.syntax import Tree
+from avow.language.syntax import (
+    Application,
+    BuiltinName,
+    Name,
+    RangeDisplay,
+    SequenceDisplay,
+    SetDisplay,
+    Syntax,
+    TermSyntax,
+    TupleDisplay,
+    unparenthesised,
+)
 from avow.language.terms import (
     Apply,
     Construct,
@@ -38,12 +49,10 @@ class Applications(Names):
 
     # --- applications ------------------------------------------------------------------------------------------------
 
-    def _application(self, tree: Tree, expected: Sort | None) -> Term | None:
-        head, arguments = tree.parts[0], tree.parts[1:]
-        while head.kind == "parenthesised":
-            head = head.parts[0]
-        if head.kind == "name":
-            name = head.parts[0]
+    def application(self, tree: Application) -> Term | None:
+        head, arguments = unparenthesised(tree.function), tree.arguments
+        if isinstance(head, Name):
+            name = head.text
             if self.scope.taken(name) is None:
                 if name == "length":
                     return self.length(tree, arguments)
@@ -66,7 +75,7 @@ class Applications(Names):
             case SequenceSort(item=item):
                 return self.index(tree, function, arguments, item)
         self.terms(arguments)
-        if self.reports.source.text[tree.parts[0].end : tree.parts[0].end + 1] == "[":
+        if self.reports.source.text[tree.function.end : tree.function.end + 1] == "[":
             return None  # reported by the lexer
         message = f"`{self.text(head)}` is of type {show_sort(function.sort)}: it is no function and takes no arguments"
         hint = None
@@ -78,7 +87,7 @@ class Applications(Names):
         return None
 
     def arguments(
-        self, tree: Tree, given: Sequence[Tree], parameters: Sequence[Sort], name: str
+        self, tree: Syntax, given: Sequence[TermSyntax], parameters: Sequence[Sort], name: str
     ) -> tuple[Term, ...] | None:
         if len(given) != len(parameters):
             self.terms(given)
@@ -93,7 +102,7 @@ class Applications(Names):
         done = tuple(m for m in made if m is not None)
         return done if len(done) == len(made) else None
 
-    def construct(self, tree: Tree, name: str, arguments: Sequence[Tree]) -> Term | None:
+    def construct(self, tree: Syntax, name: str, arguments: Sequence[TermSyntax]) -> Term | None:
         sort = self.scope.environment.elements[name]
         if isinstance(sort, EnumSort):
             self.terms(arguments)
@@ -103,7 +112,7 @@ class Applications(Names):
         given = self.arguments(tree, arguments, sort.constructor(name).parameters, name)
         return None if given is None else Construct(name, given, sort, self.span(tree))
 
-    def index(self, tree: Tree, sequence: Term, arguments: Sequence[Tree], item: Sort) -> Term | None:
+    def index(self, tree: Syntax, sequence: Term, arguments: Sequence[TermSyntax], item: Sort) -> Term | None:
         made = self.terms(arguments)
         if len(made) != 1:
             self.error("RCL305", f"a sequence takes one position and is given {len(made) or 'none'}", tree)
@@ -117,7 +126,7 @@ class Applications(Names):
             return None
         return Index(sequence, index, item, self.span(tree))
 
-    def length(self, tree: Tree, arguments: Sequence[Tree]) -> Term | None:
+    def length(self, tree: Syntax, arguments: Sequence[TermSyntax]) -> Term | None:
         made = self.terms(arguments)
         if len(made) != 1:
             self.error("RCL305", f"`length` takes one sequence and is given {len(made) or 'none'}", tree)
@@ -132,46 +141,46 @@ class Applications(Names):
 
     # --- collections -------------------------------------------------------------------------------------------------
 
-    def _tuple(self, tree: Tree, expected: Sort | None) -> Term | None:
-        wanted: Sequence[Sort | None] = [None] * len(tree.parts)
-        if isinstance(expected, TupleSort) and len(expected.items) == len(tree.parts):
+    def tuple_of(self, tree: TupleDisplay, expected: Sort | None) -> Term | None:
+        wanted: Sequence[Sort | None] = [None] * len(tree.items)
+        if isinstance(expected, TupleSort) and len(expected.items) == len(tree.items):
             wanted = expected.items
-        made = [self.term(t, w) for t, w in zip(tree.parts, wanted, strict=True)]
+        made = [self.term(t, w) for t, w in zip(tree.items, wanted, strict=True)]
         items = tuple(m for m in made if m is not None)
         if len(items) != len(made):
             return None
         return TupleTerm(items, TupleSort(tuple(i.sort for i in items)), self.span(tree))
 
-    def items(self, tree: Tree, what: str, expected: Sort | None) -> list[Term] | None:
-        made = [self.term(t, expected) for t in tree.parts]
+    def items(self, trees: Sequence[TermSyntax], what: str, expected: Sort | None) -> list[Term] | None:
+        made = [self.term(t, expected) for t in trees]
         items = [m for m in made if m is not None]
         if len(items) != len(made):
             return None
         unified = common(items)
         if unified is None:
-            wrong = [(t, i) for t, i in zip(tree.parts, items, strict=True) if common([items[0], i]) is None]
-            at, first = wrong[0] if wrong else (tree.parts[-1], items[-1])
+            wrong = [(t, i) for t, i in zip(trees, items, strict=True) if common([items[0], i]) is None]
+            at, first = wrong[0] if wrong else (trees[-1], items[-1])
             message = f"the items of a {what} are of one type: this is {show_sort(first.sort)}, "
             self.error("RCL302", message + f"the first is {show_sort(items[0].sort)}", at)
         return unified
 
-    def _sequence(self, tree: Tree, expected: Sort | None) -> Term | None:
+    def sequence(self, tree: SequenceDisplay, expected: Sort | None) -> Term | None:
         item = expected.item if isinstance(expected, SequenceSort) else None
-        if not tree.parts:
+        if not tree.items:
             if item is None:
                 self.error("RCL306", "the type of `<>` cannot be told here", tree, hint="compare it with a sequence")
                 return None
             return SequenceTerm((), SequenceSort(item), self.span(tree))
-        items = self.items(tree, "sequence", item)
+        items = self.items(tree.items, "sequence", item)
         if items is None:
             return None
         return SequenceTerm(tuple(items), SequenceSort(joined(items)), self.span(tree))
 
-    def _range(self, tree: Tree, expected: Sort | None) -> Term | None:
-        low, high = self.term(tree.parts[0]), self.term(tree.parts[1])
+    def range_of(self, tree: RangeDisplay) -> Term | None:
+        low, high = self.term(tree.low), self.term(tree.high)
         if low is None or high is None:
             return None
-        for part, term in zip(tree.parts, (low, high), strict=True):
+        for part, term in ((tree.low, low), (tree.high, high)):
             if not isinstance(term.sort, WHOLE):
                 message = f"a range goes over whole numbers, and this is of type {show_sort(term.sort)}"
                 self.error("RCL303", message, part)
@@ -179,34 +188,33 @@ class Applications(Names):
         sort = NATURAL if low.sort == NATURAL else INTEGER
         return SequenceRange(low, high, SequenceSort(sort), self.span(tree))
 
-    def _set(self, tree: Tree, expected: Sort | None) -> Term | None:
+    def set_of(self, tree: SetDisplay, expected: Sort | None) -> Term | None:
         item = expected.item if isinstance(expected, SetSort) else None
-        if not tree.parts:
+        if not tree.items:
             if item is None:
                 self.error("RCL306", "the type of the empty set cannot be told here", tree)
                 return None
             return SetTerm((), SetSort(item), self.span(tree))
-        items = self.items(tree, "set", item)
+        items = self.items(tree.items, "set", item)
         return None if items is None else SetTerm(tuple(items), SetSort(joined(items)), self.span(tree))
 
-    def collection(self, tree: Tree, item: Sort | None) -> Term | None:
+    def collection(self, tree: TermSyntax, item: Sort | None) -> Term | None:
         """The right-hand side of ``in``, or a quantifier's domain that is no type: a set or a sequence."""
-        while tree.kind == "parenthesised":
-            tree = tree.parts[0]
-        if tree.kind == "name" and self.scope.taken(tree.parts[0]) is not None:
-            sort = self.scope.environment.sort(tree.parts[0])
-            if isinstance(sort, EnumSort) and tree.parts[0] not in self.scope.bound:
+        tree = unparenthesised(tree)
+        if isinstance(tree, Name) and self.scope.taken(tree.text) is not None:
+            sort = self.scope.environment.sort(tree.text)
+            if isinstance(sort, EnumSort) and tree.text not in self.scope.bound:
                 members = tuple(EnumValue(m, sort, self.span(tree)) for m in sort.members)
                 return SetTerm(members, SetSort(sort), self.span(tree))
-            if sort is not None and self.scope.environment.constants.get(tree.parts[0]) is None:
+            if sort is not None and self.scope.environment.constants.get(tree.text) is None:
                 self.not_a_set(tree, show_sort(sort))
                 return None
-        if tree.kind == "builtin":
-            self.not_a_set(tree, tree.parts[0])
+        if isinstance(tree, BuiltinName):
+            self.not_a_set(tree, tree.text)
             return None
         expected: Sort | None = None
         if item is not None:
-            expected = SetSort(item) if tree.kind == "set" else SequenceSort(item)
+            expected = SetSort(item) if isinstance(tree, SetDisplay) else SequenceSort(item)
         made = self.term(tree, expected)
         if made is None or isinstance(made.sort, SetSort | SequenceSort):
             return made
@@ -219,6 +227,6 @@ class Applications(Names):
         self.error("RCL307", message, tree, hint=hint)
         return None
 
-    def not_a_set(self, tree: Tree, shown: str) -> None:
+    def not_a_set(self, tree: Syntax, shown: str) -> None:
         hint = "what a variable ranges over is said in its quantifier: `forall(x in REAL | …)`"
         self.error("RCL307", f"the type {shown} is not a set of values that `in` can ask about", tree, hint=hint)

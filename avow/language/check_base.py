@@ -1,7 +1,8 @@
-"""What every part of the formula checker shares: reporting, and going from a tree to the method for its kind."""
+"""What every part of the formula checker shares: reporting, and the terms of several trees."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 
 from avow.base.diagnostics import Span
@@ -17,11 +18,11 @@ from avow.language.sorts import (
     Sort,
 )
 from avow.language.source import Reports
-from avow.language.syntax import Tree
+from avow.language.syntax import Syntax, TermSyntax
 from avow.language.terms import Construct, EnumValue, Term
 
 
-class Base:
+class Base(ABC):
     """A formula's scope, and where to report. The scope's `bound` variables change on the way and are as before
     afterwards."""
 
@@ -29,7 +30,7 @@ class Base:
         self.scope = scope
         self.reports = reports
 
-    def formula(self, tree: Tree) -> Term | None:
+    def formula(self, tree: TermSyntax) -> Term | None:
         """A term of sort BOOL."""
         term = self.term(tree, BOOL)
         if term is None or term.sort == BOOL:
@@ -45,7 +46,7 @@ class Base:
         self.error("RCL301", f"this must be true or false, and it is of type {shown}", tree, hint=hint)
         return None
 
-    def _at_least(self, tree: Tree) -> bool:
+    def _at_least(self, tree: TermSyntax) -> bool:
         """Whether a term stands beside `=>`, which has been reported: it may have been meant for at least."""
         text = self.reports.source.text
         return bool(self.reports.odd) and (
@@ -53,38 +54,36 @@ class Base:
             or text[max(tree.start - 20, 0) : tree.start].rstrip().endswith("=>")
         )
 
-    def term(self, tree: Tree, expected: Sort | None = None) -> Term | None:
+    @abstractmethod
+    def term(self, tree: TermSyntax, expected: Sort | None = None) -> Term | None:
         """A term of any sort; `expected` helps only where the text leaves the sort open (``<>``)."""
-        while tree.kind == "parenthesised":
-            tree = tree.parts[0]
-        return getattr(self, f"_{tree.kind}")(tree, expected)  # type: ignore[no-any-return]
 
     def error(
         self,
         code: str,
         message: str,
-        at: Tree | Token,
+        at: Syntax | Token,
         *,
         hint: str | None = None,
         notes: tuple[tuple[str, Span | None], ...] = (),
     ) -> None:
         self.reports.error(code, message, at.start, at.end, hint=hint, notes=notes)
 
-    def span(self, tree: Tree | Token) -> Span:
+    def span(self, tree: Syntax | Token) -> Span:
         return self.reports.source.span(tree.start, tree.end)
 
-    def places(self, trees: Sequence[Tree]) -> Callable[[int, int], Span]:
+    def places(self, trees: Sequence[TermSyntax]) -> Callable[[int, int], Span]:
         """Of parts that stand one after another: the place from one of them to another."""
         return lambda first, last: self.reports.source.span(trees[first].start, trees[last].end)
 
-    def text(self, tree: Tree) -> str:
+    def text(self, tree: Syntax) -> str:
         text = " ".join(self.reports.source.text[tree.start : tree.end].split())
         return text if len(text) <= 40 else text[:39] + "…"
 
-    def terms(self, trees: Iterable[Tree]) -> list[Term | None]:
+    def terms(self, trees: Iterable[TermSyntax]) -> list[Term | None]:
         return [self.term(t) for t in trees]
 
-    def wanted(self, tree: Tree, sort: Sort, what: str) -> Term | None:
+    def wanted(self, tree: TermSyntax, sort: Sort, what: str) -> Term | None:
         """The term, converted to the sort that its place asks for."""
         term = self.term(tree, sort)
         if term is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from avow.base.diagnostics import Span
 from avow.language.check_base import Base, count
 from avow.language.contract import Port
 from avow.language.environment import did_you_mean
@@ -20,7 +21,7 @@ from avow.language.sorts import (
     Sort,
     TupleSort,
 )
-from avow.language.syntax import Tree
+from avow.language.syntax import BuiltinName, Name, NodePort, Number, Syntax, Text
 from avow.language.terms import (
     Construct,
     EnumValue,
@@ -38,29 +39,25 @@ class Names(Base):
 
     # --- literals ----------------------------------------------------------------------------------------------------
 
-    def _number(self, tree: Tree, expected: Sort | None, sign: int = 1) -> Term:
-        text: str = tree.parts[0]
-        if "." in text:
-            return Literal(sign * Fraction(text), REAL, self.span(tree))
-        value = sign * int(text)
-        return Literal(value, NATURAL if value >= 0 else INTEGER, self.span(tree))
+    def number(self, tree: Number, span: Span, sign: int = 1) -> Term:
+        if "." in tree.digits:
+            return Literal(sign * Fraction(tree.digits), REAL, span)
+        value = sign * int(tree.digits)
+        return Literal(value, NATURAL if value >= 0 else INTEGER, span)
 
-    def _string(self, tree: Tree, expected: Sort | None) -> Term | None:
-        if not tree.parts[0].endswith('"') or tree.start in self.reports.odd:
+    def string(self, tree: Text) -> Term | None:
+        if not tree.text.endswith('"') or tree.start in self.reports.odd:
             return None  # quotation marks of another kind, or none at the end: reported by the lexer
-        return Literal(unquote(tree.parts[0]), STRING, self.span(tree))
-
-    def _truth(self, tree: Tree, expected: Sort | None) -> Term:
-        return Literal(tree.parts[0] == "TRUE", BOOL, self.span(tree))
+        return Literal(unquote(tree.text), STRING, self.span(tree))
 
     # --- names -------------------------------------------------------------------------------------------------------
 
-    def _builtin(self, tree: Tree, expected: Sort | None) -> None:
+    def builtin(self, tree: BuiltinName) -> None:
         hint = "a type is declared with `:`, a constant with `=`" if not self.scope.node else None
-        self.error("RCL204", f"{tree.parts[0]} is a type, not a value", tree, hint=hint)
+        self.error("RCL204", f"{tree.text} is a type, not a value", tree, hint=hint)
 
-    def _name(self, tree: Tree, expected: Sort | None) -> Term | None:
-        name: str = tree.parts[0]
+    def name(self, tree: Name, expected: Sort | None) -> Term | None:
+        name = tree.text
         scope, environment = self.scope, self.scope.environment
         if name in scope.bound:
             bound = scope.bound[name]
@@ -94,7 +91,7 @@ class Names(Base):
             self.undeclared(name, tree, text=expected == STRING)
         return None
 
-    def undeclared(self, name: str, tree: Tree, what: str = "name", *, text: bool = False) -> None:
+    def undeclared(self, name: str, tree: Syntax, what: str = "name", *, text: bool = False) -> None:
         """Reports a name that nothing has; `text` where a text is wanted."""
         if self.scope.is_broken(name) or tree.start in self.reports.odd:  # the latter is reported by the lexer
             return
@@ -109,7 +106,7 @@ class Names(Base):
             hint = "declare it in the context, among the inputs or outputs, or in a quantifier: `exists(x in REAL | …)`"
         self.error("RCL201", f"the {what} `{name}` is not declared", tree, hint=hint)
 
-    def element(self, name: str, tree: Tree) -> Term | None:
+    def element(self, name: str, tree: Syntax) -> Term | None:
         sort = self.scope.environment.elements[name]
         if isinstance(sort, EnumSort):
             return EnumValue(name, sort, self.span(tree))
@@ -121,14 +118,14 @@ class Names(Base):
             return None
         return Construct(name, (), sort, self.span(tree))
 
-    def port(self, role: Role, name: str, tree: Tree) -> Term | None:
+    def port(self, role: Role, name: str, tree: Syntax) -> Term | None:
         port = self.scope.ports(role).get(name)
         if port is None or role not in self.scope.roles:
             self.no_port(role, name, tree)
             return None
         return Variable(role, name, port.sort, self.span(tree))
 
-    def no_port(self, role: Role, name: str, tree: Tree) -> None:
+    def no_port(self, role: Role, name: str, tree: Syntax) -> None:
         scope = self.scope
         if scope.is_broken(name) or name in KEYWORDS:  # the latter is reported by the lexer
             return
@@ -151,11 +148,7 @@ class Names(Base):
             hint = f"`{name}` is an element of a type: write `{name}` alone"
         self.error("RCL203", f"node `{scope.node}` has no {words[role]} `{name}`", tree, hint=hint)
 
-    def _port_name(self, tree: Tree, expected: Sort | None) -> Term | None:
-        role, name = tree.parts
-        return self.port(Role(role), name, tree)
-
-    def elsewhere(self, before: str, name: str, tree: Tree) -> None:
+    def elsewhere(self, before: str, name: str, tree: Syntax) -> None:
         """Reports `before.name` inside a node: a role spelled otherwise, a field, or another node's variable."""
         scope = self.scope
         own = [f"{r}.{name}" for r in (Role.INPUT, Role.OUTPUT) if name in scope.ports(r)]
@@ -180,8 +173,8 @@ class Names(Base):
     def ports_named(self, name: str) -> list[Port]:
         return [self.scope.ports(r)[name] for r in (Role.INPUT, Role.OUTPUT) if name in self.scope.ports(r)]
 
-    def _node_port(self, tree: Tree, expected: Sort | None) -> Term | None:
-        node_name, role_text, name = tree.parts
+    def node_port(self, tree: NodePort) -> Term | None:
+        node_name, role_text, name = tree.node, tree.role, tree.name
         scope = self.scope
         if not scope.nodes:
             self.elsewhere(node_name, name, tree)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from avow.language.chains import arithmetic
+from avow.language.chains import arithmetic as chained
 from avow.language.check_applications import Applications
 from avow.language.check_base import count
 from avow.language.conversions import NUMERIC, alike, common, convert, joined
@@ -21,7 +21,18 @@ from avow.language.sorts import (
     SetSort,
     Sort,
 )
-from avow.language.syntax import Tree
+from avow.language.syntax import (
+    Calculation,
+    Comparison,
+    Minus,
+    Number,
+    SequenceDisplay,
+    SetDisplay,
+    Syntax,
+    TermSyntax,
+    TupleDisplay,
+    unparenthesised,
+)
 from avow.language.terms import (
     And,
     Compare,
@@ -42,16 +53,16 @@ class Relations(Applications):
 
     # --- arithmetic --------------------------------------------------------------------------------------------------
 
-    def numeric(self, tree: Tree, operator: str) -> Term | None:
+    def numeric(self, tree: TermSyntax, operator: str) -> Term | None:
         term = self.term(tree)
         if term is not None and not isinstance(term.sort, NUMERIC):
             self.error("RCL308", f"`{operator}` is of numbers, and this is of type {show_sort(term.sort)}", tree)
             return None
         return term
 
-    def _arithmetic(self, tree: Tree, expected: Sort | None) -> Term | None:
-        trees = tree.parts[::2]
-        operators = [token.text for token in tree.parts[1::2]]
+    def arithmetic(self, tree: Calculation) -> Term | None:
+        trees = tree.operands
+        operators = [token.text for token in tree.operators]
         operands: list[Term] = []
         for operand, operator in zip(trees, [operators[0], *operators], strict=True):
             term = self.numeric(operand, operator)
@@ -63,26 +74,24 @@ class Relations(Applications):
             operands.append(term)
         if len(operands) < len(trees):
             return None
-        made = arithmetic(operators, operands, self.places(trees))
+        made = chained(operators, operands, self.places(trees))
         if made is None:
             message = f"a chain of {len(operators)} operators, with a `/` between most of them, is too long"
-            self.error("RCL110", message, tree.parts[1], hint="put parentheses around its parts")
+            self.error("RCL110", message, tree.operators[0], hint="put parentheses around its parts")
         return made
 
-    def _negative(self, tree: Tree, expected: Sort | None) -> Term | None:
-        inner = tree.parts[0]
-        if inner.kind == "number":
-            return self._number(inner._replace(start=tree.start), None, sign=-1)
-        term = self.numeric(inner, "-")
+    def negative(self, tree: Minus) -> Term | None:
+        if isinstance(tree.body, Number):
+            return self.number(tree.body, self.span(tree), sign=-1)
+        term = self.numeric(tree.body, "-")
         if term is None:
             return None
         return Negative(term, REAL if term.sort == REAL else INTEGER, self.span(tree))
 
     # --- comparisons -------------------------------------------------------------------------------------------------
 
-    def _comparison(self, tree: Tree, expected: Sort | None) -> Term | None:
-        operands: tuple[Tree, ...] = tree.parts[::2]
-        relations: tuple[Token, ...] = tree.parts[1::2]
+    def comparison(self, tree: Comparison) -> Term | None:
+        operands, relations = tree.operands, tree.relations
         if len(relations) == 1 and relations[0].type in ("IN", "NOT_IN"):
             return self.membership(tree, operands[0], relations[0], operands[1])
         if not self.check_chain(relations):
@@ -130,7 +139,7 @@ class Relations(Applications):
         return False
 
     def compare(
-        self, tree: Tree, relation: Token, left_tree: Tree, left: Term, right_tree: Tree, right: Term
+        self, tree: Comparison, relation: Token, left_tree: TermSyntax, left: Term, right_tree: TermSyntax, right: Term
     ) -> Term | None:
         operator = _OPERATORS[relation.type]
         if operator in _ORDERINGS:
@@ -148,19 +157,21 @@ class Relations(Applications):
             shown = f"{show_sort(left.sort)} and {show_sort(right.sort)}"
             message = f"`{operator}` between different types: {shown}"
             hint = self.mismatch_hint(left_tree, left, right_tree, right)
-            if len(tree.parts) > 3:
+            if len(tree.relations) > 1:
                 hint = hint or "`a < b == c` says `a < b and b == c`; put parentheses if it should not"
             self.error("RCL302", message, tree, hint=hint)
             return None
-        if len(tree.parts) > 3 and left.sort == BOOL:
-            if relation is tree.parts[1]:
+        if len(tree.relations) > 1 and left.sort == BOOL:
+            if relation is tree.relations[0]:
                 hint = "join comparisons by `and`, or use `<=>`"
                 self.error("RCL121", "truth values are not chained", relation, hint=hint)
             return None
-        span = self.span(tree) if len(tree.parts) == 3 else self.reports.source.span(left_tree.start, right_tree.end)
+        span = (
+            self.span(tree) if len(tree.relations) == 1 else self.reports.source.span(left_tree.start, right_tree.end)
+        )
         return Compare(operator, pair[0], pair[1], span)
 
-    def mismatch_hint(self, left_tree: Tree, left: Term, right_tree: Tree, right: Term) -> str | None:
+    def mismatch_hint(self, left_tree: Syntax, left: Term, right_tree: Syntax, right: Term) -> str | None:
         for tree, one, other in ((left_tree, left, right), (right_tree, right, left)):
             if isinstance(one.sort, FunctionSort) and one.sort.result == other.sort:
                 return f"apply `{self.text(tree)}` to its {count(len(one.sort.parameters), 'argument')} first"
@@ -170,7 +181,7 @@ class Relations(Applications):
                 return f"the values of {one.sort.name} are {', '.join(one.sort.members[:6])}"
         return None
 
-    def membership(self, tree: Tree, item_tree: Tree, relation: Token, of_tree: Tree) -> Term | None:
+    def membership(self, tree: Syntax, item_tree: TermSyntax, relation: Token, of_tree: TermSyntax) -> Term | None:
         item = self.term(item_tree)
         of = self.collection(of_tree, item.sort if item is not None else None)
         if item is None or of is None:
@@ -199,9 +210,8 @@ class Relations(Applications):
         return inside if relation.type == "IN" else Not(inside, span)
 
 
-def _is_open(tree: Tree) -> bool:
-    while tree.kind == "parenthesised":
-        tree = tree.parts[0]
-    if tree.kind == "tuple":
-        return any(_is_open(t) for t in tree.parts)
-    return tree.kind in ("sequence", "set") and not tree.parts
+def _is_open(tree: TermSyntax) -> bool:
+    tree = unparenthesised(tree)
+    if isinstance(tree, TupleDisplay):
+        return any(_is_open(t) for t in tree.items)
+    return isinstance(tree, SequenceDisplay | SetDisplay) and not tree.items

@@ -7,7 +7,7 @@ in four parts: `check_names`, `check_applications`, `check_relations`, and here 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.language.chains import equivalence, implication
@@ -17,6 +17,7 @@ from avow.language.environment import did_you_mean
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.sorts import (
+    BOOL,
     REAL,
     FunctionSort,
     SequenceSort,
@@ -24,11 +25,35 @@ from avow.language.sorts import (
     Sort,
     TupleSort,
 )
-from avow.language.syntax import Tree
+from avow.language.syntax import (
+    Application,
+    BuiltinName,
+    Calculation,
+    Comparison,
+    Connective,
+    Minus,
+    Name,
+    Negation,
+    NodePort,
+    Number,
+    Parentheses,
+    PortName,
+    Quantification,
+    RangeDisplay,
+    SequenceDisplay,
+    SetDisplay,
+    Sign,
+    TermSyntax,
+    Text,
+    Truth,
+    TupleDisplay,
+    unparenthesised,
+)
 from avow.language.terms import (
     And,
     Implies,
     In,
+    Literal,
     Not,
     Or,
     Quantified,
@@ -42,49 +67,84 @@ from avow.language.terms import (
 class Checker(Relations):
     """Types formulas of one scope: `formula` what must be true or false, `term` anything, `wanted` a given sort."""
 
+    def term(self, tree: TermSyntax, expected: Sort | None = None) -> Term | None:
+        match tree:
+            case PortName(role=role, name=name):
+                return self.port(Role(role), name, tree)
+            case Name():
+                return self.name(tree, expected)
+            case Parentheses(body=body):
+                return self.term(body, expected)
+            case Comparison():
+                return self.comparison(tree)
+            case Connective():
+                return self.connective(tree)
+            case Application():
+                return self.application(tree)
+            case Number():
+                return self.number(tree, self.span(tree))
+            case Truth(value=value):
+                return Literal(value, BOOL, self.span(tree))
+            case Negation(body=negated):
+                formula = self.formula(negated)
+                return None if formula is None else Not(formula, self.span(tree))
+            case Calculation():
+                return self.arithmetic(tree)
+            case Minus():
+                return self.negative(tree)
+            case Quantification():
+                return self.quantified(tree)
+            case NodePort():
+                return self.node_port(tree)
+            case TupleDisplay():
+                return self.tuple_of(tree, expected)
+            case SetDisplay():
+                return self.set_of(tree, expected)
+            case SequenceDisplay():
+                return self.sequence(tree, expected)
+            case RangeDisplay():
+                return self.range_of(tree)
+            case Text():
+                return self.string(tree)
+            case BuiltinName():
+                self.builtin(tree)
+                return None
+            case _:
+                assert_never(tree)
+
     # --- connectives -------------------------------------------------------------------------------------------------
 
-    def formulas(self, trees: Iterable[Tree]) -> tuple[Term, ...] | None:
-        made = [self.formula(t) for t in trees]
-        done = tuple(m for m in made if m is not None)
-        return done if len(done) == len(made) else None
-
-    def _and(self, tree: Tree, expected: Sort | None) -> Term | None:
-        items = self.formulas(tree.parts)
-        return None if items is None else And(items, self.span(tree))
-
-    def _or(self, tree: Tree, expected: Sort | None) -> Term | None:
-        items = self.formulas(tree.parts)
-        return None if items is None else Or(items, self.span(tree))
-
-    def _not(self, tree: Tree, expected: Sort | None) -> Term | None:
-        body = self.formula(tree.parts[0])
-        return None if body is None else Not(body, self.span(tree))
-
-    def _implies(self, tree: Tree, expected: Sort | None) -> Term | None:
-        items = self.formulas(tree.parts)
-        return None if items is None else implication(items, self.places(tree.parts))
-
-    def _iff(self, tree: Tree, expected: Sort | None) -> Term | None:
-        items = self.formulas(tree.parts)
-        return None if items is None else equivalence(items, self.places(tree.parts))
+    def connective(self, tree: Connective) -> Term | None:
+        made = [self.formula(t) for t in tree.items]
+        items = tuple(m for m in made if m is not None)
+        if len(items) != len(made):
+            return None
+        match tree.sign:
+            case Sign.AND:
+                return And(items, self.span(tree))
+            case Sign.OR:
+                return Or(items, self.span(tree))
+            case Sign.IMPLIES:
+                return implication(items, self.places(tree.items))
+            case Sign.IFF:
+                return equivalence(items, self.places(tree.items))
+            case _:
+                assert_never(tree.sign)
 
     # --- quantifiers -------------------------------------------------------------------------------------------------
 
-    def _quantified(self, tree: Tree, expected: Sort | None) -> Term | None:
-        quantifier_text, binders, body_tree = tree.parts
-        quantifier = Quantifier(quantifier_text)
+    def quantified(self, tree: Quantification) -> Term | None:
+        quantifier = tree.quantifier
         variables: list[Variable] = []
         guards: list[Term] = []
         before, broken_before = dict(self.scope.bound), set(self.scope.broken)
         sound = True
-        for binder in binders.parts:
-            *names, domain = binder.parts
-            found = self.domain(domain)
+        for binder in tree.binders:
+            found = self.domain(binder.domain)
             if found is None:
                 sound = False
-                self.scope.broken.update(n.text for n in names)
-            for name in names:
+                self.scope.broken.update(n.text for n in binder.names)
+            for name in binder.names:
                 if not self.fresh(name):
                     sound = False
                     continue
@@ -96,7 +156,7 @@ class Checker(Relations):
                 self.scope.bound[name.text] = variable
                 if collection is not None:
                     guards.append(In(variable, collection, self.span(binder)))
-        body = self.formula(body_tree)
+        body = self.formula(tree.body)
         self.scope.bound.clear()
         self.scope.bound.update(before)
         self.scope.broken.clear()
@@ -122,10 +182,9 @@ class Checker(Relations):
         self.error("RCL207", f"`{name.text}` is already {what}", name, hint=hint, notes=notes)
         return False
 
-    def domain(self, tree: Tree) -> tuple[Sort, Term | None] | None:
+    def domain(self, tree: TermSyntax) -> tuple[Sort, Term | None] | None:
         """What a quantified variable ranges over: a sort, and the set or sequence of it where it is less than that."""
-        while tree.kind == "parenthesised":
-            tree = tree.parts[0]
+        tree = unparenthesised(tree)
         sort = self.type_in_term(tree)
         if sort is not None:
             if isinstance(sort, FunctionSort):
@@ -133,8 +192,8 @@ class Checker(Relations):
                 self.error("RCL310", message, tree, hint="RCL is first-order logic")
                 return None
             return sort, None
-        if tree.kind == "name" and self.scope.taken(tree.parts[0]) is None:
-            name = tree.parts[0]
+        if isinstance(tree, Name) and self.scope.taken(tree.text) is None:
+            name = tree.text
             if not self.scope.is_broken(name):
                 environment = self.scope.environment
                 known = (*environment.types, *environment.constants, *BUILTINS)
@@ -142,8 +201,8 @@ class Checker(Relations):
                 hint = f"did you mean `{near}`?" if near else did_you_mean(name, known)
                 self.error("RCL208", f"the type or set `{name}` is not declared", tree, hint=hint)
             return None
-        if tree.kind == "port_name" and self.scope.environment.sort(tree.parts[1]) is not None:
-            role, name = tree.parts
+        if isinstance(tree, PortName) and self.scope.environment.sort(tree.name) is not None:
+            role, name = tree.role, tree.name
             if name not in self.scope.ports(Role(role)):
                 message = f"`{name}` is declared in the context, not an {'input' if role == 'in' else 'output'}"
                 self.error("RCL203", message, tree, hint=f"write `{name}` alone")
@@ -155,18 +214,18 @@ class Checker(Relations):
         assert isinstance(sort, SetSort | SequenceSort)
         return sort.item, collection
 
-    def type_in_term(self, tree: Tree) -> Sort | None:
+    def type_in_term(self, tree: TermSyntax) -> Sort | None:
         """The sort that a term-like text names: ``REAL``, ``RadStat``, ``(REAL, REAL)``; None where it names none."""
-        match tree.kind:
-            case "builtin":
-                return BUILTINS.get(tree.parts[0], REAL)
-            case "name":
-                name = tree.parts[0]
+        match tree:
+            case BuiltinName(text=text):
+                return BUILTINS.get(text, REAL)
+            case Name(text=name):
                 return None if name in self.scope.bound else self.scope.environment.sort(name)
-            case "tuple":
-                items = [self.type_in_term(t) for t in tree.parts]
+            case TupleDisplay(items=parts):
+                items = [self.type_in_term(t) for t in parts]
                 return TupleSort(tuple(i for i in items if i is not None)) if all(items) else None
-            case "sequence" if len(tree.parts) == 1:
-                item = self.type_in_term(tree.parts[0])
+            case SequenceDisplay(items=(only,)):
+                item = self.type_in_term(only)
                 return None if item is None else SequenceSort(item)
-        return None
+            case _:  # a term that names no sort
+                return None

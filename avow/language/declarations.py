@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.language.check_names import BUILTINS
 from avow.language.checker import Checker
 from avow.language.environment import Environment, did_you_mean
+from avow.language.flat import flat
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
 from avow.language.limits import MAX_DECLARED, MAX_REFERENCES, sort_extent, term_extent
@@ -30,21 +32,41 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.source import Reports
-from avow.language.syntax import Tree
-from avow.language.terms import EnumValue, Quantified, SetTerm, Term, children
+from avow.language.syntax import (
+    Binder,
+    BuiltinType,
+    ConstantDeclaration,
+    Declaration,
+    Element,
+    FunctionType,
+    Name,
+    NamedType,
+    ProductType,
+    SequenceType,
+    SetDisplay,
+    SetType,
+    Syntax,
+    TermSyntax,
+    TupleType,
+    TypeDeclaration,
+    TypeSyntax,
+    UnspecifiedType,
+    unparenthesised,
+    walk,
+)
+from avow.language.terms import EnumValue, Quantified, SetTerm, Term, subterms
 
 
 @dataclass(slots=True)
 class _Declared:
-    tree: Tree
+    tree: Declaration
     reports: Reports
     state: str = "new"
     """new, open (being elaborated: meeting it again is a circle), or done."""
 
     @property
     def name(self) -> Token:
-        name: Token = self.tree.parts[0]
-        return name
+        return self.tree.name
 
     @property
     def place(self) -> Span:
@@ -62,7 +84,7 @@ class Declarations:
     open: int = 0
     """How many declarations wait for one that they refer to."""
 
-    def add(self, trees: Sequence[Tree], reports: Reports) -> None:
+    def add(self, trees: Sequence[Declaration], reports: Reports) -> None:
         for tree in trees:
             if reports.full:
                 return
@@ -109,15 +131,16 @@ class Declarations:
             return
         declared.state = "open"
         self.open += 1
-        if declared.tree.kind == "type":
-            sort = self.type_of(declared.tree.parts[1], declared.reports, name)
-            if sort is None:
-                environment.broken.add(name)
-                environment.broken.update(_names(declared.tree.parts[1]))
-            elif self.is_small(name, sort_extent(sort), declared.name, declared.reports):
-                environment.types[name] = sort
-        else:
-            self.constant(declared)
+        match declared.tree:
+            case TypeDeclaration(type=type_):
+                sort = self.type_of(type_, declared.reports, name)
+                if sort is None:
+                    environment.broken.add(name)
+                    environment.broken.update(_names(type_))
+                elif self.is_small(name, sort_extent(sort), declared.name, declared.reports):
+                    environment.types[name] = sort
+            case ConstantDeclaration(value=value):
+                self.constant(declared, unparenthesised(value))
         self.open -= 1
         declared.state = "done"
 
@@ -137,14 +160,12 @@ class Declarations:
 
     # --- constants ---------------------------------------------------------------------------------------------------
 
-    def constant(self, declared: _Declared) -> None:
+    def constant(self, declared: _Declared, value: TermSyntax) -> None:
         environment, name = self.environment, declared.name.text
-        value: Tree = declared.tree.parts[1]
-        while value.kind == "parenthesised":
-            value = value.parts[0]
         self.needed_by(value)
-        if value.kind == "set" and value.parts and all(self.is_fresh(t) for t in value.parts):
-            members = [Token("NAME", t.parts[0], t.start, t.end) for t in value.parts]
+        fresh = self.fresh_names(value.items) if isinstance(value, SetDisplay) else []
+        if isinstance(value, SetDisplay) and fresh and len(fresh) == len(value.items):
+            members = [Token("NAME", t.text, t.start, t.end) for t in fresh]
             sort = self.enumeration(name, members, declared.reports)
             if sort is None:
                 environment.broken.update((name, *(m.text for m in members)))
@@ -153,8 +174,8 @@ class Declarations:
             span = declared.reports.source.span(value.start, value.end)
             environment.constants[name] = SetTerm(tuple(EnumValue(m, sort) for m in sort.members), SetSort(sort), span)
             return
-        if value.kind == "set":
-            self.half_known(value, declared.reports)
+        if isinstance(value, SetDisplay):
+            self.half_known(value, fresh, declared.reports)
         term = Checker(Scope(environment), declared.reports).term(value)
         if term is not None and not self.is_small(name, term_extent(term), declared.name, declared.reports):
             return
@@ -167,24 +188,23 @@ class Declarations:
         else:
             environment.constants[name] = term
 
-    def half_known(self, value: Tree, reports: Reports) -> None:
+    def half_known(self, value: SetDisplay, fresh: Sequence[Name], reports: Reports) -> None:
         """Reports the new names of a set that has known ones too: a set declares its elements, or collects them."""
-        known = [t for t in value.parts if not self.is_fresh(t)]
-        for tree in value.parts if known else ():
-            if self.is_fresh(tree):
-                first = " ".join(reports.source.text[known[0].start : known[0].end].split())[:40]
-                message = f"the name `{tree.parts[0]}` is not declared"
-                hint = f"a set of new names declares them; with `{first}` in it, it is a set of known values"
-                reports.error("RCL201", message, tree.start, tree.end, hint=hint)
-                self.environment.broken.add(tree.parts[0])
+        new = {t.start for t in fresh}
+        known = [t for t in value.items if t.start not in new]
+        for tree in fresh if known else ():
+            first = " ".join(reports.source.text[known[0].start : known[0].end].split())[:40]
+            message = f"the name `{tree.text}` is not declared"
+            hint = f"a set of new names declares them; with `{first}` in it, it is a set of known values"
+            reports.error("RCL201", message, tree.start, tree.end, hint=hint)
+            self.environment.broken.add(tree.text)
 
-    def is_fresh(self, tree: Tree) -> bool:
-        if tree.kind != "name":
-            return False
-        name = tree.parts[0]
-        return not (name in self.declared or name in self.owners or name in self.environment.elements)
+    def fresh_names(self, trees: Sequence[TermSyntax]) -> list[Name]:
+        """Those of the trees that are names which nothing has."""
+        taken = (self.declared, self.owners, self.environment.elements)
+        return [t for t in trees if isinstance(t, Name) and not any(t.text in names for names in taken)]
 
-    def needed_by(self, value: Tree) -> None:
+    def needed_by(self, value: TermSyntax) -> None:
         """Elaborates first what a constant's value mentions: other constants, and the types of elements."""
         for name in _names(value):
             owner = self.owners.get(name)
@@ -200,31 +220,33 @@ class Declarations:
 
     # --- types -------------------------------------------------------------------------------------------------------
 
-    def type_of(self, tree: Tree, reports: Reports, name: str) -> Sort | None:
+    def type_of(self, tree: TypeSyntax, reports: Reports, name: str) -> Sort | None:
         """The sort that a type denotes; `name` is what a new set of names is to be called."""
-        match tree.kind:
-            case "builtin_type":
-                return BUILTINS.get(tree.parts[0], BUILTINS["REAL"])
-            case "named_type":
+        match tree:
+            case BuiltinType(text=text):
+                return BUILTINS.get(text, BUILTINS["REAL"])
+            case NamedType():
                 return self.named(tree, reports)
-            case "unspecified_type":
+            case UnspecifiedType():
                 return OpaqueSort(self.free_name(name))
-            case "set_type":
-                return self.set_of(tree, reports, name)
-            case "tuple_type":
-                if len(tree.parts) == 1:
-                    return self.type_of(tree.parts[0], reports, name)
-                return _tuple_sort([self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(tree.parts)])
-            case "sequence_type":
-                item = self.type_of(tree.parts[0], reports, f"{name}_item")
+            case SetType(elements=elements):
+                return self.set_of(elements, reports, name)
+            case TupleType(items=(only,)):
+                return self.type_of(only, reports, name)
+            case TupleType(items=items):
+                return _tuple_sort([self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(items)])
+            case SequenceType(item=of):
+                item = self.type_of(of, reports, f"{name}_item")
                 return None if item is None else SequenceSort(item)
-            case "product_type":
+            case ProductType():
                 return _tuple_sort(self.factors(tree, reports, name))
-            case _:
+            case FunctionType():
                 return self.function(tree, reports, name)
+            case _:
+                assert_never(tree)
 
-    def named(self, tree: Tree, reports: Reports) -> Sort | None:
-        name: str = tree.parts[0]
+    def named(self, tree: NamedType, reports: Reports) -> Sort | None:
+        name = tree.text
         environment = self.environment
         other = self.declared.get(name)
         if other is not None and other.state == "open":
@@ -249,12 +271,12 @@ class Declarations:
             reports.error("RCL208", f"the type `{name}` is not declared", tree.start, tree.end, hint=hint)
         return None
 
-    def factors(self, tree: Tree, reports: Reports, name: str) -> list[Sort | None]:
+    def factors(self, tree: TypeSyntax, reports: Reports, name: str) -> list[Sort | None]:
         """The sorts of a product, or of a function's parameters."""
-        if tree.kind != "product_type":
+        if not isinstance(tree, ProductType):
             return [self.type_of(tree, reports, name)]
         sound = True
-        for sign in tree.parts[1::2]:
+        for sign in tree.signs:
             if sign.text != "x":
                 message = f"expected `x` between two types and not `{sign.text}`"
                 hint = "a function is written `A x B --> C`, a type of sequences `<A>`; there is no type of sets"
@@ -262,28 +284,26 @@ class Declarations:
                 sound = False
         if not sound:
             return [None]
-        return [self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(tree.parts[::2])]
+        return [self.type_of(t, reports, f"{name}_{i + 1}") for i, t in enumerate(tree.factors)]
 
-    def function(self, tree: Tree, reports: Reports, name: str) -> Sort | None:
-        left, right = tree.parts
-        parameters = self.factors(left, reports, name)
-        result = self.type_of(right, reports, f"{name}_result")
+    def function(self, tree: FunctionType, reports: Reports, name: str) -> Sort | None:
+        parameters = self.factors(tree.parameters, reports, name)
+        result = self.type_of(tree.result, reports, f"{name}_result")
         if result is None or None in parameters:
             return None
         return FunctionSort(tuple(p for p in parameters if p is not None), result)
 
-    def set_of(self, tree: Tree, reports: Reports, name: str) -> Sort | None:
-        elements: Sequence[Tree] = tree.parts
-        if all(e.kind == "element" for e in elements):
-            return self.enumeration(name, [e.parts[0] for e in elements], reports)
+    def set_of(self, elements: Sequence[Element], reports: Reports, name: str) -> Sort | None:
+        if not any(e.parameters for e in elements):
+            return self.enumeration(name, [e.name for e in elements], reports)
         constructors: list[Constructor] = []
         sound = True
         for element in elements:
-            sorts = [self.type_of(t, reports, f"{name}_{element.parts[0].text}") for t in element.parts[1:]]
+            sorts = [self.type_of(t, reports, f"{name}_{element.name.text}") for t in element.parameters]
             sound = sound and None not in sorts
-            constructors.append(Constructor(element.parts[0].text, tuple(s for s in sorts if s is not None)))
+            constructors.append(Constructor(element.name.text, tuple(s for s in sorts if s is not None)))
         sort = DataSort(self.free_name(name), tuple(constructors))
-        return self.introduce(sort, [e.parts[0] for e in elements], reports) if sound else None
+        return self.introduce(sort, [e.name for e in elements], reports) if sound else None
 
     def enumeration(self, name: str, members: Sequence[Token], reports: Reports) -> EnumSort | None:
         sort = EnumSort(self.free_name(name), tuple(m.text for m in members))
@@ -347,48 +367,28 @@ def _same_set(known: Sort, new: EnumSort | DataSort) -> bool:
 
 
 def _same_text(one: _Declared, other: _Declared) -> bool:
-    return _shape(one.tree) == _shape(other.tree)
-
-
-def _shape(tree: Tree | Token | str) -> object:
-    if isinstance(tree, Tree):
-        return tree.kind, tuple(_shape(p) for p in tree.parts)
-    return tree.text if isinstance(tree, Token) else tree
+    return flat(one.tree) == flat(other.tree)
 
 
 def _has_quantifier(term: Term) -> bool:
-    stack = [term]
-    while stack:
-        part = stack.pop()
-        if isinstance(part, Quantified):
-            return True
-        stack.extend(children(part))
-    return False
+    return any(isinstance(part, Quantified) for part in subterms(term))
 
 
-def _elements(tree: Tree) -> set[str]:
+def _elements(tree: Declaration) -> set[str]:
     """Every element and constructor that a declaration's types write down."""
-    found: set[str] = set()
-    stack: list[Tree] = [tree]
-    while stack:
-        part = stack.pop()
-        if part.kind in ("element", "constructor"):
-            found.add(part.parts[0].text)
-        stack.extend(p for p in part.parts if isinstance(p, Tree))
-    return found
+    return {part.name.text for part in walk(tree) if isinstance(part, Element)}
 
 
-def _names(tree: Tree) -> set[str]:
-    """Every name that occurs in a tree."""
+def _names(tree: Syntax) -> set[str]:
+    """Every name that occurs in a type or value."""
     found: set[str] = set()
-    stack: list[Tree | Token] = [tree]
-    while stack:
-        part = stack.pop()
-        if isinstance(part, Token):
-            if part.type == "NAME":
-                found.add(part.text)
-            continue
-        if part.kind in ("name", "named_type"):
-            found.add(part.parts[0])
-        stack.extend(p for p in part.parts if isinstance(p, Tree | Token))
+    for part in walk(tree):
+        if isinstance(part, Name | NamedType):
+            found.add(part.text)
+        elif isinstance(part, Element):
+            found.add(part.name.text)
+        elif isinstance(part, Binder):
+            found.update(name.text for name in part.names)
+        elif isinstance(part, ProductType):
+            found.update(sign.text for sign in part.signs)
     return found

@@ -2,71 +2,133 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from typing import assert_never
+
 from avow.language.lexer import Token
-from avow.language.syntax import Tree
+from avow.language.syntax import (
+    Application,
+    Binder,
+    BuiltinName,
+    BuiltinType,
+    Calculation,
+    Comparison,
+    Connective,
+    ConstantDeclaration,
+    Element,
+    FunctionType,
+    Minus,
+    Name,
+    NamedType,
+    Negation,
+    NodePort,
+    Number,
+    Parentheses,
+    PortDeclaration,
+    PortList,
+    PortName,
+    ProductType,
+    Quantification,
+    RangeDisplay,
+    RosType,
+    SequenceDisplay,
+    SequenceType,
+    SetDisplay,
+    SetType,
+    Syntax,
+    Text,
+    TopicDeclaration,
+    TopicList,
+    Truth,
+    TupleDisplay,
+    TupleType,
+    TypeDeclaration,
+    UnspecifiedType,
+)
 
 
-def flat(tree: Tree) -> str:
+def flat(tree: Syntax) -> str:
     """The tree on one line, in the canonical spacing; every parenthesis, number and name as it was written."""
-    p = tree.parts
-    match tree.kind:
-        case "and" | "or":
-            return f" {tree.kind} ".join(map(flat, p))
-        case "implies":
-            return " -> ".join(map(flat, p))
-        case "iff":
-            return " <=> ".join(map(flat, p))
-        case "not":
-            return f"not {flat(p[0])}"
-        case "comparison":
-            return "".join(flat(x) if isinstance(x, Tree) else f" {_relation(x)} " for x in p)
-        case "arithmetic":
-            return "".join(flat(x) if isinstance(x, Tree) else f" {x.text} " for x in p)
-        case "negative":
-            inner = flat(p[0])
+    match tree:
+        case Connective(sign=sign, items=items):
+            return f" {sign} ".join(map(flat, items))
+        case Negation(body=body):
+            return f"not {flat(body)}"
+        case Comparison(operands=operands, relations=signs):
+            return _between(operands, ("!in" if sign.type == "NOT_IN" else sign.text for sign in signs))
+        case Calculation(operands=operands, operators=signs):
+            return _between(operands, (sign.text for sign in signs))
+        case Minus(body=body):
+            inner = flat(body)
             return f"- {inner}" if inner.startswith("-") else f"-{inner}"
-        case "application":
-            return f"{flat(p[0])}({', '.join(map(flat, p[1:]))})"
-        case "parenthesised":
-            return f"({flat(p[0])})"
-        case "tuple" | "tuple_type":
-            return f"({', '.join(map(flat, p))})"
-        case "set" | "set_type" | "unspecified_type":
-            return f"{{{', '.join(map(flat, p))}}}"
-        case "sequence":
-            return f"<{', '.join(map(flat, p))}>"
-        case "sequence_type":
-            return f"<{flat(p[0])}>"
-        case "range":
-            return f"<{flat(p[0])} upto {flat(p[1])}>"
-        case "quantified":
-            return f"{p[0]}({flat(p[1])} | {flat(p[2])})"
-        case "binders":
-            return ", ".join(map(flat, p))
-        case "binder":
-            return f"{', '.join(n.text for n in p[:-1])} in {flat(p[-1])}"
-        case "port_name":
-            return f"{p[0]}.{p[1]}"
-        case "node_port":
-            return ".".join(x for x in p if x is not None)
-        case "function_type":
-            return f"{flat(p[0])} --> {flat(p[1])}"
-        case "product_type":
-            return " ".join(flat(x) if isinstance(x, Tree) else x.text for x in p)
-        case "element":
-            return str(p[0].text)
-        case "constructor":
-            return f"{p[0].text}({', '.join(map(flat, p[1:]))})"
-        case "port":
-            return f"{p[0].text} : {flat(p[1])}"
-        case "topic":
-            matched = ""
-            if p[3] is not None:
-                matched = f" matches({p[2]}.{p[3].text})" if p[2] is not None else f" matches({p[3].text})"
-            return f"{'/'.join(t.text for t in p[0].parts)} {p[1].text}{matched}"
+        case Application(function=function, arguments=arguments):
+            return f"{flat(function)}({_listed(arguments)})"
+        case Name(text=text) | BuiltinName(text=text) | Text(text=text) | NamedType(text=text) | BuiltinType(text=text):
+            return text
+        case Number(digits=digits):
+            return digits
+        case Truth(value=value):
+            return "TRUE" if value else "FALSE"
+        case PortName(role=role, name=name):
+            return f"{role}.{name}"
+        case NodePort(node=node, role=said, name=name):
+            return f"{node}.{name}" if said is None else f"{node}.{said}.{name}"
+        case Parentheses(body=body):
+            return f"({flat(body)})"
+        case TupleDisplay(items=parts) | TupleType(items=parts):
+            return f"({_listed(parts)})"
+        case SetDisplay(items=parts) | SetType(elements=parts):
+            return f"{{{_listed(parts)}}}"
+        case UnspecifiedType():
+            return "{}"
+        case SequenceDisplay(items=items):
+            return f"<{_listed(items)}>"
+        case RangeDisplay(low=low, high=high):
+            return f"<{flat(low)} upto {flat(high)}>"
+        case Quantification():
+            return f"{quantifier_head(tree)} {flat(tree.body)})"
+        case Binder(names=names, domain=domain):
+            return f"{_texts(names)} in {flat(domain)}"
+        case FunctionType(parameters=left, result=right):
+            return f"{flat(left)} --> {flat(right)}"
+        case ProductType(factors=factors, signs=signs):
+            return _between(factors, (sign.text for sign in signs))
+        case SequenceType(item=item):
+            return f"<{flat(item)}>"
+        case Element(name=token, parameters=sorts):
+            return f"{token.text}({_listed(sorts)})" if sorts else token.text
+        case TypeDeclaration() | PortDeclaration():
+            return f"{tree.name.text} : {flat(tree.type)}"
+        case ConstantDeclaration():
+            return f"{tree.name.text} = {flat(tree.value)}"
+        case PortList(items=parts) | TopicList(items=parts):
+            return _listed(parts)
+        case RosType(names=names):
+            return "/".join(name.text for name in names)
+        case TopicDeclaration(type=type_, name=token, role=said, port=port):
+            whole = f"{flat(type_)} {token.text}"
+            if port is None:
+                return whole
+            return f"{whole} matches({port.text if said is None else f'{said}.{port.text}'})"
         case _:
-            return str(p[0])
+            assert_never(tree)
 
 
-def _relation(token: Token) -> str:
-    return "!in" if token.type == "NOT_IN" else token.text
+def quantifier_head(tree: Quantification) -> str:
+    """``forall(x in REAL |``."""
+    return f"{tree.quantifier}({_listed(tree.binders)} |"
+
+
+def _listed(trees: Iterable[Syntax]) -> str:
+    return ", ".join(map(flat, trees))
+
+
+def _texts(names: Iterable[Token]) -> str:
+    return ", ".join(name.text for name in names)
+
+
+def _between(trees: Sequence[Syntax], signs: Iterable[str]) -> str:
+    text = flat(trees[0])
+    for sign, tree in zip(signs, trees[1:], strict=True):
+        text += f" {sign} {flat(tree)}"
+    return text

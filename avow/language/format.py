@@ -7,15 +7,33 @@ are spelled out, and a quantifier's `;` becomes `|`. A part with a comment insid
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from typing import assert_never
 
-from avow.base.diagnostics import Diagnostic, Rejected
-from avow.language.flat import flat
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.language.flat import flat, quantifier_head
 from avow.language.lexer import Token, tokens
 from avow.language.load import clean_text, in_order, unless_torn
-from avow.language.outline import FileSyntax, read
+from avow.language.outline import FileSyntax, NodeSyntax, read
 from avow.language.source import Reports, Source
-from avow.language.syntax import Tree
+from avow.language.syntax import (
+    Connective,
+    ConstantDeclaration,
+    Declaration,
+    Negation,
+    Parentheses,
+    PortList,
+    Quantification,
+    SetDisplay,
+    SetType,
+    Sign,
+    Syntax,
+    TermSyntax,
+    TopicList,
+    TypeDeclaration,
+    children,
+)
 
 WIDTH = 120
 _STEP = 2
@@ -23,17 +41,72 @@ _STEP = 2
 
 def format_text(text: str, file: str) -> str:
     """The text in the canonical layout. Raises `Rejected` where its syntax has errors (its types may have)."""
-    found = clean_text(text, file)
-    if isinstance(found, Diagnostic):
-        raise Rejected(found)
-    reports = Reports(found)
-    comments: list[Token] = []
-    stream = tokens(reports, comments)
-    syntax = read(stream, unless_torn(reports))
-    errors = tuple(d for d in in_order(reports) if d.is_error)
-    if errors:
-        raise Rejected(*errors)
-    return _Layout(found, stream, comments, syntax).file()
+    before = _Read(text, file)
+    after = _Layout(before.source, before.stream, before.comments, before.syntax).file()
+    _must_say_the_same(before, after)
+    return after
+
+
+class _Read:
+    """A file's text, tokens, comments and syntax. Raises `Rejected` where its syntax has errors."""
+
+    def __init__(self, text: str, file: str) -> None:
+        source = clean_text(text, file)
+        if isinstance(source, Diagnostic):
+            raise Rejected(source)
+        self.source = source
+        reports = Reports(source)
+        self.comments: list[Token] = []
+        self.stream = tokens(reports, self.comments)
+        self.syntax = read(self.stream, unless_torn(reports))
+        errors = tuple(d for d in in_order(reports) if d.is_error)
+        if errors:
+            raise Rejected(*errors)
+
+    def says(self) -> list[tuple[object, Span]]:
+        """Everything that the file says, part by part, whatever its layout; and where each part stands."""
+        found: list[tuple[object, Span]] = []
+        parts: list[Syntax | NodeSyntax] = [*self.syntax.declarations, *self.syntax.nodes]
+        for part in sorted(parts, key=lambda part: part.start):
+            if not isinstance(part, NodeSyntax):
+                found.append((_shape(part), self.source.span(part.start, part.end)))
+                continue
+            listings = (part.inputs, part.outputs, part.topics)
+            span = self.source.span(part.name.start, part.name.end)
+            found.append(((part.name.text, *map(_shape, listings)), span))
+            for clause in part.clauses:
+                said = (clause.kind, *map(_shape, (clause.name, clause.sentence, clause.formula)))
+                found.append((said, self.source.span(clause.start, clause.end)))
+        end = len(self.source.text)
+        found.append(([c.text.split() for c in self.comments], self.source.span(end, end)))
+        return found
+
+
+def _must_say_the_same(before: _Read, after: str) -> None:
+    """Raises `Rejected` where the text does not read back as what it was made from."""
+    try:
+        again = _Read(after, before.source.file).says()
+    except Rejected:
+        again = []
+    for number, (said, span) in enumerate(before.says()):
+        if number >= len(again) or again[number][0] != said:
+            message = "in the canonical layout, this would not read back as the same contract; the file stays as it is"
+            raise Rejected(
+                Diagnostic("RCL007", message, span, hint="this is a defect of Avow: please tell its authors")
+            )
+
+
+def _shape(part: object) -> object:
+    """A piece of syntax without its places. Only the dataclasses' own fields are looked at, not the printer's idea of
+    them: what the printer forgets is seen here."""
+    if isinstance(part, Token):
+        return part.type if part.type in ("NOT_IN", "EMPTY_SEQUENCE") else part.text
+    if isinstance(part, tuple):
+        return tuple(map(_shape, part))
+    if dataclasses.is_dataclass(part):
+        own = (f.name for f in dataclasses.fields(part) if f.name not in ("start", "end", "depth"))
+        return (type(part).__name__, *(_shape(getattr(part, name)) for name in own))
+    return part
 
 
 class _Layout:
@@ -46,14 +119,16 @@ class _Layout:
         self.next_comment = 0
         self.at = 0
         self.lines: list[str] = []
-        self.trees: dict[int, Tree] = {tree.start: tree for tree in syntax.declarations}
+        self.declarations: dict[int, Declaration] = {tree.start: tree for tree in syntax.declarations}
+        self.listings: dict[int, PortList | TopicList] = {}
+        self.formulas: dict[int, TermSyntax] = {}
         for node in syntax.nodes:
             for tree in (node.inputs, node.outputs, node.topics):
                 if tree is not None:
-                    self.trees[tree.start] = tree
+                    self.listings[tree.start] = tree
             for clause in node.clauses:
                 if clause.formula is not None:
-                    self.trees[clause.formula.start] = clause.formula
+                    self.formulas[clause.formula.start] = clause.formula
 
     def kind(self) -> str:
         return self.stream[self.at].type if self.at < len(self.stream) else "$END"
@@ -143,16 +218,22 @@ class _Layout:
                 self.next_comment += 1
             kept = self.relaid(self.text[start:end], _STEP, _STEP)
         elif is_declaration:
-            kept = self.declaration(self.trees[start])
+            kept = self.declaration(self.declarations[start])
         else:
             kept = self.section(own)
         self.lines.append(" " * _STEP + kept[0])
         self.lines.extend(kept[1:])
 
-    def declaration(self, tree: Tree) -> list[str]:
-        sign = " :" if tree.kind == "type" else " ="
-        head = f"{tree.parts[0].text}{sign} "
-        lines = _broken_set(tree.parts[1], _STEP + len(head), WIDTH - 1) or _lay(tree.parts[1], _STEP + 2, WIDTH - 1)
+    def declaration(self, tree: Declaration) -> list[str]:
+        match tree:
+            case TypeDeclaration(type=type_):
+                head = f"{tree.name.text} : "
+                lines = _broken_set(type_, _STEP + len(head), WIDTH - 1) or [flat(type_)]
+            case ConstantDeclaration(value=value):
+                head = f"{tree.name.text} = "
+                lines = _broken_set(value, _STEP + len(head), WIDTH - 1) or _lay(value, _STEP + 2, WIDTH - 1)
+            case _:
+                assert_never(tree)
         return [head + lines[0], *lines[1:-1], lines[-1] + ";"] if len(lines) > 1 else [head + lines[0] + ";"]
 
     def section(self, own: Sequence[Token]) -> list[str]:
@@ -162,11 +243,11 @@ class _Layout:
         while own[at].type != "LPAR":
             head += " " + own[at].text
             at += 1
-        tree = self.trees.get(own[at + 1].start) if at + 1 < len(own) - 1 else None
-        if tree is None:
+        if at + 1 >= len(own) - 1:
             return [head + "()"]
+        start = own[at + 1].start
         if keyword in ("inputs", "outputs", "topics"):
-            items = [flat(part) for part in tree.parts]
+            items = [flat(part) for part in self.listings[start].items]
             line = f"{head}( {', '.join(items)} )"
             if _STEP + len(line) <= WIDTH:
                 return [line]
@@ -174,6 +255,7 @@ class _Layout:
             return [f"{head}( {items[0]}," if len(items) > 1 else f"{head}( {items[0]} )"] + [
                 f"{pad}{item}{' )' if i == len(items) - 1 else ','}" for i, item in enumerate(items) if i
             ]
+        tree = self.formulas[start]
         line = f"{head}( {flat(tree)} )"
         if own[at - 1].type != "STRING" and _STEP + len(line) <= WIDTH:
             return [line]
@@ -187,45 +269,38 @@ class _Layout:
 # --- trees to lines --------------------------------------------------------------------------------------------------
 
 
-def _lay(tree: Tree, indent: int, width: int) -> list[str]:
-    """The lines of a formula or type that begins at column `indent`; all but the first carry their indentation."""
+def _lay(tree: TermSyntax, indent: int, width: int) -> list[str]:
+    """The lines of a formula that begins at column `indent`; all but the first carry their indentation."""
     line = flat(tree)
     if indent + len(line) <= width:
         return [line]
-    match tree.kind:
-        case "parenthesised":
-            return _enclosed("(", _lay(tree.parts[0], indent + 1, width - 1), ")")
-        case "and" | "or":
-            sign = f"{tree.kind} "
-            lines = _lay(tree.parts[0], indent, width)
-            for part in tree.parts[1:]:
+    match tree:
+        case Parentheses(body=inner):
+            return _enclosed("(", _lay(inner, indent + 1, width - 1), ")")
+        case Connective(sign=Sign.AND | Sign.OR, items=items):
+            sign = f"{tree.sign} "
+            lines = _lay(items[0], indent, width)
+            for part in items[1:]:
                 more = _lay(part, indent + len(sign), width)
                 lines += [" " * indent + sign + more[0], *more[1:]]
             return lines
-        case "implies" | "iff":
-            sign = " ->" if tree.kind == "implies" else " <=>"
-            lines = _lay(tree.parts[0], indent, width - len(sign))
-            for i, part in enumerate(tree.parts[1:], 2):
+        case Connective(items=items):
+            sign = f" {tree.sign}"
+            lines = _lay(items[0], indent, width - len(sign))
+            for i, part in enumerate(items[1:], 2):
                 lines[-1] += sign
-                last = i == len(tree.parts)
+                last = i == len(items)
                 deeper = indent + (_STEP if last else 0)
                 more = _lay(part, deeper, width - (0 if last else len(sign)))
                 lines += [" " * deeper + more[0], *more[1:]]
             return lines
-        case "not":
-            return _enclosed("not ", _lay(tree.parts[0], indent + 4, width), "")
-        case "quantified":
-            head = f"{tree.parts[0]}({flat(tree.parts[1])} |"
-            body = _lay(tree.parts[2], indent + _STEP, width - 1)
-            return (
-                [head, " " * (indent + _STEP) + body[0], *body[1:-1], body[-1] + ")"]
-                if len(body) > 1
-                else [
-                    head,
-                    " " * (indent + _STEP) + body[0] + ")",
-                ]
-            )
-    return [line]
+        case Negation(body=inner):
+            return _enclosed("not ", _lay(inner, indent + 4, width), "")
+        case Quantification(body=inner):
+            body = _enclosed(" " * (indent + _STEP), _lay(inner, indent + _STEP, width - 1), ")")
+            return [quantifier_head(tree), *body]
+        case _:  # a term, which stays on its line
+            return [line]
 
 
 def _enclosed(before: str, lines: list[str], after: str) -> list[str]:
@@ -234,14 +309,14 @@ def _enclosed(before: str, lines: list[str], after: str) -> list[str]:
     return lines
 
 
-def _broken_set(tree: Tree, indent: int, width: int) -> list[str] | None:
+def _broken_set(tree: Syntax, indent: int, width: int) -> list[str] | None:
     """A long set over several lines, as many elements on each as fit; None where it is short or no set."""
-    if tree.kind not in ("set_type", "set") or indent + len(flat(tree)) <= width:
+    if not isinstance(tree, SetType | SetDisplay) or indent + len(flat(tree)) <= width:
         return None
     lines = ["{"]
     pad = " " * (_STEP + _STEP)
     row = ""
-    items = [flat(part) for part in tree.parts]
+    items = [flat(part) for part in children(tree)]
     for i, item in enumerate(items):
         piece = item + ("," if i < len(items) - 1 else "")
         if row and len(pad) + len(row) + 1 + len(piece) > width:

@@ -136,10 +136,10 @@ def _about_text(file: LintedFile) -> Iterator[Diagnostic]:
                     span,
                     f"it is read as `{reading.shown}`: put the parentheses that you mean",
                 )
-        for topic in node.topics.parts if node.topics is not None else ():
-            _, name, role, matched = topic.parts
+        for topic in node.topics.items if node.topics is not None else ():
+            name, role, matched = topic.name, topic.role, topic.port
             if matched is not None and role is None:
-                inputs = {p.parts[0].text for p in node.inputs.parts} if node.inputs is not None else set()
+                inputs = {p.name.text for p in node.inputs.items} if node.inputs is not None else set()
                 which = "in" if matched.text in inputs else "out"
                 yield _warning(
                     "RCL409",

@@ -17,7 +17,7 @@ from avow.language.parser import MAX_DEPTH
 from avow.language.printer import show_type
 from avow.language.scope import Scope
 from avow.language.source import Reports
-from avow.language.syntax import Tree
+from avow.language.syntax import RosType, UnspecifiedType
 from avow.language.terms import Role, Term
 
 ROS_BUILTINS = (
@@ -33,8 +33,8 @@ def check_ports(
     found: list[dict[str, Port]] = []
     for role, tree in ((Role.INPUT, node.inputs), (Role.OUTPUT, node.outputs)):
         ports: dict[str, Port] = {}
-        for part in tree.parts if tree is not None else ():
-            name, type_tree = part.parts
+        for part in tree.items if tree is not None else ():
+            name = part.name
             if name.text in ports:
                 notes: tuple[tuple[str, Span | None], ...] = (
                     (f"`{name.text}` is first declared here", ports[name.text].span),
@@ -42,11 +42,11 @@ def check_ports(
                 message = f"node `{node.name.text}` has two {'in' if role is Role.INPUT else 'out'}puts `{name.text}`"
                 reports.error("RCL214", message, name.start, name.end, notes=notes)
                 continue
-            sort = declarations.type_of(type_tree, reports, name.text)
+            sort = declarations.type_of(part.type, reports, name.text)
             if sort is None or not declarations.is_small(name.text, sort_extent(sort), name, reports):
                 node.broken.add(name.text)
                 continue
-            type_name = flat(type_tree) if type_tree.kind != "unspecified_type" else show_type(sort)
+            type_name = show_type(sort) if isinstance(part.type, UnspecifiedType) else flat(part.type)
             ports[name.text] = Port(role, name.text, sort, type_name, reports.source.span(name.start, name.end))
         found.append(ports)
     return found[0], found[1]
@@ -132,14 +132,13 @@ def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]
     """The topics. One topic may stand in the list several times, with a variable each time: its messages carry them
     all, each in fields of its own."""
     seen: dict[str, list[Topic]] = {}
-    for tree in node.topics.parts if node.topics is not None else ():
-        ros_type, name, role, matched = tree.parts
-        _check_ros_type(ros_type, reports)
-        port = _matched(tree, role, matched, scope, reports) if matched is not None else None
-        if matched is not None and port is None:
+    for tree in node.topics.items if node.topics is not None else ():
+        name = tree.name
+        _check_ros_type(tree.type, reports)
+        port = _matched(tree.role, tree.port, scope, reports) if tree.port is not None else None
+        if tree.port is not None and port is None:
             continue
-        shown = "/".join(part.text for part in ros_type.parts)
-        topic = Topic(shown, name.text, port, reports.source.span(tree.start, tree.end))
+        topic = Topic(flat(tree.type), name.text, port, reports.source.span(tree.start, tree.end))
         earlier = seen.setdefault(name.text, [])
         if _goes_with(topic, earlier, name, reports):
             earlier.append(topic)
@@ -170,9 +169,9 @@ def _same_type(topic: Topic) -> tuple[str, ...]:
     return (parts[0], parts[-1], *(p for p in parts[1:-1] if p != "msg"))
 
 
-def _check_ros_type(tree: Tree, reports: Reports) -> None:
-    parts = [part.text for part in tree.parts]
-    shown = "/".join(parts)
+def _check_ros_type(tree: RosType, reports: Reports) -> None:
+    parts = [part.text for part in tree.names]
+    shown = flat(tree)
     if len(parts) == 1 and parts[0] not in ROS_BUILTINS:
         hint = did_you_mean(shown, ROS_BUILTINS) or f"write the package before it: `package/{shown}`"
         reports.error("RCL217", f"ROS has no built-in type `{shown}`", tree.start, tree.end, hint=hint)
@@ -181,7 +180,7 @@ def _check_ros_type(tree: Tree, reports: Reports) -> None:
         reports.error("RCL217", f"`{shown}` is not a ROS type", tree.start, tree.end, hint=hint)
 
 
-def _matched(tree: Tree, role_text: str | None, name: Token, scope: Scope, reports: Reports) -> Port | None:
+def _matched(role_text: str | None, name: Token, scope: Scope, reports: Reports) -> Port | None:
     text = name.text
     roles = [Role(role_text)] if role_text else [Role.INPUT, Role.OUTPUT]
     candidates = [scope.ports(r)[text] for r in roles if text in scope.ports(r)]

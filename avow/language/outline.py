@@ -14,7 +14,7 @@ from avow.language.contract import ClauseKind
 from avow.language.lexer import Token
 from avow.language.parser import parse
 from avow.language.source import Reports
-from avow.language.syntax import Tree
+from avow.language.syntax import Declaration, PortList, TermSyntax, TopicList
 
 _OPEN = {"LPAR": "RPAR", "LBRACE": "RBRACE"}
 _CLOSE = frozenset(_OPEN.values())
@@ -29,7 +29,7 @@ class ClauseSyntax:
     kind: ClauseKind
     name: Token | None
     sentence: Token | None
-    formula: Tree | None
+    formula: TermSyntax | None
     """None: it was in error, which has been reported."""
     inside: tuple[int, int]
     """Where the formula stands, between the parentheses."""
@@ -44,16 +44,16 @@ class NodeSyntax:
     name: Token
     start: int
     end: int = 0
-    inputs: Tree | None = None
-    outputs: Tree | None = None
-    topics: Tree | None = None
+    inputs: PortList | None = None
+    outputs: PortList | None = None
+    topics: TopicList | None = None
     clauses: list[ClauseSyntax] = field(default_factory=list)
     broken: set[str] = field(default_factory=set)
 
 
 @dataclass(slots=True)
 class FileSyntax:
-    declarations: list[Tree] = field(default_factory=list)
+    declarations: list[Declaration] = field(default_factory=list)
     nodes: list[NodeSyntax] = field(default_factory=list)
     broken: set[str] = field(default_factory=set)
     parts: list[tuple[int, int]] = field(default_factory=list)
@@ -444,18 +444,20 @@ class _Reader:
                 ClauseSyntax(kind, name, sentence, formula, inside, keyword.start, self.tokens[close].end)
             )
             return
-        tree = parse("topics" if section == "TOPICS" else "ports", part, self.reports, end, opening.end)
-        if tree is None:
+        listing: PortList | TopicList | None
+        if section == "TOPICS":
+            listing = topics = parse("topics", part, self.reports, end, opening.end)
+            node.topics = node.topics or topics
+        else:
+            listing = ports = parse("ports", part, self.reports, end, opening.end)
+            if section == "INPUTS":
+                node.inputs = node.inputs or ports
+            else:
+                node.outputs = node.outputs or ports
+        if listing is None:
             node.broken.update(t.text for t in part if t.type == "NAME")
         else:
-            self.out.parts.extend((t.start, t.end) for t in tree.parts)
-        match section:
-            case "INPUTS":
-                node.inputs = node.inputs or tree
-            case "OUTPUTS":
-                node.outputs = node.outputs or tree
-            case _:
-                node.topics = node.topics or tree
+            self.out.parts.extend((t.start, t.end) for t in listing.items)
 
     def unclosed(self, opening: Token, first: int, section: str, node: NodeSyntax) -> None:
         """Reports a parenthesis without partner and goes to where reading can begin again."""

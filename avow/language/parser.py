@@ -1,7 +1,7 @@
 """Tokens to surface syntax, by Lark's LALR parser over grammar.lark.
 
-Its input is a slice of the file's tokens (see `avow.language.outline`), and its callbacks build `Tree`s directly. It is
-iterative: no nesting, however deep, can exhaust the stack.
+Its input is a slice of the file's tokens (see `avow.language.outline`), and its callbacks build the trees directly.
+It is iterative: no nesting, however deep, can exhaust the stack.
 """
 
 from __future__ import annotations
@@ -11,22 +11,88 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, overload
 
 from avow.language.chains import LONG
 from avow.language.lexer import Token
 from avow.language.source import Reports
-from avow.language.syntax import Tree
+from avow.language.syntax import (
+    Application,
+    Binder,
+    BuiltinName,
+    BuiltinType,
+    Calculation,
+    Comparison,
+    Connective,
+    ConstantDeclaration,
+    Declaration,
+    Element,
+    FunctionType,
+    Minus,
+    Name,
+    NamedType,
+    Negation,
+    NodePort,
+    Number,
+    Parentheses,
+    PortDeclaration,
+    PortList,
+    PortName,
+    ProductType,
+    Quantification,
+    RangeDisplay,
+    RosType,
+    SequenceDisplay,
+    SequenceType,
+    SetDisplay,
+    SetType,
+    Sign,
+    Syntax,
+    TermSyntax,
+    Text,
+    TopicDeclaration,
+    TopicList,
+    Truth,
+    TupleDisplay,
+    TupleType,
+    TypeDeclaration,
+    UnspecifiedType,
+)
+from avow.language.terms import Quantifier
 
 MAX_DEPTH = 150
 """How deep a formula or type may be nested. Every later pass may recurse as deep as this. A chain of operators is no
 nesting: its terms are made shallow by `avow.language.chains`."""
 
-QUANTIFIERS = {"FORALL": "forall", "EXISTS": "exists", "UNIQUE": "exists_unique"}
+QUANTIFIERS = {"FORALL": Quantifier.FORALL, "EXISTS": Quantifier.EXISTS, "UNIQUE": Quantifier.UNIQUE}
 STARTS = ("declaration", "ports", "topics", "formula")
 
 
-def parse(start: str, tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None) -> Tree | None:
+@overload
+def parse(
+    start: Literal["declaration"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
+) -> Declaration | None: ...
+
+
+@overload
+def parse(
+    start: Literal["ports"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
+) -> PortList | None: ...
+
+
+@overload
+def parse(
+    start: Literal["topics"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
+) -> TopicList | None: ...
+
+
+@overload
+def parse(
+    start: Literal["formula"], tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None
+) -> TermSyntax | None: ...
+
+
+def parse(start: str, tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None) -> Syntax | None:
     """The tree of one part of a file, which stands between the offsets `begin` (of its first token, where not given)
     and `end`. Reports the first error, unless it follows from what the lexer had to leave out or guess; then None."""
     tree = _run(_tables(start), tokens, Token("$END", "", end, end))
@@ -66,7 +132,7 @@ class _Tables(NamedTuple):
     gotos: dict[int, dict[str, int]]
 
 
-def _run(tables: _Tables, tokens: Iterable[Token], end: Token) -> Tree | Token:
+def _run(tables: _Tables, tokens: Iterable[Token], end: Token) -> Syntax | Token:
     """The LALR automaton, on Lark's tables. (Lark's own loop does the same and takes three times as long: it calls a
     function for every token, and makes a list and two calls for each of the many reductions that change nothing.)
     Gives the token where it cannot go on."""
@@ -101,7 +167,7 @@ def _run(tables: _Tables, tokens: Iterable[Token], end: Token) -> Tree | Token:
             states.append(state)
             if token is end and state == last:
                 break
-    tree: Tree = values[-1]
+    tree: Syntax = values[-1]
     return tree
 
 
@@ -172,18 +238,17 @@ def _cache_file() -> Path | None:
     return folder / f"rcl-{sys.version_info.major}{sys.version_info.minor}.lark"
 
 
-def _chain(kind: str, parts: list[Any], operators: int) -> Tree:
+def _deepest(parts: Iterable[Any]) -> int:
+    deepest: int = max([part.depth for part in parts])
+    return deepest + 1
+
+
+def _chain_depth(operands: Sequence[Any]) -> int:
     """A chain of operators counts as deep as its term becomes."""
-    tree = _make(kind, tuple(parts), parts[0], parts[-1])
-    return tree._replace(depth=tree.depth - 1 + min(operators, LONG))
+    return _deepest(operands) - 1 + min(len(operands) - 1, LONG)
 
 
-def _make(kind: str, parts: tuple[Any, ...], first: Any, last: Any) -> Tree:
-    depth = 0
-    for part in parts:
-        if type(part) is Tree and part.depth > depth:
-            depth = part.depth
-    return Tree(kind, parts, first.start, last.end, depth + 1)
+_Binders = tuple[Binder, ...]
 
 
 class _Build:
@@ -191,146 +256,147 @@ class _Build:
 
     # --- declarations ------------------------------------------------------------------------------------------------
 
-    def type_declaration(self, c: list[Any]) -> Tree:  # (name token, type)
-        return _make("type", (c[0], c[2]), c[0], c[2])
+    def type_declaration(self, c: list[Any]) -> TypeDeclaration:
+        return TypeDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
 
-    def constant_declaration(self, c: list[Any]) -> Tree:  # (name token, value)
-        return _make("constant", (c[0], c[2]), c[0], c[2])
+    def constant_declaration(self, c: list[Any]) -> ConstantDeclaration:
+        return ConstantDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
 
-    def ports(self, c: list[Any]) -> Tree:  # (port, …)
-        return _listing("ports", c)
+    def ports(self, c: list[Any]) -> PortList:
+        return PortList(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2])) if c else PortList(0, 0, 1, ())
 
-    def port(self, c: list[Any]) -> Tree:  # (name token, type)
-        return _make("port", (c[0], c[2]), c[0], c[2])
+    def port(self, c: list[Any]) -> PortDeclaration:
+        return PortDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
 
-    def topics(self, c: list[Any]) -> Tree:  # (topic, …)
-        return _listing("topics", c)
+    def topics(self, c: list[Any]) -> TopicList:
+        return TopicList(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2])) if c else TopicList(0, 0, 1, ())
 
-    def plain_topic(self, c: list[Any]) -> Tree:  # (ros type, name token, role or None, matched name token or None)
-        return _make("topic", (c[0], c[1], None, None), c[0], c[-1])
+    def plain_topic(self, c: list[Any]) -> TopicDeclaration:
+        return TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], None, None)
 
-    def bare_topic(self, c: list[Any]) -> Tree:
-        return _make("topic", (c[0], c[1], None, c[4]), c[0], c[-1])
+    def bare_topic(self, c: list[Any]) -> TopicDeclaration:
+        return TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], None, c[4])
 
-    def matched_topic(self, c: list[Any]) -> Tree:
-        return _make("topic", (c[0], c[1], c[4].text, c[6]), c[0], c[-1])
+    def matched_topic(self, c: list[Any]) -> TopicDeclaration:
+        return TopicDeclaration(c[0].start, c[-1].end, 2, c[0], c[1], c[4].text, c[6])
 
-    def ros_type(self, c: list[Any]) -> Tree:  # (name token, …) without the slashes
-        return _make("ros_type", tuple(c[::2]), c[0], c[-1])
+    def ros_type(self, c: list[Any]) -> RosType:
+        return RosType(c[0].start, c[-1].end, 1, tuple(c[::2]))
 
     # --- types -------------------------------------------------------------------------------------------------------
 
-    def function_type(self, c: list[Any]) -> Tree:  # (parameters, result)
-        return _make("function_type", (c[0], c[2]), c[0], c[2])
+    def function_type(self, c: list[Any]) -> FunctionType:
+        return FunctionType(c[0].start, c[2].end, max(c[0].depth, c[2].depth) + 1, c[0], c[2])
 
-    def product_type(self, c: list[Any]) -> Tree:  # (type, x token, type, …)
-        return _make("product_type", tuple(c), c[0], c[-1])
+    def product_type(self, c: list[Any]) -> ProductType:
+        return ProductType(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]), tuple(c[1::2]))
 
-    def named_type(self, c: list[Any]) -> Tree:  # (name,)
-        return Tree("named_type", (c[0].text,), c[0].start, c[0].end, 1)
+    def named_type(self, c: list[Any]) -> NamedType:
+        return NamedType(c[0].start, c[0].end, 1, c[0].text)
 
-    def builtin_type(self, c: list[Any]) -> Tree:  # (name,)
-        return Tree("builtin_type", (c[0].text,), c[0].start, c[0].end, 1)
+    def builtin_type(self, c: list[Any]) -> BuiltinType:
+        return BuiltinType(c[0].start, c[0].end, 1, c[0].text)
 
-    def unspecified_type(self, c: list[Any]) -> Tree:
-        return Tree("unspecified_type", (), c[0].start, c[1].end, 1)
+    def unspecified_type(self, c: list[Any]) -> UnspecifiedType:
+        return UnspecifiedType(c[0].start, c[1].end, 1)
 
-    def set_type(self, c: list[Any]) -> Tree:  # (element, …)
-        return _make("set_type", tuple(c[1:-1:2]), c[0], c[-1])
+    def set_type(self, c: list[Any]) -> SetType:
+        return SetType(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
 
-    def tuple_type(self, c: list[Any]) -> Tree:  # (type, …)
-        return _make("tuple_type", tuple(c[1:-1:2]), c[0], c[-1])
+    def tuple_type(self, c: list[Any]) -> TupleType:
+        return TupleType(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
 
-    def sequence_type(self, c: list[Any]) -> Tree:  # (type,)
-        return _make("sequence_type", (c[1],), c[0], c[-1])
+    def sequence_type(self, c: list[Any]) -> SequenceType:
+        return SequenceType(c[0].start, c[-1].end, c[1].depth + 1, c[1])
 
-    def plain_element(self, c: list[Any]) -> Tree:  # (name token,)
-        return Tree("element", (c[0],), c[0].start, c[0].end, 1)
+    def plain_element(self, c: list[Any]) -> Element:
+        return Element(c[0].start, c[0].end, 1, c[0], ())
 
-    def constructor(self, c: list[Any]) -> Tree:  # (name token, type, …)
-        return _make("constructor", (c[0], *c[2:-1:2]), c[0], c[-1])
+    def constructor(self, c: list[Any]) -> Element:
+        return Element(c[0].start, c[-1].end, _deepest(c[2:-1:2]), c[0], tuple(c[2:-1:2]))
 
     # --- formulas and terms ------------------------------------------------------------------------------------------
 
-    def iff(self, c: list[Any]) -> Tree:  # (formula, …)
-        return _chain("iff", c[::2], len(c) // 2)
+    def iff(self, c: list[Any]) -> Connective:
+        items = tuple(c[::2])
+        return Connective(c[0].start, c[-1].end, _chain_depth(items), Sign.IFF, items)
 
-    def implies(self, c: list[Any]) -> Tree:  # (formula, …)
-        return _chain("implies", c[::2], len(c) // 2)
+    def implies(self, c: list[Any]) -> Connective:
+        items = tuple(c[::2])
+        return Connective(c[0].start, c[-1].end, _chain_depth(items), Sign.IMPLIES, items)
 
-    def disjunction(self, c: list[Any]) -> Tree:  # (formula, …)
-        return _make("or", tuple(c[::2]), c[0], c[-1])
+    def disjunction(self, c: list[Any]) -> Connective:
+        items = tuple(c[::2])
+        return Connective(c[0].start, c[-1].end, _deepest(items), Sign.OR, items)
 
-    def conjunction(self, c: list[Any]) -> Tree:  # (formula, …)
-        return _make("and", tuple(c[::2]), c[0], c[-1])
+    def conjunction(self, c: list[Any]) -> Connective:
+        items = tuple(c[::2])
+        return Connective(c[0].start, c[-1].end, _deepest(items), Sign.AND, items)
 
-    def negation(self, c: list[Any]) -> Tree:  # (formula,)
-        return _make("not", (c[1],), c[0], c[1])
+    def negation(self, c: list[Any]) -> Negation:
+        return Negation(c[0].start, c[1].end, c[1].depth + 1, c[1])
 
-    def comparison(self, c: list[Any]) -> Tree:  # (term, relation token, term, …)
-        return _make("comparison", tuple(c), c[0], c[-1])
+    def comparison(self, c: list[Any]) -> Comparison:
+        return Comparison(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2]), tuple(c[1::2]))
 
-    def arithmetic(self, c: list[Any]) -> Tree:  # (term, operator token, term, …)
-        return _chain("arithmetic", c, len(c) // 2)
+    def arithmetic(self, c: list[Any]) -> Calculation:
+        operands = tuple(c[::2])
+        return Calculation(c[0].start, c[-1].end, _chain_depth(operands), operands, tuple(c[1::2]))
 
-    def negative(self, c: list[Any]) -> Tree:  # (term,)
-        return _make("negative", (c[1],), c[0], c[1])
+    def negative(self, c: list[Any]) -> Minus:
+        return Minus(c[0].start, c[1].end, c[1].depth + 1, c[1])
 
-    def application(self, c: list[Any]) -> Tree:  # (function, argument, …)
-        return _make("application", (c[0], *c[2:-1:2]), c[0], c[-1])
+    def application(self, c: list[Any]) -> Application:
+        arguments = tuple(c[2:-1:2])
+        return Application(c[0].start, c[-1].end, _deepest((c[0], *arguments)), c[0], arguments)
 
-    def name(self, c: list[Any]) -> Tree:  # (name,)
-        return Tree("name", (c[0].text,), c[0].start, c[0].end, 1)
+    def name(self, c: list[Any]) -> Name:
+        return Name(c[0].start, c[0].end, 1, c[0].text)
 
-    def builtin(self, c: list[Any]) -> Tree:  # (name,)
-        return Tree("builtin", (c[0].text,), c[0].start, c[0].end, 1)
+    def builtin(self, c: list[Any]) -> BuiltinName:
+        return BuiltinName(c[0].start, c[0].end, 1, c[0].text)
 
-    def number(self, c: list[Any]) -> Tree:  # (digits,)
-        return Tree("number", (c[0].text,), c[0].start, c[0].end, 1)
+    def number(self, c: list[Any]) -> Number:
+        return Number(c[0].start, c[0].end, 1, c[0].text)
 
-    def string(self, c: list[Any]) -> Tree:  # (text with its quotation marks,)
-        return Tree("string", (c[0].text,), c[0].start, c[0].end, 1)
+    def string(self, c: list[Any]) -> Text:
+        return Text(c[0].start, c[0].end, 1, c[0].text)
 
-    def truth(self, c: list[Any]) -> Tree:  # (TRUE or FALSE,)
-        return Tree("truth", (c[0].text,), c[0].start, c[0].end, 1)
+    def truth(self, c: list[Any]) -> Truth:
+        return Truth(c[0].start, c[0].end, 1, c[0].text == "TRUE")
 
-    def port_name(self, c: list[Any]) -> Tree:  # ("in" or "out", name)
-        return Tree("port_name", (c[0].text, c[2].text), c[0].start, c[2].end, 1)
+    def port_name(self, c: list[Any]) -> PortName:
+        return PortName(c[0].start, c[2].end, 1, c[0].text, c[2].text)
 
-    def node_port(self, c: list[Any]) -> Tree:  # (node, "in" or "out" or None, name)
+    def node_port(self, c: list[Any]) -> NodePort:
         role = c[2].text if len(c) == 5 else None
-        return Tree("node_port", (c[0].text, role, c[-1].text), c[0].start, c[-1].end, 1)
+        return NodePort(c[0].start, c[-1].end, 1, c[0].text, role, c[-1].text)
 
-    def parenthesised(self, c: list[Any]) -> Tree:
-        """The inner tree under the parentheses' place: they group, and are gone."""
-        inner: Tree = c[1]
-        if inner.kind == "parenthesised":  # `((a))` counts as deep as it is written
-            return inner._replace(start=c[0].start, end=c[2].end, depth=inner.depth + 1)
-        return Tree("parenthesised", (inner,), c[0].start, c[2].end, inner.depth + 1)
+    def parenthesised(self, c: list[Any]) -> Parentheses:
+        inner = c[1].body if type(c[1]) is Parentheses else c[1]
+        return Parentheses(c[0].start, c[2].end, c[1].depth + 1, inner)
 
-    def tuple(self, c: list[Any]) -> Tree:  # (term, …)
-        return _make("tuple", tuple(c[1:-1:2]), c[0], c[-1])
+    def tuple(self, c: list[Any]) -> TupleDisplay:
+        return TupleDisplay(c[0].start, c[-1].end, _deepest(c[1:-1:2]), tuple(c[1:-1:2]))
 
-    def set(self, c: list[Any]) -> Tree:  # (term, …)
-        return _make("set", tuple(c[1:-1:2]), c[0], c[-1])
+    def set(self, c: list[Any]) -> SetDisplay:
+        items = tuple(c[1:-1:2])
+        return SetDisplay(c[0].start, c[-1].end, _deepest(items) if items else 1, items)
 
-    def sequence(self, c: list[Any]) -> Tree:  # (term, …)
-        return _make("sequence", tuple(c[1:-1:2]), c[0], c[-1])
+    def sequence(self, c: list[Any]) -> SequenceDisplay:
+        items = tuple(c[1:-1:2])
+        return SequenceDisplay(c[0].start, c[-1].end, _deepest(items) if items else 1, items)
 
-    def range(self, c: list[Any]) -> Tree:  # (low, high)
-        return _make("range", (c[1], c[3]), c[0], c[4])
+    def range(self, c: list[Any]) -> RangeDisplay:
+        return RangeDisplay(c[0].start, c[4].end, max(c[1].depth, c[3].depth) + 1, c[1], c[3])
 
-    def quantified(self, c: list[Any]) -> Tree:  # (quantifier, binders, body)
-        return _make("quantified", (QUANTIFIERS[c[0].type], c[2], c[4]), c[0], c[5])
+    def quantified(self, c: list[Any]) -> Quantification:
+        binders: _Binders = c[2]
+        depth = max(_deepest(binders) + 1, c[4].depth + 1)
+        return Quantification(c[0].start, c[5].end, depth, QUANTIFIERS[c[0].type], binders, c[4])
 
-    def binders(self, c: list[Any]) -> Tree:  # (binder, …)
-        return _make("binders", tuple(c[::2]), c[0], c[-1])
+    def binders(self, c: list[Any]) -> _Binders:
+        return tuple(c[::2])
 
-    def binder(self, c: list[Any]) -> Tree:  # (name token, …, domain)
-        return _make("binder", (*c[:-2:2], c[-1]), c[0], c[-1])
-
-
-def _listing(kind: str, c: list[Any]) -> Tree:
-    if not c:
-        return Tree(kind, (), 0, 0, 1)
-    return _make(kind, tuple(c[::2]), c[0], c[-1])
+    def binder(self, c: list[Any]) -> Binder:
+        return Binder(c[0].start, c[-1].end, c[-1].depth + 1, tuple(c[:-2:2]), c[-1])

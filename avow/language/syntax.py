@@ -1,19 +1,369 @@
 """The surface syntax of declarations and formulas: what the parser makes of the tokens, before any name is resolved.
 
-One generic node, `Tree`, keeps parsing fast: `kind` says what it is (the aliases of grammar.lark), `parts` are trees,
-tokens or plain strings as described per kind in `avow.language.parser`.
+A frozen dataclass for each kind of node, and `children`, total over them: whoever walks the tree is told by mypy of a
+kind that it forgets. Names that are only compared are plain strings; those that a diagnostic may point at are tokens.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import assert_never
+
+from avow.language.lexer import Token
+from avow.language.terms import Quantifier
 
 
-class Tree(NamedTuple):
+class Sign(StrEnum):
+    """A connective that chains."""
+
+    IFF = "<=>"
+    IMPLIES = "->"
+    OR = "or"
+    AND = "and"
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
     """A piece of syntax with its place; `depth` is its height, so that deep nesting is known before any recursion."""
 
-    kind: str
-    parts: tuple[Any, ...]
     start: int
     end: int
     depth: int
+
+
+# --- formulas and terms ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Connective(_Placed):
+    """``a and b and c``: a chain of one connective, however long."""
+
+    sign: Sign
+    items: tuple[TermSyntax, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Negation(_Placed):
+    """``not a``."""
+
+    body: TermSyntax
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison(_Placed):
+    """``a < b <= c``, ``x in S``, ``x !in S``: a chain with its relations between the operands."""
+
+    operands: tuple[TermSyntax, ...]
+    relations: tuple[Token, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Calculation(_Placed):
+    """``a + b - c`` or ``a * b / c``: a chain with its operators between the operands."""
+
+    operands: tuple[TermSyntax, ...]
+    operators: tuple[Token, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Minus(_Placed):
+    """``-a``."""
+
+    body: TermSyntax
+
+
+@dataclass(frozen=True, slots=True)
+class Application(_Placed):
+    """``f(x, y)``."""
+
+    function: TermSyntax
+    arguments: tuple[TermSyntax, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Name(_Placed):
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltinName(_Placed):
+    """``REAL`` where a term is expected."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Number(_Placed):
+    digits: str
+
+
+@dataclass(frozen=True, slots=True)
+class Text(_Placed):
+    """A string, with its quotation marks."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Truth(_Placed):
+    value: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PortName(_Placed):
+    """``in.r``; `role` is ``in`` or ``out``."""
+
+    role: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class NodePort(_Placed):
+    """``agent.command`` or ``agent.in.phase``."""
+
+    node: str
+    role: str | None
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Parentheses(_Placed):
+    """``(a)``; of ``((a))`` one is left, as deep as both."""
+
+    body: TermSyntax
+
+
+@dataclass(frozen=True, slots=True)
+class TupleDisplay(_Placed):
+    items: tuple[TermSyntax, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SetDisplay(_Placed):
+    items: tuple[TermSyntax, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceDisplay(_Placed):
+    items: tuple[TermSyntax, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RangeDisplay(_Placed):
+    """``<a upto b>``."""
+
+    low: TermSyntax
+    high: TermSyntax
+
+
+@dataclass(frozen=True, slots=True)
+class Binder(_Placed):
+    """``x, y in REAL``."""
+
+    names: tuple[Token, ...]
+    domain: TermSyntax
+
+
+@dataclass(frozen=True, slots=True)
+class Quantification(_Placed):
+    quantifier: Quantifier
+    binders: tuple[Binder, ...]
+    body: TermSyntax
+
+
+TermSyntax = (
+    Connective
+    | Negation
+    | Comparison
+    | Calculation
+    | Minus
+    | Application
+    | Name
+    | BuiltinName
+    | Number
+    | Text
+    | Truth
+    | PortName
+    | NodePort
+    | Parentheses
+    | TupleDisplay
+    | SetDisplay
+    | SequenceDisplay
+    | RangeDisplay
+    | Quantification
+)
+
+
+# --- types -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionType(_Placed):
+    parameters: TypeSyntax
+    result: TypeSyntax
+
+
+@dataclass(frozen=True, slots=True)
+class ProductType(_Placed):
+    """``A x B``; the signs between the factors are names, which should all be ``x``."""
+
+    factors: tuple[TypeSyntax, ...]
+    signs: tuple[Token, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NamedType(_Placed):
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltinType(_Placed):
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class UnspecifiedType(_Placed):
+    """``{}``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Element(_Placed):
+    """``red``, or the constructor ``move(REAL, REAL)``."""
+
+    name: Token
+    parameters: tuple[TypeSyntax, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SetType(_Placed):
+    elements: tuple[Element, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TupleType(_Placed):
+    items: tuple[TypeSyntax, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceType(_Placed):
+    item: TypeSyntax
+
+
+TypeSyntax = FunctionType | ProductType | NamedType | BuiltinType | UnspecifiedType | SetType | TupleType | SequenceType
+
+
+# --- declarations ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class TypeDeclaration(_Placed):
+    """``Name : type``."""
+
+    name: Token
+    type: TypeSyntax
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantDeclaration(_Placed):
+    """``Name = value``."""
+
+    name: Token
+    value: TermSyntax
+
+
+@dataclass(frozen=True, slots=True)
+class PortDeclaration(_Placed):
+    name: Token
+    type: TypeSyntax
+
+
+@dataclass(frozen=True, slots=True)
+class PortList(_Placed):
+    items: tuple[PortDeclaration, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RosType(_Placed):
+    """``package/msg/Type``, without the slashes."""
+
+    names: tuple[Token, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TopicDeclaration(_Placed):
+    """``package/Type name matches(in.port)``; `role` and `port` are None where it says so little."""
+
+    type: RosType
+    name: Token
+    role: str | None
+    port: Token | None
+
+
+@dataclass(frozen=True, slots=True)
+class TopicList(_Placed):
+    items: tuple[TopicDeclaration, ...]
+
+
+Declaration = TypeDeclaration | ConstantDeclaration
+Listing = PortList | TopicList
+Syntax = (
+    TermSyntax | Binder | TypeSyntax | Element | Declaration | Listing | PortDeclaration | TopicDeclaration | RosType
+)
+
+
+def children(tree: Syntax) -> tuple[Syntax, ...]:
+    """The direct parts that are trees themselves, in reading order."""
+    match tree:
+        case (
+            Name() | BuiltinName() | Number() | Text() | Truth() | PortName() | NodePort()
+            | NamedType() | BuiltinType() | UnspecifiedType() | RosType()
+        ):  # fmt: skip
+            return ()
+        case Connective() | TupleDisplay() | SetDisplay() | SequenceDisplay() | TupleType() | PortList() | TopicList():
+            return tree.items
+        case Negation() | Minus() | Parentheses():
+            return (tree.body,)
+        case Comparison() | Calculation():
+            return tree.operands
+        case Application():
+            return (tree.function, *tree.arguments)
+        case RangeDisplay():
+            return (tree.low, tree.high)
+        case Binder():
+            return (tree.domain,)
+        case Quantification():
+            return (*tree.binders, tree.body)
+        case FunctionType():
+            return (tree.parameters, tree.result)
+        case ProductType():
+            return tree.factors
+        case SetType():
+            return tree.elements
+        case Element():
+            return tree.parameters
+        case SequenceType():
+            return (tree.item,)
+        case TypeDeclaration() | PortDeclaration() | TopicDeclaration():
+            return (tree.type,)
+        case ConstantDeclaration():
+            return (tree.value,)
+        case _:
+            assert_never(tree)
+
+
+def walk(tree: Syntax) -> Iterator[Syntax]:
+    """The tree and everything in it, in reading order; however deep it is."""
+    stack = [tree]
+    while stack:
+        current = stack.pop()
+        yield current
+        stack.extend(reversed(children(current)))
+
+
+def unparenthesised(tree: TermSyntax) -> TermSyntax:
+    """What stands within the parentheses, if it stands in some."""
+    while isinstance(tree, Parentheses):
+        tree = tree.body
+    return tree

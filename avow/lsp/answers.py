@@ -16,6 +16,7 @@ from avow.language.load import check_sources, clean_text
 from avow.language.outline import FileSyntax, NodeSyntax, read
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.source import Reports, Source
+from avow.language.syntax import TypeDeclaration
 from avow.language.terms import Quantified, Variable, children
 
 StatusLookup = Callable[[str, str], str | None]
@@ -101,8 +102,9 @@ def symbols(document: Document) -> tuple[Symbol, ...]:
     """The outline: the context's declarations, the nodes, and their clauses."""
     source = Source(document.file, document.text)
     found = [
-        Symbol(tree.parts[0].text, tree.kind, tree.kind, source.span(tree.start, tree.end))
+        Symbol(tree.name.text, kind, kind, source.span(tree.start, tree.end))
         for tree in document.syntax.declarations
+        for kind in ("type" if isinstance(tree, TypeDeclaration) else "constant",)
     ]
     for node in document.syntax.nodes:
         inner = []
@@ -218,8 +220,8 @@ def _about_port(port: Port, node: Node) -> str:
 
 def _declared(document: Document, contract: Contract, name: str) -> tuple[str, Span | None] | None:
     source = Source(document.file, document.text)
-    places = {t.parts[0].text: t for t in document.syntax.declarations}
-    place = source.span(places[name].parts[0].start, places[name].parts[0].end) if name in places else None
+    places = {t.name.text: t.name for t in document.syntax.declarations}
+    place = source.span(places[name].start, places[name].end) if name in places else None
     for type_name, sort in contract.types:
         if type_name == name:
             return f"type `{name}` = `{show_type(sort)}`", place

@@ -71,4 +71,10 @@ CODES = register(
         "What the record says was read or judged is no longer the same; its digest is not replaced silently.",
         "Review it again, and say so with `--renewed DATE`.",
     ),
+    declare(
+        "REV122",
+        "stamp does not read back",
+        "With its digests filled in, the record would say something else besides; the file stays as it was.",
+        "Write the entry that the message names in the plain form of `docs/backends/review.md`, then stamp again.",
+    ),
 )

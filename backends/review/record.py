@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import datetime
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,7 +82,11 @@ class Record:
 
 def read_record(path: Path) -> Record:
     """Raises Rejected, with every problem and its place."""
-    piece, problems = load(path)
+    return record_in(*load(path))
+
+
+def record_in(piece: Piece, problems: Sequence[Diagnostic]) -> Record:
+    """The record that a YAML text says. Raises Rejected, with every problem and its place."""
     return _Reader(piece, list(problems)).read()
 
 

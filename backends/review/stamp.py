@@ -18,11 +18,11 @@ from avow.language.contract import Node
 from avow.system.load import load_system
 from avow.system.paths import inside
 from avow.system.plan import Method
-from avow.system.strict_yaml import Piece
+from avow.system.strict_yaml import Piece, read_yaml
 
 from .backend import record_name
 from .freshness import current_file, current_meaning
-from .record import load, read_record
+from .record import load, record_in
 
 _BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 _PLAIN = re.compile(r"[\w./-]+", re.ASCII)
@@ -86,14 +86,38 @@ def stamp_record(
         said.append(f"date: {renewed}")
     if not said:
         return ()
-    before = path.read_bytes()
-    write(path, editor.result())
-    try:
-        read_record(path)
-    except Rejected:
-        write(path, before)
-        raise
+    stamped = editor.result()
+    again, problems = read_yaml(stamped.encode(), str(path))
+    record_in(again, problems)
+    old, new = _besides(piece), _besides(again)
+    if old != new:
+        differing = next((key for key in {**old, **new} if old.get(key) != new.get(key)), "")
+        place = piece.entries.get(differing, piece).span
+        message = f"with its digests filled in, the record would say something else under '{differing}'"
+        raise Rejected(Diagnostic("REV122", message, place))
+    write(path, stamped)
     return tuple(said)
+
+
+def _besides(record: Piece) -> dict[str, object]:
+    """What a record says besides digests and the date: what stamping must leave as it was."""
+    found: dict[str, object] = {}
+    for key, piece in (record.entries or {}).items():
+        if key == "read" and piece.items is not None:
+            read = [_without(item, "sha256") for item in piece.items]
+            found[key] = [item["file"] if isinstance(item, dict) and [*item] == ["file"] else item for item in read]
+        elif key == "clauses" and piece.entries is not None:
+            judged = {name: _without(entry, "meaning") for name, entry in piece.entries.items()}
+            found[key] = {name: rest for name, rest in judged.items() if isinstance(rest, dict) and rest}
+        elif key not in ("date", "clauses"):
+            found[key] = piece.data
+    if not found.get("clauses"):
+        found.pop("clauses", None)
+    return found
+
+
+def _without(piece: Piece, key: str) -> object:
+    return piece.data if piece.entries is None else {k: v.data for k, v in piece.entries.items() if k != key}
 
 
 def _stamp_file(item: Piece, root: Path, editor: _Editor, said: list[str], changed: list[tuple[str, Span]]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -95,3 +96,12 @@ def test_unreadable_files_are_refused(tmp_path: Path) -> None:
     for path in (tmp_path / "r.csv", tmp_path / "none.csv", tmp_path):
         with pytest.raises(Rejected):
             read_requirements(path)
+
+
+@pytest.mark.parametrize("quoted", [lambda text: text, lambda text: f"'{text}'", lambda text: '""'])
+def test_a_section_that_does_not_read_back_is_refused(
+    quoted: Callable[[str], str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("avow.assurance.requirements_import._quoted", quoted)
+    with pytest.raises(Rejected, match="does not read back"):
+        plan_section(read_csv('id,text\nR1,"it\'s: # so"\n', "f.csv"))

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from avow.base.diagnostics import Rejected
+from avow.cli.fmt import command
+from avow.language.flat import flat
 from avow.language.format import WIDTH, format_text
 from avow.language.lexer import Token, tokens
 from avow.language.load import check_text
 from avow.language.source import Reports, Source
+from avow.language.syntax import Syntax
 
 BEFORE = """\
 // head
@@ -112,3 +117,42 @@ def test_a_text_with_syntax_errors_is_refused() -> None:
         format_text("node n { inputs( }", "f")
     badly_typed = "node n { inputs() outputs(b : BOOL) topics() guarantee(q) }"
     assert "guarantee( q )" in format_text(badly_typed, "f")
+
+
+def _with(before: str, after: str) -> Callable[[Syntax], str]:
+    return lambda tree: flat(tree).replace(before, after)
+
+
+@pytest.mark.parametrize(
+    "printer",
+    [
+        repr,
+        _with(" and ", " or "),
+        _with("not ", ""),
+        _with("<", "<="),
+        _with("(", ""),
+        _with("REAL", "INTEGER"),
+        _with("forall", "exists"),
+        _with("x", "y"),
+        _with("in.f", "out.f"),
+        _with("1.5", "1.50"),
+        lambda tree: "",
+    ],
+)
+def test_a_layout_that_says_something_else_is_never_written(
+    printer: Callable[[Syntax], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "f.rcl"
+    file.write_text(BEFORE)
+    monkeypatch.setattr("avow.language.format.flat", printer)
+    result = CliRunner().invoke(command, [str(file)], standalone_mode=False)
+    assert result.return_value == 2
+    assert "RCL007" in result.stderr
+    assert f"{file}:" in result.stderr  # it is located
+    assert file.read_text() == BEFORE
+
+
+def test_a_lost_comment_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avow.language.format._Layout.flush", lambda *_, **__: None)
+    with pytest.raises(Rejected, match="would not read back"):
+        format_text(BEFORE, "f")

@@ -91,3 +91,18 @@ def test_the_short_form_names_the_record(folder: Path) -> None:
     (folder / "plan.yaml").write_text(PLAN.split("      - review")[0] + "      - review: review.yaml\n")
     assert len(stamp(folder, "n")) == 2
     assert read_record(folder / "review.yaml").clauses[0].clause == "high"
+
+
+@pytest.mark.parametrize("damage", ["conclusion: rejected", "reviewer: Eve", "remarks: fine", "read: []", "- torn"])
+def test_a_stamp_that_says_something_else_is_not_written(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, damage: str
+) -> None:
+    """Whatever an edit does to the rest of the record: it is read once more before anything is written."""
+    record = folder / "review.yaml"
+    before = record.read_text()
+    key = damage.split(":")[0]
+    kept = "".join(line for line in before.splitlines(True) if not line.startswith(key))
+    monkeypatch.setattr("avow.backends.review.stamp._Editor.result", lambda self: f"{kept}{damage}\n")
+    with pytest.raises(Rejected):
+        stamp(folder, "n", method="review")
+    assert record.read_text() == before
