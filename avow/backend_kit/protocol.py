@@ -7,31 +7,26 @@ tool) and makes the evidence records; a backend never writes to the ledger and n
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
+from avow.base.codes import Code
 from avow.base.diagnostics import Diagnostic
+from avow.base.tools import Tool
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.evidence.obligation import Obligation
 from avow.language.contract import Clause, Contract, Node
 from avow.system.plan import Method, System
 
+__all__ = ["COMMON_OPTIONS", "Backend", "Job", "Limits", "Report", "Tool", "Translated", "lacks"]
 
-@dataclass(frozen=True, slots=True)
-class Tool:
-    """A tool as found on this machine. `version` is None where it is missing; `install` is one command."""
 
-    name: str
-    version: str | None
-    path: str | None
-    install: str
-    optional: bool = True
-
-    @property
-    def present(self) -> bool:
-        return self.version is not None
+COMMON_OPTIONS = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
+"""Options of every method, whatever its backend: they are the pipeline's, which reads and checks them. `id` names the
+method in records and commands, `guarantees` are those that it takes on, the others are `Limits`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +50,18 @@ class Job:
 
     @property
     def options(self) -> Mapping[str, Any]:
+        """The method's options that are the backend's own, as its schema describes them; none where the plan gives no
+        mapping."""
+        return {key: value for key, value in self._given.items() if key not in COMMON_OPTIONS}
+
+    @property
+    def seed(self) -> int:
+        """The plan's seed for this method, or 0."""
+        seed: int = self._given.get("seed", 0)
+        return seed
+
+    @property
+    def _given(self) -> Mapping[str, Any]:
         data = self.method.options.data
         return data if isinstance(data, Mapping) else {}
 
@@ -82,6 +89,11 @@ class Report:
     logs: Mapping[str, str] = field(default_factory=dict)
     """Name → text of logs and results to be kept beside the artifacts."""
 
+    @classmethod
+    def alike(cls, job: Job, verdict: Verdict, summary: str, tool: str, tool_version: str) -> Report:
+        """The same answer for every obligation of the job: the tool is missing, an input is at fault, …"""
+        return cls(tuple(Outcome(o.id, verdict, summary) for o in job.obligations), tool, tool_version)
+
 
 @dataclass(frozen=True, slots=True)
 class Translated:
@@ -93,64 +105,95 @@ class Translated:
     """A warning for each guarantee that is not in them, with the reason."""
 
 
-@runtime_checkable
-class Translates(Protocol):
-    """What a backend may offer besides: notations for `avow translate --to …`."""
+class Backend(ABC):
+    """A verification method. What has no value here, a backend must say; the rest may stay as it is.
 
-    translations: Mapping[str, str]
-    """Notation → what it is, in a few words."""
-
-    def translate(self, notation: str, system: System, node: Node) -> Translated:
-        """Pure, like `export`. Raises Rejected where the input is at fault: what the notation merely cannot say is
-        `Translated.missing`."""
-        ...
-
-
-@runtime_checkable
-class Suits(Protocol):
-    """What a backend may offer besides: whether it is worth suggesting for a node."""
-
-    def suits(self, node: Node) -> bool:
-        """Whether the node's contract looks like what the backend verifies. Cheap; a guess is good enough."""
-        ...
-
-
-@runtime_checkable
-class Backend(Protocol):
-    """See `docs/adding-a-backend.md`."""
+    See `docs/adding-a-backend.md`; `avow.conformance` holds a backend to all of this.
+    """
 
     name: str
+    """As plans write it: a word of small letters, digits, `_` and `-`."""
     title: str
     """What it does, in one line, for the report."""
     version: str
     """Raised when the translation or the reading of answers changes: old evidence is then stale."""
     strength: Verdict
+    """The best verdict that it may give."""
     link: Link
+    """How what it verifies hangs together with the contract's formula; an outcome may say otherwise for itself."""
     options_schema: Mapping[str, Any]
-    """JSON schema (2020-12) of the method's options in plan.yaml."""
-    # Optional: `uses_scenario = False` for a backend that never looks at the plan's scenario, `uses_steps = False` for
-    # one that looks at all of it but its `steps`, `uses_wiring = False` for one that looks at no topics, connections or
-    # other nodes. Then a change there re-runs nothing of it.
+    """JSON schema (2020-12) of the method's own options in plan.yaml (not of `COMMON_OPTIONS`)."""
     green_means: str
     """What a good verdict of this backend does and does not show, in a sentence or two."""
 
+    uses_scenario: bool = True
+    """Whether an answer may depend on the plan's scenario. Say False only if it cannot: a change there then re-runs
+    nothing, and evidence that should be stale would look current."""
+    uses_steps: bool = True
+    """Whether an answer may depend on the scenario's `steps`; likewise."""
+    uses_wiring: bool = True
+    """Whether an answer may depend on topics, connections or other nodes; likewise."""
+    codes: Mapping[str, Code] = {}
+    """The diagnostic codes that `check` and `translate` use (`avow.base.codes.register`)."""
+    translations: Mapping[str, str] = {}
+    """Notation for `avow translate --to …` → what it is, in a few words."""
+
     def tools(self) -> tuple[Tool, ...]:
         """The outside tools that it can use, as found now. Cheap; never raises."""
-        ...
+        return ()
+
+    def suits(self, node: Node) -> bool:
+        """Whether the node's contract looks like what the backend verifies: only there do reports suggest it. Cheap; a
+        guess is good enough."""
+        return True
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         """What is wrong with the plan's options: missing files, unknown names, models that do not parse."""
-        ...
+        return ()
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        """The files of the plan (programs, data, reviews) that the answer depends on; absolute."""
-        ...
+        """The files of the plan (programs, data, reviews) that the answer depends on; absolute, also where they do not
+        exist. Never raises for what the options say."""
+        return ()
 
     def export(self, job: Job) -> Mapping[str, str]:
-        """Relative path → text of every generated file. Pure: same job, same bytes; no clock, no tool."""
-        ...
+        """Relative path → text of every generated file. Pure: same job, same bytes; no clock, no tool. Raises Rejected
+        with what `check` says, or leaves out what cannot be said."""
+        return {}
 
+    @abstractmethod
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         """Settle `job.obligations`, one outcome for each. `folder` holds the exported files. Never raises for what
         the contract, the plan or a tool may do: a crash, a time-out, a missing tool are outcomes."""
-        ...
+
+    def translate(self, notation: str, system: System, node: Node) -> Translated:
+        """The node in one of `translations`. Pure, like `export`. Raises Rejected where the input is at fault: what the
+        notation merely cannot say is `Translated.missing`."""
+        raise NotImplementedError(notation)
+
+
+_REQUIRED: Mapping[str, type | tuple[type, ...]] = {
+    "name": str,
+    "title": str,
+    "version": str,
+    "strength": Verdict,
+    "link": Link,
+    "options_schema": Mapping,
+    "green_means": str,
+    "uses_scenario": bool,
+    "uses_steps": bool,
+    "uses_wiring": bool,
+    "codes": Mapping,
+    "translations": Mapping,
+}
+
+
+def lacks(found: object) -> str:
+    """Why an object is no backend, in words; empty where it is one."""
+    if not isinstance(found, Backend):
+        return "it is no instance of avow.backend_kit.protocol.Backend"
+    missing = [name for name in _REQUIRED if not hasattr(found, name)]
+    if missing:
+        return f"it lacks {', '.join(missing)}"
+    wrong = [name for name, kind in _REQUIRED.items() if not isinstance(getattr(found, name), kind)]
+    return f"it has a wrong type in {', '.join(wrong)}" if wrong else ""

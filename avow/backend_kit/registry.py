@@ -8,9 +8,9 @@ import importlib
 from collections.abc import Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 
-from avow.backend_kit.protocol import Backend, Translates
+from avow.backend_kit.protocol import Backend, lacks
 from avow.base.codes import Code
-from avow.base.codes_workspace import CORE_CODES, of_backend
+from avow.base.codes_workspace import CORE_CODES
 from avow.base.diagnostics import Diagnostic, Rejected
 
 GROUP = "avow.backends"
@@ -64,22 +64,21 @@ def every_code() -> Mapping[str, Code]:
     found = dict(CORE_CODES)
     for name in names():
         with contextlib.suppress(Rejected):
-            found |= of_backend(backend(name))
+            found |= backend(name).codes
     return found
 
 
-def translators(plugins: tuple[str, ...] = ()) -> dict[str, Translates]:
+def translators(plugins: tuple[str, ...] = ()) -> dict[str, Backend]:
     """Notation → the backend that translates into it. A backend that does not load offers none; of two that offer one
     notation, the first by name has it."""
-    found: dict[str, Translates] = {}
-    offered: list[object] = []
+    found: dict[str, Backend] = {}
+    offered: list[Backend] = []
     for name in names():
         with contextlib.suppress(Rejected):
             offered.append(backend(name, plugins))
     for one in (*offered, *_plugins(plugins)):
-        if isinstance(one, Translates):
-            for notation in one.translations:
-                found.setdefault(notation, one)
+        for notation in one.translations:
+            found.setdefault(notation, one)
     return found
 
 
@@ -97,8 +96,8 @@ def _plugin(module: str) -> Backend:
 
 
 def _promise(found: object, where: str) -> Backend:
-    if not isinstance(found, Backend):
-        members = {*Backend.__annotations__, "tools", "check", "files", "export", "discharge"}
-        lacks = ", ".join(sorted(m for m in members if not hasattr(found, m)))
-        raise Rejected(Diagnostic("BACKEND003", f"{where} does not keep the backend protocol: it lacks {lacks}"))
+    why = lacks(found)
+    if why or not isinstance(found, Backend):
+        hint = "docs/adding-a-backend.md has an example"
+        raise Rejected(Diagnostic("BACKEND003", f"{where} does not keep a backend's promise: {why}", hint=hint))
     return found

@@ -181,14 +181,6 @@ CORE_CODES: Mapping[str, Code] = register(*CODES.values(), *PLAN_CODES.values(),
 """Every code of the core: a backend's own are in its attribute `codes`."""
 
 
-def of_backend(backend: object) -> Mapping[str, Code]:
-    """The codes that a backend declares. The attribute is optional: another's backend may have none."""
-    found = getattr(backend, "codes", None)
-    if not isinstance(found, Mapping):
-        return {}
-    return {name: code for name, code in found.items() if isinstance(code, Code)}
-
-
 def page_rows(codes: Iterable[Code]) -> list[str]:
     """The rows of the table in `docs/diagnostics.md`. What the language wants, its examples show."""
     return [

@@ -21,7 +21,7 @@ NOTATIONS = {
     "smtlib": "avow.solving.contract_smtlib",
 }
 """Notation → the module with its function ``to_<notation>(contract) -> str``, imported when it is asked for. Further
-notations are those of the backends (`avow.backend_kit.protocol.Translates`)."""
+notations are those of the backends (`avow.backend_kit.protocol.Backend`)."""
 
 
 @click.command()

@@ -15,7 +15,6 @@ from doit.exceptions import TaskError
 
 from avow import __version__
 from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
-from avow.backend_kit.protocol import Suits
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest, digest_file, is_intact, write
@@ -164,8 +163,7 @@ def _methods(assessment: Assessment) -> tuple[MethodInfo, ...]:
         tool = backend(name, plugins)
         missing = [t for t in tool.tools() if not t.present and not t.optional]
         install = missing[0].install if missing else ""
-        suits = tool.suits if isinstance(tool, Suits) else lambda _: True
-        unsuited = tuple(node.name for node in assessment.surveyed.system.contract.nodes if not suits(node))
+        unsuited = tuple(node.name for node in assessment.surveyed.system.contract.nodes if not tool.suits(node))
         found.append(
             MethodInfo(
                 tool.name, tool.title, tool.strength, tool.link, tool.green_means, not missing, install, unsuited

@@ -9,10 +9,11 @@ from typing import Any
 
 from doit.exceptions import TaskError
 
+from avow.backend_kit.protocol import COMMON_OPTIONS
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_file, write
 from avow.base.workspace import Workspace
-from avow.pipeline.work import COMMON_OPTIONS, ENGINES, method_backend, method_job
+from avow.pipeline.work import ENGINES, method_backend, method_job
 from avow.pipeline.workload import Survey
 from avow.system.plan import Located, Method, System
 

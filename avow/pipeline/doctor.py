@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from importlib import metadata
 from typing import Any
 
-from avow.backend_kit.protocol import Tool
 from avow.backend_kit.registry import backend, names
+from avow.base.tools import Tool
 
 _PACKAGES = (
     ("logic", "z3-solver", "pip install z3-solver", False),

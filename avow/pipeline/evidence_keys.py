@@ -27,9 +27,9 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
     """As text; `options` are the method's, as they enter its key."""
     parts: list[Any] = [_ports(job.node), list(_constants(job.contract, options, tool.files(job)))]
     scenario = job.system.plan.scenario
-    if getattr(tool, "uses_scenario", True) is not False and scenario:
-        parts.append(scenario.digest if getattr(tool, "uses_steps", True) is not False else scenario.content)
-    if getattr(tool, "uses_wiring", True) is not False:
+    if tool.uses_scenario and scenario:
+        parts.append(scenario.digest if tool.uses_steps else scenario.content)
+    if tool.uses_wiring:
         parts.append(_wiring(job.system, job.node, tool.name))
     return json.dumps(parts)
 

@@ -36,9 +36,6 @@ COMPOSE = "compose"
 ENGINES = (LANGUAGE, SANITY, COMPOSE)
 """The core's own engines; the plan cannot name a method so."""
 
-COMMON_OPTIONS = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
-"""Options of every method, whatever its backend: they are the pipeline's, not the backend's."""
-
 
 @dataclass(frozen=True, slots=True)
 class Work:

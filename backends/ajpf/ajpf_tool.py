@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from avow.backend_kit.protocol import Tool
 from avow.base.process import Completed, ToolMissing, run
+from avow.base.tools import Tool
 
 INSTALL = (
     "git clone https://github.com/mcapl/mcapl && (cd mcapl && ant build); export AJPF_HOME=$PWD/mcapl; "

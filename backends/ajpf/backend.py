@@ -7,19 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from avow.backend_kit.protocol import Job, Limits, Report, Tool
+from avow.backend_kit.given import file_path
+from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
 from avow.language.contract import Node
-from avow.system.paths import inside
 
 from .codes import CODES
 from .schema import SCHEMA
 
 
-class AjpfBackend:
+class AjpfBackend(Backend):
     """See `docs/backends/ajpf.md`."""
 
     name = "ajpf"
@@ -29,7 +28,7 @@ class AjpfBackend:
     uses_steps = False
     uses_wiring = False
     link = Link.MAPPED
-    options_schema: Mapping[str, Any] = SCHEMA
+    options_schema = SCHEMA
     codes = CODES
     green_means = (
         "Every property that the guarantee became, through the plan's table and for the plan's instances, holds in "
@@ -59,8 +58,7 @@ class AjpfBackend:
         return (*diagnose(job, setup, instances(job, setup)), *unknown_words(job, setup))
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        names = [v for key in ("program", "environment") if isinstance(v := job.options.get(key), str)]
-        return tuple(path for name in names if (path := inside(job.root, name)) is not None)
+        return tuple(path for key in ("program", "environment") if (path := file_path(job, key)) is not None)
 
     def export(self, job: Job) -> Mapping[str, str]:
         from .files import export_files

@@ -30,8 +30,6 @@ from .schema import SCHEMA
 from .shape import TooComplex, free, shape
 from .syntax import Program
 
-COMMON = ("id", "guarantees", "seconds", "megabytes", "seed")
-"""Options that belong to every method; the core reads them."""
 MAX_INSTANCES = 1_000
 DEFAULT_STATES = 1_000_000
 
@@ -78,12 +76,11 @@ class Setup:
 def read(job: Job) -> Setup:
     """Raises Rejected with every problem."""
     options = job.method.options
-    given = {key: value for key, value in job.options.items() if key not in COMMON}
     odd = [
         Diagnostic(
             "AJPF119", f"{'.'.join(map(str, e.absolute_path)) or 'options'}: {e.message}"[:300], options.at(*e.path)
         )
-        for e in jsonschema.Draft202012Validator(SCHEMA).iter_errors(given)
+        for e in jsonschema.Draft202012Validator(SCHEMA).iter_errors(job.options)
     ]
     if odd:
         raise Rejected(*odd)

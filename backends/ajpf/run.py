@@ -7,10 +7,11 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.files import write
-from avow.base.verdict import Counterexample, Link, Outcome, Verdict
+from avow.base.verdict import Counterexample, Verdict
 
 from . import ajpf_tool, spin
 from .ajpf_tool import Answer, Said
@@ -45,12 +46,8 @@ def settle(job: Job, folder: Path, limits: Limits, version: str) -> Report:
     try:
         setup = read(job)
     except Rejected as error:
-        said = "; ".join(d.message for d in error.diagnostics[:3])
-        outcomes = tuple(
-            Outcome(o.id, Verdict.ERROR, f"the agent cannot be checked: {said}", link=Link.MAPPED)
-            for o in job.obligations
-        )
-        return Report(outcomes, ENGINE, version)
+        why = f"the agent cannot be checked: {told(job, error.diagnostics)}"
+        return Report.alike(job, Verdict.ERROR, why, ENGINE, version)
     run = _Run(setup, instances(job, setup), folder, limits)
     frame = run.frame()
     claims = {claim.guarantee: claim for claim in frame.made.claims}

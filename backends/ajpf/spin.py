@@ -13,9 +13,9 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from avow.backend_kit.protocol import Tool
 from avow.base.files import write
 from avow.base.process import ToolMissing, run
+from avow.base.tools import Tool
 
 from . import psl
 from .checker import Checker, Property

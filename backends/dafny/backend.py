@@ -7,14 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.protocol import Job, Limits, Report, Tool, Translated
+from avow.backend_kit.given import existing_file, file_path, told
+from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool, Translated
 from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.language.contract import Node
-from avow.system.paths import inside
 from avow.system.plan import System
-from avow.system.schema import suggest
 
 from .codes import CODES
 from .judge import Settled, settle
@@ -22,9 +21,6 @@ from .modules import Generated, generate, lines_map, one_line
 from .printer import NotExpressible
 from .runner import INSTALL, dafny
 from .scanner import Scan, scan
-
-COMMON = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
-"""Options that every method has; they are the pipeline's."""
 
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -42,7 +38,7 @@ SCHEMA: dict[str, Any] = {
 MAX_BYTES = 2_000_000
 
 
-class DafnyBackend:
+class DafnyBackend(Backend):
     """See `docs/backends/dafny.md`."""
 
     name = "dafny"
@@ -52,9 +48,9 @@ class DafnyBackend:
     uses_scenario = False
     uses_wiring = False
     link = Link.GENERATED
-    options_schema: Mapping[str, Any] = SCHEMA
+    options_schema = SCHEMA
     codes = CODES
-    translations: Mapping[str, str] = {"dafny": "Dafny types, predicates, a specification and a skeleton for each node"}
+    translations = {"dafny": "Dafny types, predicates, a specification and a skeleton for each node"}
     green_means = (
         "Dafny proved that the implementation's Step meets this guarantee for all inputs that meet the assumptions "
         "(and Env, where it says more), that it always ends, and that such inputs exist. "
@@ -65,36 +61,24 @@ class DafnyBackend:
         return (dafny(),)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
-        options = job.method.options
-        found = [
-            Diagnostic(
-                "DFY101",
-                f"'{key}' is no option of dafny",
-                options.at(key),
-                hint=suggest(str(key), SCHEMA["properties"]),
-            )
-            for key in job.options
-            if key not in SCHEMA["properties"] and key not in COMMON
-        ]
         try:
             path, text = _implementation(job)
         except Rejected as error:
-            return (*found, *error.diagnostics)
+            return error.diagnostics
         try:
             generated = _generate(job)
         except NotExpressible as problem:
             # The contract is in order; it is this backend that cannot treat it. The outcome says so, too.
             message = f"node '{job.node.name}' cannot be put into Dafny: {problem.what}"
-            return (*found, Diagnostic("DFY104", message, problem.span or job.node.span, Severity.WARNING))
+            return (Diagnostic("DFY104", message, problem.span or job.node.span, Severity.WARNING),)
         scanned = _scan(text, generated)
-        for line, what in (*scanned.problems, *scanned.hypotheses):
-            place = Span(str(path), line, 1, line + 1, 1)
-            found.append(Diagnostic("DFY103", what, place, Severity.WARNING))
-        return tuple(found)
+        return tuple(
+            Diagnostic("DFY103", what, Span(str(path), line, 1, line + 1, 1), Severity.WARNING)
+            for line, what in (*scanned.problems, *scanned.hypotheses)
+        )
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        name = job.options.get("implementation")
-        path = inside(job.root, name) if isinstance(name, str) else None
+        path = file_path(job, "implementation")
         return (path,) if path is not None else ()
 
     def export(self, job: Job) -> Mapping[str, str]:
@@ -130,14 +114,13 @@ class DafnyBackend:
         version = tool.version or ""
 
         def all_alike(verdict: Verdict, summary: str) -> Report:
-            outcomes = tuple(Outcome(o.id, verdict, summary, link=Link.GENERATED) for o in job.obligations)
-            return Report(outcomes, "dafny", version)
+            return Report.alike(job, verdict, summary, "dafny", version)
 
         try:
             path, text = _implementation(job)
             generated = _generate(job)
         except Rejected as error:
-            return all_alike(Verdict.ERROR, "; ".join(d.message for d in error.diagnostics))
+            return all_alike(Verdict.ERROR, told(job, error.diagnostics))
         except NotExpressible as problem:
             return all_alike(Verdict.UNKNOWN, f"not covered: Dafny's counterpart is missing for {problem.what}")
         if not tool.present:
@@ -172,16 +155,9 @@ def _outcome(obligation: str, settled: Settled) -> Outcome:
 
 def _implementation(job: Job) -> tuple[Path, str]:
     """The hand-written file. Raises Rejected."""
-    name = job.options.get("implementation")
-    place = job.method.options.at("implementation")
-    if not isinstance(name, str) or not name:
-        raise Rejected(Diagnostic("DFY101", "dafny needs 'implementation': a file of the system's folder", place))
-    path = inside(job.root, name)
-    if path is None:
-        raise Rejected(Diagnostic("DFY101", f"'{name}' is not a file in the system's folder", place))
-    if not path.is_file():
-        hint = f"for a skeleton to start from: python -m avow.backends.dafny {_shown(job.root)} {job.node.name}"
-        raise Rejected(Diagnostic("DFY102", f"there is no file '{name}' in {job.root.name}/", place, hint=hint))
+    name, place = job.options.get("implementation"), job.method.options.at("implementation")
+    hint = f"for a skeleton to start from: python -m avow.backends.dafny {_shown(job.root)} {job.node.name}"
+    path = existing_file(job, "implementation", name, wrong="DFY101", absent="DFY102", hint=hint)
     try:
         data = path.read_bytes()
         if len(data) > MAX_BYTES:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.backend_kit.protocol import Limits, Tool
-from avow.backend_kit.tools import find_tool
 from avow.base import process
+from avow.base.tools import find_tool
 
 from . import modern
 from .answer import Complaint, Member, complaints, counted, quiet, read_members

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-from avow.backend_kit.protocol import Job, Limits, Report, Tool
+from avow.backend_kit.given import file_path, told
+from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Outcome, Verdict
-from avow.system.paths import inside
 
 from .codes import CODES
 from .figures import Figures, read_figures
@@ -20,7 +19,7 @@ from .quantity import show
 from .runs import Runs, read_runs
 
 
-class ExperimentBackend:
+class ExperimentBackend(Backend):
     """See `docs/backends/experiment.md`."""
 
     name = "experiment"
@@ -30,15 +29,12 @@ class ExperimentBackend:
     uses_scenario = False
     uses_wiring = False
     link = Link.GUIDED
-    options_schema: Mapping[str, Any] = SCHEMA
+    options_schema = SCHEMA
     codes = CODES
     green_means = (
         "The runs in the data set stayed within the stated tolerance, often enough for the stated confidence. "
         "It shows nothing of other conditions; that the measure is what the guarantee means is a person's judgement."
     )
-
-    def tools(self) -> tuple[Tool, ...]:
-        return ()
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         experiment, problems = read(job)
@@ -52,8 +48,7 @@ class ExperimentBackend:
 
     def files(self, job: Job) -> tuple[Path, ...]:
         """Whatever the options name, also where they are not in order."""
-        names = [value for key in ("data", "summary") if isinstance(value := job.options.get(key), str)]
-        return tuple(path for name in names if (path := inside(job.root, name)) is not None)
+        return tuple(path for key in ("data", "summary") if (path := file_path(job, key)) is not None)
 
     def export(self, job: Job) -> Mapping[str, str]:
         """The claim as it will be judged, in exact numbers."""
@@ -98,15 +93,13 @@ def _settle(job: Job) -> tuple[Judgement, dict[str, str]]:
             raise Rejected(*problems)
         material = _material(experiment)
     except Rejected as error:
-        # One tolerant line each: the places are in the diagnostics that `check` returns.
-        said = "; ".join(_line(job, d) for d in error.diagnostics[:5])
-        more = f"; and {len(error.diagnostics) - 5} more" if len(error.diagnostics) > 5 else ""
-        return Judgement(Verdict.ERROR, f"the experiment cannot be judged: {said}{more}", {}, {}), {}
+        why = f"the experiment cannot be judged: {told(job, error.diagnostics)}"
+        return Judgement(Verdict.ERROR, why, {}, {}), {}
     if isinstance(material, Figures):
         return judge_figures(material, experiment), {}
     judgement = judge_runs(material.runs, experiment)
     if material.warnings:
-        judgement.details["warnings"] = [_line(job, d) for d in material.warnings[:20]]
+        judgement.details["warnings"] = [told(job, [d]) for d in material.warnings[:20]]
     lines = [
         f"{run.name}\t{show(run.measure.low, 9)}\t{'failed' if run.measure.low > experiment.within else 'ok'}"
         for run in material.runs
@@ -119,14 +112,3 @@ def _material(experiment: Experiment) -> Runs | Figures:
         return read_runs(experiment.data, experiment.measure, experiment.id_column)
     assert experiment.summary is not None
     return read_figures(experiment.summary, experiment.unit)
-
-
-def _line(job: Job, diagnostic: Diagnostic) -> str:
-    """A diagnostic in one line, with a place that is the same on every machine."""
-    span = diagnostic.span
-    if span is None:
-        return diagnostic.message
-    path = Path(span.file)
-    root = job.root.resolve()
-    name = path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name
-    return f"{name}:{span.line}: {diagnostic.message}"

@@ -12,13 +12,9 @@ from avow.base.diagnostics import Diagnostic
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Literal, Negative, Term, Widen
 from avow.system.paths import inside
-from avow.system.schema import suggest
 
 from .expression import Expression, Malformed, parse
 from .quantity import conversion, decimal, figure
-
-COMMON = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
-"""Options that every method has; they are the pipeline's."""
 
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -81,10 +77,6 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
     """The experiment, or None with what hinders it."""
     problems = Problems(job, [])
     options = job.options
-    known: dict[str, Any] = SCHEMA["properties"]
-    for key in options:
-        if key not in known and key not in COMMON:
-            problems.add(str(key), f"'{key}' is no option of an experiment", suggest(str(key), known))
     data, summary = _path(problems, "data"), _path(problems, "summary")
     if ("data" in options) == ("summary" in options):
         problems.add(None, "an experiment has either 'data' (the runs) or 'summary' (printed figures)")

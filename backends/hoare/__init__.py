@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
-from avow.backend_kit.protocol import Job, Limits, Report, Tool
+from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
 
@@ -35,7 +34,7 @@ _TERMINATION = {
 }
 
 
-class Hoare:
+class Hoare(Backend):
     """See `docs/backends/hoare.md`."""
 
     name = "hoare"
@@ -45,7 +44,7 @@ class Hoare:
     uses_scenario = False
     uses_wiring = False
     link = Link.GENERATED
-    options_schema: Mapping[str, Any] = {
+    options_schema = {
         "type": "object",
         "properties": {"program": _FILE, "variables": _TABLE, "termination": _TERMINATION},
         "required": ["program"],

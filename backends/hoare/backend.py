@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+from avow.backend_kit.given import existing_file, told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
@@ -19,7 +20,6 @@ from avow.language.terms import FALSE, TRUE, Not, Role, Variable
 from avow.solving.questions import Entailment, entails, z3_version
 from avow.solving.smtlib import export as smtlib
 from avow.solving.translation import Unsupported
-from avow.system.paths import inside
 
 from .checker import Checked, check
 from .endless import endless_run
@@ -85,17 +85,7 @@ def load(job: Job) -> Work:
 
 def program_file(job: Job) -> Path:
     """The plan's program. Raises Rejected (``HOARE400``) where there is none, or outside the system's folder."""
-    name = job.options.get("program")
-    place = job.method.options.at("program")
-    if not isinstance(name, str):
-        message = "the method needs a program: `program: models/….imp`"
-        raise Rejected(Diagnostic("HOARE400", message, job.method.options.span))
-    path = inside(job.root, name)
-    if path is None:
-        raise Rejected(Diagnostic("HOARE400", f"`{name}` is outside the system's folder", place))
-    if not path.is_file():
-        raise Rejected(Diagnostic("HOARE400", f"there is no file `{name}` in the system's folder", place))
-    return path
+    return existing_file(job, "program", job.options.get("program"), wrong="HOARE400", absent="HOARE400")
 
 
 def _table(job: Job) -> dict[str, tuple[str, Span]]:
@@ -183,9 +173,7 @@ def settle(job: Job, limits: Limits) -> Report:
         work = load(job)
         found = work.triples
     except Rejected as rejected:
-        why = "; ".join(f"{d.span}: {d.message}" for d in rejected.diagnostics)
-        failed = tuple(Outcome(o.id, Verdict.ERROR, why) for o in job.obligations)
-        return Report(failed, "weakest preconditions", version)
+        return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), "weakest preconditions", version)
     logs: dict[str, str] = {}
     outcomes = tuple(_obligation(o, found[o.id], work, limits, logs) for o in job.obligations)
     open_ = {o.verdict for o in outcomes} & {*GIVEN, Verdict.UNKNOWN}

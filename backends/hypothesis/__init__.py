@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
-from avow.backend_kit.protocol import Job, Limits, Report, Tool
+from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
 
@@ -21,7 +20,7 @@ _SUBJECT = {
 _CASES = {"type": "integer", "minimum": 1, "maximum": 1_000_000, "default": 500, "description": "how many cases"}
 
 
-class HypothesisBackend:
+class HypothesisBackend(Backend):
     """See `docs/backends/hypothesis.md`."""
 
     name = "hypothesis"
@@ -31,9 +30,9 @@ class HypothesisBackend:
     uses_steps = False
     uses_wiring = False
     link = Link.GENERATED
-    options_schema: Mapping[str, Any] = {
+    options_schema = {
         "type": "object",
-        "properties": {"subject": _SUBJECT, "cases": _CASES, "seed": {"type": "integer", "minimum": 0}},
+        "properties": {"subject": _SUBJECT, "cases": _CASES},
         "required": ["subject"],
         "additionalProperties": False,
     }

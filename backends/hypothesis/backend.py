@@ -14,6 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.process import Completed, ToolMissing, run
@@ -51,8 +52,7 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     version = f"hypothesis {metadata.version('hypothesis')}"
     found = problems(job)
     if found:
-        why = "; ".join(f"{d.span}: {d.message}" for d in found)
-        return Report(tuple(Outcome(o.id, Verdict.ERROR, why) for o in job.obligations), "hypothesis", version)
+        return Report.alike(job, Verdict.ERROR, told(job, found), "hypothesis", version)
     with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
         # what was exported is written afresh: a file changed in between would be tested in place of the contract
         place = Path(scratch)
@@ -64,8 +64,7 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     if answer is None:
         why = _silence(done, limits)
         verdict = Verdict.UNKNOWN if done is not None and done.timed_out else Verdict.ERROR
-        failed = tuple(Outcome(o.id, verdict, why) for o in job.obligations)
-        return Report(failed, "hypothesis", version, command, logs)
+        return replace(Report.alike(job, verdict, why, "hypothesis", version), command=command, logs=logs)
     outcomes = tuple(_outcome(o, answer, limits.seed) for o in job.obligations)
     logs["result.json"] = json.dumps(answer, indent=1) + "\n"
     return Report(outcomes, "hypothesis", version, command, logs)

@@ -84,7 +84,7 @@ def _data(job: Job, subject: SubjectFile) -> str:
         "node": job.node.name,
         "subject": {"file": subject.name, "function": subject.function},
         "cases": cases(job),
-        "seed": job.options.get("seed", 0),
+        "seed": job.seed,
         "inputs": [_port(port) for port in job.node.inputs],
         "outputs": [_port(port) for port in job.node.outputs],
         "assumptions": [_clause(clause) for clause in job.node.assumptions],

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from avow.backend_kit.protocol import Job, Limits, Report, Tool
+from avow.backend_kit.given import existing_file, told
+from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evidence.obligation import Obligation
@@ -17,9 +18,6 @@ from avow.system.schema import suggest
 from .codes import CODES
 from .freshness import current_meaning, stale_clause, stale_files
 from .record import CONCLUSIONS, Judged, Record, read_record
-
-COMMON = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
-"""Options that every method has; they are the pipeline's."""
 
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -33,7 +31,7 @@ SCHEMA: dict[str, Any] = {
 }
 
 
-class ReviewBackend:
+class ReviewBackend(Backend):
     """See `docs/backends/review.md`."""
 
     name = "review"
@@ -43,15 +41,12 @@ class ReviewBackend:
     uses_scenario = False
     uses_wiring = False
     link = Link.GUIDED
-    options_schema: Mapping[str, Any] = SCHEMA
+    options_schema = SCHEMA
     codes = CODES
     green_means = (
         "A named person read exactly these files, answered every question of the checklist and accepted this "
         "guarantee in exactly this meaning. It shows what that person saw, no more."
     )
-
-    def tools(self) -> tuple[Tool, ...]:
-        return ()
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:
@@ -85,12 +80,8 @@ class ReviewBackend:
         try:
             record = _read(job)
         except Rejected as error:
-            said = "; ".join(_line(job, d) for d in error.diagnostics[:5])
-            outcomes = [
-                Outcome(o.id, Verdict.ERROR, f"the review cannot be used: {said}", link=Link.GUIDED)
-                for o in job.obligations
-            ]
-            return Report(tuple(outcomes), "avow review", self.version)
+            why = f"the review cannot be used: {told(job, error.diagnostics)}"
+            return Report.alike(job, Verdict.ERROR, why, "avow review", self.version)
         return Report(tuple(_settle(job, record, o) for o in job.obligations), "avow review", self.version)
 
 
@@ -103,23 +94,8 @@ def record_name(job: Job) -> str | None:
 
 def _read(job: Job) -> Record:
     """The record, held against plan and contract. Raises Rejected."""
-    options = job.method.options
     problems = []
-    for key in job.options:
-        if key not in SCHEMA["properties"] and key not in COMMON:
-            message = f"'{key}' is no option of a review"
-            problems.append(
-                Diagnostic("REV101", message, options.at(key), hint=suggest(str(key), SCHEMA["properties"]))
-            )
-    name = record_name(job)
-    place = options.at("record")
-    if name is None:
-        raise Rejected(*problems, Diagnostic("REV101", "a review needs 'record': the file that records it", place))
-    path = inside(job.root, name)
-    if path is None:
-        raise Rejected(*problems, Diagnostic("REV101", f"'{name}' is not a file in the system's folder", place))
-    if not path.is_file():
-        raise Rejected(*problems, Diagnostic("REV102", f"there is no file '{name}' in {job.root.name}/", place))
+    path = existing_file(job, "record", record_name(job), wrong="REV101", absent="REV102")
     record = read_record(path)
     if record.node and record.node != job.node.name:
         message = f"this is a review of node '{record.node}', not of '{job.node.name}'"
@@ -200,13 +176,3 @@ def _details(record: Record, judged: Judged | None) -> dict[str, object]:
 
 def _against(record: Record) -> str:
     return "; ".join(f"{q.question} {q.answer}: {q.note}" for q in record.checklist if not q.good)
-
-
-def _line(job: Job, diagnostic: Diagnostic) -> str:
-    """A diagnostic in one line, with a place that is the same on every machine."""
-    span = diagnostic.span
-    if span is None:
-        return diagnostic.message
-    path, root = Path(span.file), job.root.resolve()
-    name = path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name
-    return f"{name}:{span.line}: {diagnostic.message}"

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from avow.backend_kit.protocol import Job, Limits, Report, Tool, Translated
+from avow.backend_kit.given import told
+from avow.backend_kit.protocol import Backend, Job, Limits, Report, Translated
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.system.paths import inside
@@ -28,7 +29,7 @@ KEPT = 200
 """Violations of one trace that are written to the log; all are counted."""
 
 
-class RosMonitoringBackend:
+class RosMonitoringBackend(Backend):
     """See `docs/backends/rosmonitoring.md`."""
 
     name = "rosmonitoring"
@@ -37,16 +38,13 @@ class RosMonitoringBackend:
     strength = Verdict.MONITORED
     link = Link.MAPPED
     uses_steps = False
-    options_schema: Mapping[str, Any] = SCHEMA
+    options_schema = SCHEMA
     codes = CODES
-    translations: Mapping[str, str] = {"rml": "an RML specification for each node, by the plan's mapping"}
+    translations = {"rml": "an RML specification for each node, by the plan's mapping"}
     green_means = (
         "On the recorded events the guarantee held at every judgement, by exact evaluation. It shows nothing of other "
         "runs; that the mapping reads the messages rightly is a person's judgement."
     )
-
-    def tools(self) -> tuple[Tool, ...]:
-        return ()
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .options import setup
@@ -128,10 +126,7 @@ class RosMonitoringBackend:
 
         found, faults = setup(job.system, job.node, job.method.options)
         if faults:
-            outcomes = tuple(
-                Outcome(o.id, Verdict.ERROR, "; ".join(f.message for f in faults)) for o in job.obligations
-            )
-            return Report(outcomes, "avow monitor", __version__)
+            return Report.alike(job, Verdict.ERROR, told(job, faults), "avow monitor", __version__)
         refused = _refused(job, found)
         if not _traces(job):
             outcomes = tuple(_without_trace(job, found, refused, o) for o in job.obligations)

@@ -13,7 +13,7 @@ import pytest
 from avow.backend_kit.registry import backend, names
 from avow.base.codes import CODES, Code, declare, register
 from avow.base.codes_plan import PLAN_CODES
-from avow.base.codes_workspace import CORE_CODES, WORKSPACE_CODES, of_backend, page_rows
+from avow.base.codes_workspace import CORE_CODES, WORKSPACE_CODES, page_rows
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "diagnostics.md"
@@ -74,7 +74,7 @@ def severities(modules: Iterable[tuple[Path, ast.Module]]) -> dict[str, int]:
 
 
 def backends() -> dict[str, dict[str, Code]]:
-    return {name: dict(of_backend(backend(name))) for name in names() if (ROOT / "backends" / name).is_dir()}
+    return {name: dict(backend(name).codes) for name in names() if (ROOT / "backends" / name).is_dir()}
 
 
 def declared() -> dict[str, Code]:
@@ -134,15 +134,6 @@ def test_every_code_says_what_it_means() -> None:
         assert code.title
         assert code.explanation.endswith((".", "`)", ".)")), code.code
         assert code.remedy.endswith((".", "`")) or code.code in CODES, code.code
-
-
-def test_a_backend_may_have_no_codes() -> None:
-    assert of_backend(object()) == {}
-
-    class Odd:
-        codes = {"X001": "not a code"}
-
-    assert of_backend(Odd()) == {}
 
 
 def test_the_page_is_in_step() -> None:

@@ -119,19 +119,15 @@ def test_a_plugin_of_the_plan_may_offer_a_notation(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (place / "shouting.py").write_text(
-        "from avow.backend_kit.protocol import Translated\n"
+        "from avow.backend_kit.protocol import Backend, Translated\n"
         "from avow.base.verdict import Link, Verdict\n"
-        "class Shouting:\n"
+        "class Shouting(Backend):\n"
         "    name, title, version, green_means = 'shouting', 'loud', '1', ''\n"
         "    strength, link, options_schema = Verdict.TESTED, Link.GUIDED, {}\n"
         "    translations = {'loud': 'in capitals', 'escape': 'outside'}\n"
         "    def translate(self, notation, system, node):\n"
         "        name = '../../escaped' if notation == 'escape' else 'a.txt'\n"
         "        return Translated({name: node.name.upper() + '\\n', 'b.txt': ''})\n"
-        "    def tools(self): return ()\n"
-        "    def check(self, job): return ()\n"
-        "    def files(self, job): return ()\n"
-        "    def export(self, job): return {}\n"
         "    def discharge(self, job, folder, limits): raise NotImplementedError\n"
         "BACKEND = Shouting()\n"
     )

@@ -16,9 +16,9 @@ import pytest
 from test_dafny_tricks import CONTRACT, GOOD
 
 from avow.backend_kit.protocol import Job, Limits
-from avow.backend_kit.tools import find_tool
 from avow.backends.dafny import BACKEND, modern
 from avow.backends.dafny.runner import has_commands
+from avow.base.tools import find_tool
 from avow.base.verdict import Outcome, Verdict
 
 MakeJob = Callable[..., Job]

@@ -88,8 +88,8 @@ def test_a_wrong_implementation_is_not_proved(
 
 
 def test_nothing_is_run_where_dafny_is_missing(make_job: MakeJob, monkeypatch: Any) -> None:
-    from avow.backend_kit.protocol import Tool
     from avow.backends.dafny import backend
+    from avow.base.tools import Tool
 
     monkeypatch.setattr(backend, "dafny", lambda: Tool("dafny", None, None, "apt-get install dafny"))
     job = job_for(make_job, "remote_inspection", "radiationSensor", "models/radiation_sensor_impl.dfy")

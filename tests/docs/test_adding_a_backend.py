@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from avow.backend_kit import registry
-from avow.base.codes_workspace import of_backend
 from avow.pipeline.evidence_keys import surroundings
 from avow.pipeline.work import method_job
 from avow.system.load import load_system
@@ -79,5 +78,5 @@ def test_the_optional_members_are_read(workspace: Path, monkeypatch: pytest.Monk
             )
     assert seen["plain", "0..3"] != seen["plain", "0..4"]
     assert seen["full", "0..3"] == seen["full", "0..4"]
-    assert list(of_backend(registry.backend("coin", ("coin_full",)))) == ["COIN101"]
-    assert of_backend(registry.backend("coin", ("coin_plain",))) == {}
+    assert list(registry.backend("coin", ("coin_full",)).codes) == ["COIN101"]
+    assert registry.backend("coin", ("coin_plain",)).codes == {}

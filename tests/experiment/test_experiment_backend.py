@@ -151,7 +151,6 @@ def test_data_that_are_not_text(make_job: Callable[..., Any], tmp_path: Path) ->
         ({**GOOD, "confidence": 1}, "confidence"),
         ({**GOOD, "confidence": "high"}, "number"),
         ({**GOOD, "at_least": 1}, "between"),
-        ({**GOOD, "mesure": "d"}, "no option"),
         ({**GOOD, "run_column": "who"}, "no column 'who'"),
         ({**GOOD, "protocol": ["x"]}, "text"),
     ],

@@ -26,17 +26,13 @@ BACKEND = """
 import os, signal, subprocess, sys, time
 from pathlib import Path
 from avow.base import process
-from avow.backend_kit.protocol import Report
+from avow.backend_kit.protocol import Backend, Report
 from avow.base.verdict import Link, Outcome, Verdict
 
-class Odd:
+class Odd(Backend):
     name, title, version, green_means = "odd", "does as it is told", "1", ""
     strength, link = Verdict.TESTED, Link.GUIDED
     options_schema = {"type": "object"}
-    def tools(self): return ()
-    def check(self, job): return ()
-    def files(self, job): return ()
-    def export(self, job): return {}
     def discharge(self, job, folder, limits):
         match job.options["does"]:
             case "answers":

@@ -11,12 +11,11 @@ import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 
 import pytest
 from helpers import edit
 
-from avow.backend_kit.protocol import Backend, Limits
+from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.backend_kit.registry import backend
 from avow.base.diagnostics import Rejected
 from avow.calculus.composition import compose
@@ -379,7 +378,7 @@ def test_who_says_that_it_needs_no_steps_does_not_look_at_them(tmp_path: Path, m
     else:
         planned = planned_method(work)
         job, tool = method_job(system, system.contract.node("agent"), planned), backend(method)
-        assert getattr(tool, "uses_steps", True) is False
+        assert not tool.uses_steps
         assert tool.check(job) is not None
         tool.export(job)
         outcomes = tool.discharge(job, tmp_path, Limits(seconds=60)).outcomes
@@ -404,18 +403,18 @@ def test_a_plug_in_is_taken_to_look_at_the_steps(tmp_path: Path) -> None:
     assert given is not None
     other = replace(system, plan=replace(system.plan, scenario=replace(given, steps=1, digest="other")))
 
-    class Tool:
+    class Tool(Backend):
         name = "plugin"
 
-        def files(self, job: object) -> tuple[Path, ...]:
-            return ()
+        def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+            raise NotImplementedError
 
     class Short(Tool):
         uses_steps = False
 
-    def key(tool: object, of: System) -> str:
+    def key(tool: Backend, of: System) -> str:
         work = catalogue(system).work("agent", "hypothesis")
-        return surroundings(cast("Backend", tool), method_job(of, of.contract.node("agent"), planned_method(work)), "")
+        return surroundings(tool, method_job(of, of.contract.node("agent"), planned_method(work)), "")
 
     assert key(Tool(), system) != key(Tool(), other)
     assert key(Short(), system) == key(Short(), other)

@@ -1,5 +1,5 @@
-"""Finding outside tools. Asking a program for its version may take a second, so the answer is remembered for as long as
-the program's file is the same."""
+"""Outside tools, and finding them. Asking a program for its version may take a second, so the answer is kept for as
+long as the program's file is the same."""
 
 from __future__ import annotations
 
@@ -9,11 +9,27 @@ import os
 import re
 import shutil
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from avow.backend_kit.protocol import Tool
 from avow.base import process
 from avow.base.files import write
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """A tool as found on this machine. `version` is None where it is missing; `install` is one command."""
+
+    name: str
+    version: str | None
+    path: str | None
+    install: str
+    optional: bool = True
+    """Its absence leaves something unasked, but no method without an engine."""
+
+    @property
+    def present(self) -> bool:
+        return self.version is not None
 
 
 @functools.cache

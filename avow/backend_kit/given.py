@@ -1,0 +1,49 @@
+"""Reading what a plan gives a method, and telling what is wrong with it, in one way for all backends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from avow.backend_kit.protocol import Job
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.system.paths import inside
+
+
+def file_path(job: Job, key: str) -> Path | None:
+    """The path under an option, whether or not a file is there; None where the option names nothing in the system's
+    folder. For `Backend.files`, which also counts what does not exist yet."""
+    name = job.options.get(key)
+    return inside(job.root, name) if isinstance(name, str) else None
+
+
+def existing_file(job: Job, key: str, name: object, *, wrong: str, absent: str, hint: str | None = None) -> Path:
+    """The file that the option `key` names (`name` is its value). Raises Rejected: with code `wrong` where it is no
+    name of a file in the system's folder, with code `absent` where there is none; `hint` says how to get one."""
+    place = job.method.options.at(key)
+    if not isinstance(name, str) or not name:
+        message = f"{job.method.backend} needs '{key}': a file of the system's folder"
+        raise Rejected(Diagnostic(wrong, message, place))
+    path = inside(job.root, name)
+    if path is None:
+        raise Rejected(Diagnostic(wrong, f"'{name}' is not a file in the system's folder", place))
+    if not path.is_file():
+        raise Rejected(Diagnostic(absent, f"there is no file '{name}' in {job.root.name}/", place, hint=hint))
+    return path
+
+
+def told(job: Job, diagnostics: Sequence[Diagnostic], most: int = 5) -> str:
+    """Diagnostics in one line, for an outcome's summary: with places that are the same on every machine."""
+    said = [_line(job, d) for d in diagnostics[:most]]
+    if len(diagnostics) > most:
+        said.append(f"and {len(diagnostics) - most} more")
+    return "; ".join(said)
+
+
+def _line(job: Job, diagnostic: Diagnostic) -> str:
+    span = diagnostic.span
+    if span is None:
+        return diagnostic.message
+    path, root = Path(span.file), job.root.resolve()
+    name = path.relative_to(root).as_posix() if path.is_relative_to(root) else path.name
+    return f"{name}:{span.line}: {diagnostic.message}"
