@@ -106,26 +106,31 @@ def _ask(
     if timeout_ms <= 0:
         return "unknown", None, (), "no answer in time"
     if engine == "qsat":
-        with _limited(translator, timeout_ms):
+        with limited(translator, timeout_ms):
             return _ask_qsat(translator, assertions, tracked, timeout_ms)
     solver = z3.Solver(ctx=translator.context)
-    solver.set("timeout", _wall(timeout_ms))
-    solver.set("random_seed", seed)
-    # Its Gröbner bases of non-linear integer terms cannot be interrupted: Z3 would hang.
-    solver.set("smt.arith.nl.grobner", False)
+    configured(solver, timeout_ms, seed)
     solver.add(*assertions)
     switches = {}
     for number, (label, expr) in enumerate(tracked):
         switch = z3.Bool(f"track!{number}", translator.context)
         solver.add(z3.Implies(switch, expr))
         switches[switch.get_id()] = (switch, label)
-    with _limited(translator, timeout_ms):
+    with limited(translator, timeout_ms):
         result = solver.check(*(switch for switch, _ in switches.values()))
     if result == z3.sat:
         return "sat", solver.model(), (), ""
     if result == z3.unsat:
         return "unsat", None, tuple(switches[s.get_id()][1] for s in solver.unsat_core()), ""
     return "unknown", None, (), _reason(solver)
+
+
+def configured(solver: z3.Solver, timeout_ms: int, seed: int) -> None:
+    """Set a solver's limits and seed."""
+    solver.set("timeout", _wall(timeout_ms))
+    solver.set("random_seed", seed)
+    # Its Gröbner bases of non-linear integer terms cannot be interrupted: Z3 would hang.
+    solver.set("smt.arith.nl.grobner", False)
 
 
 def _reason(solver: z3.Solver) -> str:
@@ -138,7 +143,8 @@ _IN_TIME = ("canceled", "interrupted", "interrupted from keyboard", "timeout", "
 
 
 @contextlib.contextmanager
-def _limited(translator: Translator, timeout_ms: int) -> Iterator[None]:
+def limited(translator: Translator, timeout_ms: int) -> Iterator[None]:
+    """What is asked of the translator's context within the block ends with its limit."""
     with watchdog(timeout_ms, translator.context.interrupt) as interrupted:
         yield
     if interrupted.is_set():

@@ -314,7 +314,7 @@ def _within_bounds(
 ) -> Solution | None:
     """Where there are sequences or divisions: values for which nothing outside a sequence matters, and no division by
     zero. Sequences are asked about as functions; if these formulas contradict one another, so do the original ones."""
-    if not any(_is_partial(formula) for formula in labelled.values()):
+    if not any(is_partial(formula) for formula in labelled.values()):
         return None
     inside = conjunction(map(defined, labelled.values()))
     sequences = [v for v in free if isinstance(v.sort, SequenceSort) and v not in given]
@@ -347,7 +347,7 @@ def _has_solution(
     """Whether formulas without quantifiers, functions and partial operations hold together: there, what the solver
     finds is a solution even if it cannot be written down."""
     parts = [part for formula in labelled.values() for part in subterms(formula)]
-    if any(isinstance(part, Quantified | Apply) for part in parts) or any(map(_is_partial, labelled.values())):
+    if any(isinstance(part, Quantified | Apply) for part in parts) or any(map(is_partial, labelled.values())):
         return False
     if any(isinstance(v.sort, FunctionSort | OpaqueSort) for v in free):
         return False
@@ -361,7 +361,7 @@ def _has_solution(
         return False
 
 
-def _is_partial(formula: Term) -> bool:
+def is_partial(formula: Term) -> bool:
     """Whether sequences or divisions occur."""
     return any(
         isinstance(part.sort, SequenceSort) or (isinstance(part, Arithmetic) and part.operator == "/")

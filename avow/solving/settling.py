@@ -1,0 +1,85 @@
+"""Many questions of one kind, put cheaply: do these hypotheses imply this goal, yes or no?
+
+A proof needs no core, no model and no replay, so that a verification condition is one check: one context, each formula
+translated once, and one solver in which a question is pushed and popped. Only `unsat` counts. Where the answer is
+anything else, or a partial operation occurs, nothing is said, and the caller asks the whole question
+(`avow.solving.questions.entails`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from avow.formulas.formula import free_variables, negation
+from avow.language.terms import Term
+from avow.solving.checking import Status, configured, limited
+from avow.solving.limits import allowed
+from avow.solving.questions import is_partial
+from avow.solving.translation import Expr, Translator, Unsupported
+from avow.solving.z3_module import z3
+
+
+@dataclass(slots=True)
+class Settler:
+    """The solver of one program, or of one node. Not to be shared between threads."""
+
+    seed: int = 0
+    checks: int = 0
+    """How often the solver was asked."""
+    _translator: Translator = field(default_factory=Translator)
+    _exprs: dict[Term, tuple[Expr, ...] | None] = field(default_factory=dict)
+    _solver: Any = None
+
+    def settles(self, hypotheses: Iterable[Term], goal: Term, *, timeout_ms: int) -> bool:
+        """Whether it is proved that the hypotheses imply the goal, for all values of the free variables. False says
+        nothing."""
+        try:
+            facts = [self._facts(term) for term in (*hypotheses, negation(goal))]
+            exprs = [expr for fact in facts if fact is not None for expr in fact]
+            if None in facts:
+                return False
+            status = self._ask(exprs, timeout_ms)
+            return status == "unsat"
+        except (Unsupported, z3.Z3Exception):
+            self._solver = None
+            return False
+
+    def _facts(self, term: Term) -> tuple[Expr, ...] | None:
+        """A formula, and what its variables' types say; None where a partial operation occurs. Raises Unsupported."""
+        if term not in self._exprs:
+            if is_partial(term):
+                self._exprs[term] = None
+            else:
+                expr = self._translator.term(term)
+                self._exprs[term] = (*self._translator.background(free_variables(term)), expr)
+        return self._exprs[term]
+
+    def _ask(self, exprs: list[Expr], timeout_ms: int) -> Status:
+        limit = allowed(timeout_ms)
+        if limit <= 0:
+            return "unknown"
+        known = self._translator.opaque_facts()
+        if self._solver is None:
+            self._solver = z3.Solver(ctx=self._translator.context)
+        status = self._check(self._solver, [*known, *exprs], limit, pop=True)
+        if status == "unknown":
+            # pushed questions are not simplified first, and a solver that gave up once may go on doing so
+            self._solver = None
+            status = self._check(z3.Solver(ctx=self._translator.context), [*known, *exprs], allowed(limit), pop=False)
+        return status
+
+    def _check(self, solver: Any, exprs: list[Expr], limit: int, *, pop: bool) -> Status:
+        if limit <= 0:
+            return "unknown"
+        configured(solver, limit, self.seed)
+        if pop:
+            solver.push()
+        solver.add(*exprs)
+        self.checks += 1
+        with limited(self._translator, limit):
+            result = solver.check()
+        if pop:
+            solver.pop()
+        return "unsat" if result == z3.unsat else "sat" if result == z3.sat else "unknown"
