@@ -1,22 +1,22 @@
 """Many questions of one kind, put cheaply: do these hypotheses imply this goal, yes or no?
 
 A proof needs no core, no model and no replay, so that a verification condition is one check: one context, each formula
-translated once, and one solver in which a question is pushed and popped. Only `unsat` counts. Where the answer is
-anything else, or a partial operation occurs, nothing is said, and the caller asks the whole question
-(`avow.solving.questions.entails`).
+translated once, and one solver in which a question is pushed and popped. Where a partial operation occurs, nothing is
+said, and the whole question (`avow.solving.questions.entails`) has to be asked.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from avow.base.verdict import Verdict
 from avow.formulas.formula import free_variables, negation
 from avow.language.terms import Term
 from avow.solving.checking import Status, configured, limited
 from avow.solving.limits import allowed
-from avow.solving.questions import is_partial
+from avow.solving.questions import entails, is_partial
 from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
 
@@ -32,19 +32,27 @@ class Settler:
     _exprs: dict[Term, tuple[Expr, ...] | None] = field(default_factory=dict)
     _solver: Any = None
 
-    def settles(self, hypotheses: Iterable[Term], goal: Term, *, timeout_ms: int) -> bool:
-        """Whether it is proved that the hypotheses imply the goal, for all values of the free variables. False says
-        nothing."""
+    def settles(self, hypotheses: Iterable[Term], goal: Term, *, timeout_ms: int) -> Status:
+        """`unsat`: the hypotheses imply the goal, for all values of the free variables; that is proved. `sat`: it
+        cannot be proved (the model is not looked at, so that nothing is refuted). `unknown` says nothing."""
         try:
             facts = [self._facts(term) for term in (*hypotheses, negation(goal))]
             exprs = [expr for fact in facts if fact is not None for expr in fact]
-            if None in facts:
-                return False
-            status = self._ask(exprs, timeout_ms)
-            return status == "unsat"
+            return "unknown" if None in facts else self._ask(exprs, timeout_ms)
         except (Unsupported, z3.Z3Exception):
             self._solver = None
-            return False
+            return "unknown"
+
+    def proves(self, hypotheses: Sequence[Term], goal: Term, *, timeout_ms: int) -> bool:
+        """Whether the hypotheses imply the goal; where the short question does not say, by the whole one."""
+        match self.settles(hypotheses, goal, timeout_ms=timeout_ms):
+            case "unsat":
+                return True
+            case "sat":
+                return False
+            case _:
+                answer = entails(hypotheses, goal, timeout_ms=timeout_ms, seed=self.seed)
+                return answer.verdict is Verdict.PROVED
 
     def _facts(self, term: Term) -> tuple[Expr, ...] | None:
         """A formula, and what its variables' types say; None where a partial operation occurs. Raises Unsupported."""

@@ -18,6 +18,7 @@ from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.values import show as show_value
 from avow.language.terms import FALSE, TRUE, Not, Role, Variable
 from avow.solving.questions import Entailment, entails, z3_version
+from avow.solving.settling import Settler
 from avow.solving.smtlib import export as smtlib
 from avow.solving.translation import Unsupported
 
@@ -50,6 +51,11 @@ class Work:
     job: Job
     checked: Checked
     text: str
+
+    @cached_property
+    def settler(self) -> Settler:
+        """The solver that this program's questions are put to."""
+        return Settler()
 
     @cached_property
     def triples(self) -> dict[str, tuple[Triple, ...]]:
@@ -171,6 +177,7 @@ def settle(job: Job, limits: Limits) -> Report:
     version = f"z3 {z3_version()}"
     try:
         work = load(job)
+        work.settler.seed = limits.seed
         found = work.triples
     except Rejected as rejected:
         return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), "weakest preconditions", version)
@@ -261,14 +268,14 @@ def _every_run(work: Work, limits: Limits) -> Settled:
     not shown to fall, an input on which it never ends is looked for: that is none to be content with either."""
     triple, deadline = work.every_run, time.monotonic() + limits.seconds
     program = work.checked.program
-    unfaithful = _unfaithful(triple, deadline, limits)
+    unfaithful = _unfaithful(triple, work.settler, deadline)
     if unfaithful is Verdict.REFUTED:
         return Settled(triple, Verdict.ERROR, UNFAITHFUL)
     if unfaithful is not None:
         triple = triple.as_stated
     try:
         wanted = run_conditions(triple, program)
-        failed = [c for c in wanted if not _holds(c, deadline, limits)]
+        failed = [c for c in wanted if not _holds(c, work.settler, deadline)]
         shown = breach(triple, program, failed, max(1000, _left(deadline))) if failed else None
         if shown is None and (_termination(work) or (failed and has_loops(program))):
             shown = endless_run(triple, program, max(1000, min(_left(deadline), SEARCHED)))
@@ -284,9 +291,8 @@ def _every_run(work: Work, limits: Limits) -> Settled:
     return Settled(triple, Verdict.PROVED, "proved", conditions=len(wanted))
 
 
-def _holds(condition: Condition, deadline: float, limits: Limits) -> bool:
-    answer = entails(condition.hypotheses, condition.goal, timeout_ms=_left(deadline), seed=limits.seed)
-    return answer.verdict is Verdict.PROVED
+def _holds(condition: Condition, settler: Settler, deadline: float) -> bool:
+    return settler.proves(condition.hypotheses, condition.goal, timeout_ms=_left(deadline))
 
 
 def _stopped(outcome: Outcome, running: Settled, work: Work) -> Outcome:
@@ -333,17 +339,20 @@ def _guarded(triple: Triple, work: Work, limits: Limits, deadline: float) -> Set
         return Settled(triple, Verdict.UNKNOWN, "its formulas are nested too deeply for this method")
 
 
-def _unfaithful(triple: Triple, deadline: float, limits: Limits) -> Verdict | None:
+def _unfaithful(triple: Triple, settler: Settler, deadline: float) -> Verdict | None:
     """None where the triple is shown to claim what the contract's own formulas claim; else what the solver says."""
     if triple.fidelity == TRUE:
         return None
-    answer = entails([], triple.fidelity, timeout_ms=min(5000, _left(deadline)), seed=limits.seed)
+    limit = min(5000, _left(deadline))
+    if settler.settles([], triple.fidelity, timeout_ms=limit) == "unsat":
+        return None
+    answer = entails([], triple.fidelity, timeout_ms=limit, seed=settler.seed)
     return None if answer.verdict is Verdict.PROVED else answer.verdict
 
 
 def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Settled:
     program = work.checked.program
-    unfaithful = _unfaithful(triple, deadline, limits)
+    unfaithful = _unfaithful(triple, work.settler, deadline)
     if unfaithful is Verdict.REFUTED:
         return Settled(triple, Verdict.ERROR, UNFAITHFUL)
     if unfaithful is not None:
@@ -354,12 +363,14 @@ def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Sett
         return Settled(triple, Verdict.UNKNOWN, str(error))
     failed: list[tuple[Condition, Entailment]] = []
     for condition in wanted:
+        if work.settler.settles(condition.hypotheses, condition.goal, timeout_ms=_left(deadline)) == "unsat":
+            continue
         answer = entails(condition.hypotheses, condition.goal, timeout_ms=_left(deadline), seed=limits.seed)
         if answer.verdict is not Verdict.PROVED:
             failed.append((condition, answer))
     if not failed:
-        vacuous = _vacuous(triple, deadline, limits)
-        if not vacuous and _endless(triple, work, deadline, limits):
+        vacuous = _vacuous(triple, work.settler, deadline)
+        if not vacuous and _endless(triple, work, deadline):
             why = "its loops never end where it applies, and a node that never answers guarantees nothing"
             return Settled(triple, Verdict.UNKNOWN, why)
         return Settled(triple, Verdict.PROVED, "proved", None, vacuous, len(wanted))
@@ -376,23 +387,23 @@ def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Sett
     return Settled(triple, Verdict.UNKNOWN, why)
 
 
-def _vacuous(triple: Triple, deadline: float, limits: Limits) -> str:
+def _vacuous(triple: Triple, settler: Settler, deadline: float) -> str:
     """A triple that every program meets says nothing of this one."""
-    free = entails([triple.pre], FALSE, timeout_ms=min(2000, _left(deadline)), seed=limits.seed)
-    if free.verdict is Verdict.PROVED:
+    if settler.settles([triple.pre], triple.post, timeout_ms=min(2000, _left(deadline))) == "sat":
+        return ""  # and then some input meets the precondition too
+    if settler.proves([triple.pre], FALSE, timeout_ms=min(2000, _left(deadline))):
         return f"no input meets the precondition {show(triple.pre)}"
-    always = entails([triple.pre], triple.post, timeout_ms=min(2000, _left(deadline)), seed=limits.seed)
-    if always.verdict is Verdict.PROVED:
+    if settler.proves([triple.pre], triple.post, timeout_ms=min(2000, _left(deadline))):
         return "it holds whatever a program does: it says nothing of this one"
     return ""
 
 
-def _endless(triple: Triple, work: Work, deadline: float, limits: Limits) -> bool:
+def _endless(triple: Triple, work: Work, deadline: float) -> bool:
     """Whether no run from the precondition ends: "terminates" would be a hypothesis that is known to be false."""
     if not _termination(work):
         return False
     return all(
-        entails(c.hypotheses, c.goal, timeout_ms=min(2000, _left(deadline)), seed=limits.seed).verdict is Verdict.PROVED
+        work.settler.proves(c.hypotheses, c.goal, timeout_ms=min(2000, _left(deadline)))
         for c in conditions(replace(triple, post=FALSE), work.checked.program.body)
     )
 

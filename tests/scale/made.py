@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 
 def node(
@@ -45,3 +46,18 @@ def seconds(*works: Callable[[], object], rounds: int = 3) -> list[float]:
             work()
             found.append(time.thread_time() - start)
     return [min(found) for found in times]
+
+
+def programs(folder: Path, nodes: int, guarantees: int) -> Path:
+    """A system whose nodes each have a program, and so many guarantees of it."""
+    (folder / "models").mkdir(parents=True, exist_ok=True)
+    contract, plan = "", "system: made\ncontract: system.rcl\nnodes:\n"
+    for k in range(nodes):
+        promised = [f"in.x{k} > {i} -> out.y{k} >= in.x{k} + {i} - {guarantees}" for i in range(guarantees)]
+        contract += node(f"n{k}", [f"x{k}"], [f"y{k}"], [f"in.x{k} >= -1000"], promised)
+        plan += f"  n{k}: {{criticality: high, methods: [hoare: {{program: models/n{k}.imp}}]}}\n"
+        program = f"IF (x{k} > 10) THEN\n   y{k} := x{k} + 1\nELSE\n   y{k} := x{k}\n"
+        (folder / "models" / f"n{k}.imp").write_text(program)
+    (folder / "system.rcl").write_text(contract)
+    (folder / "plan.yaml").write_text(plan)
+    return folder
