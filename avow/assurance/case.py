@@ -34,8 +34,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 
+from avow.assurance.answers import Baseline
+from avow.assurance.changes import changes
+from avow.assurance.closure import Closure
 from avow.assurance.facts import Facts, facts_of_case, facts_of_system
 from avow.assurance.findings import handle
+from avow.assurance.first_screen import answers, weakest_of, with_signature
 from avow.assurance.gap import independent
 from avow.assurance.gates import exit_code, gates, suggestion_for
 from avow.assurance.model import (
@@ -48,13 +52,14 @@ from avow.assurance.model import (
     HypothesisView,
     MethodInfo,
     ObligationView,
-    RequirementView,
     RunInfo,
     ToolInfo,
 )
-from avow.assurance.naming import derivation_claim, requirement_claim, short
+from avow.assurance.naming import derivation_claim
+from avow.assurance.relied import relied_upon
 from avow.assurance.remarks import remarks
-from avow.assurance.summary import limits, not_shown, open_items, worst_first
+from avow.assurance.requirement_views import held, requirement_view
+from avow.assurance.summary import limits, not_shown, open_items
 from avow.assurance.support import (
     Names,
     criticality,
@@ -62,9 +67,10 @@ from avow.assurance.support import (
     obligation_claim,
     open_conditions,
     requirement_claim_of,
-    requirement_support,
     supposition_claims,
 )
+from avow.assurance.suppositions import Statements, suppositions
+from avow.assurance.weakenings import weakenings
 from avow.base.verdict import Link, Verdict
 from avow.evidence.audit import Discrepancy
 from avow.evidence.claims import Standing, judge
@@ -72,7 +78,7 @@ from avow.evidence.ledger import GENESIS, Entry
 from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, behind, best_link, effective, roll_up, weigh
-from avow.system.plan import Requirement, System
+from avow.system.plan import System
 
 
 def build_case(
@@ -91,6 +97,7 @@ def build_case(
     ledger_head: str = GENESIS,
     graph_svg: str = "",
     sources: Mapping[str, str] | None = None,
+    baseline: Baseline | None = None,
 ) -> Case:
     """The case. Pure: same arguments, same case. `sources` are the texts behind `digests`, by the same names.
     Raises Rejected for an unusable policy."""
@@ -110,6 +117,7 @@ def build_case(
             ledger_head,
             graph_svg,
             sources or {},
+            baseline,
         )
     )
 
@@ -145,11 +153,46 @@ def conclude(facts: Facts) -> Case:
         _obligation(o, facts, evidence[o.id], statuses[o.id], standings[o.id], rests[o.id], handled.get(o.id, ""))
         for o in facts.obligations
     )
-    requirements = tuple(_requirement(r, names, standings, statuses) for r in facts.requirements)
+    said = Statements(facts.statements, facts.today)
+    relied = {
+        v.id: r for v in views if (r := relied_upon(v, lambda t: names.obligation_named(t) is not None, said.judge))
+    }
+    closure = Closure(views, facts.nodes, rests, standings)
+    closed = {r.id: closure.of_requirement(r.id) for r in facts.requirements}
+    supposed = suppositions(facts, views, relied, closed, said)
+    requirements = tuple(
+        held(requirement_view(r, names, standings, statuses), closed[r.id], views, relied, supposed, facts)
+        for r in facts.requirements
+    )
     derived = tuple(_derivation(d, standings, rests, names) for d in facts.derivations)
     grade, reason = _grade(facts, views)
     found = gates(facts, views, requirements, derived, findings, grade)
-    return Case(
+    listed = (*open_items(facts, views, requirements, derived, findings), *remarks(facts.sources, views))
+    single = _single(views)
+    basis = closure.of(names.every_guarantee()).claims if not closed else {n for c in closed.values() for n in c.claims}
+    weakened = weakenings(views, requirements, supposed, listed, findings, relied, single, basis, facts.run.id)
+    changed = changes(facts.baseline, requirements, views, supposed, weakened)
+    by_id, titles = {view.id: view for view in views}, {node.name: node.title for node in facts.nodes}
+    weakest = weakest_of(basis, by_id, relied, titles)
+    following = weakest_of(basis, by_id, relied, titles, beside=weakest.node) if weakest else None
+    if weakest is not None:
+        weakest = replace(weakest, needed_by=tuple(r.id for r in requirements if weakest.claim in r.closure))
+    code = exit_code(found)
+    told = answers(
+        requirements,
+        facts.nodes,
+        views,
+        relied,
+        supposed,
+        weakened,
+        found,
+        changed,
+        weakest,
+        following,
+        strict=facts.expected is not None,
+        passed=code == 0,
+    )
+    case = Case(
         system=facts.system,
         title=facts.title,
         today=facts.today.isoformat(),
@@ -157,11 +200,15 @@ def conclude(facts: Facts) -> Case:
         grade=grade,
         grade_reason=reason,
         policy=facts.policy,
-        exit_code=exit_code(found),
+        exit_code=code,
         ledger_head=facts.ledger_head,
         digests=facts.digests,
+        answers=told,
         requirements=requirements,
-        open_items=(*open_items(facts, views, requirements, derived, findings), *remarks(facts.sources, views)),
+        suppositions=supposed,
+        weakenings=weakened,
+        changes=changed,
+        open_items=listed,
         nodes=facts.nodes,
         obligations=views,
         derivations=derived,
@@ -169,7 +216,7 @@ def conclude(facts: Facts) -> Case:
         environment=facts.environment,
         findings=findings,
         gates=found,
-        single_method=_single(views),
+        single_method=single,
         limits=limits(facts, views),
         not_shown=not_shown(facts, views, requirements),
         tools=facts.tools,
@@ -180,8 +227,11 @@ def conclude(facts: Facts) -> Case:
         orphans=orphans,
         graph_svg=facts.graph_svg,
         maps=facts.maps,
+        statements=facts.statements,
+        baseline=facts.baseline,
         sources=facts.sources,
     )
+    return replace(case, answers=with_signature(case))
 
 
 def _evidence(facts: Facts) -> tuple[dict[str, tuple[EvidenceView, ...]], tuple[Entry, ...]]:
@@ -303,64 +353,6 @@ def _obligation(
         handled=handled,
     )
     return replace(view, suggestion=suggestion_for(view, facts, facts.today))
-
-
-def _requirement(
-    requirement: Requirement, names: Names, standings: Mapping[str, Standing], statuses: Mapping[str, Status]
-) -> RequirementView:
-    standing = standings[requirement_claim(requirement.id)]
-    rests, unknown = requirement_support(requirement, names)
-    weakest, weakest_status = standing.weakest
-    return RequirementView(
-        id=requirement.id,
-        text=requirement.text,
-        formula=requirement.formula or "",
-        temporal=requirement.temporal or "",
-        supported_by=requirement.supported_by,
-        rests_on=rests,
-        unknown_names=unknown,
-        status=standing.status,
-        weakest=weakest,
-        weakest_status=weakest_status,
-        below=worst_first(standing.below, statuses),
-        hypotheses=standing.hypotheses,
-        link=standing.link,
-        obligations=tuple(names.own.get(requirement.id, ())),
-        answer=_answer(requirement, standing, unknown, statuses, names.own.get(requirement.id, ())),
-        span=requirement.span,
-    )
-
-
-def _answer(
-    requirement: Requirement,
-    standing: Standing,
-    unknown: tuple[str, ...],
-    statuses: Mapping[str, Status],
-    own_obligations: Sequence[str],
-) -> str:
-    if unknown:
-        return f"Not shown: {', '.join(unknown)} under supported_by stands for nothing."
-    if standing.circle:
-        return f"Refused: it would support itself ({' → '.join(short(name) for name in standing.circle)})."
-    if standing.status.supports:
-        name, status = standing.weakest
-        how = "Linked in prose" if standing.status is Status.LINKED else standing.status.value.capitalize()
-        hypotheses = len(standing.hypotheses)
-        rest = f", on {hypotheses} hypothes{'is' if hypotheses == 1 else 'es'}" if hypotheses else ""
-        return f"{how}{rest}; the weakest link is {short(name)}, {status}."
-    if standing.direct and standing.status is not Status.MISSING:
-        own = [name for name in own_obligations if name in standing.below]
-        where = ", ".join(short(name) for name in own or standing.below) or "its evidence"
-        return f"{standing.status.value.capitalize()}: see {where}."
-    if standing.below:
-        below = worst_first(standing.below, statuses)
-        causes = [f"{short(name)} is {statuses.get(name, 'not shown')}" for name in below]
-        more = f" and {len(causes) - 3} more" if len(causes) > 3 else ""
-        return f"Not shown: {', '.join(causes[:3])}{more}."
-    if not standing.direct:
-        return "Not shown."
-    formal = requirement.formula or requirement.temporal
-    return "Not shown: nobody has tried." if formal else "Not shown: nothing is named that would support it."
 
 
 def _derivation(

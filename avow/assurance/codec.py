@@ -23,7 +23,7 @@ from avow.evidence.encoding import LATER, Unreadable, encode, plain
 from avow.evidence.encoding import decode as decode_evidence
 from avow.evidence.record import Evidence
 
-SCHEMA = "https://avow.invalid/schemas/case-3"
+SCHEMA = "https://avow.invalid/schemas/case-4"
 """Names the format in ``report.json``; raised when it changes incompatibly."""
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 
+from avow.assurance.answers import Baseline
 from avow.assurance.model import (
     Case,
     Derivation,
@@ -23,11 +24,13 @@ from avow.assurance.model import (
 )
 from avow.assurance.policy import Policy, read_policy
 from avow.base.diagnostics import Span
+from avow.base.plain import words_of
 from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.language.contract import Clause
-from avow.system.plan import Finding, Plan, Requirement, System
+from avow.system.names import ports_named
+from avow.system.plan import Finding, Plan, Requirement, Statement, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,8 @@ class Facts:
     graph_svg: str
     maps: tuple[MapView, ...] = ()
     sources: tuple[SourceView, ...] = ()
+    statements: tuple[Statement, ...] = ()
+    baseline: Baseline | None = None
 
 
 def facts_of_system(
@@ -72,6 +77,7 @@ def facts_of_system(
     ledger_head: str,
     graph_svg: str,
     sources: Mapping[str, str],
+    baseline: Baseline | None = None,
 ) -> Facts:
     """Raises Rejected for an unusable policy."""
     plan = system.plan
@@ -85,6 +91,7 @@ def facts_of_system(
             tuple((m.id, m.backend) for m in plan.node(node.name).methods),
             tuple((clause.name, _say(clause)) for clause in node.guarantees),
             tuple((clause.name, _say(clause)) for clause in node.assumptions),
+            plan.node(node.name).title or words_of(node.name),
         )
         for node in system.contract.nodes
     )
@@ -98,7 +105,16 @@ def facts_of_system(
         digests=tuple(sorted(digests.items())),
         requirements=tuple(replace(r, span=_relative(r.span, plan)) for r in plan.requirements),
         nodes=nodes,
-        environment=tuple(EnvironmentView(e.port, e.assume or "", e.because or "") for e in plan.environment),
+        environment=tuple(
+            EnvironmentView(
+                e.port,
+                e.assume or "",
+                e.because or "",
+                e.constant,
+                tuple(dict.fromkeys(node.name for node, _ in ports_named(e.port, system.contract.nodes))),
+            )
+            for e in plan.environment
+        ),
         expected=plan.expected,
         accepted=plan.accepted,
         obligations=tuple({o.id: replace(o, span=_relative(o.span, plan)) for o in obligations}.values()),
@@ -115,6 +131,8 @@ def facts_of_system(
                 (SourceView(path, text) for path, text in sources.items()), key=lambda s: (not s.is_contract, s.path)
             )
         ),
+        statements=tuple(replace(s, span=_relative(s.span, plan)) for s in plan.statements),
+        baseline=baseline,
     )
 
 
@@ -175,6 +193,8 @@ def facts_of_case(case: Case) -> Facts:
         graph_svg=case.graph_svg,
         maps=case.maps,
         sources=case.sources,
+        statements=case.statements,
+        baseline=case.baseline,
     )
 
 

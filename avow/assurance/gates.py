@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date
 
+from avow.assurance.answers import How
 from avow.assurance.facts import Facts
 from avow.assurance.findings import FINDINGS
 from avow.assurance.gap import shortfall, suggest
@@ -196,12 +197,12 @@ def _requirements(
     excused: set[str],
 ) -> Gate:
     good = facts.policy.requirements
-    failing = [r for r in requirements if good and r.status not in good]
-    causes = {r.id: r.below if r.below else _weak(r, derivations, views, good) for r in failing}
+    failing = [r for r in requirements if good and (r.status not in good or r.how is How.OPEN)]
+    causes = {r.id: r.below or r.failing or _weak(r, derivations, views, good) for r in failing}
     bad = [r for r in failing if not _all_excused(causes[r.id], excused)]
     let_off = tuple(requirement_claim(r.id) for r in failing if r not in bad)
     reason = "; ".join(
-        f"{r.id} is {_short_of(r.status, good)}{f': {_because(causes[r.id])}' if causes[r.id] else ''}" for r in bad[:5]
+        f"{r.id} is {_standing(r, good)}{f': {_because(causes[r.id])}' if causes[r.id] else ''}" for r in bad[:5]
     )
     found = [s for r in bad for name in causes[r.id] if name in views for s in _suggestion(views[name])]
     if any(not (r.formula or r.temporal or r.below or causes[r.id]) for r in bad):
@@ -221,6 +222,13 @@ def _requirements(
         bool(bad) and all(_tool_only(r.below, views) for r in bad),
         idle=not good,
     )
+
+
+def _standing(requirement: RequirementView, good: Sequence[Status]) -> str:
+    """Why it does not count; one that would hold by its own evidence may still rest on what has failed or expired."""
+    if requirement.status not in good:
+        return _short_of(requirement.status, good)
+    return "open" if requirement.failing else "open: a supposition has expired"
 
 
 def _weak(

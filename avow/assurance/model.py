@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from avow.assurance.answers import Answers, Baseline, Changes, How, Supposition, Tone, Weakening, WeakestEvidence
 from avow.assurance.naming import is_advice
 from avow.assurance.policy import Policy
 from avow.base.diagnostics import Span
@@ -19,6 +20,7 @@ from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.evidence.status import Status
+from avow.system.plan import Statement
 
 # -- handed in by the pipeline --------------------------------------------------------------------------------------
 
@@ -206,6 +208,15 @@ class RequirementView:
     """Its own obligations (entailment, model checking), where it has a formula or a temporal property."""
     answer: str
     """One line for people."""
+    how: How = How.OPEN
+    tone: Tone = Tone.RED
+    closure: tuple[str, ...] = ()
+    """Every obligation under it, closed: a guarantee with what discharges its node's assumptions, and so on."""
+    failing: tuple[str, ...] = ()
+    """Those of them that do not hold."""
+    weakest_evidence: WeakestEvidence | None = None
+    supposes: tuple[str, ...] = ()
+    """Keys of suppositions."""
     span: Span | None = None
 
 
@@ -231,6 +242,8 @@ class NodeView:
     guarantees: tuple[tuple[str, str], ...]
     """(clause name, sentence or formula)."""
     assumptions: tuple[tuple[str, str], ...]
+    title: str = ""
+    """What people call it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,6 +259,10 @@ class EnvironmentView:
     port: str
     assume: str
     because: str
+    constant: bool = False
+    """Whether it is declared to be the same at every step."""
+    nodes: tuple[str, ...] = ()
+    """The nodes that read it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,7 +347,11 @@ class Case:
     exit_code: int
     ledger_head: str
     digests: tuple[tuple[str, str], ...]
+    answers: Answers
     requirements: tuple[RequirementView, ...]
+    suppositions: tuple[Supposition, ...]
+    weakenings: tuple[Weakening, ...]
+    changes: Changes
     open_items: tuple[OpenItem, ...]
     nodes: tuple[NodeView, ...]
     obligations: tuple[ObligationView, ...]
@@ -355,6 +376,10 @@ class Case:
     graph_svg: str = ""
     """The dataflow picture; shown as an image, never as markup."""
     maps: tuple[MapView, ...] = ()
+    statements: tuple[Statement, ...] = ()
+    """The plan's words for what is supposed."""
+    baseline: Baseline | None = None
+    """The last signed report, as far as this one is compared with it."""
     sources: tuple[SourceView, ...] = ()
     """Contracts first, then the plan. No verdict is concluded from them; the remarks on how they are written are."""
 

@@ -90,6 +90,19 @@ PLAN_CODES: dict[str, Code] = {
             "PLAN114", "temporal property", "The text is no temporal property.", remedy="Write it as in `docs/plan.md`."
         ),
         Code(
+            "PLAN115",
+            "plain words",
+            "What `says` says is for a reader who has never seen the contract: at most 14 words, no names from it.",
+            remedy="Say it shorter, without names such as `agent.at`; `because` may hold all of the reason.",
+        ),
+        Code(
+            "PLAN128",
+            "no plain words yet",
+            "Something is supposed, and the plan has no words for a reader who has never seen the contract.",
+            severity=Severity.WARNING,
+            remedy="Add `says: …` (at most 14 words), and `who` and `until`.",
+        ),
+        Code(
             "PLAN121",
             "types clash",
             "An output and the input that it would feed have different types.",

@@ -196,8 +196,10 @@ def _key(assessment: Assessment) -> str:
     surveyed, ledger = assessment.surveyed, ledger_of(assessment.workspace.ledger(assessment.system))
     keys = sorted((*pair, key) for pair, key in surveyed.keys.items())
     damage = [str(d) for d in (*ledger.damage, *continuity(ledger, read_index(index_path(ledger.path.parent))))]
+    from avow.assurance.codec import SCHEMA
+
     explain = os.environ.get(EXPLAIN, "")
-    return digest(json.dumps([surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]))
+    return digest(json.dumps([SCHEMA, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]))
 
 
 def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, str], ...]) -> Result:

@@ -8,7 +8,7 @@ other system's.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Contract
 from avow.system.folding import holders, outermost
 from avow.system.graph import Graph, dataflow
-from avow.system.plan import Connection, Endpoint, EnvironmentInput, Plan, Subsystem, System
+from avow.system.plan import Connection, Endpoint, EnvironmentInput, Plan, Statement, Subsystem, System
 
 Load = Callable[[Path], System]
 
@@ -121,9 +121,18 @@ def _taken_in(
         plan,
         connections=plan.connections + connections,
         environment=plan.environment + tuple(said),
+        statements=(*plan.statements, *_statements(subsystem.name, part.plan)),
         included=tuple(dict.fromkeys((*plan.included, *files, *part.plan.included))),
     )
     return larger, merged, (*inner, whole)
+
+
+def _statements(subsystem: str, plan: Plan) -> Iterator[Statement]:
+    """What the other system's plan says of its environment, under the names that its inputs have here."""
+    for statement in plan.statements:
+        place, _, port = statement.place.partition(".")
+        if place == "environment":
+            yield replace(statement, place=f"environment.{_entry(subsystem, port)}")
 
 
 def _entry(subsystem: str, port: str) -> str:

@@ -25,6 +25,7 @@ def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic
         *_model(root, nodes),
         *_scenario(plan, root, contract, nodes),
         *_findings(root, nodes),
+        *_suppositions(plan, root),
     )
 
 
@@ -98,6 +99,17 @@ def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[D
                 yield _unknown(where, item.text, [*nodes, *goals], item.span)
             elif clause not in [g.name for g in nodes[owner].guarantees]:
                 yield _unknown(where, item.text, [f"{owner}.{g.name}" for g in nodes[owner].guarantees], item.span)
+
+
+def _suppositions(plan: Plan, root: Piece) -> Iterator[Diagnostic]:
+    methods = sorted({method.id for node in plan.nodes for method in node.methods})
+    piece = root.at("suppositions")
+    for name in (piece.entries or {}) if piece else ():
+        method = name.partition(".")[0]
+        if method not in methods:
+            span = piece.key_span(name) if piece else root.span
+            message = f"suppositions.{name}: the plan has no method {method!r}"
+            yield Diagnostic("PLAN106", message, span, hint=suggest(method, methods))
 
 
 def _goals(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:

@@ -76,6 +76,25 @@ class EnvironmentInput:
 
 
 @dataclass(frozen=True, slots=True)
+class Statement:
+    """What a person says of something that results rest on without its being shown, in words for any reader.
+
+    `place` says of what: ``environment.in.r``, ``D1.persistence``, ``D1.one-output``, ``D1.entered``,
+    ``suppositions.<method>.<word>`` or ``requirements.REQ1.amounts``.
+    """
+
+    place: str
+    says: str = ""
+    """At most 14 words, none of them a name from a contract; empty where nobody has found any yet."""
+    because: str = ""
+    who: str = ""
+    """Who keeps it true; empty: nobody is named."""
+    until: str = ""
+    """The last day (ISO 8601) on which it may be relied upon; empty: no day is named."""
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Table:
     """Rows of a scenario's CSV file or list. Cells are exact text; `columns` names them."""
 
@@ -135,6 +154,8 @@ class NodePlan:
     criticality: str
     methods: tuple[Method, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
+    title: str = ""
+    """What people call it, in a report's first screen; empty: its name, taken apart into words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,6 +256,7 @@ class Plan:
     lints_off: tuple[str, ...]
     pictures: tuple[Picture, ...] = ()
     subsystems: tuple[Subsystem, ...] = ()
+    statements: tuple[Statement, ...] = ()
     included: tuple[Path, ...] = ()
     """Files of other systems that were taken in as subsystems: what is said here depends on them too."""
 

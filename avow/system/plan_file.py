@@ -29,10 +29,12 @@ from avow.system.plan import (
     Plan,
     Requirement,
     Scenario,
+    Statement,
     Subsystem,
     Table,
 )
 from avow.system.schema import check_shape
+from avow.system.statements import read_statements
 from avow.system.strict_yaml import Piece, read_yaml
 from avow.system.tables import domain, interpretation, plain, read_csv, read_rows
 
@@ -124,7 +126,13 @@ class _Reader:
             lints_off=tuple(_texts(self.root.at("lints_off"))),
             pictures=tuple(self.pictures(scenario)),
             subsystems=tuple(self.subsystems()),
+            statements=self.statements(),
         )
+
+    def statements(self) -> tuple[Statement, ...]:
+        found, faults = read_statements(self.root)
+        self.faults += faults
+        return found
 
     def pictures(self, scenario: Scenario | None) -> Iterator[Picture]:
         tables = {table.name: table for table in scenario.tables} if scenario else {}
@@ -327,7 +335,7 @@ class _Reader:
 
     def nodes(self) -> Iterator[NodePlan]:
         for name, piece in self.entries("nodes"):
-            criticality = piece.at("criticality")
+            criticality, title = piece.at("criticality"), piece.at("title")
             used: set[str] = set()
             methods: list[Method] = []
             methods_piece = piece.at("methods")
@@ -335,7 +343,8 @@ class _Reader:
                 method = self.method(name, item, used)
                 if method is not None:
                     methods.append(method)
-            yield NodePlan(name, criticality.text if criticality else "medium", tuple(methods), piece.span)
+            level = criticality.text if criticality else "medium"
+            yield NodePlan(name, level, tuple(methods), piece.span, " ".join(title.text.split()) if title else "")
 
     def method(self, node: str, item: Piece, used: set[str]) -> Method | None:
         if item.entries is None:

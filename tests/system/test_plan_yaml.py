@@ -233,3 +233,48 @@ def test_a_path_that_no_file_can_have(tmp_path: Path, form: str, path: str) -> N
     found = faults(tmp_path, form.format(path))
     assert found
     assert all(len(d.message) < 1000 for d in found)
+
+
+SAYS = "environment:\n  in.a: {{assume: 'TRUE', because: b, {0}}}\n"
+
+
+@pytest.mark.parametrize(
+    ("entry", "code", "words"),
+    [
+        (
+            "says: one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen",
+            "PLAN115",
+            "15",
+        ),
+        ("says: what agent.wayP gives", "PLAN115", "agent.wayP"),
+        ("says: what wayP gives", "PLAN115", "wayP"),
+        ("until: 2026-02-30", "PLAN105", "calendar"),
+        ("until: tomorrow", "PLAN105", "right form"),
+        ("who: ''", "PLAN105", "empty"),
+    ],
+)
+def test_plain_words_owners_and_dates_are_checked(tmp_path: Path, entry: str, code: str, words: str) -> None:
+    (fault,) = faults(tmp_path, SAYS.format(entry))
+    assert (fault.code, words in fault.message) == (code, True), fault
+    assert fault.span is not None
+    assert fault.span.line == 2
+
+
+def test_statements_of_a_plan(tmp_path: Path) -> None:
+    text = (
+        "compose: {D: {persistence: {because: b, says: It stays, who: W, until: 2030-01-01}, entered: {because: e}}}\n"
+        "suppositions: {hoare.map: {says: The map fits}}\n"
+        "requirements: {R: {text: t, amounts: {because: it does}}}\n"
+        "nodes: {a: {title: the first, methods: [hoare: {}]}}\n"
+    )
+    (tmp_path / "plan.yaml").write_text(text)
+    (tmp_path / "a.rcl").write_text("node a { inputs() outputs() topics() guarantee(TRUE) }")
+    plan, _, faults_ = read_plan(tmp_path / "plan.yaml")
+    assert faults_ == ()
+    assert [(s.place, s.says, s.because, s.who, s.until) for s in plan.statements] == [
+        ("D.persistence", "It stays", "b", "W", "2030-01-01"),
+        ("D.entered", "", "e", "", ""),
+        ("suppositions.hoare.map", "The map fits", "", "", ""),
+        ("requirements.R.amounts", "", "it does", "", ""),
+    ]
+    assert plan.node("a").title == "the first"

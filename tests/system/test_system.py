@@ -363,3 +363,13 @@ def test_every_ros_node_is_accounted_for(tmp_path: Path) -> None:
     told = account(unlinked, dataflow(unlinked))
     assert told is not None
     assert "ROS sends /chatter from a to b; the contracts link nothing there" in [f.message for f in told.findings]
+
+
+def test_what_is_supposed_without_plain_words_is_a_warning(tmp_path: Path) -> None:
+    from avow.system.statements import without_words
+
+    said = make(tmp_path / "a", A, "environment: {a.r: {assume: '0 <= in.r', because: b, says: It is small}}")
+    silent = make(tmp_path / "b", A, "environment: {a.r: {assume: '0 <= in.r', because: b}}")
+    assert [d.code for d in without_words(said)] == []
+    assert [d.code for d in without_words(silent)] == ["PLAN128"]
+    assert faults(tmp_path / "c", A, "suppositions: {nobody.word: {says: x}}")[0].code == "PLAN106"

@@ -1,0 +1,223 @@
+"""The five answers that a report gives first, as data: words and counts that no format computes again.
+
+What is claimed, on what is it based, what is the weakest evidence, what is supposed without being shown, and what
+changed since the last signed report. Evidence and suppositions are two orders, never one: a person's reason is not weak
+evidence, it is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Tone(StrEnum):
+    """A colour; it never stands without a mark and a word."""
+
+    GREEN = "green"
+    """Derived without bounds, on proofs and exhaustive checks only, every supposition owned and in date."""
+    AMBER = "amber"
+    """It holds, but less is known than that."""
+    RED = "red"
+    """Open, refuted, or a gate fails."""
+    GREY = "grey"
+    """Not relied upon: as bad as was expected."""
+
+    @property
+    def rank(self) -> int:
+        """Greater is better; grey is no place in this order."""
+        return {Tone.GREEN: 2, Tone.AMBER: 1, Tone.RED: 0, Tone.GREY: 0}[self]
+
+
+class How(StrEnum):
+    """How a requirement comes to hold."""
+
+    DERIVED = "derived"
+    """A tool concluded its formula from the guarantees."""
+    BOUNDED = "derived, bounded"
+    """The same, but only within the plan's finite scenario."""
+    ARGUED = "argued"
+    """A person says that the guarantees amount to the sentence."""
+    OPEN = "open"
+    """Refuted, missing or stale, or resting on something that is; or on a supposition that has expired."""
+
+
+class Sort(StrEnum):
+    """What a supposition is about."""
+
+    WORLD = "the world"
+    PLATFORM = "the platform"
+    MODELS = "models"
+    SAMPLING = "sampling"
+    MEANING = "meaning"
+
+
+class Headline(StrEnum):
+    """The verdict on the whole case; never another word."""
+
+    HOLDS = "Holds"
+    CONDITIONAL = "Holds if"
+    NOT_SHOWN = "Not shown"
+    EXAMINED = "Examined, not relied upon"
+
+
+@dataclass(frozen=True, slots=True)
+class Supposition:
+    """Something that requirements rest on without its being shown, each once."""
+
+    number: str
+    """``S1``: on this report's pages only; `key` is what stays."""
+    key: str
+    sort: Sort
+    says: str
+    """Plain words from the plan; empty where nobody has found any yet."""
+    text: str
+    """All of it, as the plan or the method has it."""
+    because: str
+    who: str
+    until: str
+    expired: bool
+    needed_by: tuple[str, ...]
+    """Requirements."""
+    where: tuple[str, ...]
+    """Places of the plan, or claims whose evidence says it."""
+
+    @property
+    def owned(self) -> bool:
+        """Whether somebody keeps it true, and until when."""
+        return bool(self.who and self.until)
+
+    @property
+    def words(self) -> str:
+        return self.says or NO_WORDS
+
+
+NO_WORDS = "(no plain words yet)"
+
+
+@dataclass(frozen=True, slots=True)
+class Weakening:
+    """One kind of reason for which the case says less than it seems to. `why` says what a reader should make of it."""
+
+    key: str
+    count: int
+    claims: tuple[str, ...]
+    words: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class WeakestEvidence:
+    """The least evidence under a requirement, or under the whole case: evidence only, no reasons."""
+
+    claim: str
+    node: str
+    title: str
+    """What people call the node."""
+    status: str
+    """``tested``, ``observed``…: the words of a page, not of the ledger."""
+    quote: str
+    """The guarantee in English."""
+    words: str
+    """What was seen, with its bound, as a sentence without its full stop."""
+    needed_by: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NodeBasis:
+    """On what a node's guarantees stand: a letter and a colour each, and the same counted in words."""
+
+    node: str
+    title: str
+    squares: tuple[tuple[str, Tone], ...]
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class SupposedLine:
+    """One line for all suppositions of a sort: how many, and the most needed."""
+
+    sort: Sort
+    count: int
+    says: str
+    number: str
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """What was signed, as far as a later case is compared with it."""
+
+    name: str
+    """The file, relative to the workspace."""
+    who: str
+    signed_on: str
+    until: str
+    content: str
+    """Digest of the signed case's content."""
+    verdict: str
+    requirements: tuple[tuple[str, str, str, str], ...]
+    """(id, digest of its words and formula, how, formula)."""
+    guarantees: tuple[tuple[str, str, str, str, str], ...]
+    """(id, digest of its meaning, status, formula, mark of the records that count)."""
+    suppositions: tuple[tuple[str, str, str], ...]
+    """(key, words, until)."""
+    weakenings: tuple[tuple[str, int], ...]
+    checked: str = ""
+    """How its signature was verified, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeLine:
+    """One change since the signed report, worst kinds first."""
+
+    kind: str
+    """``open``, ``weaker``, ``gone``, ``meaning``, ``supposition``, ``expired``, ``weakening``, ``better``."""
+    subject: str
+    words: str
+    before: str = ""
+    after: str = ""
+
+    @property
+    def worse(self) -> bool:
+        return self.kind != "better"
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """What changed since the last signed report. `against` names it; empty: none has been signed."""
+
+    against: str
+    entries: tuple[ChangeLine, ...] = ()
+    again: int = 0
+    """So many guarantees were asked again with the same answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """The first screen in words."""
+
+    headline: Headline
+    verdict: str
+    """``Holds if 12 suppositions hold``."""
+    tone: Tone
+    by_how: tuple[tuple[How, int], ...]
+    counts: str
+    weakened: str
+    gates: str
+    listed: tuple[str, ...]
+    """The requirements that have a row of their own: all of them, or the worst."""
+    based_on: tuple[NodeBasis, ...]
+    more_nodes: str
+    weakest: WeakestEvidence | None
+    next_weakest: str
+    refuted: str
+    """What is refuted, in place of the weakest evidence; empty where nothing is."""
+    supposed: tuple[SupposedLine, ...]
+    owned: str
+    changed_against: str
+    changed: tuple[tuple[str, str], ...]
+    """(mark, sentence), five at most."""
+    signed: str
+    """``not signed``, or by whom and whether the case is still that one."""
+    statement: str
+    """What a signature says."""

@@ -1,0 +1,173 @@
+"""What changed since the last signed report: what of a case a signature covers, and the comparison with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from avow.assurance.answers import Baseline, ChangeLine, Changes, How, Supposition, Weakening
+from avow.assurance.model import Case, ObligationView, RequirementView
+from avow.assurance.relied import word
+from avow.base.files import digest
+from avow.base.plain import count
+from avow.evidence.obligation import Kind
+from avow.evidence.record import Evidence
+from avow.evidence.status import Status
+
+KINDS = ("open", "gone", "weaker", "meaning", "expired", "supposition", "weakening", "new", "better")
+"""Worst first."""
+MARKS = {"open": "✘", "better": "▲", "meaning": "≠", "new": "+"}
+_HOW_RANK = {How.DERIVED: 3, How.BOUNDED: 2, How.ARGUED: 1, How.OPEN: 0}
+_PASSING = ("believed",)
+"""Weakenings of the run, not of the case."""
+
+
+def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", until: str = "") -> Baseline:
+    """What of a case is signed, and compared with later ones."""
+    found = Baseline(
+        name=name,
+        who=who,
+        signed_on=signed_on,
+        until=until,
+        content="",
+        verdict=case.answers.verdict,
+        requirements=tuple((r.id, _meaning(r), r.how.value, r.formula or r.temporal) for r in case.requirements),
+        guarantees=tuple(_guarantee(view) for view in case.obligations if view.obligation.kind is Kind.GUARANTEE),
+        suppositions=tuple((s.key, s.words, s.until) for s in case.suppositions),
+        weakenings=tuple((w.key, w.count) for w in case.weakenings if w.key not in _PASSING),
+    )
+    return replace(found, content=_content(found))
+
+
+def _content(of: Baseline) -> str:
+    """SHA-256 of all that a signature speaks of: verdict, requirements, evidence, suppositions, weakenings."""
+    from avow.evidence.encoding import canonical
+
+    return digest(
+        canonical(
+            {
+                "verdict": of.verdict,
+                "requirements": [list(item) for item in of.requirements],
+                "guarantees": [list(item[:-1]) for item in of.guarantees],
+                "suppositions": [list(item) for item in of.suppositions],
+                "weakenings": [list(item) for item in of.weakenings],
+            }
+        )
+    )
+
+
+def changes(
+    old: Baseline | None,
+    requirements: Sequence[RequirementView],
+    views: Sequence[ObligationView],
+    suppositions: Sequence[Supposition],
+    weakenings: Sequence[Weakening],
+) -> Changes:
+    """What is otherwise than in the signed report, worst first."""
+    if old is None:
+        return Changes("")
+    guarantees = [view for view in views if view.obligation.kind is Kind.GUARANTEE]
+    now = {item[0]: item for item in map(_guarantee, guarantees)}
+    then = {item[0]: item for item in old.guarantees}
+    titles = {view.id: view.obligation.claim for view in guarantees}
+    entries = [
+        *_requirements(old, requirements),
+        *_guarantees(then, now, titles),
+        *_suppositions(old, suppositions),
+        *_weakenings(old, weakenings),
+    ]
+    again = sum(
+        1 for name in now if name in then and now[name][1:3] == then[name][1:3] and now[name][4] != then[name][4]
+    )
+    by = f"{old.who}, {old.signed_on}"
+    return Changes(by, tuple(sorted(entries, key=lambda entry: KINDS.index(entry.kind))), again)
+
+
+def _meaning(view: RequirementView) -> str:
+    return digest("\n".join((view.text, view.formula, view.temporal, *view.supported_by)))
+
+
+def _guarantee(view: ObligationView) -> tuple[str, str, str, str, str]:
+    counting = sorted(_mark(item.entry.evidence, item.entry.hash) for item in view.counting)
+    return view.id, view.obligation.digest, view.standing.value, view.obligation.formula, digest("\n".join(counting))
+
+
+def _mark(record: Evidence, hash_: str) -> str:
+    return f"{record.method} {record.run} {hash_}"
+
+
+def _requirements(old: Baseline, requirements: Sequence[RequirementView]) -> Iterator[ChangeLine]:
+    then = {item[0]: item for item in old.requirements}
+    for r in requirements:
+        if r.id not in then:
+            kind = "open" if r.how is How.OPEN else "new"
+            yield ChangeLine(kind, r.id, f"{r.id} is new, and {r.how}", "", r.how.value)
+            continue
+        _, meaning, how, formula = then[r.id]
+        was = How(how)
+        if _HOW_RANK[r.how] < _HOW_RANK[was]:
+            kind = "open" if r.how is How.OPEN else "weaker"
+            yield ChangeLine(kind, r.id, f"{r.id} was {was}, and is {r.how}", was.value, r.how.value)
+        elif _HOW_RANK[r.how] > _HOW_RANK[was]:
+            yield ChangeLine("better", r.id, f"{r.id} was {was}, and is {r.how}", was.value, r.how.value)
+        if meaning != _meaning(r):
+            yield ChangeLine("meaning", r.id, f"{r.id} says something else", formula, r.formula or r.temporal)
+    for name in then:
+        if name not in {r.id for r in requirements}:
+            yield ChangeLine("gone", name, f"{name} is not claimed any more", then[name][2], "")
+
+
+def _guarantees(
+    then: Mapping[str, tuple[str, str, str, str, str]],
+    now: Mapping[str, tuple[str, str, str, str, str]],
+    titles: Mapping[str, str],
+) -> Iterator[ChangeLine]:
+    for name, (_, meaning, status, formula, _) in now.items():
+        title = f"“{titles[name]}”"
+        if name not in then:
+            yield ChangeLine("new", name, f"new guarantee, {word(Status(status))}: {title}", "", status)
+            continue
+        _, old_meaning, old_status, old_formula, _ = then[name]
+        is_, was = Status(status), Status(old_status)
+        if meaning != old_meaning:
+            yield ChangeLine("meaning", name, f"{title} means something else", old_formula, formula)
+        if is_ is not was:
+            kind = "better" if is_.rank > was.rank else "weaker" if is_.supports else "open"
+            yield ChangeLine(kind, name, f"{word(was)} → {word(is_)}: {title}", old_status, status)
+    for name, item in then.items():
+        if name not in now:
+            yield ChangeLine("gone", name, "a guarantee is not there any more", item[2], "")
+
+
+def _suppositions(old: Baseline, suppositions: Sequence[Supposition]) -> Iterator[ChangeLine]:
+    then = {key: (words, until) for key, words, until in old.suppositions}
+    for s in suppositions:
+        if s.key not in then:
+            yield ChangeLine("supposition", s.key, f"new supposition: {s.words}", "", s.words)
+        elif s.words != then[s.key][0]:
+            yield ChangeLine("supposition", s.key, f"another supposition: {s.words}", then[s.key][0], s.words)
+        if s.expired:
+            yield ChangeLine(
+                "expired", s.key, f"expired on {s.until}: {s.words}", then.get(s.key, ("", ""))[1], s.until
+            )
+    for key in then:
+        if key not in {s.key for s in suppositions}:
+            yield ChangeLine("better", key, f"supposed no more: {then[key][0]}", then[key][0], "")
+
+
+def _weakenings(old: Baseline, weakenings: Sequence[Weakening]) -> Iterator[ChangeLine]:
+    then = dict(old.weakenings)
+    for w in weakenings:
+        was = then.get(w.key, 0)
+        if w.key not in _PASSING and w.count > was:
+            yield ChangeLine("weakening", w.key, f"{w.words}: {was or 'none'} → {w.count}", str(was), str(w.count))
+    now = {w.key: w.count for w in weakenings}
+    for key, was in old.weakenings:
+        if now.get(key, 0) < was:
+            yield ChangeLine(
+                "better",
+                key,
+                f"{count(was - now.get(key, 0), 'weakening')} fewer of one kind",
+                str(was),
+                str(now.get(key, 0)),
+            )

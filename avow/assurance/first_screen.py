@@ -1,0 +1,248 @@
+"""The first screen in words and numbers, computed once; formats only set it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from avow.assurance.answers import (
+    Answers,
+    Baseline,
+    Changes,
+    Headline,
+    How,
+    NodeBasis,
+    Sort,
+    SupposedLine,
+    Supposition,
+    Tone,
+    Weakening,
+    WeakestEvidence,
+)
+from avow.assurance.changes import MARKS, baseline_of
+from avow.assurance.model import Case, Gate, NodeView, ObligationView, RequirementView
+from avow.assurance.relied import EVIDENCE, EXHAUSTIVE, LETTERS, Relied, seen, weakness, word
+from avow.base.plain import count
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
+
+ROWS, WORST, NODES, SQUARES, LINES = 6, 3, 8, 12, 5
+"""So many requirements have a row each; else so many of the worst; nodes; squares for a node; changes."""
+_HOW_ORDER = (How.OPEN, How.ARGUED, How.BOUNDED, How.DERIVED)
+
+
+def tone_of(how: How, relied: Iterable[Relied], supposed: Iterable[Supposition]) -> Tone:
+    """A requirement's colour. Green is for what is derived without bounds, on proofs and exhaustive checks alone, every
+    supposition owned and in date."""
+    supposed = tuple(supposed)
+    if how is How.OPEN or any(s.expired for s in supposed):
+        return Tone.RED
+    sure = all(item.status in EXHAUSTIVE for item in relied)
+    return Tone.GREEN if how is How.DERIVED and sure and all(s.owned for s in supposed) else Tone.AMBER
+
+
+def weakest_of(
+    claims: Iterable[str],
+    views: Mapping[str, ObligationView],
+    relied: Mapping[str, Relied],
+    titles: Mapping[str, str],
+    *,
+    beside: str = "",
+) -> WeakestEvidence | None:
+    """The least evidence among claims; of another node than `beside`, where that is given."""
+    found = [
+        name
+        for name in claims
+        if name in relied
+        and relied[name].status in EVIDENCE
+        and views[name].obligation.kind in (Kind.GUARANTEE, Kind.REQUIREMENT)
+        and not (beside and views[name].obligation.node == beside)
+    ]
+    own = [name for name in found if views[name].obligation.kind is Kind.GUARANTEE]
+    if not found:
+        return None
+    name = min(own or found, key=lambda n: (*weakness(relied[n]), n))
+    o = views[name].obligation
+    return WeakestEvidence(
+        name,
+        o.node,
+        titles.get(o.node, "the whole"),
+        word(relied[name].status),
+        o.claim.rstrip("."),
+        seen(relied[name]),
+    )
+
+
+def answers(
+    requirements: Sequence[RequirementView],
+    nodes: Sequence[NodeView],
+    views: Sequence[ObligationView],
+    relied: Mapping[str, Relied],
+    suppositions: Sequence[Supposition],
+    weakenings: Sequence[Weakening],
+    gates: Sequence[Gate],
+    changes: Changes,
+    weakest: WeakestEvidence | None,
+    following: WeakestEvidence | None,
+    *,
+    strict: bool,
+    passed: bool,
+) -> Answers:
+    """Everything that the first screen says, but whether it is signed."""
+    number = Counter(r.how for r in requirements)
+    headline, verdict, tone = _verdict(requirements, suppositions, gates, strict=strict, passed=passed)
+    by_how = tuple((how, number[how]) for how in _HOW_ORDER if number[how])
+    good = sum(gate.passed for gate in gates)
+    kinds = len(weakenings)
+    basis = [_basis(node, views, relied) for node in nodes]
+    basis.sort(key=lambda b: min((tone.rank for _, tone in b.squares), default=0)) if len(basis) > NODES else None
+    owned = sum(s.owned for s in suppositions)
+    return Answers(
+        headline=headline,
+        verdict=verdict,
+        tone=tone,
+        by_how=by_how,
+        counts=" · ".join(f"{many} {how}" for how, many in by_how) or "no requirement",
+        weakened=f"weakened in {count(kinds, 'way')}" if kinds else "not weakened",
+        gates=f"policy: {good} of {count(len(gates), 'gate')} pass" + ("es" if len(gates) == 1 else ""),
+        listed=_listed(requirements),
+        based_on=tuple(basis[:NODES]),
+        more_nodes=f"and {count(len(basis) - NODES, 'node')} on no less" if len(basis) > NODES else "",
+        weakest=weakest,
+        next_weakest=f"{following.title}, {following.words}" if following else "",
+        refuted=_refuted(requirements, views),
+        supposed=tuple(_lines(suppositions)),
+        owned=f"{owned} of {len(suppositions)}" if suppositions else "",
+        changed_against=f"Against the report signed by {changes.against}:" if changes.against else "",
+        changed=_changed(changes),
+        signed="not signed",
+        statement=_statement(verdict, suppositions, kinds),
+    )
+
+
+def _verdict(
+    requirements: Sequence[RequirementView],
+    suppositions: Sequence[Supposition],
+    gates: Sequence[Gate],
+    *,
+    strict: bool,
+    passed: bool,
+) -> tuple[Headline, str, Tone]:
+    still_open = sum(r.how is How.OPEN for r in requirements)
+    failed = sum(not gate.passed for gate in gates)
+    if strict and passed:
+        return Headline.EXAMINED, Headline.EXAMINED.value, Tone.GREY
+    if still_open:
+        return Headline.NOT_SHOWN, f"{Headline.NOT_SHOWN}: {still_open} open", Tone.RED
+    if failed or not passed:
+        fails = f"{count(failed, 'gate')} fail{'s' if failed == 1 else ''}"
+        return Headline.NOT_SHOWN, f"{Headline.NOT_SHOWN}: {fails}", Tone.RED
+    if not requirements:
+        return Headline.EXAMINED, f"{Headline.EXAMINED}: no requirement is named", Tone.GREY
+    tone = min((r.tone for r in requirements), key=lambda t: t.rank)
+    if suppositions:
+        many = len(suppositions)
+        said = f"{Headline.CONDITIONAL} {count(many, 'supposition')} hold{'s' if many == 1 else ''}"
+        return Headline.CONDITIONAL, said, tone
+    return Headline.HOLDS, Headline.HOLDS.value, tone
+
+
+def badness(view: RequirementView) -> tuple[int, int, int]:
+    """Sorts the worst requirement first: colour, how it holds, how much it supposes."""
+    return view.tone.rank, _HOW_ORDER.index(view.how), -len(view.supposes)
+
+
+def _listed(requirements: Sequence[RequirementView]) -> tuple[str, ...]:
+    if len(requirements) <= ROWS:
+        return tuple(r.id for r in requirements)
+    return tuple(r.id for r in sorted(requirements, key=badness)[:WORST])
+
+
+def _basis(node: NodeView, views: Sequence[ObligationView], relied: Mapping[str, Relied]) -> NodeBasis:
+    own = [v for v in views if v.obligation.kind is Kind.GUARANTEE and v.obligation.node == node.name]
+    marks = [(_mark(view, relied), view) for view in own]
+    number = Counter(said for (said, _), _ in marks)
+    words = ", ".join(f"{many} {said}" for said, many in number.items()) or "no guarantees"
+    squares = tuple((LETTERS.get(said, "✘"), tone) for (said, tone), _ in marks)
+    return NodeBasis(node.name, node.title, squares if len(squares) <= SQUARES else (), words)
+
+
+def _mark(view: ObligationView, relied: Mapping[str, Relied]) -> tuple[str, Tone]:
+    if view.id not in relied:
+        wrong = view.status in (Status.REFUTED, Status.CONTRADICTORY)
+        return "refuted" if wrong else "open", Tone.RED
+    if not view.standing.supports:
+        return "open", Tone.RED
+    found = relied[view.id]
+    return word(found.status), Tone.GREEN if found.status in EXHAUSTIVE else Tone.AMBER
+
+
+def _refuted(requirements: Sequence[RequirementView], views: Sequence[ObligationView]) -> str:
+    """What is refuted, said by the requirements that it takes down; empty where nothing is."""
+    wrong = [v for v in views if v.status in (Status.REFUTED, Status.CONTRADICTORY) and not v.advice]
+    if not wrong:
+        return ""
+    felled = [r.id for r in requirements if r.how is How.OPEN]
+    first = wrong[0].obligation.claim.rstrip(".")
+    more = f", and {count(len(wrong) - 1, 'more claim')}" if len(wrong) > 1 else ""
+    takes = f" With it {_some(felled)} {'is' if len(felled) == 1 else 'are'} open." if felled else ""
+    return f"Refuted: “{first}”{more}.{takes}"
+
+
+def _some(names: Sequence[str], most: int = 6) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def _lines(suppositions: Sequence[Supposition]) -> Iterable[SupposedLine]:
+    for sort in Sort:
+        of_sort = [s for s in suppositions if s.sort is sort]
+        if of_sort:
+            most = max(of_sort, key=lambda s: (s.expired, bool(s.says), len(s.needed_by)))
+            yield SupposedLine(sort, len(of_sort), most.words, most.number)
+
+
+def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
+    if not changes.against:
+        return (("", "No report has been signed: all of this is new."),)
+    shown = [(MARKS.get(e.kind, "▼"), e.words) for e in changes.entries]
+    if len(shown) > LINES:
+        worse = sum(e.worse for e in changes.entries[LINES - 1 :])
+        better = len(shown) - (LINES - 1) - worse
+        rest = " and ".join(
+            p for p in (f"{worse} more worse or other" * bool(worse), f"{better} better" * bool(better)) if p
+        )
+        shown = [*shown[: LINES - 1], ("…", rest)]
+    if not shown:
+        shown = [("=", "Nothing.")]
+    return (
+        (*shown, ("⟲", f"asked again: {count(changes.again, 'guarantee')}, same answer"))
+        if changes.again
+        else tuple(shown)
+    )
+
+
+def with_signature(case: Case) -> Answers:
+    """The answers, with what there is to say of a signature: whose it is, and whether the case is still that one."""
+    return replace(case.answers, signed=_signed(case.baseline, baseline_of(case).content))
+
+
+def _signed(baseline: Baseline | None, content: str) -> str:
+    if baseline is None:
+        return "not signed"
+    same = baseline.content == content
+    until = f" until {baseline.until}" if baseline.until else ""
+    if same:
+        return f"signed by {baseline.who} on {baseline.signed_on}{until}"
+    return f"not signed; changed since {baseline.who} signed on {baseline.signed_on}"
+
+
+def _statement(verdict: str, suppositions: Sequence[Supposition], kinds: int) -> str:
+    if not suppositions:
+        accepted = "it rests on no suppositions"
+    elif len(suppositions) == 1:
+        accepted = "I accept supposition S1 as listed"
+    else:
+        accepted = f"I accept suppositions S1 to S{len(suppositions)} as listed"
+    known = f"I know of the {count(kinds, 'kind')} of weakening" if kinds else "no weakening is known"
+    return f"By signing I say: I agree with the verdict “{verdict}”, {accepted}, and {known}."

@@ -1,0 +1,154 @@
+"""The record of each guarantee that is relied upon, and what was seen, in words with its bound.
+
+Of several records that support a claim one is chosen: one whose suppositions have not expired before any other, then
+one that is a proof or an exhaustive check, then one whose suppositions all have an owner. So losing a record never
+makes a case look better: what is left was there to be chosen before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from avow.assurance.model import ObligationView
+from avow.base.plain import count
+from avow.evidence.record import Evidence
+from avow.evidence.status import Status, weigh
+
+WORDS = {
+    Status.PROVED: "proved",
+    Status.CHECKED: "checked",
+    Status.TESTED: "tested",
+    Status.MONITORED: "observed",
+    Status.REVIEWED: "reviewed",
+    Status.JUSTIFIED: "supposed",
+    Status.LINKED: "argued",
+}
+"""A status in the words of a page; any other is `open` there."""
+LETTERS = {"proved": "P", "checked": "C", "tested": "T", "observed": "O", "reviewed": "R", "supposed": "S"}
+EXHAUSTIVE = frozenset({Status.PROVED, Status.CHECKED})
+EVIDENCE = frozenset({*EXHAUSTIVE, Status.TESTED, Status.MONITORED, Status.REVIEWED})
+"""What tools and readers found; a plan's reason is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What is thought of one hypothesis of a record: whether it is out of date, and whether somebody answers for it."""
+
+    expired: bool
+    owned: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Relied:
+    """The record relied upon, what it counts as, and its suppositions (hypotheses that are no claims of the case)."""
+
+    record: Evidence
+    status: Status
+    suppositions: tuple[str, ...]
+
+
+Opinion = Callable[[str, str], Judged]
+"""(method, hypothesis) → what is thought of it."""
+
+
+def relied_upon(view: ObligationView, is_claim: Callable[[str], bool], opinion: Opinion) -> Relied | None:
+    """None where nothing supports the claim."""
+    if not view.status.supports:
+        return None
+    ways = []
+    for item in view.counting:
+        record = item.entry.evidence
+        status = weigh(record).support
+        if status is None:
+            continue
+        open_ones = tuple(dict.fromkeys(h for h in record.hypotheses if not is_claim(h)))
+        thought = [opinion(record.method, text) for text in open_ones]
+        badness = (
+            any(t.expired for t in thought),
+            status not in EXHAUSTIVE,
+            not all(t.owned for t in thought),
+            -status.rank,
+            len(open_ones),
+            record.method,
+        )
+        ways.append((badness, Relied(record, status, open_ones)))
+    return min(ways, key=lambda way: way[0], default=(None, None))[1]
+
+
+def word(status: Status) -> str:
+    return WORDS.get(status, "open")
+
+
+def upper_bound(record: Evidence) -> float | None:
+    """The greatest part of cases that may fail, at the record's confidence: where the claim has a condition, of those
+    that met it. None where the record gives no such bound."""
+    found = [
+        float(value)
+        for key, value in record.bound.items()
+        if isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and "failure" in key.lower().replace("_", " ")
+        and any(word in key.lower() for word in ("below", "at most"))
+    ]
+    return max(found, default=None)
+
+
+def judgements(record: Evidence) -> int:
+    """How many cases, runs or judgements it rests on; 0 where it does not say."""
+    for key in ("triggered", "judged", "runs", "cases"):
+        value = record.bound.get(key)
+        if isinstance(value, int) and not isinstance(value, bool):
+            return value
+    return 0
+
+
+def weakness(relied: Relied) -> tuple[int, float, int]:
+    """Sorts the weakest first: by status, then the greatest bound on failures, then the fewest judgements."""
+    bound = upper_bound(relied.record)
+    return relied.status.rank, -(1.0 if bound is None else bound), judgements(relied.record)
+
+
+def seen(relied: Relied) -> str:
+    """What was seen, with its bound: ``47 runs, 0 failed (at most 6.2 % fail, 95 %)``."""
+    bound = relied.record.bound
+    match relied.status:
+        case Status.PROVED:
+            return "proved for all inputs"
+        case Status.CHECKED:
+            return "every case of a bounded model was looked at"
+        case Status.TESTED if isinstance(bound.get("runs"), int):
+            failures = bound.get("failures", 0)
+            return f"{count(bound['runs'], 'run')}, {failures} failed{_at_most(relied.record, 'at most')}"
+        case Status.TESTED if isinstance(bound.get("cases"), int):
+            cases, triggered = bound["cases"], bound.get("triggered")
+            if isinstance(triggered, int):
+                few = "only " if triggered < cases / 2 else ""
+                told = f"{few}{triggered} of {count(cases, 'case')} met its condition, none failed"
+            else:
+                told = f"{count(cases, 'case')}, none failed"
+            return told + _at_most(relied.record, "fewer than")
+        case Status.MONITORED if isinstance(bound.get("judged"), int):
+            traces = bound.get("traces")
+            on = f" on {count(len(traces), 'recorded run')}" if isinstance(traces, Mapping | list) and traces else ""
+            return f"observed {count(bound['judged'], 'time')}{on}"
+        case Status.REVIEWED:
+            return "read by a person who accepts it" + (" on conditions" if relied.record.hypotheses else "")
+        case _:
+            return f"{word(relied.status)}, without a bound on failures"
+
+
+def _at_most(record: Evidence, how: str) -> str:
+    bound, confidence = upper_bound(record), record.bound.get("confidence")
+    if bound is None:
+        return ", with no bound on failures"
+    sure = f", {_percent(float(confidence))}" if isinstance(confidence, int | float) else ""
+    return f" ({how} {_percent(bound)} fail{sure})"
+
+
+def _percent(part: float) -> str:
+    """Rounded up: a bound that is shown smaller than it is would be none."""
+    from decimal import ROUND_CEILING, Context, Decimal
+
+    value = Context(prec=2, rounding=ROUND_CEILING).create_decimal(Decimal(str(part)) * 100)
+    return f"{value.normalize():f} %"

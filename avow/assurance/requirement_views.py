@@ -1,0 +1,108 @@
+"""A requirement as a reader meets it: where it stands, how it comes to hold, on what weakest evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from avow.assurance.answers import How, Supposition
+from avow.assurance.closure import Closed
+from avow.assurance.facts import Facts
+from avow.assurance.first_screen import tone_of, weakest_of
+from avow.assurance.model import ObligationView, RequirementView
+from avow.assurance.naming import requirement_claim, short
+from avow.assurance.relied import EVIDENCE, Relied
+from avow.assurance.summary import worst_first
+from avow.assurance.support import Names, requirement_support
+from avow.evidence.claims import Standing
+from avow.evidence.status import Status
+from avow.system.plan import Requirement
+
+
+def requirement_view(
+    requirement: Requirement, names: Names, standings: Mapping[str, Standing], statuses: Mapping[str, Status]
+) -> RequirementView:
+    standing = standings[requirement_claim(requirement.id)]
+    rests, unknown = requirement_support(requirement, names)
+    weakest, weakest_status = standing.weakest
+    return RequirementView(
+        id=requirement.id,
+        text=requirement.text,
+        formula=requirement.formula or "",
+        temporal=requirement.temporal or "",
+        supported_by=requirement.supported_by,
+        rests_on=rests,
+        unknown_names=unknown,
+        status=standing.status,
+        weakest=weakest,
+        weakest_status=weakest_status,
+        below=worst_first(standing.below, statuses),
+        hypotheses=standing.hypotheses,
+        link=standing.link,
+        obligations=tuple(names.own.get(requirement.id, ())),
+        answer=_answer(requirement, standing, unknown, statuses, names.own.get(requirement.id, ())),
+        span=requirement.span,
+    )
+
+
+def held(
+    view: RequirementView,
+    closed: Closed,
+    views: Sequence[ObligationView],
+    relied: Mapping[str, Relied],
+    supposed: Sequence[Supposition],
+    facts: Facts,
+) -> RequirementView:
+    """A requirement with how it holds, its colour, its weakest evidence and what it supposes."""
+    by_id = {v.id: v for v in views}
+    mine = [s for s in supposed if view.id in s.needed_by]
+    how = How.DERIVED
+    if not view.status.supports or closed.failing or view.unknown_names or any(s.expired for s in mine):
+        how = How.OPEN
+    elif not (view.formula or view.temporal):
+        how = How.ARGUED
+    elif any(by_id[name].status is not Status.PROVED for name in view.obligations):
+        how = How.BOUNDED
+    under = [relied[name] for name in closed.claims if name in relied and relied[name].status in EVIDENCE]
+    titles = {node.name: node.title for node in facts.nodes}
+    return replace(
+        view,
+        how=how,
+        tone=tone_of(how, under, mine),
+        closure=closed.claims,
+        failing=closed.failing,
+        weakest_evidence=weakest_of(closed.claims, by_id, relied, titles),
+        supposes=tuple(s.key for s in mine),
+    )
+
+
+def _answer(
+    requirement: Requirement,
+    standing: Standing,
+    unknown: tuple[str, ...],
+    statuses: Mapping[str, Status],
+    own_obligations: Sequence[str],
+) -> str:
+    if unknown:
+        return f"Not shown: {', '.join(unknown)} under supported_by stands for nothing."
+    if standing.circle:
+        return f"Refused: it would support itself ({' → '.join(short(name) for name in standing.circle)})."
+    if standing.status.supports:
+        name, status = standing.weakest
+        how = "Linked in prose" if standing.status is Status.LINKED else standing.status.value.capitalize()
+        hypotheses = len(standing.hypotheses)
+        rest = f", on {hypotheses} hypothes{'is' if hypotheses == 1 else 'es'}" if hypotheses else ""
+        return f"{how}{rest}; the weakest link is {short(name)}, {status}."
+    if standing.direct and standing.status is not Status.MISSING:
+        own = [name for name in own_obligations if name in standing.below]
+        where = ", ".join(short(name) for name in own or standing.below) or "its evidence"
+        return f"{standing.status.value.capitalize()}: see {where}."
+    if standing.below:
+        below = worst_first(standing.below, statuses)
+        causes = [f"{short(name)} is {statuses.get(name, 'not shown')}" for name in below]
+        more = f" and {len(causes) - 3} more" if len(causes) > 3 else ""
+        return f"Not shown: {', '.join(causes[:3])}{more}."
+    if not standing.direct:
+        return "Not shown."
+    formal = requirement.formula or requirement.temporal
+    return "Not shown: nobody has tried." if formal else "Not shown: nothing is named that would support it."

@@ -1,0 +1,38 @@
+"""Plain words: texts that a reader meets before any contract hold no identifiers."""
+
+from __future__ import annotations
+
+import re
+
+_IDENTIFIER = re.compile(
+    r"""[A-Za-z]\w*\.[A-Za-z_]\w*      # node.port
+      | \b\w*[^\W_]_\w+                # snake_case
+      | \b[A-Za-z]\w*/[A-Za-z]\w*      # path/to
+      | \b[a-z]+[A-Z]\w*               # camelCase
+      | \b(?=\w*\d)[0-9a-f]{12,}\b     # a digest
+    """,
+    re.VERBOSE,
+)
+_HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|_+|-+")
+
+
+def identifiers(text: str) -> tuple[str, ...]:
+    """What in a text looks like a name from a contract, a path or a digest."""
+    return tuple(found.group() for found in _IDENTIFIER.finditer(text))
+
+
+def words_of(name: str) -> str:
+    """A name as words: ``batteryMonitor`` is *battery monitor*; a name in capitals stays as it is."""
+    parts = [part for part in _HUMP.split(name) if part]
+    return (
+        " ".join(
+            part if part.isupper() or (len(parts) == 1 and not part[:1].isupper()) else part[:1].lower() + part[1:]
+            for part in parts
+        )
+        or name
+    )
+
+
+def count(number: int, one: str, many: str = "") -> str:
+    """``1 gate``, ``3 gates``."""
+    return f"{number:,} {one if number == 1 else many or one + 's'}".replace(",", " ")

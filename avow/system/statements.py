@@ -1,0 +1,91 @@
+"""What the plan says, in plain words, of all that is supposed without being shown: read, and what is missing told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import date
+
+from avow.base.diagnostics import Diagnostic, Severity
+from avow.base.plain import identifiers
+from avow.system.plan import Plan, Statement, System
+from avow.system.strict_yaml import Piece
+
+MOST_WORDS = 14
+_ARGUMENTS = {"persistence": "persistence", "one_output": "one-output", "entered": "entered"}
+
+
+def read_statements(root: Piece) -> tuple[tuple[Statement, ...], list[Diagnostic]]:
+    """Every statement of a well-shaped plan, and what is wrong with their words and dates."""
+    faults: list[Diagnostic] = []
+    return tuple(_statement(place, piece, faults) for place, piece in _places(root)), faults
+
+
+def without_words(system: System) -> Iterator[Diagnostic]:
+    """A warning for each supposition of this plan that has no words for a reader who does not know the contract."""
+    for statement in system.plan.statements:
+        if not statement.says and statement.span is not None and _own(statement, system.plan):
+            yield Diagnostic(
+                "PLAN128",
+                f"{statement.place}: no plain words yet",
+                statement.span,
+                Severity.WARNING,
+                hint=f"add  says: …  (at most {MOST_WORDS} words), and  who: …, until: …",
+            )
+
+
+def _own(statement: Statement, plan: Plan) -> bool:
+    return statement.span is not None and statement.span.file == str(plan.path)
+
+
+def _places(root: Piece) -> Iterator[tuple[str, Piece]]:
+    for port, piece in _entries(root, "environment"):
+        if piece.at("assume") is not None or _is_true(piece.at("constant")):
+            yield f"environment.{port}", piece
+    for section in ("compose", "subsystems"):
+        for goal, piece in _entries(root, section):
+            for key, name in _ARGUMENTS.items():
+                argument = piece.at(key)
+                if argument is not None:
+                    yield f"{goal}.{name}", argument
+    for name, piece in _entries(root, "suppositions"):
+        yield f"suppositions.{name}", piece
+    for name, piece in _entries(root, "requirements"):
+        amounts = piece.at("amounts")
+        if amounts is not None:
+            yield f"requirements.{name}.amounts", amounts
+
+
+def _entries(root: Piece, key: str) -> Iterator[tuple[str, Piece]]:
+    piece = root.at(key)
+    if piece is not None and piece.entries is not None:
+        yield from piece.entries.items()
+
+
+def _is_true(piece: Piece | None) -> bool:
+    return piece is not None and piece.value is True
+
+
+def _statement(place: str, piece: Piece, faults: list[Diagnostic]) -> Statement:
+    texts = {key: " ".join(part.text.split()) for key, part in (piece.entries or {}).items() if part.items is None}
+    says, until = piece.at("says"), piece.at("until")
+    if says is not None:
+        number = len(texts["says"].split())
+        if number > MOST_WORDS:
+            message = f"{place}: says has {number} words; at most {MOST_WORDS} fit a report's first screen"
+            faults.append(Diagnostic("PLAN115", message, says.span, hint="the whole reason is for  because"))
+        names = identifiers(texts["says"])
+        if names:
+            message = f"{place}: says is for readers who do not know the contract, but names {', '.join(names)}"
+            faults.append(Diagnostic("PLAN115", message, says.span, hint="say it in words"))
+    if until is not None and not _is_date(texts["until"]):
+        faults.append(Diagnostic("PLAN105", f"{place}: {texts['until']!r} is no date of the calendar", until.span))
+    words = {key: texts.get(key, "") for key in ("says", "because", "who", "until")}
+    return Statement(place, span=piece.span, **words)
+
+
+def _is_date(text: str) -> bool:
+    try:
+        date.fromisoformat(text)
+    except ValueError:
+        return False
+    return True

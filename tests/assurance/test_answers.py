@@ -1,0 +1,258 @@
+"""The five answers: laws that no mixture of evidence and suppositions may break, and their words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import date
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from assurance.sample import TODAY, case, evidence, guarantee, node_plan, obligation, rover_case, system
+from avow.assurance.answers import Headline, How, Sort, Tone
+from avow.assurance.case import conclude_again
+from avow.assurance.changes import KINDS, baseline_of
+from avow.assurance.model import Case
+from avow.base.plain import identifiers, words_of
+from avow.base.verdict import Link, Verdict
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
+from avow.evidence.record import Evidence
+from avow.system.plan import EnvironmentInput, Requirement, Statement, System
+
+NODES = {"a": ["g", "h"], "b": ["g"]}
+GUARANTEES = [guarantee(node, name) for node, names in NODES.items() for name in names]
+METHODS = {"hoare": Verdict.PROVED, "ajpf": Verdict.CHECKED, "hypothesis": Verdict.TESTED, "review": Verdict.REVIEWED}
+HYPOTHESES = ("the map is true", "the runs are drawn", "the table fits")
+OWNED, LATE, NOBODY = ("somebody", "2030-01-01"), ("somebody", "2020-01-01"), ("", "")
+PLANS = [node_plan(node, "low", *METHODS) for node in NODES]
+PROSE = Requirement("R", "It is safe.", None, None, ("a", "b"))
+FORMAL = Requirement("R", "It is safe.", "a.x > 0", None, ("a", "b"))
+OWN = obligation(SYSTEM_LEVEL, Kind.REQUIREMENT, "R", clauses=("a.g", "a.h", "b.g"))
+
+
+def subject(requirement: Requirement, statements: Sequence[Statement] = (), **others: Any) -> System:
+    made = system(NODES, plans=PLANS, requirements=[requirement], **others)
+    return replace(made, plan=replace(made.plan, statements=tuple(statements)))
+
+
+def build(records: Sequence[Evidence], statements: Sequence[Statement] = (), *, formal: bool) -> Case:
+    more = [OWN] if formal else []
+    derived = [evidence(OWN, method="compose")] if formal else []
+    made = subject(FORMAL if formal else PROSE, statements)
+    return case(made, [*GUARANTEES, *more], [*records, *derived])
+
+
+@st.composite
+def records(draw: st.DrawFn) -> list[Evidence]:
+    found = []
+    for target in GUARANTEES:
+        for method in draw(st.lists(st.sampled_from(sorted(METHODS)), unique=True, max_size=4)):
+            verdict = draw(st.sampled_from([METHODS[method], METHODS[method], Verdict.UNKNOWN, Verdict.REFUTED]))
+            supposed = tuple(draw(st.lists(st.sampled_from(HYPOTHESES), unique=True, max_size=2)))
+            found.append(evidence(target, verdict, method, hypotheses=supposed))
+    return found
+
+
+@st.composite
+def statements(draw: st.DrawFn) -> list[Statement]:
+    found = []
+    for method in METHODS:
+        for word in ("map", "runs", "table"):
+            who, until = draw(st.sampled_from([OWNED, OWNED, LATE, NOBODY]))
+            found.append(Statement(f"suppositions.{method}.{word}", f"The {word} of {method}", "", who, until))
+    return [*found, Statement("requirements.R.amounts", "It amounts to it", "", *OWNED)]
+
+
+LAW = settings(max_examples=120, deadline=None)
+
+
+@LAW
+@given(records(), statements(), st.booleans(), st.data())
+def test_lost_evidence_never_improves_the_colour(
+    listed: list[Evidence], said: list[Statement], formal: bool, data: st.DataObject
+) -> None:
+    support = [at for at, record in enumerate(listed) if record.verdict.supports]
+    if not support:
+        return
+    lost = data.draw(st.sampled_from(support))
+    before = build(listed, said, formal=formal)
+    after = build([*listed[:lost], *listed[lost + 1 :]], said, formal=formal)
+    assert after.requirements[0].tone.rank <= before.requirements[0].tone.rank
+    assert after.answers.tone.rank <= before.answers.tone.rank
+
+
+@LAW
+@given(records(), statements(), st.booleans(), st.data())
+def test_a_new_supposition_never_improves_the_colour(
+    listed: list[Evidence], said: list[Statement], formal: bool, data: st.DataObject
+) -> None:
+    if not listed:
+        return
+    at = data.draw(st.sampled_from(range(len(listed))))
+    text = data.draw(st.sampled_from([*HYPOTHESES, "something else"]))
+    more = replace(listed[at], hypotheses=(*listed[at].hypotheses, text))
+    before = build(listed, said, formal=formal)
+    after = build([*listed[:at], more, *listed[at + 1 :]], said, formal=formal)
+    assert after.requirements[0].tone.rank <= before.requirements[0].tone.rank
+    assert after.answers.tone.rank <= before.answers.tone.rank
+
+
+@LAW
+@given(records(), statements())
+def test_what_is_argued_is_never_stronger_than_what_is_derived(listed: list[Evidence], said: list[Statement]) -> None:
+    argued, derived = build(listed, said, formal=False), build(listed, said, formal=True)
+    assert argued.requirements[0].tone.rank <= derived.requirements[0].tone.rank
+    assert argued.requirements[0].tone is not Tone.GREEN
+    assert {s.key for s in argued.suppositions} >= {s.key for s in derived.suppositions}
+    assert (
+        argued.requirements[0].weakest_evidence == derived.requirements[0].weakest_evidence
+        or derived.requirements[0].weakest_evidence is not None
+    )
+
+
+@LAW
+@given(records(), statements(), st.booleans())
+def test_the_verdict_counts_what_it_speaks_of_and_follows_from_what_the_case_holds(
+    listed: list[Evidence], said: list[Statement], formal: bool
+) -> None:
+    found = build(listed, said, formal=formal)
+    assert conclude_again(found) == found
+    a = found.answers
+    match a.headline:
+        case Headline.CONDITIONAL:
+            assert f" {len(found.suppositions)} supposition" in a.verdict
+            assert found.exit_code == 0
+        case Headline.HOLDS:
+            assert found.suppositions == ()
+        case Headline.NOT_SHOWN:
+            assert a.tone is Tone.RED
+            assert found.exit_code != 0 or any(r.how is How.OPEN for r in found.requirements)
+        case Headline.EXAMINED:
+            assert a.tone is Tone.GREY
+    assert sum(many for _, many in a.by_how) == len(found.requirements)
+    assert sum(line.count for line in a.supposed) == len(found.suppositions)
+    assert len({s.key for s in found.suppositions}) == len(found.suppositions)
+
+
+def test_past_its_last_day_a_supposition_opens_what_needs_it() -> None:
+    listed = [evidence(g, hypotheses=("the map is true",)) for g in GUARANTEES]
+
+    def on(until: str) -> Case:
+        said = Statement("suppositions.hoare.map", "The map is true", "", "somebody", until)
+        return build(listed, [said], formal=True)
+
+    good = on(TODAY.isoformat())
+    assert (good.requirements[0].how, good.requirements[0].tone, good.answers.tone) == (
+        How.DERIVED,
+        Tone.GREEN,
+        Tone.GREEN,
+    )
+    assert good.answers.verdict == "Holds if 1 supposition holds"
+    late = on("2026-11-20")
+    assert late.requirements[0].how is How.OPEN
+    assert late.answers.verdict == "Not shown: 1 open"
+    assert late.exit_code == 1
+    (gate,) = [g for g in late.gates if g.id == "requirements"]
+    assert "a supposition has expired" in gate.reason
+
+
+def test_without_owner_or_date_a_supposition_weakens() -> None:
+    listed = [evidence(g, hypotheses=("the map is true",)) for g in GUARANTEES]
+    found = build(listed, formal=True)
+    assert found.answers.tone is Tone.AMBER
+    assert found.suppositions[0].words == "(no plain words yet)"
+    assert {w.key: w.count for w in found.weakenings}["unowned"] == 1
+
+
+def test_a_supposition_stands_once_whoever_needs_it() -> None:
+    said = [
+        Statement("environment.in.a", "The map is right", "surveyed", "x", "2030-01-01"),
+        Statement("environment.in.b", "The map is right", "surveyed", "x", "2029-01-01"),
+    ]
+    claims = [obligation(SYSTEM_LEVEL, Kind.COMPOSITION, f"environment.in.{p}") for p in "ab"]
+    reasons = [evidence(c, Verdict.JUSTIFIED, "compose", link=Link.GUIDED, summary="surveyed") for c in claims]
+    needs = tuple(c.local_id for c in claims)
+    proofs = [evidence(g, hypotheses=needs) for g in GUARANTEES]
+    made = subject(PROSE, said, environment=[EnvironmentInput(f"in.{p}", "TRUE", "surveyed") for p in "ab"])
+    found = case(made, [*GUARANTEES, *claims], [*proofs, *reasons])
+    (world,) = [s for s in found.suppositions if s.sort is Sort.WORLD]
+    assert (world.key, world.until, world.needed_by) == ("environment.in.a", "2029-01-01", ("R",))
+
+
+def test_a_side_condition_brings_what_its_proof_used_and_a_guarantee_what_its_node_assumes() -> None:
+    """b assumes something that a's guarantee discharges, which a test supports: a requirement on b rests on a."""
+    side = obligation(SYSTEM_LEVEL, Kind.COMPOSITION, "whole.b.input", clauses=("b.input", "a.g"))
+    listed: list[Obligation] = [*GUARANTEES, side]
+    made = subject(replace(PROSE, supported_by=("b.g",)))
+    node = replace(made.contract.nodes[1], assumptions=(replace(made.contract.nodes[1].guarantees[0], name="input"),))
+    made = replace(made, contract=replace(made.contract, nodes=(made.contract.nodes[0], node)))
+    given_ = [
+        evidence(GUARANTEES[0], Verdict.TESTED, "hypothesis", bound={"cases": 10, "failure_probability_below": 0.3}),
+        evidence(GUARANTEES[2]),
+        evidence(side, method="compose", details={"needed": ["a.g"]}),
+    ]
+    found = case(made, listed, given_).requirements[0]
+    assert found.weakest_evidence is not None
+    assert (found.weakest_evidence.node, found.weakest_evidence.words) == (
+        "a",
+        "10 cases, none failed (fewer than 30 % fail)",
+    )
+    lost = case(made, listed, given_[1:]).requirements[0]
+    assert lost.how is How.OPEN
+    assert lost.failing == (GUARANTEES[0].id,)
+    nothing = case(made, [*GUARANTEES], given_[:2])
+    assert [s.key for s in nothing.suppositions if s.sort is Sort.WORLD] == ["assumption.b.input"]
+
+
+def test_changes_since_the_signed_report_worst_first() -> None:
+    old = build([evidence(g) for g in GUARANTEES], formal=True)
+    signed = baseline_of(old, "signed/rover/1.json", "A. Person", "2026-11-20", "2027-11-20")
+    weaker = [evidence(GUARANTEES[0], Verdict.TESTED, "hypothesis"), *(evidence(g) for g in GUARANTEES[1:])]
+    now = case(subject(FORMAL), [*GUARANTEES, OWN], [*weaker, evidence(OWN, method="compose")], baseline=signed)
+    kinds = [e.kind for e in now.changes.entries]
+    assert kinds == sorted(kinds, key=KINDS.index)
+    assert "weaker" in kinds
+    assert now.answers.signed.startswith("not signed; changed since A. Person")
+    same = case(
+        subject(FORMAL),
+        [*GUARANTEES, OWN],
+        [*(evidence(g) for g in GUARANTEES), evidence(OWN, method="compose")],
+        baseline=signed,
+    )
+    assert same.changes.entries == ()
+    assert same.answers.signed == "signed by A. Person on 2026-11-20 until 2027-11-20"
+    assert now.changes.against == same.changes.against
+
+
+def test_what_means_something_else_shows_both_formulas() -> None:
+    first = build([evidence(g) for g in GUARANTEES], formal=False)
+    moved = replace(GUARANTEES[0], digest="0" * 64, formula="x > 2")
+    signed = baseline_of(first, "f", "A", "2026-11-20")
+    now = case(
+        subject(PROSE), [moved, *GUARANTEES[1:]], [evidence(g) for g in (moved, *GUARANTEES[1:])], baseline=signed
+    )
+    (changed,) = [e for e in now.changes.entries if e.kind == "meaning"]
+    assert (changed.before, changed.after) == ("", "x > 2")
+
+
+def test_the_first_screen_of_a_full_case_is_in_plain_words() -> None:
+    a = rover_case().answers
+    own = [a.verdict, a.counts, a.weakened, a.gates, a.owned, a.signed, *(b.words for b in a.based_on)]
+    own += [b.title for b in a.based_on]
+    assert [name for text in own for name in identifiers(text)] == []
+
+
+def test_plain_words() -> None:
+    assert words_of("radiationSensor") == "radiation sensor"
+    assert words_of("GRA") == "GRA"
+    assert identifiers("agent.at and a_b in src/x.py of fooBar, 0123456789ab") == (
+        "agent.at",
+        "a_b",
+        "src/x",
+        "fooBar",
+        "0123456789ab",
+    )
+    assert identifiers("It holds for 0.5 m, and/or less; REQ1.") == ("and/or",)
+    assert date.fromisoformat("2030-01-01") > TODAY
