@@ -6,7 +6,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 
-from .syntax import Bindings, Condition, Rule, Struct, Term, Var, apply, unify, variables
+from .syntax import (
+    Bindings,
+    Condition,
+    Goal,
+    Rule,
+    Struct,
+    Term,
+    Var,
+    apply,
+    is_ground,
+    plain,
+    rename,
+    unify,
+    variables,
+)
 
 MAX_RULE_DEPTH = 60
 
@@ -17,18 +31,22 @@ class TooDeep(Exception):  # noqa: N818 - it names what happened
 
 @dataclass(frozen=True, slots=True)
 class Beliefs:
-    """`own` were added by the agent (or stood in the program), `perceived` by perception."""
+    """`own` were added by the agent (or stood in the program), `perceived` by perception; what it had when the other
+    came is not added again. Beliefs of one name are tried in the order of their texts."""
 
     own: frozenset[Struct]
     perceived: frozenset[Struct]
     index: Mapping[tuple[str, int], tuple[Struct, ...]] = field(compare=False, repr=False)
+    percepts: tuple[Struct, ...] = field(compare=False, repr=False)
+    """What is perceived, in the order in which AIL looks whether it is gone."""
 
     @staticmethod
     def of(own: frozenset[Struct], perceived: frozenset[Struct]) -> Beliefs:
         index: dict[tuple[str, int], list[Struct]] = {}
-        for belief in sorted(own | perceived, key=repr):
+        for belief in sorted(own | perceived, key=plain):
             index.setdefault((belief.functor, len(belief.args)), []).append(belief)
-        return Beliefs(own, perceived, {key: tuple(found) for key, found in index.items()})
+        percepts = tuple(sorted(perceived, key=lambda p: plain(p) + "[source(percept)]"))
+        return Beliefs(own, perceived, {key: tuple(found) for key, found in index.items()}, percepts)
 
     def __contains__(self, belief: Struct) -> bool:
         return belief in self.own or belief in self.perceived
@@ -36,7 +54,16 @@ class Beliefs:
     def matching(self, pattern: Struct) -> tuple[Struct, ...]:
         """The beliefs that unify with the pattern."""
         found = self.index.get((pattern.functor, len(pattern.args)), ())
-        return tuple(b for b in found if unify(pattern, b, {}) is not None)
+        return tuple(b for b in found if unify(pattern, apart(b, "''"), {}) is not None)
+
+
+def apart(belief: Struct, suffix: str) -> Struct:
+    """A belief with variables in it (what was added had them) speaks of anything: they are nobody else's."""
+    if not belief.args or is_ground(belief):
+        return belief
+    renamed = rename(belief, {name: Var(name + suffix) for name in variables(belief)})
+    assert isinstance(renamed, Struct)
+    return renamed
 
 
 @dataclass(slots=True)
@@ -60,13 +87,15 @@ class Reasoner:
             return
         key = (goal.functor, len(goal.args))
         for belief in beliefs.index.get(key, ()):
+            if belief.args and not is_ground(belief):
+                belief = apart(belief, f"'{next(self.fresh)}")
             found = unify(goal, belief, bindings)
             if found is not None:
                 yield found
         for rule in self.rules.get(key, ()):
             if depth >= MAX_RULE_DEPTH:
                 raise TooDeep
-            renamed = rename(rule, f"'{next(self.fresh)}")
+            renamed = renamed_rule(rule, f"'{next(self.fresh)}")
             found = unify(goal, renamed.head, bindings)
             if found is not None:
                 yield from self.holds(beliefs, renamed.body, found, (), depth + 1)
@@ -76,7 +105,7 @@ class Reasoner:
         beliefs: Beliefs,
         conditions: Sequence[Condition],
         bindings: Bindings,
-        goals: Sequence[Term],
+        goals: Sequence[Goal],
         depth: int = 0,
     ) -> Iterator[Bindings]:
         """Every way to meet all conditions. They come with the negated ones last."""
@@ -88,14 +117,19 @@ class Reasoner:
             yield from self.holds(beliefs, rest, found, goals, depth)
 
     def _one(
-        self, beliefs: Beliefs, condition: Condition, bindings: Bindings, goals: Sequence[Term], depth: int
+        self, beliefs: Beliefs, condition: Condition, bindings: Bindings, goals: Sequence[Goal], depth: int
     ) -> Iterator[Bindings]:
         if condition.term is None:
             yield bindings
             return
         ways: Iterator[Bindings]
         if condition.is_goal:
-            ways = (u for g in goals if (u := unify(condition.term, g, bindings)) is not None)
+            ways = (
+                u
+                for g in goals
+                if (condition.goal is None or g.kind is condition.goal)
+                and (u := unify(condition.term, g.term, bindings)) is not None
+            )
         else:
             ways = self.believes(beliefs, condition.term, bindings, depth)
         if condition.positive:
@@ -104,20 +138,11 @@ class Reasoner:
             yield bindings
 
 
-def rename(rule: Rule, suffix: str) -> Rule:
+def renamed_rule(rule: Rule, suffix: str) -> Rule:
     """The rule with variables of its own."""
     terms = [rule.head, *(c.term for c in rule.body if c.term is not None)]
     own: Bindings = {name: Var(name + suffix) for term in terms for name in variables(term)}
-    body = tuple(c if c.term is None else Condition(_apply_once(c.term, own), c.positive, c.is_goal) for c in rule.body)
-    head = _apply_once(rule.head, own)
+    body = tuple(c if c.term is None else Condition(rename(c.term, own), c.positive, c.is_goal) for c in rule.body)
+    head = rename(rule.head, own)
     assert isinstance(head, Struct)
     return Rule(head, body, rule.span)
-
-
-def _apply_once(term: Term, bindings: Mapping[str, Term]) -> Term:
-    if isinstance(term, Var):
-        return bindings.get(term.name, term)
-    return Struct(term.functor, tuple(_apply_once(arg, bindings) for arg in term.args))
-
-
-rename_term = _apply_once

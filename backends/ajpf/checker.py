@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 
 from .automaton import Automaton, build, compiled
 from .explore import Graph
-from .interpreter import NONE, Agent, Frame, State
+from .intentions import Frame
+from .interpreter import Agent, State
+from .mind import NONE
 from .psl import Atom, Formula, Modality, Not, atoms, conjunction
 from .structure import Fair, Kripke, Lasso, components, find_lasso, reduce
 from .syntax import DeedKind, Sign, Struct, Term, Var, unify
@@ -161,13 +163,14 @@ def label_states(agent: Agent, states: Iterable[State], wanted: Sequence[Atom]) 
     """For each state the bits of the atoms that hold in it, above them two bits for each fairness assumption."""
     by_beliefs: dict[int, int] = {}
     by_last: dict[int, int] = {NONE: 0}
-    by_choice: dict[int, int] = {}
+    by_goals: dict[int, int] = {}
     by_intention: dict[int, int] = {NONE: 0}
     numbered = [(1 << at, atom) for at, atom in enumerate(wanted)]
     believed = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.BELIEVES]
     done = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.DID]
     perceived = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.PERCEPT]
-    mental = (Modality.WANTS, Modality.INTENDS, Modality.INTENDS_TO_DO)
+    wanted_goals = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.WANTS]
+    mental = (Modality.INTENDS, Modality.INTENDS_TO_DO)
     intended = [(bit, a.modality, _own(a.term)) for bit, a in numbered if a.modality in mental]
     fair = [(1 << (len(wanted) + 2 * at), f.percept) for at, f in enumerate(agent.environment.fair)]
 
@@ -178,9 +181,12 @@ def label_states(agent: Agent, states: Iterable[State], wanted: Sequence[Atom]) 
     def of_last(number: int) -> int:
         return sum(bit for bit, term in done if unify(term, agent.actions.items[number], {}) is not None)
 
-    def of_choice(number: int) -> int:
-        offered = agent.environment.percepts(agent.choices.items[number])
+    def of_offer(offered: tuple[Struct, ...]) -> int:
         return sum(bit for bit, term in perceived if any(unify(term, p, {}) is not None for p in offered))
+
+    def of_goals(number: int) -> int:
+        goals = agent.goals.items[number]
+        return sum(bit for bit, term in wanted_goals if any(unify(term, g.term, {}) is not None for g in goals))
 
     def of_draw(number: int) -> int:
         offered = agent.environment.percepts(agent.choices.items[number])
@@ -192,12 +198,14 @@ def label_states(agent: Agent, states: Iterable[State], wanted: Sequence[Atom]) 
         bits = _memo(by_beliefs, state.beliefs, of_beliefs)
         if done:
             bits |= _memo(by_last, state.last, of_last)
+        if wanted_goals:
+            bits |= _memo(by_goals, state.goals, of_goals)
         if perceived:
-            bits |= _memo(by_choice, state.choice, of_choice)
+            bits |= of_offer(agent.sees(state))
         if fair and state.drawn:
             bits |= _memo(by_draw, state.choice, of_draw)
         if intended:
-            for number in (*state.active, *state.suspended, state.running):
+            for number in (*state.queue, state.current):
                 bits |= _memo(by_intention, number, lambda n: _mental(agent.intentions.items[n].frames, intended))
         result.append(bits)
     return result
@@ -219,7 +227,7 @@ def _mental(frames: Iterable[Frame], wanted: Sequence[tuple[int, Modality, Term]
                 hits = any(d.kind is DeedKind.ACTION and unify(term, d.term, {}) is not None for d in frame.deeds or ())
             else:
                 hits = is_goal and unify(term, frame.event.term, {}) is not None
-                hits = hits and (modality is Modality.WANTS or frame.deeds is not None)
+                hits = hits and frame.deeds is not None
             if hits:
                 bits |= bit
     return bits
@@ -234,7 +242,6 @@ def _own(term: Term, names: list[int] | None = None) -> Term:
     return Struct(term.functor, tuple(_own(arg, names) for arg in term.args))
 
 
-def needs_fine_steps(properties: Iterable[Property]) -> bool:
-    """Whether a property looks at intentions, which change between a plan's choice and its first deed."""
-    fine = (Modality.INTENDS, Modality.INTENDS_TO_DO)
-    return any(atom.modality in fine for p in properties for atom in atoms(p.formula))
+def asks_for_percepts(wanted: Property) -> bool:
+    """Whether a property looks at the environment (`interpreter.Agent`, "probed")."""
+    return any(atom.modality is Modality.PERCEPT for atom in atoms(wanted.formula))

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .beliefs import TooDeep
+from .builtin import Crash
 from .interpreter import Agent, State
 
 MAX_STATES = 2_000_000
@@ -40,7 +41,7 @@ _MANY = 6
 
 
 def _backlog(newest: Sequence[State]) -> str:
-    most = max(len(state.active) + len(state.suspended) for state in newest)
+    most = max(len(state.queue) for state in newest)
     if most < _MANY:
         return ""
     return (
@@ -83,6 +84,9 @@ def explore(agent: Agent, *, states: int = MAX_STATES, seconds: float = 60.0, me
             reached = successors(found[at])
         except (TooDeep, RecursionError):
             unfinished = "the agent's terms or reasoning rules nest too deeply"
+            break
+        except Crash as error:
+            unfinished = f"the agent ends with an error of its own: {error}"
             break
         for state in reached:
             targets.append(number(state))

@@ -204,7 +204,7 @@ class _Builder(Transformer):  # type: ignore[misc]
 
     @_build
     def rule(self, meta: Any, parts: list[Any]) -> Rule:
-        return Rule(parts[0], _negated_last(parts[1:]), self.span(meta))
+        return Rule(parts[0], tuple(parts[1:]), self.span(meta))
 
     def rules(self, parts: list[Any]) -> tuple[Rule, ...]:
         return tuple(p for p in parts if p is not None)
@@ -244,16 +244,16 @@ class _Builder(Transformer):  # type: ignore[misc]
         return Condition(parts[0], positive=False)
 
     def wanted(self, parts: list[Any]) -> Condition:
-        return Condition(parts[0], is_goal=True)
+        return Condition(parts[0], is_goal=True, goal=parts[1])
 
     def not_wanted(self, parts: list[Any]) -> Condition:
-        return Condition(parts[0], positive=False, is_goal=True)
+        return Condition(parts[0], positive=False, is_goal=True, goal=parts[1])
 
     def anything(self, parts: list[Any]) -> Condition:
         return Condition(None)
 
     def guard(self, parts: list[Condition]) -> tuple[Condition, ...]:
-        return _negated_last(parts)
+        return _as_tried(parts)
 
     def add_belief(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind.ADD_BELIEF, parts[1])
@@ -269,6 +269,15 @@ class _Builder(Transformer):  # type: ignore[misc]
 
     def wait(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind.WAIT, parts[0])
+
+    def lock(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind.LOCK, Struct(".lock"))
+
+    def unlock(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind.UNLOCK, Struct(".lock"))
+
+    def wait_not(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind.WAIT_NOT, parts[0])
 
     def action(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind.ACTION, parts[0])
@@ -299,6 +308,10 @@ def _number(text: str) -> str:
     return shown if shown == "0" else sign + shown
 
 
-def _negated_last(conditions: list[Condition]) -> tuple[Condition, ...]:
-    """Negated conjuncts are evaluated after the positive ones (page "AJPF and Gwendolen"), which bind the variables."""
-    return tuple(sorted(conditions, key=lambda c: not c.positive))
+def _as_tried(conditions: list[Condition]) -> tuple[Condition, ...]:
+    """A guard's conditions in the order in which AIL tries them: as written, but a negated first one after the second
+    if that is not negated (it may bind the variables of the first). `True` is no condition."""
+    real = [c for c in conditions if c.term is not None]
+    if len(real) > 1 and not real[0].positive and real[1].positive:
+        real[:2] = real[1], real[0]
+    return tuple(real)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
@@ -17,7 +19,7 @@ from . import ajpf_tool, spin
 from .ajpf_tool import Answer, Said
 from .automaton import TooLarge
 from .beliefs import TooDeep
-from .checker import Checker, OutOfTime, Property, needs_fine_steps
+from .checker import Checker, OutOfTime, Property, asks_for_percepts
 from .explore import explore
 from .files import ail_file, jpf_file
 from .instances import Instantiation, instances
@@ -67,7 +69,9 @@ class _Run:
         self.deadline = time.monotonic() + limits.seconds
         self.results: dict[str, Settled] = {}
         self.counterexamples: dict[str, Counterexample] = {}
-        self.bound: dict[str, object] = {}
+        self.bound: dict[str, Any] = {}
+        self.checkers: dict[str, Checker] = {}
+        """Property's key → what knows the state space that it was checked on."""
         self.engine = ENGINE
         self.logs: dict[str, str] = {}
         self.command: tuple[str, ...] = ()
@@ -82,35 +86,47 @@ class _Run:
         return max(0.0, self.deadline - time.monotonic())
 
     def frame(self) -> Frame:
-        checker = self.own()
-        if checker is not None and self.setup.engine in ("auto", "spin"):
-            self.ask_spin(checker)
+        checkers = self.own()
+        if checkers and self.setup.engine in ("auto", "spin"):
+            self.ask_spin(checkers)
         if self.setup.engine == "ajpf" or (self.setup.engine == "auto" and self.ajpf is not None):
             self.ask_ajpf(instead=self.setup.engine == "ajpf")
         return Frame(self.setup, self.made, self.results, self.counterexamples, self.engine, self.bound)
 
     # Our own engine
 
-    def own(self) -> Checker | None:
-        """Results for every property; where a bound was met, a violation within it still counts. The checker of the
-        whole state space, where that was explored."""
-        setup, properties = self.setup, self.made.properties
-        agent = Agent(setup.program, setup.environment, setup.semantics, fine=needs_fine_steps(properties))
+    def own(self) -> list[Checker]:
+        """Results for every property; where a bound was met, a violation within it still counts. The checkers of the
+        whole state spaces: properties that ask for percepts have one of their own (`interpreter.Agent`)."""
+        whole = []
+        self.bound |= {"states": 0, "transitions": 0, "exhaustive": True}
+        for probed in (False, True):
+            properties = [p for p in self.made.properties if asks_for_percepts(p) is probed]
+            if properties or (not probed and not self.made.properties):
+                checker = self.explored(properties, probed)
+                whole += [checker] if checker is not None and checker.graph.unfinished is None else []
+        self.explain()
+        return whole if self.bound["exhaustive"] else []
+
+    def explored(self, properties: Sequence[Property], probed: bool) -> Checker | None:
+        setup = self.setup
+        agent = Agent(setup.program, setup.environment, setup.semantics, probed=probed)
         graph = explore(agent, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
-        self.bound |= {"states": len(graph), "transitions": graph.transitions, "exhaustive": graph.unfinished is None}
+        self.bound["states"] += len(graph)
+        self.bound["transitions"] += graph.transitions
         if graph.unfinished is not None:
-            self.bound["unfinished"] = graph.unfinished
+            self.bound |= {"exhaustive": False, "unfinished": graph.unfinished}
             self.deadline += self.limits.seconds * GRACE
         try:
             checker = Checker(graph, properties)
         except (TooDeep, RecursionError):
             reason = "the agent's terms or reasoning rules nest too deeply"
-            self.results = {p.key: Settled(Verdict.UNKNOWN, reason) for p in properties}
+            self.results |= {p.key: Settled(Verdict.UNKNOWN, reason) for p in properties}
             return None
         for p in properties:
             self.results[p.key] = self.one(checker, p)
-        self.explain(checker)
-        return checker if graph.unfinished is None else None
+            self.checkers[p.key] = checker
+        return checker
 
     def one(self, checker: Checker, p: Property) -> Settled:
         try:
@@ -139,13 +155,14 @@ class _Run:
         )
         return Verdict.UNKNOWN, reason
 
-    def explain(self, checker: Checker) -> None:
+    def explain(self) -> None:
         """A run for the first refuted property of each guarantee, and of each further property."""
         groups = [claim.properties for claim in self.made.claims] + [ps for _, ps in self.made.extras]
         for group in groups:
             refuted = next((p for p in group if self.results[p.key].verdict is Verdict.REFUTED), None)
             if refuted is None:
                 continue
+            checker = self.checkers[refuted.key]
             lasso = checker.lasso(refuted)
             if lasso is None:  # the reduced and the whole graph disagree: never to happen, never to be passed over
                 self.results[refuted.key] = Settled(Verdict.ERROR, "the checker contradicts itself")
@@ -156,12 +173,14 @@ class _Run:
 
     # Others
 
-    def ask_spin(self, checker: Checker) -> None:
+    def ask_spin(self, checkers: Sequence[Checker]) -> None:
         name = f"Spin {spin.version()}"
+        answers: dict[str, bool] = {}
         with tempfile.TemporaryDirectory() as temporary:
             try:
-                seconds = self.left() * SPIN_SHARE if self.setup.engine == "auto" else self.left()
-                answers = spin.opinions(checker, self.made.properties, Path(temporary), seconds)
+                for checker in checkers:
+                    seconds = self.left() * SPIN_SHARE if self.setup.engine == "auto" else self.left()
+                    answers |= spin.opinions(checker, checker.properties, Path(temporary), seconds)
             except spin.NoOpinion as error:
                 self.bound["spin"] = f"no second opinion: {error.reason}"
                 if self.setup.engine == "spin":

@@ -67,6 +67,8 @@ class Condition:
     term: Term | None
     positive: bool = True
     is_goal: bool = False
+    goal: GoalKind | None = None
+    """Of a goal: its kind; without a written kind it is either."""
 
 
 class DeedKind(StrEnum):
@@ -75,7 +77,13 @@ class DeedKind(StrEnum):
     ADD_GOAL = "+!"
     DROP_GOAL = "-!"
     WAIT = "*"
+    WAIT_NOT = "*~"
+    LOCK = "+.lock"
+    UNLOCK = "-.lock"
+    SEND = ".send"
     ACTION = "action"
+    NULL = "null"
+    """Nothing: what is left of a deed that posted a goal to be performed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +91,14 @@ class Deed:
     kind: DeedKind
     term: Term
     goal: GoalKind = GoalKind.PERFORM
+
+    @property
+    def args(self) -> bool:
+        """Whether there may be variables in it."""
+        return isinstance(self.term, Var) or bool(self.term.args)
+
+
+NULL = Deed(DeedKind.NULL, Struct("null"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +139,13 @@ def show(term: Term) -> str:
     return f"{term.functor}({', '.join(map(show, term.args))})" if term.args else term.functor
 
 
+def plain(term: Term) -> str:
+    """A term as AIL's own texts write it, by which it also sorts: no space after a comma."""
+    if isinstance(term, Var):
+        return term.name
+    return f"{term.functor}({','.join(map(plain, term.args))})" if term.args else term.functor
+
+
 def show_event(event: Event) -> str:
     return f"{event.sign}{'!' if event.is_goal else ''}{show(event.term)}{f' [{event.goal}]' if event.goal else ''}"
 
@@ -147,6 +170,13 @@ def variables(term: Term) -> Iterator[str]:
 
 def is_ground(term: Term) -> bool:
     return isinstance(term, Struct) and all(map(is_ground, term.args))
+
+
+def rename(term: Term, names: Mapping[str, Term]) -> Term:
+    """The term with other variables in the place of its own, once: what comes in is not looked at again."""
+    if isinstance(term, Var):
+        return names.get(term.name, term)
+    return Struct(term.functor, tuple(rename(arg, names) for arg in term.args)) if term.args else term
 
 
 def apply(term: Term, bindings: Mapping[str, Term]) -> Term:

@@ -17,8 +17,9 @@ from . import psl
 from .automaton import compiled
 from .checker import Property, label_states
 from .explore import Graph
-from .interpreter import NONE, State
+from .interpreter import State
 from .mapping import Row
+from .mind import NONE
 from .psl import Formula
 from .psl_parser import Malformed, index_names, instantiate
 from .structure import Lasso

@@ -36,13 +36,14 @@ def test_another_agent_with_other_names(lift, tmp_path):
 
 
 def test_the_percept_semantics_change_the_verdict_and_are_named(lift, tmp_path):
-    """A call that came while the door was open fires no event when the door shuts, if events are for changes only."""
+    """A door that stays open is perceived anew at each draw, or is no event any more."""
+    plans = "+open : { B seen } <- halt(0);\n+open : { ~B seen } <- +seen;"
     files = {
-        "cabin.yaml": "draws: {at_quiescence: repeatedly}\npercepts: {door: [open, nothing], c: [call(1), nothing]}\n",
-        "cabin.gwen": (FIXTURES / "lift" / "cabin.gwen").read_text().replace("+open : { True } <- halt(0);", ""),
+        "cabin.yaml": "draws: {at_quiescence: repeatedly}\npercepts: {door: [open], c: [call(1), nothing]}\n",
+        "cabin.gwen": (FIXTURES / "lift" / "cabin.gwen").read_text().replace("+open : { True } <- halt(0);", plans),
     }
-    assert settle(lift({"semantics": "mcapl"}, files), tmp_path)["answers"].verdict is Verdict.CHECKED
-    outcome = settle(lift({"semantics": "edge"}, files), tmp_path)["answers"]
+    assert settle(lift({"semantics": "mcapl"}, files), tmp_path)["halts"].verdict is Verdict.CHECKED
+    outcome = settle(lift({"semantics": "edge"}, files), tmp_path)["halts"]
     assert outcome.verdict is Verdict.REFUTED
     assert "edge percepts" in outcome.summary
     assert outcome.counterexample.trace

@@ -98,7 +98,7 @@ QUICK = ("a plan dropped", "a wrong next location", "leaving too early", "the in
 @pytest.mark.parametrize("fault", [f if f in QUICK else pytest.param(f, marks=pytest.mark.slow) for f in FAULTS])
 def test_seeded_faults_are_caught(rover, tmp_path, fault):
     change, caught = FAULTS[fault]
-    outcomes = settle(rover(*REPAIRED, {"states": 6_000}, program=change), tmp_path)
+    outcomes = settle(rover(*REPAIRED, {"states": 30_000}, program=change), tmp_path)
     refuted = {name for name, outcome in outcomes.items() if outcome.verdict is Verdict.REFUTED}
     assert refuted >= caught
     for name in refuted:

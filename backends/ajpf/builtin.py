@@ -1,0 +1,73 @@
+"""Actions that compute: AIL's environments carry them out themselves, and they count as actions for all that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from .syntax import Bindings, Struct, Term, Var, plain
+
+
+class Crash(Exception):  # noqa: N818 - it names what the agent does
+    """AIL would end with a Java exception here; the text is a clause for people."""
+
+
+def _divide(x: float, y: float) -> float:
+    if y != 0:
+        return x / y
+    return float("nan") if x == 0 else float("inf") if x > 0 else float("-inf")
+
+
+_ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
+    "sum": lambda x, y: x + y,
+    "minus": lambda x, y: x - y,
+    "times": lambda x, y: x * y,
+    "div": _divide,
+}
+COMPUTING = frozenset((*_ARITHMETIC, "append", "toString"))
+
+
+def compute(action: Struct) -> Bindings:
+    """What carrying out the action binds. Raises Crash."""
+    if action.functor in _ARITHMETIC and len(action.args) >= 3:
+        left, right = number(action.args[0]), number(action.args[1])
+        if left is None or right is None:
+            raise Crash(f"{plain(action)} computes with what is no number")
+        return _bound(action, 2, Struct(shown(_ARITHMETIC[action.functor](left, right))))
+    if action.functor == "append" and len(action.args) >= 3:
+        texts = [text(arg) for arg in action.args[:2]]
+        if None in texts:
+            raise Crash(f"{plain(action)} appends what is no text")
+        return _bound(action, 2, Struct('"' + "".join(t or "" for t in texts) + '"'))
+    if action.functor == "toString" and len(action.args) >= 2:
+        return _bound(action, 1, Struct(f'"{plain(action.args[0])}"'))
+    return {}
+
+
+def _bound(action: Struct, at: int, value: Struct) -> Bindings:
+    result = action.args[at]
+    if not isinstance(result, Var):
+        raise Crash(f"the result of {plain(action)} is no free variable")
+    return {result.name: value}
+
+
+def number(term: Term) -> float | None:
+    """The value of a number; None for anything else."""
+    if isinstance(term, Var) or term.args or not term.functor[-1:].isdigit():
+        return None
+    try:
+        return float(term.functor)
+    except ValueError:
+        return None
+
+
+def text(term: Term) -> str | None:
+    if isinstance(term, Struct) and term.functor[:1] in ("'", '"') and not term.args:
+        return term.functor[1:-1]
+    return None
+
+
+def shown(value: float) -> str:
+    """A number as AIL writes it: 4.0 is 4."""
+    if value == int(value) if abs(value) < 1e15 else False:
+        return str(int(value))
+    return repr(value)

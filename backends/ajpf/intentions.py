@@ -1,0 +1,142 @@
+"""Intentions: stacks of events with the deeds that are left to do about each, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from .syntax import (
+    NULL,
+    Bindings,
+    Deed,
+    Event,
+    Goal,
+    GoalKind,
+    Sign,
+    Struct,
+    Term,
+    Var,
+    apply,
+    is_ground,
+    rename,
+    show_event,
+    variables,
+)
+
+START = Event(Sign.ADD, Struct(":start"))
+"""The bottom of an intention that stands for an initial goal."""
+PERCEPTION = Event(Sign.ADD, Struct(":perception"))
+"""The event of an intention that takes up one percept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """An event and what is left to do about it; `deeds` is None until a plan is chosen."""
+
+    event: Event
+    deeds: tuple[Deed, ...] | None = None
+    fresh: bool = False
+    """A plan was chosen for it, and no deed of it done: where AIL counts the rows of an intention it matters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Intention:
+    """A stack of frames, the bottom one first. `waiting` is the literal that suspended it; a `locked` intention stays
+    the current one until it unlocks itself."""
+
+    frames: tuple[Frame, ...]
+    waiting: Term | None = None
+    locked: bool = False
+
+    @property
+    def weight(self) -> tuple[int, str]:
+        """The order of suspended intentions: by their number of rows, then by the text of their top event. AIL keeps
+        the next deed of a frame in a row of its own once one has been done."""
+        rows = sum(2 if f.deeds is not None and len(f.deeds) > 1 and not f.fresh else 1 for f in self.frames)
+        return rows, show_event(self.frames[-1].event)
+
+    def goals(self) -> tuple[Goal, ...]:
+        """The goals of its events, the bottom one first."""
+        return tuple(goal for frame in self.frames if (goal := goal_of(frame.event)) is not None)
+
+
+EMPTY = Intention(())
+
+
+def goal_of(event: Event) -> Goal | None:
+    if not event.is_goal:
+        return None
+    return Goal(event.term, event.goal or GoalKind.PERFORM)
+
+
+def of_event(event: Event) -> Intention:
+    return Intention((Frame(event),))
+
+
+def of_deed(event: Event, deed: Deed) -> Intention:
+    return Intention((Frame(event, (deed,)),))
+
+
+def bind(intention: Intention, bindings: Bindings) -> Intention:
+    """The intention with its bound variables replaced, in all its frames."""
+    if not bindings or not intention.frames:
+        return intention
+    return replace(intention, frames=tuple(_bound(frame, bindings) for frame in intention.frames))
+
+
+def _bound(frame: Frame, bindings: Bindings) -> Frame:
+    event = replace(frame.event, term=apply(frame.event.term, bindings))
+    if frame.deeds is None:
+        return Frame(event)
+    deeds = tuple(d if not d.args else replace(d, term=apply(d.term, bindings)) for d in frame.deeds)
+    return Frame(event, deeds, frame.fresh)
+
+
+def tail(intention: Intention) -> tuple[Intention, Goal | None]:
+    """Without its next deed. With its last deed a frame goes, and the goal of a frame that goes is given too: it leaves
+    the goal base."""
+    top = intention.frames[-1]
+    if top.deeds is not None and len(top.deeds) > 1:
+        return replace(intention, frames=(*intention.frames[:-1], Frame(top.event, top.deeds[1:]))), None
+    return replace(intention, frames=intention.frames[:-1]), goal_of(top.event)
+
+
+def perform(intention: Intention, goal: Goal) -> Intention:
+    """The goal is posted; the deed that did so becomes one that does nothing, which takes a turn of its own later."""
+    top = intention.frames[-1]
+    assert top.deeds
+    below = Frame(top.event, (NULL, *top.deeds[1:]))
+    return replace(intention, frames=(*intention.frames[:-1], below, Frame(event_of(goal))))
+
+
+def achieve(intention: Intention, goal: Goal) -> Intention:
+    """The goal is posted; the deed that did so stays, and is looked at again when the goal has been dealt with."""
+    top = intention.frames[-1]
+    below = Frame(top.event, top.deeds)
+    return replace(intention, frames=(*intention.frames[:-1], below, Frame(event_of(goal))))
+
+
+def event_of(goal: Goal, sign: Sign = Sign.ADD) -> Event:
+    return Event(sign, goal.term, goal.kind, is_goal=True)
+
+
+def canonical(intention: Intention) -> Intention:
+    """Variables of reasoning rules, named apart at every use, get names that depend on the intention alone."""
+    if all(is_ground(f.event.term) and all(is_ground(d.term) for d in f.deeds or ()) for f in intention.frames):
+        return intention
+    names: dict[str, Term] = {}
+    for frame in intention.frames:
+        for term in (frame.event.term, *(d.term for d in frame.deeds or ())):
+            for name in variables(term):
+                if "'" in name:
+                    names.setdefault(name, Var(f"~{len(names)}"))
+    if not names:
+        return intention
+    frames = tuple(
+        replace(
+            frame,
+            event=replace(frame.event, term=rename(frame.event.term, names)),
+            deeds=None if frame.deeds is None else tuple(replace(d, term=rename(d.term, names)) for d in frame.deeds),
+        )
+        for frame in intention.frames
+    )
+    return replace(intention, frames=frames)

@@ -1,0 +1,281 @@
+"""What an agent has in mind, in interned parts, and what choosing a plan or doing one deed makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Generic, NamedTuple, TypeVar
+
+from .beliefs import Beliefs, Reasoner, apart
+from .builtin import COMPUTING, compute
+from .intentions import (
+    EMPTY,
+    PERCEPTION,
+    Frame,
+    Intention,
+    bind,
+    canonical,
+    goal_of,
+    of_event,
+    tail,
+)
+from .syntax import (
+    Bindings,
+    DeedKind,
+    Event,
+    Goal,
+    GoalKind,
+    Plan,
+    Program,
+    Sign,
+    Struct,
+    Term,
+    Var,
+    plain,
+    rename,
+    unify,
+    variables,
+)
+
+T = TypeVar("T")
+NONE = -1
+
+
+class Table(Generic[T]):
+    """Numbers for things, in order of appearance."""
+
+    def __init__(self) -> None:
+        self.items: list[T] = []
+        self._numbers: dict[T, int] = {}
+
+    def number(self, item: T) -> int:
+        found = self._numbers.get(item)
+        if found is None:
+            found = self._numbers[item] = len(self.items)
+            self.items.append(item)
+        return found
+
+
+class Done(NamedTuple):
+    """What one deed does, as far as it depends on beliefs, goals and the intention alone."""
+
+    beliefs: int
+    goals: int
+    intention: int
+    posted: tuple[int, ...] = ()
+    changed: tuple[Term, ...] = ()
+    action: int = NONE
+    suspended: bool = False
+
+
+class Mind:
+    """Belief bases, goal bases, intentions and actions by their numbers; and the steps between them."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.reasoner = Reasoner.of(program.rules)
+        self.beliefs: Table[Beliefs] = Table()
+        self.goals: Table[frozenset[Goal]] = Table()
+        self.intentions: Table[Intention] = Table()
+        self.actions: Table[Struct] = Table()
+        self.empty = self.intentions.number(EMPTY)
+        self.uses_goals = any(c.is_goal for plan in program.plans for c in plan.guard)
+        self._triggers = _trigger_index(program.plans)
+        self._bases: dict[tuple[frozenset[Struct], frozenset[Struct]], int] = {}
+
+    # Plans
+
+    def choose(self, base: int, goals: int, number: int) -> tuple[int, int]:
+        intention = self.intentions.items[number]
+        event, below = intention.frames[-1].event, intention.frames[:-1]
+        suffix = f"^{len(intention.frames)}"
+        for plan in self._triggers.get(_key(event), ()):
+            if plan.event.goal not in (None, event.goal):
+                continue
+            bindings = unify(_own(plan.event.term, suffix), event.term, {})
+            if bindings is None:
+                continue
+            guard = tuple(c if c.term is None else replace(c, term=_own(c.term, suffix)) for c in plan.guard)
+            met = next(self.reasoner.holds(self.beliefs.items[base], guard, bindings, self._wanted(goals)), None)
+            if met is None:
+                continue
+            if not plan.deeds:
+                left = bind(replace(intention, frames=below), met)
+                gone = goal_of(event) if event.sign is Sign.ADD else None
+                return self.number(left), self.without(goals, gone)
+            deeds = tuple(replace(d, term=_own(d.term, suffix)) if d.args else d for d in plan.deeds)
+            top = Frame(event, deeds, fresh=True)
+            return self.number(bind(replace(intention, frames=(*below, top)), met)), goals
+        if not below and not (event.is_goal and event.sign is Sign.DROP):
+            return self.empty, goals
+        if event.is_goal and event.sign is Sign.ADD:
+            problem = Frame(replace(event, sign=Sign.DROP))
+            return self.number(replace(intention, frames=(*intention.frames, problem))), goals
+        return number, goals
+
+    # Deeds
+
+    def effect(self, base: int, goals: int, number: int) -> Done:
+        intention = self.intentions.items[number]
+        top = intention.frames[-1]
+        if not top.deeds:  # an event -!g that no plan takes up
+            return Done(base, goals, number)
+        deed, beliefs = top.deeds[0], self.beliefs.items[base]
+        term = deed.term
+        match deed.kind:
+            case DeedKind.ACTION | DeedKind.SEND:
+                action = self.actions.number(_named(term))
+                bindings = compute(self.actions.items[action]) if _functor(term) in COMPUTING else {}
+                return self.after(base, goals, intention, bindings, action=action)
+            case DeedKind.ADD_BELIEF:
+                return self._add_belief(goals, intention, beliefs, base, _named(term))
+            case DeedKind.DROP_BELIEF:
+                return self._drop_belief(goals, intention, beliefs, term)
+            case DeedKind.WAIT | DeedKind.WAIT_NOT:
+                met: Bindings | None = next(self.reasoner.believes(beliefs, term, {}), None)
+                if deed.kind is DeedKind.WAIT_NOT:
+                    met = {} if met is None else None
+                if met is not None:
+                    return self.after(base, goals, intention, met)
+                return Done(base, goals, self.number(replace(intention, waiting=term)), suspended=True)
+            case DeedKind.LOCK | DeedKind.UNLOCK:
+                locked = replace(intention, locked=deed.kind is DeedKind.LOCK)
+                return self.after(base, goals, locked, {})
+            case _:  # goals are looked at with the queue in view
+                return self.after(base, goals, intention, {})
+
+    def after(
+        self,
+        base: int,
+        goals: int,
+        intention: Intention,
+        bindings: Bindings,
+        posted: tuple[int, ...] = (),
+        changed: tuple[Term, ...] = (),
+        action: int = NONE,
+    ) -> Done:
+        """The deed is done."""
+        left, gone = tail(intention)
+        return Done(base, self.without(goals, gone), self.number(bind(left, bindings)), posted, changed, action)
+
+    def _add_belief(self, goals: int, intention: Intention, beliefs: Beliefs, base: int, belief: Struct) -> Done:
+        known = next(self.reasoner.believes(beliefs, belief, {}), None) is not None
+        new = base
+        if belief not in beliefs:
+            if intention.frames[0].event == PERCEPTION:
+                new = self.base(beliefs.own, beliefs.perceived | {belief})
+            else:
+                new = self.base(beliefs.own | {belief}, beliefs.perceived)
+        posted = () if known else (self.intentions.number(of_event(Event(Sign.ADD, belief))),)
+        return self.after(new, goals, intention, {}, posted, (belief,))
+
+    def _drop_belief(self, goals: int, intention: Intention, beliefs: Beliefs, term: Term) -> Done:
+        gone = beliefs.matching(term) if isinstance(term, Struct) else ()
+        new = self.base(beliefs.own.difference(gone), beliefs.perceived.difference(gone))
+        event = self.intentions.number(of_event(Event(Sign.DROP, term)))
+        bindings = (unify(term, apart(gone[0], "''"), {}) if gone else None) or {}
+        return self.after(new, goals, intention, bindings, (event,) * len(gone), (term,))
+
+    def drop_goal(
+        self, base: int, goals: int, intention: Intention, queue: tuple[int, ...], goal: Goal
+    ) -> tuple[Done, tuple[int, ...]]:
+        """The goal is dropped from the intention that drops it, with all that stands on it and the deed that posted it,
+        else from all others; with it go the goals of the intention that it was dropped from last."""
+        goals = self.without(goals, goal)
+        cut = _cut(intention, goal)
+        if cut is not None:
+            lost = intention.goals()
+            left, gone = tail(cut)
+        else:
+            lost = ()
+            others = []
+            for number in queue:
+                other = self.intentions.items[number]
+                short = _cut(other, goal)
+                if short is not None:
+                    lost = other.goals()
+                    other, gone = tail(replace(short, waiting=None))
+                    goals = self.without(goals, gone)
+                    number = self.number(other)
+                elif goal.kind is GoalKind.PERFORM and other.frames and _posts(other, goal):
+                    other, gone = tail(other)
+                    goals = self.without(goals, gone)
+                    number = self.number(other)
+                if number != self.empty:
+                    others.append(number)
+            queue = tuple(others)
+            left, gone = tail(intention)
+        goals = self.without(goals, gone)
+        for other_goal in lost:
+            goals = self.without(goals, other_goal)
+        return Done(base, goals, self.number(left)), queue
+
+    # Parts
+
+    def number(self, intention: Intention) -> int:
+        if not intention.frames:
+            return self.empty
+        return self.intentions.number(canonical(intention))
+
+    def base(self, own: frozenset[Struct], perceived: frozenset[Struct]) -> int:
+        key = (own, perceived)
+        found = self._bases.get(key)
+        if found is None:
+            found = self._bases[key] = self.beliefs.number(Beliefs.of(own, perceived))
+        return found
+
+    def without(self, goals: int, goal: Goal | None) -> int:
+        if goal is None or goal not in self.goals.items[goals]:
+            return goals
+        return self.goals.number(self.goals.items[goals] - {goal})
+
+    def _wanted(self, goals: int) -> tuple[Goal, ...]:
+        return tuple(sorted(self.goals.items[goals], key=lambda g: plain(g.term))) if self.uses_goals else ()
+
+
+def _key(event: Event) -> tuple[Sign, bool, str, int]:
+    assert isinstance(event.term, Struct)
+    return event.sign, event.is_goal, event.term.functor, len(event.term.args)
+
+
+def _trigger_index(plans: Iterable[Plan]) -> dict[tuple[Sign, bool, str, int], list[Plan]]:
+    """Plans by what triggers them, in file order."""
+    index: dict[tuple[Sign, bool, str, int], list[Plan]] = {}
+    for plan in plans:
+        index.setdefault(_key(plan.event), []).append(plan)
+    return index
+
+
+def _cut(intention: Intention, goal: Goal) -> Intention | None:
+    """The intention below the first frame that is at the goal. Where only the goal's kind or the event's sign differ,
+    all of the intention; None if nothing fits."""
+    for at, frame in enumerate(intention.frames):
+        event = frame.event
+        if event.is_goal and event.sign is Sign.ADD and event.goal is goal.kind and _fits(goal, event.term):
+            return replace(intention, frames=intention.frames[:at])
+    return intention if any(_fits(goal, other.term) for other in intention.goals()) else None
+
+
+def _fits(goal: Goal, term: Term) -> bool:
+    return unify(goal.term, term, {}) is not None
+
+
+def _posts(intention: Intention, goal: Goal) -> bool:
+    """Whether its next deed posts the goal."""
+    deeds = intention.frames[-1].deeds
+    return bool(deeds) and deeds[0].kind is DeedKind.ADD_GOAL and unify(goal.term, deeds[0].term, {}) is not None  # type: ignore[index]
+
+
+def _own(term: Term, suffix: str) -> Term:
+    """The term with the variables of one use of a plan."""
+    names = set(variables(term))
+    return rename(term, {name: Var(name + suffix) for name in names}) if names else term
+
+
+def _functor(term: Term) -> str:
+    return term.functor if isinstance(term, Struct) else ""
+
+
+def _named(term: Term) -> Struct:
+    """What enters the belief base or the world is no mere variable."""
+    return term if isinstance(term, Struct) else Struct("_")
