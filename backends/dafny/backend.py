@@ -17,7 +17,7 @@ from avow.system.plan import System
 
 from .codes import CODES
 from .judge import Settled, settle
-from .modules import Generated, generate, lines_map, one_line
+from .modules import PROBE_FILE, Generated, generate, lines_map, one_line
 from .printer import NotExpressible
 from .runner import INSTALL, dafny
 from .scanner import Scan, scan
@@ -43,7 +43,7 @@ class DafnyBackend(Backend):
 
     name = "dafny"
     title = "a Dafny implementation, verified against the contract"
-    version = "3"
+    version = "4"
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False
@@ -89,6 +89,7 @@ class DafnyBackend(Backend):
             return {"NOT-COVERED.txt": f"{one_line(problem.what)}\n"}
         return {
             **_specification(generated),
+            PROBE_FILE: generated.probe,
             "guarantees.json": lines_map(generated),
             f"skeleton/{generated.impl_file}": generated.skeleton,
         }

@@ -3,12 +3,15 @@
 Proved only if all of this holds: the file refines the generated specification and takes nothing for granted (our scan
 and Dafny's own complaints agree); every method and lemma that it declares, and Step and EnvNotEmpty among them, is in
 the answer; everything in the answer is correct; and the printed count of errors is 0. Anything less is not a proof.
+
+What Env asks for is read from the program that Dafny prints once it has resolved all names, in the implementation's
+module; that an Env that reads `true` asks nothing is proved besides, of the name that a module of Avow's own resolves.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from avow.backend_kit.protocol import Limits
@@ -17,9 +20,9 @@ from avow.language.contract import Node
 
 from .answer import Member
 from .candidate import candidates
-from .modules import Generated
+from .modules import CALL, ENV_ALWAYS, PROBE_FILE, Generated, without_env_always
 from .runner import Audit, Run, audit, verify
-from .scanner import Scan
+from .scanner import Scan, resolved_environment
 
 _FINISHED = re.compile(r"Dafny program verifier finished with (\d+) verified, (\d+) errors?(.*)")
 _SHOWN = 6
@@ -46,8 +49,9 @@ def settle(node: Node, generated: Generated, scanned: Scan, shown_name: str, lim
 
     Raises ToolMissing, OSError.
     """
-    guarantees = [name for _, name in generated.ensures]
-    files = _files(generated, scanned, generated.spec)
+    guarantees = tuple(name for _, name in generated.ensures)
+    asks = scanned.environment != "true"
+    files = _files(generated, scanned, guarantees, asks)
     run = verify(files, limits)
     logs = {"verify.log": run.output}
 
@@ -62,27 +66,32 @@ def settle(node: Node, generated: Generated, scanned: Scan, shown_name: str, lim
     taken = _taken_for_granted(audited, scanned, generated, shown_name)
     if taken is None:
         return alike(Settled(Verdict.ERROR, "Dafny did not say what the implementation leaves open", (), {}))
-    lacking = _lacking(run.members or (), scanned, generated)
+    environment = _environment(run, scanned, generated)
+    lacking = _lacking(run.members or (), scanned, generated, environment)
     if lacking:
         return alike(Settled(Verdict.ERROR, f"missing: {'; '.join(lacking)}", taken))
+    if asks != (environment != "true"):
+        text = f"Env is not what it seems: {scanned.environment} in the file, {environment} for Dafny"
+        return alike(Settled(Verdict.ERROR, text, taken))
     unproved = dict.fromkeys(guarantees, _unproved(run))
     spared = _spared(run, generated)
     if spared:
         # Only other guarantees failed. Dafny assumes what it has reported before it goes on, so these are asked
         # again without those.
-        again = verify(_files(generated, scanned, _only(generated, spared)), limits)
+        again = verify(_files(generated, scanned, spared, asks), limits)
         logs["verify-again.log"] = again.output
         if _broken(again, scanned, generated, shown_name) is None:
-            left = _unproved(again) or tuple(_lacking(again.members or (), scanned, generated))
+            left = _unproved(again) or tuple(_lacking(again.members or (), scanned, generated, environment))
             unproved |= dict.fromkeys(spared, left)
     tried = [dict(c) for c in candidates(run.model, node)] if any(unproved.values()) else []
-    verdicts = {name: _verdict(unproved[name], taken, scanned, generated, tried) for name in guarantees}
+    verdicts = {name: _verdict(unproved[name], taken, environment, scanned, generated, tried) for name in guarantees}
     return Judgement(verdicts, run.command, logs)
 
 
 def _verdict(
     unproved: tuple[str, ...],
     taken: tuple[str, ...],
+    environment: str | None,
     scanned: Scan,
     generated: Generated,
     tried: list[dict[str, str]],
@@ -101,8 +110,8 @@ def _verdict(
         )
     added: tuple[str, ...] = ()
     summary = f"Step of {generated.impl_module} meets it for all inputs that meet the assumptions"
-    if scanned.environment != "true":
-        added = (f"added assumption of the implementation, Env: {scanned.environment}",)
+    if environment != "true":
+        added = (f"added assumption of the implementation, Env: {environment}",)
         summary += " and Env"
     return Settled(Verdict.PROVED, summary, added, details)
 
@@ -141,14 +150,24 @@ def _taken_for_granted(audited: Audit, scanned: Scan, generated: Generated, show
     return tuple(dict.fromkeys(found))
 
 
-def _lacking(members: tuple[Member, ...], scanned: Scan, generated: Generated) -> list[str]:
+def _environment(run: Run, scanned: Scan, generated: Generated) -> str | None:
+    """The body of Env: Dafny's own, where this version prints it; else as the file has it in the module itself."""
+    if run.resolved is None:
+        return scanned.environment
+    return resolved_environment(run.resolved, generated.impl_module)
+
+
+def _lacking(members: tuple[Member, ...], scanned: Scan, generated: Generated, environment: str | None) -> list[str]:
     """Members that should be in the answer and are not: Dafny is silent of a method without a body."""
-    there = {m.name for m in members if (m.kind, m.module, m.scope) == ("Impl", generated.impl_module, "_default")}
+    there = {(m.module, m.name) for m in members if (m.kind, m.scope) == ("Impl", "_default")}
     names = {m.name for m in members if m.kind == "Impl"}
     found = [what for _, what in scanned.problems]
-    found += [f"no answer about {n}" for n in ("EnvNotEmpty", "Step") if n not in there]
+    own = [(generated.impl_module, n) for n in ("EnvNotEmpty", "Step")] + [(generated.probe_module, CALL)]
+    if environment == "true":
+        own.append((generated.probe_module, ENV_ALWAYS))
+    found += [f"no answer about {name}" for module, name in own if (module, name) not in there]
     found += [f"no answer about {kind} {name}" for kind, name in scanned.members if name not in names]
-    if scanned.environment is None:
+    if environment is None:
         found.append("predicate Env has no body")
     return list(dict.fromkeys(found))
 
@@ -188,22 +207,26 @@ def _spared(run: Run, generated: Generated) -> tuple[str, ...]:
     return tuple(name for name in lines.values() if name not in failed) if failed else ()
 
 
-def _only(generated: Generated, guarantees: tuple[str, ...]) -> str:
-    """The specification with the `ensures` of some guarantees; every line keeps its number."""
-    lines = generated.spec.split("\n")
-    for number, name in generated.ensures:
+def _only(text: str, ensures: Sequence[tuple[int, str]], guarantees: tuple[str, ...]) -> str:
+    """A generated text with the `ensures` of some guarantees; every line keeps its number."""
+    lines = text.split("\n")
+    for number, name in ensures:
         if name not in guarantees:
             lines[number - 1] = ""
     return "\n".join(lines)
 
 
-def _files(generated: Generated, scanned: Scan, spec: str) -> dict[str, str]:
-    return {
+def _files(generated: Generated, scanned: Scan, guarantees: tuple[str, ...], asks: bool) -> dict[str, str]:
+    """What Dafny is given. `asks`: whether Env, as the file has it, asks for something. A file that cannot be an
+    implementation is not called from outside: then Dafny's complaints are about the file alone."""
+    probe = _only(generated.probe, generated.probe_ensures, guarantees)
+    files = {
         generated.types_file: generated.types,
         generated.contract_file: generated.contract,
-        generated.spec_file: spec,
+        generated.spec_file: _only(generated.spec, generated.ensures, guarantees),
         generated.impl_file: scanned.text,
     }
+    return files if scanned.problems else {**files, PROBE_FILE: without_env_always(probe) if asks else probe}
 
 
 def _name(file: str, generated: Generated, shown_name: str) -> str:

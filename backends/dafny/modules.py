@@ -46,8 +46,18 @@ class Generated:
     spec: str
     skeleton: str
     ensures: tuple[tuple[int, str], ...]
+    probe_module: str
+    probe: str
+    """A module of Avow's own that calls the implementation from outside, by its qualified name: that its Step gives
+    what the contract wants, and that its Env asks nothing, is then said of what Dafny takes these names for."""
+    probe_ensures: tuple[tuple[int, str], ...]
+    """The same map for its `ensures`."""
     uncovered: tuple[tuple[str, str], ...]
     """Guarantees that cannot be expressed, with the reason."""
+
+
+PROBE_FILE = "probe.dfy"
+ENV_ALWAYS, CALL = "EnvAlways", "Call"
 
 
 def generate(node: Node, guarantees: Sequence[str]) -> Generated:
@@ -60,6 +70,7 @@ def generate(node: Node, guarantees: Sequence[str]) -> Generated:
     title = identifier(node.name).replace("'", "")
     title = title[:1].upper() + title[1:]
     spec_module, impl_module = names.fresh(f"{title}Spec"), names.fresh(f"{title}Impl")
+    probe_module = names.fresh(f"{title}Probe")
     for clause in node.clauses:  # clauses first: they keep their names whatever their quantifiers are called
         names("clause", clause.name)
     for port in inputs + outputs:
@@ -83,10 +94,11 @@ def generate(node: Node, guarantees: Sequence[str]) -> Generated:
     clauses = list(zip(node.assumptions, assumed, strict=True)) + promised
     contract = _contract(node, clauses, words, types_file)
     spec, ensures = _spec(node, assumed, promised, words, spec_module, contract_file)
+    probe, probe_ensures = _probe(node, assumed, promised, words, probe_module, impl_module)
     skeleton = _skeleton(inputs, outputs, words, spec_module, impl_module, spec_file)
     return Generated(
         node.name, spec_module, impl_module, types_file, contract_file, spec_file, impl_file, _types(words), contract,
-        spec, skeleton, ensures, tuple(uncovered),
+        spec, skeleton, ensures, probe_module, probe, probe_ensures, tuple(uncovered),
     )  # fmt: skip
 
 
@@ -199,6 +211,50 @@ def _spec(
         lines.append(f"    ensures {call(predicates[-1], words, 'Contract.')}")
         ensures.append((len(lines), clause.name))
     return "\n".join([*lines, "}", ""]), tuple(ensures)
+
+
+def _probe(
+    node: Node,
+    assumed: Sequence[tuple[Predicate, ...]],
+    promised: Sequence[tuple[Clause, tuple[Predicate, ...]]],
+    words: Vocabulary,
+    probe_module: str,
+    impl_module: str,
+) -> tuple[str, tuple[tuple[int, str], ...]]:
+    taken = signature([p.variable for p in node.inputs], words)
+    given = signature([p.variable for p in node.outputs], words)
+    arguments = ", ".join(words.local(p.variable) for p in node.inputs)
+    results = ", ".join(words.local(p.variable) for p in node.outputs)
+    sane = [f"    requires {call(p[-1], words, 'Contract.')}" for p in assumed]
+    lines = [
+        f"// Generated: {impl_module} used from outside. Do not edit.",
+        f"{_MODULE} {probe_module} {{",
+        "  import Types",
+        "  import Contract",
+        f"  import Implementation = {impl_module}",
+        "",
+        f"  method {CALL}({taken})" + (f" returns ({given})" if given else ""),
+        *sane,
+        f"    requires Implementation.Env({arguments})",
+    ]
+    ensures = []
+    for clause, predicates in promised:
+        lines.append(f"    ensures {call(predicates[-1], words, 'Contract.')}")
+        ensures.append((len(lines), clause.name))
+    lines.append(f"  {{ {f'{results} := ' if results else ''}Implementation.Step({arguments}); }}")
+    lines += [
+        "",
+        f"  lemma {ENV_ALWAYS}({taken})",
+        *sane,
+        f"    ensures Implementation.Env({arguments})",
+        "  { }",
+    ]
+    return "\n".join([*lines, "}", ""]), tuple(ensures)
+
+
+def without_env_always(probe: str) -> str:
+    """The probe for an implementation whose Env asks for something."""
+    return probe[: probe.index(f"\n  lemma {ENV_ALWAYS}(")] + "}\n"
 
 
 def _skeleton(

@@ -21,6 +21,7 @@ from .answer import Complaint, Member, complaints, counted, quiet, read_members
 INSTALL = "apt-get install dafny"
 
 _ANSWER = "answer.xml"
+_RESOLVED = "resolved.txt"
 _MODEL = "model.txt"
 _MAX_MODEL = 4_000_000
 _FINISHED = re.compile(r"Dafny program verifier finished with \d+ verified, \d+ errors?")
@@ -53,6 +54,9 @@ class Run:
     output: str
     model: str
     """The prover's models of what it could not prove, as Boogie prints them."""
+    resolved: str | None
+    """The program as Dafny has it once names are resolved and refinements made; None where this version has no such
+    option."""
 
     @property
     def timed_out(self) -> bool:
@@ -71,9 +75,11 @@ def verify(files: Mapping[str, str], limits: Limits) -> Run:
     """Verify all files together. Raises ToolMissing."""
     each = max(1, min(30, int(limits.seconds / 2)))
     if not has_commands(dafny().version):
-        flags = ("/nologo", "/compile:0", f"/timeLimit:{each}", "/errorLimit:20", f"/xml:{_ANSWER}", f"/mv:{_MODEL}")
-        done = _run(flags, files, limits)
-        return _answer(done, read_members(done.answers[_ANSWER]) if done.answers[_ANSWER] else None)
+        flags = ("/nologo", "/compile:0", f"/timeLimit:{each}", "/errorLimit:20")
+        said = (f"/xml:{_ANSWER}", f"/mv:{_MODEL}", f"/rprint:{_RESOLVED}")
+        done = _run((*flags, *said), files, limits)
+        members = read_members(done.answers[_ANSWER]) if done.answers[_ANSWER] else None
+        return _answer(done, members, done.answers[_RESOLVED])
     done = _run(modern.verify_arguments(each, lenient=True), files, limits)
     if modern.is_unknown_option(done.output):
         done = _run(modern.verify_arguments(each, lenient=False), files, limits)
@@ -104,9 +110,9 @@ class _Done:
     answers: Mapping[str, str]
 
 
-def _answer(done: _Done, members: tuple[Member, ...] | None) -> Run:
+def _answer(done: _Done, members: tuple[Member, ...] | None, resolved: str | None = None) -> Run:
     said, model = complaints(done.output), done.answers[_MODEL][:_MAX_MODEL]
-    return Run(done.command, done.code, members, said, counted(done.output), done.output, model)
+    return Run(done.command, done.code, members, said, counted(done.output), done.output, model, resolved)
 
 
 def _run(first: Sequence[str], files: Mapping[str, str], limits: Limits) -> _Done:
@@ -122,7 +128,7 @@ def _run(first: Sequence[str], files: Mapping[str, str], limits: Limits) -> _Don
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
         done = process.run(command, cwd=folder, seconds=limits.seconds, megabytes=megabytes, env=env)
-        answers = {each: _read(folder / each) for each in (_ANSWER, _MODEL, modern.LOG)}
+        answers = {each: _read(folder / each) for each in (_ANSWER, _MODEL, _RESOLVED, modern.LOG)}
     return _Done(command, done.code, quiet(done.stdout + done.stderr), answers)
 
 

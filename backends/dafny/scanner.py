@@ -21,6 +21,8 @@ _CALLABLES = frozenset({"method", "lemma", "colemma", "constructor", "function",
 _MODIFIERS = frozenset(
     {"ghost", "static", "protected", "inductive", "twostate", "least", "greatest", "abstract", "opaque"}
 )
+MEMBERS = _CALLABLES | _MODIFIERS | {"const", "type", "module", "datatype", "codatatype", "newtype", "class", "import"}
+"""Words with which another member begins."""
 _DIRECTIVE = re.compile(r"\s*#(?:if|else|elsif|endif)")
 _TOKEN = re.compile(
     r"""
@@ -55,7 +57,7 @@ class Scan:
     members: tuple[tuple[str, str], ...]
     """(kind, name) of every method and lemma that it declares: each must be found proved."""
     environment: str | None
-    """The body of `Env`, or None where it has none."""
+    """The body of the implementation's own `Env`, or None where it has none."""
     text: str
     """The file with its includes of generated files blanked out: the generated files are given to Dafny directly."""
 
@@ -101,6 +103,68 @@ def _comment_end(text: str, start: int) -> int:
         else:
             position += 1
     return position
+
+
+def resolved_environment(program: str, module: str) -> str | None:
+    """The body of `Env` as Dafny itself has it in that module, from the program that it prints once all names are
+    resolved and all refinements made; None where it is not there, or not once."""
+    return _body_of_env(program, tokens(program), module)
+
+
+def matching(found: Sequence[Token], at: int) -> int:
+    """The index of the bracket that closes the one at `at`, or of the last token."""
+    depth = 0
+    for position in range(at, len(found)):
+        text = found[position].text
+        depth += (text in ("(", "{", "[", "{:")) - (text in (")", "}", "]"))
+        if depth == 0:
+            return position
+    return len(found) - 1
+
+
+def _body_of_env(text: str, found: Sequence[Token], module: str) -> str | None:
+    """What stands in classes, in modules within, or in other modules is another's."""
+    at, bodies, modules = 0, list[str | None](), 0
+    while at < len(found):
+        if found[at].text == "module":
+            name = at + 1
+            while name < len(found) and found[name].text == "{:":
+                name = matching(found, name) + 1
+            opened = next((k for k in range(name, len(found)) if found[k].text == "{"), None)
+            if opened is not None and name < len(found) and found[name].text == module:
+                modules += 1
+                bodies += _envs(text, found, opened + 1, matching(found, opened))
+            if opened is not None:
+                at = opened
+        # whatever stands in brackets is not at the top
+        at = matching(found, at) + 1 if found[at].text in ("{", "{:", "(", "[") else at + 1
+    return bodies[0] if modules == 1 and len(bodies) == 1 else None
+
+
+def _envs(text: str, found: Sequence[Token], at: int, end: int) -> list[str | None]:
+    bodies: list[str | None] = []
+    while at < end:
+        if found[at].text in ("predicate", "function", "copredicate"):
+            name = at + 1
+            while found[name].text in ("{:", "method"):
+                name = (matching(found, name) if found[name].text == "{:" else name) + 1
+            if found[name].text == "Env":
+                bodies.append(_body(text, found, name + 1, end))
+        at = matching(found, at) + 1 if found[at].text in ("{", "{:", "(", "[") else at + 1
+    return bodies
+
+
+def _body(text: str, found: Sequence[Token], at: int, end: int) -> str | None:
+    """The first braces behind a name, if another member, or nothing, stands behind them: else they are part of a
+    clause, and what is meant is not guessed."""
+    while at < end and found[at].text != "{" and found[at].text not in MEMBERS:
+        at = (matching(found, at) if found[at].text in ("(", "[", "{:") else at) + 1
+    closed = matching(found, at)
+    if at >= end or found[at].text != "{" or not (closed + 1 >= end or found[closed + 1].text in MEMBERS):
+        return None
+    inside = tokens(text[found[at].end : found[closed].start])
+    spaced = [f"{' ' if k and inside[k - 1].end < token.start else ''}{token.text}" for k, token in enumerate(inside)]
+    return "".join(spaced)
 
 
 class _Scanner:
@@ -265,25 +329,11 @@ class _Scanner:
                 self.problems.append((1, f"{kind} {name} is missing"))
 
     def environment(self) -> str | None:
-        """The text between the braces of `predicate Env(…) { … }`."""
-        for at, token in enumerate(self.tokens):
-            if token.text != "predicate" or self.text_at(at + 1) != "Env" or self.text_at(at + 2) != "(":
-                continue
-            position = self.matching(at + 2) + 1
-            if self.text_at(position) == "{":
-                end = self.matching(position)
-                return " ".join(self.text[self.tokens[position].end : self.tokens[end].start].split())
-        return None
+        """The text between the braces of `predicate Env(…) { … }`, of the implementation's module itself."""
+        return _body_of_env(self.text, self.tokens, self.impl_module)
 
     def matching(self, at: int) -> int:
-        """The index of the bracket that closes the one at `at`, or of the last token."""
-        depth = 0
-        for position in range(at, len(self.tokens)):
-            text = self.tokens[position].text
-            depth += (text in ("(", "{", "[", "{:")) - (text in (")", "}", "]"))
-            if depth == 0:
-                return position
-        return len(self.tokens) - 1
+        return matching(self.tokens, at)
 
     def name_after(self, at: int) -> Token | None:
         position = at + 1

@@ -50,8 +50,10 @@ ROWS = (
     "LampImpl.EnvNotEmpty (correctness),Passed,00:00:00.1,12,0\n"
     "LampImpl.Step (well-formedness),Passed,00:00:00.1,12,0\n"
     "LampImpl.Step (correctness),Passed,00:00:00.1,12,0\n"
+    "LampProbe.Call (correctness),Passed,00:00:00.1,12,0\n"
+    "LampProbe.EnvAlways (correctness),Passed,00:00:00.1,12,0\n"
 )
-FINISHED = "\nDafny program verifier finished with 4 verified, 0 errors"
+FINISHED = "\nDafny program verifier finished with 6 verified, 0 errors"
 VERIFIED: dict[str, Any] = {"csv": HEAD + ROWS, "text": FINISHED}
 AUDITED: dict[str, Any] = {
     "text": "Dafny auditor completed with 0 findings\n\nDafny program verifier did not attempt verification"
@@ -101,7 +103,7 @@ def test_the_commands_are_those_of_version_4(make_job: MakeJob, tmp_path: Path, 
     assert {o.verdict for o in outcomes.values()} == {Verdict.PROVED}
     version, verify, audit = asked()
     assert version == ["/version"]
-    files = ["types.dfy", "lamp_contract.dfy", "lamp_spec.dfy", "lamp_impl.dfy"]
+    files = ["types.dfy", "lamp_contract.dfy", "lamp_spec.dfy", "lamp_impl.dfy", "probe.dfy"]
     assert verify == [
         "verify", "--allow-warnings", "--verification-time-limit:30", "--log-format:csv;LogFileName=answer.csv",
         "--show-snippets:false", *files,
@@ -174,7 +176,7 @@ NOT_PROVED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "a failed member": ({"csv": HEAD + ROWS + "Contract.high (x),Failed,0,1,0\n", "text": FINISHED}, AUDITED),
     "an error is counted": ({"csv": HEAD + ROWS, "text": FINISHED.replace("0 errors", "1 error")}, AUDITED),
     "a time-out is counted": ({"csv": HEAD + ROWS, "text": FINISHED + ", 1 time out"}, AUDITED),
-    "nothing was verified": ({"csv": HEAD + ROWS, "text": FINISHED.replace("4 verified", "0 verified")}, AUDITED),
+    "nothing was verified": ({"csv": HEAD + ROWS, "text": FINISHED.replace("6 verified", "0 verified")}, AUDITED),
     "it did not finish": ({"csv": HEAD + ROWS, "text": "Dafny program verifier did not attempt verification"}, AUDITED),
     "another exit code": ({**VERIFIED, "code": 2}, AUDITED),
     "no audit": (VERIFIED, {"text": "Unrecognized command or argument 'audit'.", "code": 1}),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from avow.backend_kit.protocol import Job, Limits
-from avow.backends.dafny import BACKEND
+from avow.backends.dafny import BACKEND, judge, scanner
 from avow.backends.dafny.scanner import Scan, scan, tokens
 from avow.base.verdict import Outcome, Verdict
 
@@ -184,6 +184,72 @@ def test_what_is_taken_for_granted_is_shown(make_job: MakeJob, tmp_path: Path, n
         assert outcome.verdict in (Verdict.UNKNOWN, Verdict.ERROR), outcome
 
 
+ENV = "  predicate Env(in_r: real) { true }\n"
+NARROW = "  predicate Env(in_r: real) { in_r < 10.0 }\n"
+DECOY = "predicate Env(in_r: real) { true }"
+DECOYS = {
+    "another module before": f"module Decoy {{ {DECOY} }}\n" + WRONG.replace(ENV, NARROW),
+    "another module behind": WRONG.replace(ENV, NARROW) + f"module Decoy {{ {DECOY} }}\n",
+    "the top level": f"{DECOY}\n" + WRONG.replace(ENV, NARROW),
+    "a module within": WRONG.replace(ENV, f"  module Inner {{ {DECOY} }}\n" + NARROW),
+    "a module of the same name within": WRONG.replace(ENV, f"  module LampImpl {{ {DECOY} }}\n" + NARROW),
+    "a module of the same name within another": f"module Out {{ module LampImpl {{ {DECOY} }} }}\n"
+    + WRONG.replace(ENV, NARROW),
+    "a module of a longer name": f"module LampImplementation {{ {DECOY} }}\n" + WRONG.replace(ENV, NARROW),
+    "a class": WRONG.replace(ENV, f"  class C {{ static {DECOY} }}\n" + NARROW),
+    "a datatype's member": WRONG.replace(ENV, f"  class C {{ {DECOY} }}\n" + NARROW),
+    "a comment": WRONG.replace(ENV, f"  // {DECOY}\n  /* {DECOY} */\n" + NARROW),
+    "a string": WRONG.replace(ENV, f'  const s := "{DECOY}";\n' + NARROW),
+    "a verbatim string": WRONG.replace(ENV, f'  const s := @"{DECOY}";\n' + NARROW),
+    "a clause": WRONG.replace(ENV, NARROW.replace("{", "decreases {true} {")),
+    "a clause with more": WRONG.replace(ENV, NARROW.replace("{", "decreases {true} + {false} {")),
+    "an imported module": f"module Decoy {{ {DECOY} }}\n"
+    + WRONG.replace(ENV, "  import opened Decoy\n" + NARROW),
+    "a refined module": f"module Decoy refines LampSpec {{ {DECOY} lemma EnvNotEmpty() returns (in_r: real)"
+    " { in_r := 0.0; } }\n" + WRONG.replace(ENV, NARROW),
+    "attributes": WRONG.replace(ENV, f"  module M {{ {DECOY} }}\n" + NARROW.replace("Env(", "{:opaque} Env(")),
+    "a helper": WRONG.replace(ENV, "  predicate Env(in_r: real) { Free(in_r) } predicate Free(r: real) { r < 10.0 }\n"),
+    "a predicate called true": WRONG.replace(ENV, "  predicate Env(in_r: real) { True() && in_r < 10.0 }\n"
+    "  predicate True() { true }\n"),
+    "a chain": WRONG.replace("include \"lamp_spec.dfy\"\nmodule LampImpl", "module Mid").replace(ENV, NARROW)
+    + "module LampImpl refines Mid { }\n",
+    "braces in Env": WRONG.replace(ENV, "  predicate Env(in_r: real) { in_r in (set x: int | x in {1, 2} :: 1.0) }\n"),
+    "nothing meets it": WRONG.replace(ENV, f"  module M {{ {DECOY} }}\n  predicate Env(in_r: real) {{ false }}\n"),
+}  # fmt: skip
+
+
+@pytest.mark.needs_dafny
+@pytest.mark.parametrize(
+    "name",
+    [n if n in ("another module before", "a clause") else pytest.param(n, marks=pytest.mark.slow) for n in DECOYS],
+)
+def test_no_decoy_hides_what_env_adds(make_job: MakeJob, tmp_path: Path, name: str) -> None:
+    """`high` is false of this lamp; it can be proved only under the real Env, and then that is a hypothesis."""
+    outcome = settle(make_job, tmp_path, DECOYS[name])["high"]
+    if outcome.verdict is Verdict.PROVED:
+        (told,) = outcome.hypotheses
+        assert told.startswith("added assumption of the implementation, Env: ")
+        assert told.removeprefix("added assumption of the implementation, Env: ") not in ("", "true")
+    else:
+        assert outcome.verdict in (Verdict.UNKNOWN, Verdict.ERROR), outcome
+
+
+@pytest.mark.needs_dafny
+@pytest.mark.parametrize("text", ["in_r < 10.0", pytest.param("true", marks=pytest.mark.slow)])
+def test_a_wrong_scanner_proves_nothing(
+    make_job: MakeJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
+    """Whatever the scan takes Env to be, Dafny's own word counts."""
+    told = "true" if text != "true" else "in_r < 10.0"
+    monkeypatch.setattr(scanner, "_body_of_env", lambda *_: told)
+    monkeypatch.setattr(judge, "resolved_environment", lambda program, module: told)
+    for outcome in settle(make_job, tmp_path, WRONG.replace("{ true }", f"{{ {text} }}")).values():
+        if told == "true":
+            assert outcome.verdict is Verdict.UNKNOWN, outcome
+        else:
+            assert outcome.verdict is Verdict.UNKNOWN or outcome.hypotheses, outcome
+
+
 def scanned(text: str) -> Scan:
     return scan(text, "LampSpec", "LampImpl", ("types.dfy", "lamp_contract.dfy", "lamp_spec.dfy"))
 
@@ -248,6 +314,30 @@ class TestScan:
     )
     def test_openings_are_seen(self, text: str) -> None:
         assert scanned(GOOD + text).hypotheses
+
+    @pytest.mark.parametrize("name", DECOYS)
+    def test_decoys_are_not_read_as_env(self, name: str) -> None:
+        assert scanned(DECOYS[name]).environment != "true"
+
+    def test_env_is_read_as_dafny_resolves_it(self) -> None:
+        resolved = """
+/* module LampImpl refines LampSpec { predicate Env(in_r: real) { false } } */
+module Decoy { predicate Env(in_r: real) { true } }
+module LampImpl refines LampSpec {
+  module LampImpl { predicate Env(in_r: real) { true } }
+  class C { predicate Env(in_r: real) { true } }
+  predicate Env(in_r: real)
+    decreases in_r
+  {
+    in_r < 5.0 /* a comment */ &&
+    forall x: real ::
+      x == in_r
+  }
+}
+"""
+        assert scanner.resolved_environment(resolved, "LampImpl") == "in_r < 5.0 && forall x: real :: x == in_r"
+        assert scanner.resolved_environment(resolved, "LampSpec") is None
+        assert scanner.resolved_environment(resolved + resolved, "LampImpl") is None
 
     def test_an_unended_comment_or_string_ends_the_scan_quietly(self) -> None:
         for text in ("/* /* */", '"abc', '@"abc', "'", "{:", "include", "module", "const", "type", "predicate Env("):
