@@ -13,6 +13,8 @@ from avow.base.verdict import Link, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, effective, join, link_rank, weigh
+from avow.isolation.level import Isolation
+from avow.isolation.observed import ISOLATION
 
 _LONG = 160
 """So much of a tool's own words stands in a suggestion."""
@@ -121,6 +123,9 @@ def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) ->
         return f"the link is {item.link}, {' or '.join(demand.links)} is asked"
     if demand.unconditional and item.hypotheses:
         return "rests on hypotheses"
+    kept = item.details.get(ISOLATION)
+    if kept in tuple(Isolation) and Isolation(kept).rank < demand.isolation.rank:
+        return f"the program ran with isolation {kept}, {demand.isolation} is asked (avow verify --sandbox)"
     return None
 
 

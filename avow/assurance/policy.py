@@ -25,6 +25,7 @@ import yaml
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.verdict import Link
 from avow.evidence.status import Status
+from avow.isolation.level import Isolation
 from avow.system.plan import Located
 
 CRITICALITIES = ("high", "medium", "low")
@@ -44,6 +45,9 @@ class Demand:
     links: tuple[Link, ...] = ()
     """Empty: any."""
     unconditional: bool = False
+    isolation: Isolation = Isolation.NONE
+    """How far a program under test had to be kept from its judge; evidence for which nothing was run has no such
+    level."""
 
     def max_age(self, status: Status) -> int | None:
         ages = dict(self.max_age_days)
@@ -60,6 +64,8 @@ class Demand:
             parts.append(f"link {' or '.join(self.links)}")
         if self.unconditional:
             parts.append("without hypotheses")
+        if self.isolation is not Isolation.NONE:
+            parts.append(f"isolation {self.isolation} or better")
         if self.reviewers > 1:
             parts.append(f"reviews by {self.reviewers} persons")
         parts += [f"{word} not older than {days} days" for word, days in self.max_age_days]
@@ -139,7 +145,7 @@ def _profile(name: str, span: Span) -> tuple[Policy, list[Diagnostic]]:
 
 
 _KEYS = ("profile", "guarantees", "sanity", "composition", "requirements", "reviewers", "certified")
-_DEMAND_KEYS = ("one_of", "methods", "independent", "max_age_days", "reviewers", "links", "unconditional")
+_DEMAND_KEYS = ("one_of", "methods", "independent", "max_age_days", "reviewers", "links", "unconditional", "isolation")
 
 
 def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
@@ -206,7 +212,16 @@ class _Reader:
             reviewers=self.count(data.get("reviewers", 1), (*path, "reviewers")),
             links=tuple(Link(word) for word in self.words(data.get("links", ()), tuple(Link), (*path, "links"))),
             unconditional=self.flag(data.get("unconditional", False), (*path, "unconditional")),
+            isolation=self.level(data.get("isolation", Isolation.NONE.value), (*path, "isolation")),
         )
+
+    def level(self, data: object, path: tuple[str | int, ...]) -> Isolation:
+        given = self.words(data, tuple(Isolation), path) if isinstance(data, str) else ()
+        if given:
+            return Isolation(given[0])
+        if not isinstance(data, str):
+            self.fault(f"isolation is one of {', '.join(Isolation)}", path)
+        return Isolation.NONE
 
     def statuses(self, data: object, path: tuple[str | int, ...]) -> tuple[Status, ...]:
         return tuple(Status(word) for word in self.words(data, _GIVEN, path))

@@ -18,6 +18,8 @@ from avow.base.diagnostics import Diagnostic
 from avow.base.tools import Tool
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.evidence.obligation import Obligation
+from avow.isolation.level import Isolation
+from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Contract, Node
 from avow.system.plan import Method, System
 
@@ -88,6 +90,11 @@ class Report:
     command: tuple[str, ...] = ()
     logs: Mapping[str, str] = field(default_factory=dict)
     """Name → text of logs and results to be kept beside the artifacts."""
+    observed: tuple[Observed, ...] = ()
+    """What the subject was seen to look at; the core keys the answer by it. With something `Seen.OUTSIDE` in it no good
+    verdict counts."""
+    isolation: Isolation = Isolation.NONE
+    """How far the subject was kept from whoever judged it."""
 
     @classmethod
     def alike(cls, job: Job, verdict: Verdict, summary: str, tool: str, tool_version: str) -> Report:

@@ -58,6 +58,7 @@ def run(
     megabytes: int | None = None,
     env: Mapping[str, str] | None = None,
     stdin: str | None = None,
+    pass_fds: Sequence[int] = (),
 ) -> Completed:
     """Run a program without a shell. Raises ToolMissing; a failure or a time-out is a result, not an exception."""
     start = time.monotonic()
@@ -72,6 +73,7 @@ def run(
                 env={**os.environ, **env} if env else None,
                 start_new_session=True,
                 preexec_fn=_before_exec(megabytes),
+                pass_fds=pass_fds,
             )
         except (FileNotFoundError, PermissionError, NotADirectoryError) as error:
             raise ToolMissing(f"{command[0]}: {error.strerror or error}") from error
@@ -117,7 +119,7 @@ def kill_all() -> None:
 
 def kill_tree(pid: int) -> None:
     """Kill a process, its group, and descendants that moved to a group of their own (a tool that a worker runs)."""
-    family = _descendants(pid)
+    family = [pid, *_descendants(pid)]
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(pid, signal.SIGKILL)
     for member in family:
@@ -126,13 +128,7 @@ def kill_tree(pid: int) -> None:
 
 
 def _descendants(pid: int) -> list[int]:
-    """Read from /proc; empty where there is none."""
-    children: dict[int, list[int]] = {}
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError, ValueError, IndexError):
-            # the name in parentheses may hold spaces and parentheses of its own
-            fields = stat.read_text(errors="replace").rpartition(")")[2].split()
-            children.setdefault(int(fields[1]), []).append(int(stat.parent.name))
+    children = _parents()
     found: list[int] = []
     todo = [pid]
     while todo:
@@ -142,7 +138,20 @@ def _descendants(pid: int) -> list[int]:
     return found
 
 
+def _parents() -> dict[int, list[int]]:
+    """Process → its children. Read from /proc; empty where there is none."""
+    children: dict[int, list[int]] = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            # the name in parentheses may hold spaces and parentheses of its own
+            fields = stat.read_text(errors="replace").rpartition(")")[2].split()
+            children.setdefault(int(fields[1]), []).append(int(stat.parent.name))
+    return children
+
+
 _PR_SET_PDEATHSIG = 1
+_PR_SET_DUMPABLE = 4
+_PR_SET_CHILD_SUBREAPER = 36
 _libc = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
 
 
@@ -152,6 +161,55 @@ def die_with(parent: int) -> None:
         _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:  # it died before that was said
             os._exit(1)
+
+
+_adopted_since: list[frozenset[int]] = []
+"""The children that this process had when it began to adopt orphans; empty before."""
+
+
+def adopt_orphans() -> None:
+    """From now on, what a descendant leaves running becomes our child, whatever session or group it moved to; and
+    where the system can hide our memory and descriptors from our own user, it does. Only on Linux."""
+    if _libc is None or _adopted_since:
+        return
+    _libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    _libc.prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
+    _adopted_since.append(frozenset(_children(os.getpid())))
+
+
+def forget_orphans() -> None:
+    """In a fork: what the process that it is a fork of adopts is not this one's."""
+    _adopted_since.clear()
+
+
+def end_orphans() -> bool:
+    """Kill all that became our child unasked, until nothing is left; whether there was any. See `adopt_orphans`."""
+    if not _adopted_since:
+        return False
+    found = False
+    for _ in range(1000):  # what is killed may leave children of its own, which become ours
+        with _lock:
+            expected = _adopted_since[0] | _running
+        orphans = [pid for pid in _children(os.getpid()) if pid not in expected]
+        if not orphans:
+            return found
+        found = True
+        for pid in orphans:
+            kill_tree(pid)
+        for pid in orphans:
+            with contextlib.suppress(ChildProcessError):
+                os.waitpid(pid, 0)
+    return found
+
+
+def _children(pid: int) -> list[int]:
+    return _parents().get(pid, [])
+
+
+def python_path() -> str:
+    """PYTHONPATH for a Python that proves or tests: no entry means the folder in which one happens to stand."""
+    entries = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    return os.pathsep.join(entry for entry in entries if os.path.isabs(entry))  # noqa: PTH117
 
 
 def _before_exec(megabytes: int | None) -> Callable[[], None]:

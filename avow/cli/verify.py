@@ -14,15 +14,21 @@ import click
 @click.option(
     "--explain", is_flag=True, help="Say what each failing gate lacks, and the cheapest method that would close it."
 )
-def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool) -> int:
+@click.option(
+    "--sandbox", is_flag=True, help="Run programs under test sealed (bubblewrap): no network, nothing written, or not."
+)
+def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool, sandbox: bool) -> int:
     """Verify every system under contracts/, or only SYSTEMS (their names)."""
     from avow.base.workspace import require_systems, workspace
+    from avow.isolation.level import SANDBOX
     from avow.pipeline.run_info import EXPLAIN, FRESH
 
     place = workspace()
     require_systems(place, systems)
     if fresh:
         os.environ[FRESH] = "1"
+    if sandbox:
+        os.environ[SANDBOX] = "required"
     if explain:
         os.environ[EXPLAIN] = "1"
     os.chdir(place.root)

@@ -20,6 +20,7 @@ from avow.base.diagnostics import Rejected
 from avow.base.files import digest, digest_file, is_intact, write
 from avow.base.workspace import Workspace
 from avow.evidence.continuity import continuity
+from avow.evidence.currency import as_of_now, stands
 from avow.evidence.heads import index_path, read_index
 from avow.evidence.record import RETRY
 from avow.pipeline import check as checking
@@ -129,7 +130,7 @@ def build(assessment: Assessment) -> Case:
     return build_case(
         system,
         assessment.surveyed.catalogue.obligations,
-        ledger.records(),
+        as_of_now(ledger.records(), workspace.root),
         keys=assessment.surveyed.keys,
         today=_today(),
         run=RunInfo(
@@ -199,6 +200,8 @@ def _key(assessment: Assessment) -> str:
     from avow.assurance.codec import SCHEMA
 
     explain = os.environ.get(EXPLAIN, "")
+    root = assessment.workspace.root
+    damage += [f"{e.number} is of an earlier state" for e in ledger.records() if not stands(e.evidence, root)]
     return digest(json.dumps([SCHEMA, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]))
 
 

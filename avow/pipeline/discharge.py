@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import functools
+import os
 import time
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,9 +14,12 @@ from avow.backend_kit.protocol import Report
 from avow.base.files import digest, digest_file, is_intact, write
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.base.workspace import Workspace
+from avow.evidence.currency import stands
 from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY, Evidence
+from avow.isolation.level import Isolation
+from avow.isolation.observed import ISOLATION, OBSERVED, to_json
 from avow.pipeline import worker
 from avow.pipeline.export import folder
 from avow.pipeline.run_info import Run
@@ -34,7 +39,8 @@ def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obliga
 
 
 def _is_settled(workspace: Workspace, ledger: Ledger, work: Work, obligation: Obligation, run: Run) -> bool:
-    records = [e.evidence for e in ledger.current(obligation.id, work.keys[obligation.id])]
+    found = [e.evidence for e in ledger.current(obligation.id, work.keys[obligation.id])]
+    records = [record for record in found if stands(record, workspace.root)]
     if not records or (run.fresh and records[-1].run != run.id):
         return False
     last = records[-1]
@@ -82,7 +88,7 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
                 counterexample=outcome.counterexample,
                 hypotheses=outcome.hypotheses,
                 bound=outcome.bound,
-                details=outcome.details,
+                details={**outcome.details, **_circumstances(workspace, report)},
                 vacuous=outcome.vacuous,
                 run=run.id,
                 rests_on=outcome.rests_on,
@@ -90,6 +96,15 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
         )
     ledger_of(workspace.ledger(work.system.name)).append_all(records)
     return report.outcomes
+
+
+def _circumstances(workspace: Workspace, report: Report) -> dict[str, object]:
+    """What the subject looked at, with paths relative to the workspace where they lie within, and how it was kept."""
+    if report.isolation is Isolation.NONE:
+        return {}
+    root = str(workspace.root.resolve()) + os.sep
+    seen = [replace(o, path=o.path.removeprefix(root)) for o in report.observed]
+    return {ISOLATION: report.isolation.value, OBSERVED: to_json(seen)}
 
 
 def _language(obligations: tuple[Obligation, ...]) -> Report:

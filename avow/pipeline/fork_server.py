@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from avow.base.process import die_with, kill_tree
+from avow.base.process import die_with, forget_orphans, kill_tree
 from avow.pipeline import worker
 
 PRELOADED = (
@@ -109,6 +109,7 @@ def _work(arguments: Sequence[str], server: int, errors: int, open_here: Sequenc
     code = 1
     try:
         os.setsid()
+        forget_orphans()
         die_with(server)
         os.dup2(errors, 2)
         for descriptor in {*open_here, errors}:

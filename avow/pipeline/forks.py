@@ -31,8 +31,12 @@ WORKER = "avow.pipeline.worker"
 PLAIN = "AVOW_PLAIN_WORKERS"
 """Environment: when set, every work gets a new Python."""
 
-_KEEP_BYTE_CODE = {"PYTHONDONTWRITEBYTECODE": ""}
-"""A run may start dozens of Pythons: each would compile the same modules again."""
+
+def _python() -> dict[str, str]:
+    """Environment of a Python that works for us. It keeps its byte code: a run may start dozens, and each would compile
+    the same modules again."""
+    return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": process.python_path()}
+
 
 _START = 60.0
 """Seconds that the server gets for its imports."""
@@ -54,7 +58,7 @@ def run(arguments: Sequence[str], *, cwd: Path, seconds: float) -> Completed:
     done = server.run(arguments, seconds) if server else None
     if done is not None:
         return done
-    return process.run([sys.executable, "-m", WORKER, *arguments], cwd=cwd, seconds=seconds, env=_KEEP_BYTE_CODE)
+    return process.run([sys.executable, "-P", "-m", WORKER, *arguments], cwd=cwd, seconds=seconds, env=_python())
 
 
 def _server(cwd: Path) -> _Server | None:
@@ -106,12 +110,12 @@ class _Server:
         with theirs:
             # Not bound to our life by a signal, as that is bound to the starting *thread*: it ends as `control` closes.
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "avow.pipeline.fork_server", str(theirs.fileno())],
+                [sys.executable, "-P", "-m", "avow.pipeline.fork_server", str(theirs.fileno())],
                 cwd=cwd,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                env={**os.environ, **_KEEP_BYTE_CODE},
+                env={**os.environ, **_python()},
                 start_new_session=True,
                 pass_fds=[theirs.fileno()],
             )

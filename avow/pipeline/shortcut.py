@@ -20,10 +20,12 @@ from pathlib import Path
 import avow.backends
 from avow.base.files import write
 from avow.base.workspace import Workspace
+from avow.isolation.level import SANDBOX
+from avow.isolation.observed import Observed, Seen, from_json, look, to_json
 from avow.pipeline.results import Result, read_result
 from avow.pipeline.run_info import EXPLAIN, FRESH
 
-_ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH)
+_ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX)
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
 """Avow's own code, wherever it is installed."""
 
@@ -41,7 +43,8 @@ def nothing_to_do(workspace: Workspace, wanted: Sequence[str]) -> tuple[Result, 
     try:
         kept = json.loads(_stamp(workspace).read_text())
         results = tuple(read_result(r) for r in kept["results"])
-        if kept["identity"] != _identity(workspace):
+        observed = from_json(kept["observed"])
+        if kept["identity"] != _identity(workspace, observed):
             return None
     except (OSError, ValueError, KeyError, TypeError):
         return None
@@ -56,8 +59,13 @@ def keep(workspace: Workspace, results: Sequence[Result]) -> None:
     try:
         if _begun.get(workspace.root.resolve()) != _sources(workspace):
             return
-        identity = _identity(workspace)
-        write(_stamp(workspace), json.dumps({"identity": identity, "results": [r.json() for r in results]}))
+        observed = _observed(workspace)
+        kept = {
+            "identity": _identity(workspace, observed),
+            "observed": to_json(observed),
+            "results": [r.json() for r in results],
+        }
+        write(_stamp(workspace), json.dumps(kept))
     except OSError:
         return
 
@@ -66,9 +74,21 @@ def _stamp(workspace: Workspace) -> Path:
     return workspace.artifacts / ".settled.json"
 
 
-def _identity(workspace: Workspace) -> str:
+def _observed(workspace: Workspace) -> tuple[Observed, ...]:
+    """What subjects were seen to look at beyond the workspace."""
+    from avow.evidence.currency import outside_of
+    from avow.evidence.ledger import Ledger
+
+    entries = [e for path in sorted(workspace.ledgers.glob("*.jsonl")) for e in Ledger(path).records()]
+    return outside_of(entries, workspace.root)
+
+
+def _identity(workspace: Workspace, observed: Sequence[Observed]) -> str:
     """Raises OSError for anything that cannot be looked at."""
     digest = hashlib.sha256(_sources(workspace).encode())
+    for o in observed:
+        mark = _mark(o.path) if o.kind is Seen.READ and Path(o.path).is_file() else look(o.kind, o.path)
+        digest.update(f"{o.kind} {o.path} {mark}\n".encode("utf-8", "surrogateescape"))
     _add_files(digest, workspace.artifacts, workspace.reports)
     return digest.hexdigest()
 

@@ -12,6 +12,8 @@ from avow.evidence.encoding import (
     encode_counterexample,
     encode_hypotheses,
 )
+from avow.isolation import observed
+from avow.isolation.level import Isolation
 
 
 def report_to_json(report: Report) -> dict[str, Any]:
@@ -21,6 +23,8 @@ def report_to_json(report: Report) -> dict[str, Any]:
         "command": list(report.command),
         "logs": dict(report.logs),
         "outcomes": [outcome_to_json(o) for o in report.outcomes],
+        "observed": observed.to_json(report.observed),
+        "isolation": report.isolation.value,
     }
 
 
@@ -31,6 +35,8 @@ def report_from_json(data: dict[str, Any]) -> Report:
         data["tool_version"],
         tuple(data["command"]),
         data["logs"],
+        observed.from_json(data["observed"]),
+        Isolation(data["isolation"]),
     )
 
 

@@ -14,7 +14,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from avow import __version__
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backend_kit.registry import backend
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
@@ -23,6 +22,7 @@ from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import node_digest, sort_digest
 from avow.language.contract import Contract, Node
 from avow.language.printer import show_term
+from avow.pipeline.engine_code import backend_digest, engine_digest
 from avow.pipeline.evidence_keys import surroundings
 from avow.system.plan import Method, System
 
@@ -72,7 +72,7 @@ def language_work(system: System) -> Work:
         "",
         _contract_digest(contract),
     )
-    return _work(system, SYSTEM_LEVEL, LANGUAGE, (obligation,), __version__)
+    return _work(system, SYSTEM_LEVEL, LANGUAGE, (obligation,), engine_digest())
 
 
 def sanity_work(whole: Frame, node: Node) -> Work:
@@ -128,7 +128,8 @@ def method_work(system: System, node: Node, method: Method) -> Work:
     parts = (
         tool.name,
         tool.version,
-        json.dumps([(t.name, t.version) for t in tool.tools()]),
+        backend_digest(tool),
+        json.dumps([(t.name, t.version, _program(t.path)) for t in tool.tools()]),
         told,
         _files(tool, job),
         surroundings(tool, job, told),
@@ -246,6 +247,20 @@ def _contract_digest(contract: Contract) -> str:
     return digest(json.dumps(sorted(parts)))  # the order of declarations means nothing
 
 
+def _program(path: str | None) -> str:
+    """The digest of a tool's program: a version is what it says of itself."""
+    try:
+        info = Path(path or "").stat()
+        return _program_as(path or "", (info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns))
+    except OSError:
+        return ""
+
+
+@functools.lru_cache(maxsize=1000)
+def _program_as(path: str, mark: tuple[int, ...]) -> str:
+    return _digest(Path(path))
+
+
 def _digest(path: Path) -> str:
     try:
         return digest_file(path)
@@ -261,4 +276,4 @@ def _scenario(system: System) -> str:
 @functools.cache
 def _z3_version() -> str:
     # importing z3 to ask it would cost more than all the rest of a run with nothing to do
-    return f"avow {__version__}, z3 {metadata.version('z3-solver')}"
+    return f"avow {engine_digest()}, z3 {metadata.version('z3-solver')}"

@@ -27,6 +27,7 @@ from avow.calculus.variables import frame
 from avow.evidence.encoding import Unreadable
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
+from avow.isolation.observed import Seen
 from avow.pipeline import forks
 from avow.pipeline.mutant_systems import Altered, alter
 from avow.pipeline.remarks import remarked
@@ -93,14 +94,23 @@ def _complete(report: Report, obligations: tuple[Obligation, ...]) -> Report:
     for obligation in obligations:
         match answers.get(obligation.id, []):
             case [outcome]:
-                outcomes.append(outcome)
+                outcomes.append(_declared(outcome, report))
             case []:
                 outcomes.append(Outcome(obligation.id, Verdict.ERROR, "the engine gave no answer for this obligation"))
             case _:
                 outcomes.append(
                     Outcome(obligation.id, Verdict.ERROR, "the engine gave several answers for this obligation")
                 )
-    return Report(tuple(outcomes), report.tool, report.tool_version, report.command, report.logs)
+    return replace(report, outcomes=tuple(outcomes))
+
+
+def _declared(outcome: Outcome, report: Report) -> Outcome:
+    """What was answered from something that cannot be recorded could come out otherwise tomorrow, unnoticed."""
+    outside = [o.path for o in report.observed if o.kind is Seen.OUTSIDE]
+    if not outside or not outcome.verdict.supports:
+        return outcome
+    summary = f"undeclared input: the subject used {', '.join(outside[:3])}, which cannot be recorded"
+    return replace(outcome, verdict=Verdict.UNKNOWN, summary=f"{summary} (else: {outcome.summary})")
 
 
 def _failed(
@@ -116,6 +126,7 @@ class Changed(Exception):  # noqa: N818 - it names what happened
 
 def entry(arguments: Sequence[str]) -> int:
     """The whole work of the process; its exit code."""
+    process.adopt_orphans()
     try:
         _main(arguments)
     except Changed:
@@ -132,6 +143,7 @@ def _main(arguments: Sequence[str]) -> None:
     report = _execute(request, system, work)
     if process.ended_by_others():
         report = replace(report, outcomes=tuple(map(_asked_again, report.outcomes)))
+    process.end_orphans()  # nothing that a tool or a subject left running outlives its answer
     _asked(request)  # tools read the plan's files by themselves, at any time until now
     write(Path(arguments[1]), json.dumps(report_to_json(report), default=str))
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import secrets
 import sys
 import tempfile
 from collections.abc import Mapping
@@ -17,9 +15,12 @@ from typing import Any
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.process import Completed, ToolMissing, run
+from avow.base.process import Completed, ToolMissing
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation
+from avow.isolation import judge
+from avow.isolation.level import Isolation, Unavailable, available
+from avow.isolation.observed import from_json
 
 from . import export, wire
 from .subject import subject
@@ -50,6 +51,10 @@ def files(job: Job) -> Mapping[str, str]:
 def settle(job: Job, folder: Path, limits: Limits) -> Report:
     """One outcome for each obligation."""
     version = f"hypothesis {metadata.version('hypothesis')}"
+    try:
+        available()
+    except Unavailable as missing:
+        return Report.alike(job, Verdict.NOT_RUN, str(missing), "hypothesis", version)
     found = problems(job)
     if found:
         return Report.alike(job, Verdict.ERROR, told(job, found), "hypothesis", version)
@@ -65,20 +70,22 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         why = _silence(done, limits)
         verdict = Verdict.UNKNOWN if done is not None and done.timed_out else Verdict.ERROR
         return replace(Report.alike(job, verdict, why, "hypothesis", version), command=command, logs=logs)
-    outcomes = tuple(_outcome(o, answer, limits.seed) for o in job.obligations)
+    try:
+        observed, isolation = from_json(answer.pop("observed")), Isolation(answer.pop("isolation"))
+        outcomes = tuple(_outcome(o, answer, limits.seed) for o in job.obligations)
+    except (KeyError, ValueError, TypeError) as error:
+        return Report.alike(job, Verdict.ERROR, f"the judge's answer is not one: {error!r}", "hypothesis", version)
     logs["result.json"] = json.dumps(answer, indent=1) + "\n"
-    return Report(outcomes, "hypothesis", version, command, logs)
+    return Report(outcomes, "hypothesis", version, command, logs, observed, isolation)
 
 
 def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, dict[str, Any] | None]:
-    """The test's own report, if it wrote one that is of this run."""
-    nonce = secrets.token_hex(16)
-    result = place / "result.json"
+    """The judge's answer, if it gave one."""
     seconds = max(1.0, limits.seconds * 0.8)
-    test = export.test_name(job)
     try:
-        done = run(
-            [sys.executable, "-P", test, str(result), str(seconds), str(limits.seed)],
+        return judge.ask(
+            export.test_name(job),
+            [str(seconds), str(limits.seed)],
             cwd=place,
             seconds=limits.seconds,
             megabytes=limits.megabytes,
@@ -87,21 +94,10 @@ def _run(job: Job, place: Path, limits: Limits) -> tuple[Completed | None, dict[
                 "HYPOTHESIS_STORAGE_DIRECTORY": str(place / ".hypothesis"),
                 "PYTHONDONTWRITEBYTECODE": "",  # or every run would compile the same modules
                 "PYTHONHASHSEED": "0",
-                "PYTHONPATH": os.environ.get("PYTHONPATH", ""),
             },
-            stdin=nonce,
         )
     except ToolMissing:
         return None, None
-    if done.code != 0 or not result.is_file():
-        return done, None
-    try:
-        answer = json.loads(result.read_text(encoding="utf-8"))
-    except ValueError:
-        return done, None
-    if not isinstance(answer, dict) or answer.get("nonce") != nonce:
-        return done, None
-    return done, {key: value for key, value in answer.items() if key != "nonce"}
 
 
 def _silence(done: Completed | None, limits: Limits) -> str:
@@ -129,6 +125,8 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Ou
         pairs, why = answer["crash"]
         shown = Counterexample(tuple((str(n), str(v)) for n, v in pairs), str(why))
         return replace(outcome, verdict=Verdict.ERROR, summary=str(why), counterexample=shown)
+    if answer["fault"]:
+        return replace(outcome, verdict=Verdict.ERROR, summary=str(answer["fault"]))
     why = _doubt(answer, own, valid, rejected, wanted)
     if why:
         return replace(outcome, summary=why)

@@ -20,15 +20,18 @@ from hypothesis import strategies as st
 from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 from hypothesis.internal.conjecture import providers
 
+from avow.base.process import adopt_orphans
 from avow.formulas.values import Value, show
+from avow.isolation import judge
+from avow.isolation.observed import to_json
+from avow.isolation.subject import PATIENCE, Subject, SubjectFailed
 from avow.language.sorts import BoolSort, FunctionSort, Sort
 
 from . import wire
-from .convention import Malformed, outputs
+from .convention import Malformed, outputs, sent
 from .generate import BYTES, Failing, Generator, Impossible, Inputs, Source
 from .judging import Trigger, blamed, guarantee, judged
 from .pools import parse_cell, pools
-from .process import PATIENCE, Subject, SubjectFailed
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
 # and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
@@ -62,7 +65,8 @@ class Bench:
         self.guarantees = {c["name"]: guarantee(judged(c)) for c in data["guarantees"]}
         formulas = [j.formula for j in (*self.assumptions, *(g.judged for g in self.guarantees.values()))]
         self.generator = Generator(self.inputs_sorts, pools(formulas, self._rows()))
-        self.subject = Subject(_find(data, folder), data["subject"]["function"], PATIENCE)
+        root = _root(data, folder)
+        self.subject = Subject(root / data["subject"]["file"], data["subject"]["function"], PATIENCE, root)
         self._aims = tuple(_aim(t) for g in self.guarantees.values() for t in g.triggers)
         self.valid = self.edges = self.rejected = self.undecided = 0
         self.crash: tuple[Inputs, str] | None = None
@@ -98,7 +102,7 @@ class Bench:
 
     def run(self, inputs: Inputs) -> dict[str, Value]:
         """The subject's outputs. Raises SubjectFailed."""
-        return self._outputs(self.subject.ask(inputs))
+        return self._outputs(self.subject.ask(_sent(inputs)))
 
     def _outputs(self, reply: Any) -> dict[str, Value]:
         if isinstance(reply, SubjectFailed):
@@ -113,22 +117,20 @@ class Bench:
     # -- for Avow ------------------------------------------------------------------------------------------------------
 
     def main(self) -> int:
-        """``python test_….py RESULT SECONDS SEED CASES``: all guarantees, and the counts, into a file."""
-        result, seconds, self.seed = Path(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3])
-        nonce = sys.stdin.read().strip()
+        """``python test_….py CHANNEL SECONDS SEED``: all guarantees, and the counts, for whoever holds the channel."""
+        channel, seconds, self.seed = int(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3])
+        os.set_inheritable(channel, False)
+        adopt_orphans()
         self.end = time.monotonic() + seconds
         self.subject.patience = min(PATIENCE, max(1.0, seconds / 4))
         try:
             stopped = self._sweep()
             smaller = {name: self._shrunk(name) for name, g in self.guarantees.items() if g.failure is not None}
-            if self.crash is not None:
+            if self.crash is not None and not self.subject.fault:
                 self.crash = self._shrunk_crash()
         finally:
-            self.subject.close()
-        report = {"nonce": nonce, **self._report(stopped, smaller)}
-        temporary = result.with_suffix(".part")
-        temporary.write_text(json.dumps(report), encoding="utf-8")
-        temporary.replace(result)
+            fault = self.subject.close()
+        judge.say(channel, {**self._report(stopped, smaller), "fault": fault})
         return 0
 
     def _sweep(self) -> str:
@@ -172,7 +174,7 @@ class Bench:
 
     def _try(self, cases: list[Inputs], edge: bool = False) -> None:
         """Ask the subject, and judge each guarantee of each answer."""
-        for inputs, reply in zip(cases, self.subject.ask_all(cases), strict=False):
+        for inputs, reply in zip(cases, self.subject.ask_all([*map(_sent, cases)]), strict=False):
             self._in_time()
             try:
                 found = self._outputs(reply)
@@ -262,6 +264,8 @@ class Bench:
             "undecided": self.undecided,
             "wanted": self.cases,
             "stopped": stopped,
+            "observed": to_json(self.subject.observed()),
+            "isolation": self.subject.isolation.value,
             "crash": [_pairs(self.crash[0], {}), self.crash[1]] if self.crash else None,
             "guarantees": {
                 name: {
@@ -346,14 +350,17 @@ def _pairs(inputs: Inputs, found: Mapping[str, Value]) -> list[tuple[str, str]]:
     return [(name, show(value)) for name, value in valuation(inputs, found).items()]
 
 
-def _find(data: Mapping[str, Any], folder: Path) -> Path:
-    """The subject's file: the system's folder is known from the environment, or lies beside the artifacts."""
-    name: str = data["subject"]["file"]
+def _sent(inputs: Inputs) -> dict[str, Any]:
+    return {name: sent(value) for name, value in inputs.items()}
+
+
+def _root(data: Mapping[str, Any], folder: Path) -> Path:
+    """The system's folder: known from the environment, or beside the artifacts."""
     root = os.environ.get("AVOW_SYSTEM_ROOT")
     if root:
-        return Path(root) / name
+        return Path(root)
     for parent in folder.resolve().parents:
-        candidate: Path = parent / "contracts" / str(data["folder"]) / name
-        if candidate.is_file():
+        candidate: Path = parent / "contracts" / str(data["folder"])
+        if (candidate / str(data["subject"]["file"])).is_file():
             return candidate
-    return folder / name
+    return folder

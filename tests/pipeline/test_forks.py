@@ -72,6 +72,7 @@ def odd(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         )
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(root))
+        patch.setenv("PYTHONPATH", str(root))  # where a worker stands is not where it looks for modules
         yield root
 
 

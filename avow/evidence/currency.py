@@ -1,0 +1,76 @@
+"""Which records still answer today's question, as far as what their subject was seen to look at can tell.
+
+A record's key covers what the plan declares. What the subject looked at besides stands in the record, with digests: if
+one of these is another now, the record is of an earlier state, whatever its key says.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from avow.base.files import digest
+from avow.evidence.ledger import Entry
+from avow.evidence.record import Evidence
+from avow.isolation.level import Isolation, wanted
+from avow.isolation.observed import ISOLATION, OBSERVED, Observed, Seen, from_json, look
+
+
+def stands(record: Evidence, root: Path) -> bool:
+    """Whether all that the subject looked at is as it was, and it was kept as far apart as is asked for now."""
+    return not changed(record, root) and _apart(record)
+
+
+def changed(record: Evidence, root: Path) -> tuple[str, ...]:
+    """The paths that are not as they were; relative ones are under `root`, the workspace."""
+    try:
+        seen = from_json(record.details.get(OBSERVED, ()))
+    except ValueError:
+        return ("what was observed cannot be read",)
+    return tuple(o.path for o in seen if _now(o.kind, os.path.join(root, o.path)) != o.digest)  # noqa: PTH118
+
+
+def as_of_now(entries: Iterable[Entry], root: Path) -> tuple[Entry, ...]:
+    """The entries; those that do not stand with a key that is nobody's, so that they count as of an earlier state."""
+    return tuple(
+        entry
+        if stands(entry.evidence, root)
+        else replace(entry, evidence=replace(entry.evidence, key=digest(f"changed since: {entry.hash}")))
+        for entry in entries
+    )
+
+
+def outside_of(entries: Iterable[Entry], root: Path) -> tuple[Observed, ...]:
+    """What subjects looked at beyond the workspace, each once: a change there is none that its folders tell of."""
+    found: dict[tuple[str, Seen], Observed] = {}
+    for entry in entries:
+        try:
+            seen = from_json(entry.evidence.details.get(OBSERVED, ()))
+        except ValueError:
+            continue
+        found |= {(o.path, o.kind): o for o in seen if Path(o.path).is_absolute() and o.kind is not Seen.OUTSIDE}
+    return tuple(found.values())
+
+
+def _apart(record: Evidence) -> bool:
+    level = record.details.get(ISOLATION)
+    return level is None or wanted() is not Isolation.SEALED or level == Isolation.SEALED.value
+
+
+def _now(kind: Seen, path: str) -> str:
+    """As `look`; a file that is as it was a moment ago is not read again."""
+    if kind is not Seen.READ:
+        return look(kind, path)
+    try:
+        info = Path(path).stat()
+    except (OSError, ValueError):
+        return look(kind, path)
+    return _digest(path, (info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns))
+
+
+@functools.lru_cache(maxsize=100_000)
+def _digest(path: str, mark: tuple[int, ...]) -> str:
+    return look(Seen.READ, path)

@@ -1,0 +1,315 @@
+"""Runs the subject, and nothing else, in a process of its own: what it prints, patches or breaks stays here.
+
+A script without imports from Avow. Each line of JSON that comes in holds the inputs of some
+cases; a line with an answer for each goes out.
+Values of the contract are given to the subject as plain Python: an element of an enumeration is a string, a REAL is a
+`Fraction`, ``move(1, 2)`` is ``("move", 1, 2)``, a sequence is a tuple, a function or relation is a `Table`.
+"""
+
+from __future__ import annotations
+
+import _posixsubprocess
+import enum
+import functools
+import importlib.machinery
+import importlib.util
+import inspect
+import json
+import os
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+
+class Table:
+    """A function given by finitely many points and a default; call it, or look at its points.
+
+    ``wayP(x, y, 3)``; ``wayP.points()`` are the points at which a relation holds, or at which another function differs
+    from its default (without their values; those come from calling it); ``before.updated(4, True)`` is a changed copy.
+    """
+
+    def __init__(self, table: Mapping[Any, Any], default: Any) -> None:
+        self._table = {k if isinstance(k, tuple) else (k,): v for k, v in table.items()}
+        self.default = default
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._table.get(arguments, self.default)
+
+    def points(self) -> list[Any]:
+        """Points whose value is not the default; bare values where the function has one parameter."""
+        different = (k for k, v in self._table.items() if v != self.default)
+        return [k[0] if len(k) == 1 else k for k in different]
+
+    def items(self) -> list[tuple[Any, Any]]:
+        """(point, value) pairs for `points()`."""
+        return [(k, self(*k) if isinstance(k, tuple) else self(k)) for k in self.points()]
+
+    def updated(self, *point_and_value: Any) -> Table:
+        """A copy with another value at one point: ``t.updated(x, y, value)``."""
+        *point, value = point_and_value
+        return Table({**self._table, tuple(point): value}, self.default)
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.points())
+
+    def __contains__(self, point: object) -> bool:
+        return point in self.points()
+
+    def __len__(self) -> int:
+        return len(self.points())
+
+    def __repr__(self) -> str:
+        return f"Table({dict(self.items())!r}, default={self.default!r})"
+
+
+def plain(data: Any) -> Any:
+    """A value as the judge sends it, as the subject gets it."""
+    match data:
+        case {"q": [numerator, denominator]}:
+            return Fraction(numerator, denominator)
+        case {"t": items}:
+            return tuple(plain(item) for item in items)
+        case {"f": rows, "d": default}:
+            return Table({tuple(plain(a) for a in point): plain(value) for point, value in rows}, plain(default))
+        case _:
+            return data
+
+
+def coded(value: Any, depth: int = 0) -> Any:
+    """Whatever the subject returned, as JSON; what no contract has is named by its type."""
+    if depth > 20:
+        return {"?": "something nested too deeply"}
+    inner = depth + 1
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, enum.Enum):
+        return str(value.name)
+    if isinstance(value, str):
+        return str.__str__(value)
+    if isinstance(value, int):
+        return {"q": [str(int(value)), "1"], "w": True}
+    if isinstance(value, Fraction | Decimal | float):
+        try:
+            numerator, denominator = value.as_integer_ratio()
+        except (ValueError, OverflowError):
+            return {"?": f"the number {value}"}
+        return {"q": [str(numerator), str(denominator)]}
+    if isinstance(value, Table):
+        rows = [[[coded(a, inner) for a in k], coded(v, inner)] for k, v in value._table.items()]
+        return {"f": rows, "d": coded(value.default, inner)}
+    if isinstance(value, Mapping):
+        rows = [[coded(k, inner) if k is not ... else {"...": True}, coded(v, inner)] for k, v in value.items()]
+        return {"m": rows}
+    if isinstance(value, set | frozenset):
+        return {"s": [coded(item, inner) for item in value]}
+    if isinstance(value, tuple | list):
+        return {"t": [coded(item, inner) for item in value]}
+    return {"?": f"a value of type {type(value).__name__}"}
+
+
+def load(path: str, function: str) -> Any:
+    spec = importlib.util.spec_from_loader("avow_subject", _FromSource("avow_subject", path))
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} is no Python module")
+    spec.origin, spec.has_location = path, True
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["avow_subject"] = module
+    sys.path.insert(0, os.path.dirname(path))  # noqa: PTH120 - its own neighbours, as if it were run
+    spec.loader.exec_module(module)
+    return getattr(module, function)
+
+
+class _FromSource(importlib.machinery.SourceFileLoader):
+    """Never believes a compiled file: it may be of another source than the one that is recorded."""
+
+    def get_code(self, fullname: str) -> Any:
+        path = self.get_filename(fullname)
+        return self.source_to_code(self.get_data(path), path)
+
+
+def read_sources_only(root: str) -> None:
+    """Modules from within `root` are compiled anew."""
+    suffixes = (_FromSource, importlib.machinery.SOURCE_SUFFIXES)
+    extensions = (importlib.machinery.ExtensionFileLoader, importlib.machinery.EXTENSION_SUFFIXES)
+    finder = importlib.machinery.FileFinder.path_hook(extensions, suffixes)
+
+    def hook(path: str) -> Any:
+        inside = os.path.realpath(path)
+        if inside != root and not inside.startswith(root + os.sep):
+            raise ImportError(path)
+        return finder(path)
+
+    sys.path_hooks.insert(0, hook)
+    sys.path_importer_cache.clear()
+
+
+# -- what the subject does besides answering ----------------------------------------------------------------------
+
+_READS = frozenset({"sqlite3.connect", "os.chdir"})
+_LISTS = frozenset({"os.listdir", "os.scandir"})
+_CHANGES = frozenset(
+    {"os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate", "os.chmod", "os.chown"}
+    | {"os.utime", "os.setxattr", "os.removexattr", "os.mkfifo", "os.mknod"}
+)
+_PROCESSES = frozenset({"os.fork", "os.forkpty", "os.kill", "os.killpg", "os.exec", "signal.pthread_kill", "pty.spawn"})
+_PROGRAMS = frozenset({"subprocess.Popen", "os.posix_spawn", "os.spawn", "os.system"})
+_NETWORK = ("socket.", "urllib.", "http.", "ftplib.", "smtplib.", "telnetlib.", "imaplib.", "poplib.", "nntplib.")
+_WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+
+
+def watch(scratch: str) -> tuple[list[list[str]], list[str]]:
+    """(what it looks at, as [event, path]; what no subject may do), growing as it runs. A hook cannot be taken away."""
+    seen: list[list[str]] = []
+    faults: list[str] = []
+    known: set[tuple[str, str]] = set()
+    fspath, isabs, join, getcwd, norm = os.fspath, os.path.isabs, os.path.join, os.getcwd, os.path.normpath
+
+    def path_of(place: Any) -> str | None:
+        if place is None or isinstance(place, int):  # an open descriptor: told when it was opened
+            return None
+        place = fspath(place)
+        if isinstance(place, bytes):
+            place = bytes.decode(place, sys.getfilesystemencoding(), "surrogateescape")
+        text = str.__str__(place)  # of no class of the subject's own
+        path = norm(text if isabs(text) else join(getcwd(), text))
+        return None if path == scratch or path.startswith(scratch + os.sep) else path
+
+    def told(event: str, place: Any) -> None:
+        path = place if event == "outside" else path_of(place)
+        if path is not None and (event, path) not in known:
+            known.add((event, path))
+            seen.append([event, path])
+
+    def fault(what: str) -> None:
+        if len(faults) < 20 and what not in faults:
+            faults.append(what)
+        raise PermissionError(f"a subject {what}")
+
+    def changes(place: Any, what: str) -> None:
+        path = path_of(place)
+        if path is not None and path != "/dev/null":
+            fault(f"{what} {path}")
+
+    def opens(place: Any, mode: Any, flags: Any) -> None:
+        path = path_of(place)
+        if path is None:
+            return
+        if (isinstance(mode, str) and set(mode) & set("wax+")) or (isinstance(flags, int) and flags & _WRITES):
+            changes(path, "writes")
+        elif path.startswith("/proc/") and path.split("/")[2] not in _HARMLESS:
+            fault(f"looks at another process ({path})")
+        else:
+            told("read", path)
+
+    def hook(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open":
+            opens(*arguments)
+        elif event in _LISTS:
+            told("list", arguments[0] if arguments[0] is not None else ".")
+        elif event == "import":
+            told("read", arguments[1])
+        elif event == "ctypes.dlopen" and arguments[0] is not None:  # of None: `import ctypes` itself
+            told("outside", f"the library {arguments[0]}")
+        elif event.startswith("ctypes.dlsym"):
+            told("outside", "a library's functions")
+        elif event in _READS:
+            told("read", arguments[0])
+        elif event in _CHANGES:
+            changes(arguments[0], event)
+        elif event in _PROCESSES:
+            fault(f"calls {event}")
+        elif event in _PROGRAMS:
+            told("outside", f"the program {str(arguments[0])[:200]}")
+        elif event.startswith(_NETWORK):
+            told("outside", "the network")
+
+    sys.addaudithook(hook)
+    _look_out(told)
+    return seen, faults
+
+
+_HARMLESS = ("self", "thread-self", "cpuinfo", "meminfo", "stat", "version", "filesystems", "mounts", "sys")
+
+
+def _look_out(told: Callable[[str, Any], None]) -> None:
+    """No audit event tells of a file that is looked at without being opened, nor of a program started by hand."""
+
+    def outer(inner: Callable[..., Any], event: str, what: str | None = None) -> Callable[..., Any]:
+        def call(*arguments: Any, **named: Any) -> Any:
+            told(event, what or (arguments or (None,))[0])
+            return inner(*arguments, **named)
+
+        return functools.wraps(inner)(call)
+
+    for name in ("stat", "lstat", "access", "readlink"):
+        setattr(os, name, outer(getattr(os, name), "state"))
+    _posixsubprocess.fork_exec = outer(_posixsubprocess.fork_exec, "outside", "a program")
+
+
+def accepted(function: Any) -> frozenset[str] | None:
+    """The keyword arguments that it takes; None: all."""
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return None
+    if any(p.kind is p.VAR_KEYWORD for p in parameters):
+        return None
+    return frozenset(p.name for p in parameters)
+
+
+def answer(function: Any, known: frozenset[str] | None, request: Mapping[str, Any]) -> dict[str, Any]:
+    try:
+        inputs = {name: plain(value) for name, value in request.items() if known is None or name in known}
+        return {"value": coded(function(**inputs))}
+    except BaseException as error:
+        return {"error": _told(error)}
+
+
+def _told(error: BaseException) -> str:
+    """The error and where in the subject it came from."""
+    try:
+        place = next((f for f in reversed(traceback.extract_tb(error.__traceback__)) if f.filename != __file__), None)
+        where = f" ({os.path.basename(place.filename)}, line {place.lineno})" if place else ""  # noqa: PTH119
+        return f"{type(error).__name__}: {error}"[:500] + where
+    except BaseException:
+        return type(error).__name__
+
+
+def main() -> None:
+    path, function, root, level = sys.argv[1:5]
+    source, sink = int(sys.argv[5]), int(sys.argv[6])
+    with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
+        read_sources_only(os.path.realpath(root))
+        seen, faults = watch(tempfile.gettempdir())
+        dumps = json.dumps
+
+        def say(message: dict[str, Any]) -> None:
+            told, seen[:] = seen[:], []
+            answers.write(dumps({**message, "seen": told, "faults": faults}) + "\n")
+            answers.flush()
+
+        try:
+            subject = load(path, function)
+            known = accepted(subject)
+            ready: dict[str, Any] = {"ready": True}
+        except BaseException as error:
+            ready = {"error": _told(error)}
+        say(ready)
+        if "error" in ready:
+            return
+        for line in requests:
+            say({"replies": [answer(subject, known, request) for request in json.loads(line)]})
+        processes = [int(name) for name in os.listdir("/proc") if name.isdigit()] if level == "sealed" else []  # noqa: PTH208
+        if set(processes) - {1, os.getpid()}:
+            faults.append("left processes behind")
+        say({"end": True})
+
+
+if __name__ == "__main__":
+    sys.setrecursionlimit(2000)
+    main()
+    os._exit(0)

@@ -1,0 +1,85 @@
+"""How far a subject is kept from its judge and from this machine."""
+
+from __future__ import annotations
+
+import functools
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from enum import StrEnum
+from pathlib import Path
+
+SANDBOX = "AVOW_SANDBOX"
+"""Environment: ``required`` (`avow verify --sandbox`) runs subjects sealed or not at all, ``off`` never seals them.
+Otherwise they are sealed wherever this machine can."""
+
+
+class Isolation(StrEnum):
+    """Weakest first."""
+
+    NONE = "none"
+    """In the process that judges, or by a tool of its own that is not kept from anything."""
+    PROCESSES = "processes"
+    """In a process of its own, with a pipe to its judge; all that it starts ends with it. It is the same user."""
+    SEALED = "sealed"
+    """Besides, without network, without sight of other processes, with a view of the files that it cannot write."""
+
+    @property
+    def rank(self) -> int:
+        return list(Isolation).index(self)
+
+
+class Unavailable(Exception):  # noqa: N818 - it names a state
+    """A sandbox is required, and there is none on this machine; the message says how to get one."""
+
+
+def wanted() -> Isolation | None:
+    """The level that the user asked for; None: the best that there is."""
+    match os.environ.get(SANDBOX, ""):
+        case "required":
+            return Isolation.SEALED
+        case "off":
+            return Isolation.PROCESSES
+        case _:
+            return None
+
+
+def available() -> Isolation:
+    """The level at which a subject runs here and now. Raises Unavailable."""
+    match wanted():
+        case Isolation.PROCESSES:
+            return Isolation.PROCESSES
+        case Isolation.SEALED if not seals():
+            raise Unavailable("a sandbox is required, but bubblewrap does not run here (apt install bubblewrap)")
+        case _:
+            return Isolation.SEALED if seals() else Isolation.PROCESSES
+
+
+@functools.cache
+def seals() -> bool:
+    """Whether bubblewrap works: found out by running it, as a container may forbid namespaces."""
+    if sys.platform != "linux" or shutil.which("bwrap") is None:
+        return False
+    try:
+        command = [*_bubblewrap(()), "true"]
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=20, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0
+
+
+def sealed(command: Sequence[str], shown: Sequence[Path], scratch: str) -> list[str]:
+    """The command within a sandbox: nothing can be written but `scratch`, a folder of an otherwise empty ``/tmp``, in
+    which only the folders `shown` are seen; no network, no other processes."""
+    return [*_bubblewrap(shown, scratch), *command]
+
+
+def _bubblewrap(shown: Sequence[Path], scratch: str = "/tmp") -> list[str]:
+    options = ["--unshare-all", "--die-with-parent", "--new-session", "--ro-bind", "/", "/", "--dev", "/dev"]
+    options += ["--proc", "/proc", "--tmpfs", "/tmp", "--dir", scratch]
+    for folder in dict.fromkeys(shown):
+        if folder.is_relative_to("/tmp"):
+            options += ["--ro-bind", str(folder), str(folder)]
+    return [shutil.which("bwrap") or "bwrap", *options, "--"]

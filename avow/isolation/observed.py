@@ -1,0 +1,136 @@
+"""What a subject was seen to look at: files that it read, files that it looked for in vain, folders that it listed.
+
+Who declares nothing reads all the same. So what was seen becomes part of what an answer depends on: a record is current
+only while every one of these is as it was.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import sys
+import sysconfig
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from avow.base.files import digest, digest_file
+
+
+class Seen(StrEnum):
+    """What is to be compared later."""
+
+    READ = "read"
+    """A file; the digest is of its bytes."""
+    MISSING = "missing"
+    """There was nothing of that name. The digest is empty."""
+    LISTING = "listing"
+    """A folder; the digest is of the names in it."""
+    STATE = "state"
+    """Looked at, not opened: whether it is there, its size and whether it is a folder."""
+    OUTSIDE = "outside"
+    """Something whose content cannot be recorded: the network, another program, a device. The digest is empty."""
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """One thing that the answer depends on. `path` is absolute, or relative to the workspace in a record."""
+
+    path: str
+    kind: Seen
+    digest: str = ""
+
+
+def look(kind: Seen, path: str) -> str:
+    """The digest as of now. A thing that has changed its kind has another digest."""
+    try:
+        info = os.stat(path)  # noqa: PTH116 - bytes of names that are no text stay as they are
+        match kind:
+            case Seen.READ:
+                return digest_file(Path(path))
+            case Seen.MISSING:
+                return "there"
+            case Seen.LISTING:
+                # what Python and we leave behind is nobody's input
+                return digest(json.dumps(sorted(n for n in os.listdir(path) if n != "__pycache__")))  # noqa: PTH208
+            case Seen.STATE:
+                size = "" if stat.S_ISDIR(info.st_mode) else str(info.st_size)
+                return digest(f"{stat.S_IFMT(info.st_mode)} {size}")
+            case Seen.OUTSIDE:
+                return ""
+    except (OSError, ValueError):
+        return "" if kind in (Seen.MISSING, Seen.OUTSIDE) else "gone"
+
+
+def recorded(events: Iterable[tuple[str, str]]) -> tuple[Observed, ...]:
+    """What (event, path) pairs of a subject's process stand for, each once, with digests as of now."""
+    found: dict[tuple[str, Seen], Observed] = {}
+    for event, path in events:
+        kind = _kind(event, path)
+        if kind is not None:
+            found.setdefault((path, kind), Observed(path, kind, look(kind, path)))
+    return tuple(found[key] for key in sorted(found))
+
+
+def _kind(event: str, path: str) -> Seen | None:
+    if event == "outside":
+        return Seen.OUTSIDE
+    if _of_python(path):
+        return None
+    if path.startswith(("/proc/", "/sys/")):
+        return Seen.OUTSIDE if event == "read" else None
+    try:
+        mode = os.stat(path).st_mode  # noqa: PTH116
+    except (OSError, ValueError):
+        return Seen.MISSING
+    if stat.S_ISDIR(mode):
+        return Seen.LISTING if event in ("read", "list") else Seen.STATE
+    if event == "state":
+        return Seen.STATE
+    if stat.S_ISREG(mode):
+        return Seen.READ
+    return None if path in _EMPTY else Seen.OUTSIDE
+
+
+_EMPTY = ("/dev/null", "/dev/zero", "/dev/full", "/dev/urandom", "/dev/random")
+
+_PYTHON = tuple(dict.fromkeys(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")))
+_INSTALLED = tuple(dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib")))
+
+
+def _of_python(path: str) -> bool:
+    """Of the interpreter that runs us; its version and program stand for all of it."""
+    if "/__pycache__" in path:
+        return True  # of installed packages only: a subject's own are never read
+    inside = any(path.startswith(folder + os.sep) or path == folder for folder in _PYTHON)
+    return inside and not any(
+        path.startswith(folder + os.sep) for folder in (*_INSTALLED, *(f"{p}/dist-packages" for p in _PYTHON))
+    )
+
+
+def interpreter() -> Observed:
+    """The Python that runs a subject."""
+    path = os.path.realpath(sys.executable)
+    return Observed(path, Seen.READ, look(Seen.READ, path))
+
+
+def to_json(observed: Iterable[Observed]) -> list[list[str]]:
+    return [[o.kind.value, o.path, o.digest] for o in observed]
+
+
+def from_json(data: Any) -> tuple[Observed, ...]:
+    """Raises ValueError for what `to_json` did not make."""
+    try:
+        return tuple(Observed(str(path), Seen(kind), str(mark)) for kind, path, mark in data)
+    except TypeError as error:
+        raise ValueError("not a list of what was observed") from error
+
+
+OBSERVED = "observed"
+"""Among a record's details: what the subject was seen to look at, as (kind, path, digest)."""
+
+ISOLATION = "isolation"
+"""Among a record's details: how far the subject was kept from its judge."""

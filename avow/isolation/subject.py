@@ -1,0 +1,208 @@
+"""A subject's process, from the judge's side: questions and answers as lines of JSON, with bounded patience."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from avow.base import process
+from avow.isolation.level import Isolation, available, sealed
+from avow.isolation.observed import Observed, interpreter, recorded
+
+PATIENCE = 10.0
+"""Seconds that a subject may take for one answer."""
+
+_SCRATCH = "/tmp/avow-scratch"
+"""Where a sealed subject may write."""
+
+
+class SubjectFailed(Exception):  # noqa: N818 - it names what happened
+    """The subject raised, ended, hung, did what no subject may do, or returned what is no value of the output's
+    type."""
+
+
+class Subject:
+    """The process that holds a function of a Python file. Started at the first question.
+
+    `root` is the system's folder. Once `fault` says something, no answer of this subject counts: it started processes,
+    wrote files or looked at other processes; what it left running is found where the judge has said
+    `process.adopt_orphans`. Raises `level.Unavailable` where it must be sealed and cannot be.
+    """
+
+    def __init__(self, path: Path, function: str, patience: float, root: Path | None = None) -> None:
+        self.path, self.function, self.patience = path.resolve(), function, patience
+        self.root = (root or path.parent).resolve()
+        self.isolation: Isolation = available()
+        self.fault = ""
+        self.process: subprocess.Popen[bytes] | None = None
+        self._events: dict[tuple[str, str], None] = {}
+        self._to = self._from = -1
+        self._buffer = b""
+        self._scratch: tempfile.TemporaryDirectory[str] | None = None
+
+    def ask(self, inputs: Mapping[str, Any]) -> Any:
+        """What the subject returned, as the host's data. Raises SubjectFailed."""
+        reply = self.ask_all([inputs])[0]
+        if isinstance(reply, SubjectFailed):
+            raise reply
+        return reply
+
+    def ask_all(self, cases: Sequence[Mapping[str, Any]]) -> list[Any]:
+        """For each case what the subject returned, or the SubjectFailed that it ended in; where the process itself
+        fails, nothing for the cases after. Many at a time cost less: each question wakes another process."""
+        try:
+            replies = self._exchange(cases)
+        except SubjectFailed as failure:
+            if len(cases) == 1 or self.fault:
+                return [failure]
+            return self._one_by_one(cases)
+        return [self._reply(reply) for reply in replies]
+
+    def observed(self) -> tuple[Observed, ...]:
+        """What it has looked at so far, the interpreter first."""
+        return (interpreter(), *recorded(self._events))
+
+    def close(self) -> str:
+        """End it, with all that it started; what it did that no subject may do, in words."""
+        if self.process is not None:
+            os.close(self._to)
+            self._to = -1
+            with contextlib.suppress(SubjectFailed):
+                self.patience = min(self.patience, 2.0)
+                self._message()  # its last: what it looked at, and whether something is left
+        self._stop()
+        return self.fault
+
+    # -- inside ------------------------------------------------------------------------------------------
+
+    def _one_by_one(self, cases: Sequence[Mapping[str, Any]]) -> list[Any]:
+        """The answers up to the first case that has none: which of many it was that ended the process."""
+        replies: list[Any] = []
+        for inputs in cases:
+            replies.append(self.ask_all([inputs])[0])
+            if isinstance(replies[-1], SubjectFailed):
+                break
+        return replies
+
+    def _reply(self, reply: Any) -> Any:
+        if not isinstance(reply, dict) or not ({"error", "value"} & reply.keys()):
+            return SubjectFailed("the subject's answer is no data")
+        return SubjectFailed(f"the subject raised {reply['error']}") if "error" in reply else reply["value"]
+
+    def _exchange(self, cases: Sequence[Mapping[str, Any]]) -> list[Any]:
+        if self.fault:
+            raise SubjectFailed(self.fault)
+        if self.process is None:
+            self._start()
+        if self._buffer:
+            raise SubjectFailed("the subject's process answers out of turn")
+        request = json.dumps(list(cases)).encode() + b"\n"
+        try:
+            while request:
+                request = request[os.write(self._to, request) :]
+        except OSError as error:
+            raise self._end("the subject's process has ended") from error
+        replies = self._message().get("replies")
+        if not isinstance(replies, list) or len(replies) != len(cases):
+            raise self._end("the subject's answer is no data")
+        return replies
+
+    def _end(self, why: str) -> SubjectFailed:
+        """Stop it, and say why: what it did before that no subject may do, or else `why`."""
+        self._stop()
+        return SubjectFailed(self.fault or why)
+
+    def _stop(self) -> None:
+        if self.process is not None:
+            process.kill_tree(self.process.pid)
+            self.process.wait()
+            process.unwatch(self.process.pid)
+            for channel in {self._to, self._from} - {-1}:
+                os.close(channel)
+            left = process.end_orphans()
+            if left and self.isolation is not Isolation.SEALED and not self.fault:
+                self.fault = "the subject left processes behind"
+            self.process, self._buffer = None, b""
+        if self._scratch is not None:
+            self._scratch.cleanup()
+            self._scratch = None
+
+    def _start(self) -> None:
+        there, self._to = os.pipe()
+        self._from, back = os.pipe()
+        host = Path(__file__).with_name("host.py").resolve()
+        command = [sys.executable, "-P", "-B", str(host), str(self.path), self.function, str(self.root)]
+        command += [self.isolation.value, str(there), str(back)]
+        environment = {
+            "PATH": os.environ.get("PATH", os.defpath),
+            "PYTHONPATH": process.python_path(),
+            "PYTHONHASHSEED": "0",
+            "LANG": "C.UTF-8",
+        }
+        if self.isolation is Isolation.SEALED:
+            environment["TMPDIR"] = _SCRATCH
+            shown = (self.root, host.parent, Path(sys.prefix), Path(sys.base_prefix))
+            command = sealed(command, shown, _SCRATCH)
+        else:
+            self._scratch = tempfile.TemporaryDirectory(prefix="avow-subject-")
+            environment["TMPDIR"] = os.path.realpath(self._scratch.name)
+        environment["HOME"] = environment["TMPDIR"]
+        self.process = subprocess.Popen(
+            command,
+            cwd=self.root,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+            start_new_session=True,
+            pass_fds=(there, back),
+        )
+        process.watch(self.process.pid)
+        os.close(there)
+        os.close(back)
+        ready = self._message()
+        if not ready.get("ready"):
+            why = ready.get("error", "no reason given")
+            raise self._end(f"the subject cannot be loaded: {why}")
+
+    def _message(self) -> dict[str, Any]:
+        """What its process says next, of which is kept what the subject looked at. Raises SubjectFailed."""
+        message = self._line()
+        if not isinstance(message, dict):
+            raise self._end("the subject's answer is no data")
+        try:
+            self._events.update(((str(event), str(path)), None) for event, path in message.get("seen", ()))
+            faults = [str(fault) for fault in message.get("faults", ())]
+        except (TypeError, ValueError):
+            raise self._end("the subject's answer is no data") from None
+        if faults:
+            self.fault = f"the subject {faults[0]}"
+            raise self._end(self.fault)
+        return message
+
+    def _line(self) -> Any:
+        end = time.monotonic() + self.patience
+        while b"\n" not in self._buffer:
+            left = end - time.monotonic()
+            if left <= 0 or not select.select([self._from], [], [], left)[0]:
+                raise self._end(f"the subject does not answer within {self.patience:g} s")
+            part = os.read(self._from, 1 << 16)
+            if not part:
+                raise self._end("the subject's process has ended")
+            self._buffer += part
+            if len(self._buffer) > 16_000_000:
+                raise self._end("the subject's answer has no end")
+        line, _, self._buffer = self._buffer.partition(b"\n")
+        try:
+            return json.loads(line)
+        except (ValueError, RecursionError):
+            raise self._end("the subject's answer is no data") from None

@@ -1,0 +1,197 @@
+"""What a subject looks at without anybody having declared it: a change of it makes the evidence stale."""
+
+from __future__ import annotations
+
+import py_compile
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from avow.base.verdict import Verdict
+from avow.base.workspace import Workspace
+from avow.isolation.level import SANDBOX
+from avow.pipeline.discharge import discharge, ledger_of, open_obligations
+from avow.pipeline.run_info import Run
+from avow.pipeline.work import Work
+from avow.pipeline.workload import Survey, survey
+
+RCL = """
+node limiter {
+  inputs ( wish: REAL )
+  outputs ( speed: REAL )
+  topics ( )
+  guarantee limited ( out.speed <= 10 )
+}
+"""
+
+PLAN = """
+system: robot
+contract: robot.rcl
+nodes:
+  limiter:
+    methods:
+      - hypothesis: {subject: models/limiter.py:step, cases: 20}
+"""
+
+SUBJECT = """
+import ctypes, glob, json, os, pathlib
+from pkg import part
+from pkg.deep import leaf
+import space.inner
+here = pathlib.Path(__file__).parent
+limits = json.loads((here.parent / "config" / "limits.json").read_text())
+try:
+    bonus = float(open("config/bonus.txt").read())
+except OSError:
+    bonus = 0
+if (here / "boost").exists():
+    bonus += 100
+extra = sum(1 for name in os.listdir(here / "plugins"))
+later = len(glob.glob(str(here / "many" / "*.txt")))
+size = os.path.getsize(here / "size.bin")
+import sys
+sys.path.insert(0, str(here / "vendor"))
+import vendored
+outside = (pathlib.Path(OUTSIDE)).read_text()
+
+def step(wish):
+    return min(wish, 10 if limits["top"] and part.ON and leaf.ON and space.inner.ON and vendored.ON else 1000)
+"""
+
+FILES = {
+    "robot.rcl": RCL,
+    "plan.yaml": PLAN,
+    "config/limits.json": '{"top": 1}',
+    "models/pkg/__init__.py": "",
+    "models/pkg/part.py": "from . import twin\nON = twin.ON\n",
+    "models/pkg/twin.py": "ON = True\n",
+    "models/pkg/deep/__init__.py": "from ..twin import ON as _\n",
+    "models/pkg/deep/leaf.py": "ON = True\n",
+    "models/space/inner.py": "ON = True\n",
+    "models/plugins/a.py": "",
+    "models/many/a.txt": "",
+    "models/size.bin": "xx",
+    "models/vendor/vendored.py": "ON = True\n",
+}
+
+
+CHANGES = {
+    "a module of a package": ("models/pkg/part.py", "from . import twin\nON = 0\n"),
+    "a relative import": ("models/pkg/twin.py", "ON = False\n"),
+    "a package's __init__": ("models/pkg/__init__.py", "x = 1\n"),
+    "a nested package": ("models/pkg/deep/leaf.py", "ON = False\n"),
+    "a namespace package": ("models/space/inner.py", "ON = False\n"),
+    "a parameter file": ("config/limits.json", '{"top": 0}'),
+    "a missing file that appears": ("config/bonus.txt", "5"),
+    "a file that is only looked for": ("models/boost", ""),
+    "a listed folder": ("models/plugins/b.py", ""),
+    "a globbed folder": ("models/many/b.txt", ""),
+    "a file's size": ("models/size.bin", "xxx"),
+    "a folder put on the path": ("models/vendor/vendored.py", "ON = False\n"),
+    "a module that comes first": ("models/json.py", "def loads(text): return {'top': 0}\n"),
+    "a package in place of a namespace": ("models/space/__init__.py", "ON = False\n"),
+    "a file outside": ("../../outside.txt", "other"),
+    "the subject": ("models/limiter.py", "def step(wish): return 0\n"),
+}
+
+
+@pytest.fixture(scope="module")
+def settled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Workspace, Work]:
+    root = tmp_path_factory.mktemp("observed")
+    workspace = Workspace(root)
+    folder = root / "contracts" / "robot"
+    (root / "outside.txt").write_text("one")
+    subject = SUBJECT.replace("OUTSIDE", repr(str(root / "outside.txt")))
+    for name, text in {**FILES, "models/limiter.py": subject}.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    work = method(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(SANDBOX, "off")  # a sealed one would not see the file outside, which lies under /tmp
+        outcomes = discharge(workspace, work, Run("first", False))
+    assert [o.verdict for o in outcomes] == [Verdict.TESTED], outcomes
+    assert not open_obligations(workspace, work, Run("second", False))
+    return workspace, work
+
+
+def method(folder: Path) -> Work:
+    found = survey(folder)
+    assert isinstance(found, Survey), found
+    return found.work("hypothesis")
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_change_of_it_makes_stale_and_the_old_state_is_known_again(
+    settled: tuple[Workspace, Work], name: str
+) -> None:
+    workspace, _ = settled
+    folder = workspace.contracts / "robot"
+    place, text = CHANGES[name]
+    path = folder / place
+    before = path.read_text() if path.exists() else None
+    try:
+        path.write_text(text)
+        assert open_obligations(workspace, method(folder), Run("third", False))
+    finally:
+        path.unlink() if before is None else path.write_text(before)
+    assert not open_obligations(workspace, method(folder), Run("fourth", False))
+
+
+def test_a_file_that_goes_makes_stale(settled: tuple[Workspace, Work]) -> None:
+    workspace, _ = settled
+    path = workspace.contracts / "robot" / "config" / "limits.json"
+    text = path.read_text()
+    path.unlink()
+    assert open_obligations(workspace, method(workspace.contracts / "robot"), Run("third", False))
+    path.write_text(text)
+
+
+def test_what_nobody_looked_at_changes_nothing(settled: tuple[Workspace, Work]) -> None:
+    workspace, _ = settled
+    (workspace.contracts / "robot" / "config" / "notes.txt").write_text("nobody reads this")
+    assert not open_obligations(workspace, method(workspace.contracts / "robot"), Run("third", False))
+
+
+def test_a_sandbox_asked_for_later_asks_again(settled: tuple[Workspace, Work], monkeypatch: pytest.MonkeyPatch) -> None:
+    workspace, work = settled
+    assert ledger_of(workspace.ledger("robot")).records()[-1].evidence.details["isolation"] == "processes"
+    monkeypatch.setenv(SANDBOX, "required")
+    assert open_obligations(workspace, work, Run("third", False))
+
+
+UNRECORDABLE = {
+    "another program": "import subprocess\ntop = 10 if subprocess.run(['true']) else 1000\n",
+    "the network": "import socket\nsocket.socket(socket.AF_UNIX).close()\ntop = 10\n",
+    "a library": "import ctypes\nctypes.CDLL(None).getpid()\ntop = 10\n",
+    "a device": "open('/dev/full', 'rb').close()\nopen('/proc/self/stat').close()\ntop = 10\n",
+    "a pipe": "import os\nos.close(os.open('pipe', os.O_RDONLY | os.O_NONBLOCK))\ntop = 10\n",
+}
+
+
+@pytest.mark.parametrize("name", UNRECORDABLE)
+def test_what_cannot_be_recorded_is_not_green(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "contracts" / "robot"
+    (folder / "models").mkdir(parents=True)
+    (folder / "robot.rcl").write_text(RCL)
+    (folder / "plan.yaml").write_text(PLAN)
+    if name == "a pipe":
+        subprocess.run(["mkfifo", str(folder / "pipe")], check=True)
+    (folder / "models" / "limiter.py").write_text(UNRECORDABLE[name] + "def step(wish): return min(wish, top)\n")
+    outcomes = discharge(Workspace(tmp_path), method(folder), Run("first", False))
+    assert [o.verdict for o in outcomes] == [Verdict.UNKNOWN]
+    assert "undeclared input" in outcomes[0].summary
+
+
+def test_a_compiled_file_never_stands_for_its_source(tmp_path: Path) -> None:
+    folder = tmp_path / "contracts" / "robot"
+    (folder / "models").mkdir(parents=True)
+    (folder / "robot.rcl").write_text(RCL)
+    (folder / "plan.yaml").write_text(PLAN)
+    (folder / "models" / "limiter.py").write_text("import helper\ndef step(wish): return helper.f(wish)\n")
+    helper = folder / "models" / "helper.py"
+    helper.write_text("def f(x): return min(x, 10)\n")
+    py_compile.compile(str(helper), invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH)
+    helper.write_text("def f(x): return x\n")
+    outcomes = discharge(Workspace(tmp_path), method(folder), Run("first", False))
+    assert [o.verdict for o in outcomes] == [Verdict.REFUTED]
