@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 _NOISE = re.compile(r"Prover error: line \d+ column \d+: unknown parameter|Legal parameters are:|  \w+ \([\w ]+\)")
 _SAID = re.compile(
-    r"(?P<file>[^\s(][^(\n]*)\((?P<line>\d+),(?P<column>\d+)\): (?P<what>Error[^\n]*|Warning[^\n]*no body[^\n]*)"
+    r"^ *(?P<file>[^\s(][^(\n]*)\((?P<line>\d+),(?P<column>\d+)\): (?P<what>Error[^\n]*|Warning[^\n]*no body[^\n]*)",
+    re.MULTILINE,  # from a line's start only: a tool that prints no line ends would take minutes to read
 )
 _COUNT = re.compile(r"(\d+) (?:resolution/type|parse) errors? detected in ")
 

@@ -27,12 +27,6 @@ SCHEMA: dict[str, Any] = {
     "type": "object",
     "additionalProperties": False,
     "properties": {
-        "id": {"type": "string", "description": "tells several methods of one node apart"},
-        "guarantees": {
-            "type": ["array", "string"],
-            "items": {"type": "string"},
-            "description": "the guarantees that are monitored (default: all of the node's)",
-        },
         "traces": {
             "type": "array",
             "items": {"type": "string"},

@@ -1,0 +1,359 @@
+"""What every backend is held to. The rules are those of `docs/adding-a-backend.md`; a test's docstring says which."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import jsonschema
+import pytest
+
+from avow.backend_kit import registry
+from avow.backend_kit.protocol import COMMON_OPTIONS, Backend, Job, Limits, lacks
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.tools import find_tool
+from avow.base.verdict import Outcome, Verdict
+from avow.conformance.seeded import Seeded, settle, verdicts
+from avow.language.contract import Node
+from avow.pipeline.evidence_keys import surroundings
+from avow.system.plan import System
+
+_HOSTILE = ("class", "ensures", "lambda", "None", "self", "exit", "con", "x" * 120)
+"""Names that are plain words of the contract language, and something else to a tool, a file system or Python."""
+
+_ODD_VALUES: tuple[Any, ...] = (None, True, -1, 10**30, 1.5, "", "nowhere", "../../../etc/passwd", [], {}, [[]])
+"""Options that somebody's slip may give; most are of a wrong type for any option."""
+
+_FOLDER = 'it\'s; $(touch broken) "a b" µ'
+"""A system's folder that is a trap for whoever pastes paths into commands."""
+
+_LIES = (None, "", "exit 1", "kill -9 $$", "head -c 100000 /dev/zero", "echo unsat; echo 0 errors")
+"""What stands under the tools' names: nothing at all, or a script that does this."""
+
+_ENOUGH = Limits(seconds=120.0)
+_HARDLY = Limits(seconds=0.05)
+_PATIENCE = 60.0
+"""Seconds within which a discharge with hardly any time must be back, on a busy machine."""
+
+
+class Conformance:
+    """Inherit it, name `backend`, and seed it. The name of the class must start with `Test`."""
+
+    backend: ClassVar[Backend]
+    seeded: ClassVar[tuple[Seeded, ...]]
+    """Contracts with known verdicts. At least one claim must be supported, and one refuted (or, by `never_refutes`,
+    not supported): a method that says the same of everything shows nothing."""
+    never_refutes: ClassVar[bool] = False
+    """The method cannot show that a claim is false: what it does not support is `unknown`."""
+    files_name_the_node: ClassVar[bool] = False
+    """The seeded files contain names that are made of the node's: it keeps its name then."""
+
+    def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
+        if "case" in metafunc.fixturenames:
+            metafunc.parametrize("case", self.seeded, ids=[case.name for case in self.seeded])
+        if "answer" in metafunc.fixturenames:
+            outside = any(tool.path for tool in self.backend.tools())
+            metafunc.parametrize("answer", _LIES if outside else ())
+
+    @pytest.fixture
+    def job(self, case: Seeded, tmp_path: Path) -> Job:
+        return case.written(self.backend, tmp_path / "system")
+
+    # -- what it says of itself ----------------------------------------------------------------------------------------
+
+    def test_it_keeps_the_promise(self) -> None:
+        """All attributes are there, of the right types, and say something."""
+        assert lacks(self.backend) == ""
+        assert self.backend.strength.supports, "strength is the best verdict, one that supports a claim"
+        for name in ("name", "title", "version", "green_means"):
+            assert getattr(self.backend, name).strip(), f"{name} says nothing"
+        assert self.backend.name == self.backend.name.lower()
+        assert self.backend.name.replace("_", "").replace("-", "").isalnum()
+
+    def test_the_schema_is_one(self, case: Seeded) -> None:
+        """`options_schema` is JSON schema, leaves the pipeline's own options alone, and takes the seeded options."""
+        jsonschema.Draft202012Validator.check_schema(self.backend.options_schema)
+        common = COMMON_OPTIONS & set(self.backend.options_schema.get("properties", {}))
+        assert not common, f"these are options of every method: {sorted(common)}"
+        own = case.options
+        if isinstance(own, Mapping):
+            own = {key: value for key, value in own.items() if key not in COMMON_OPTIONS}
+        jsonschema.validate(own, self.backend.options_schema, jsonschema.Draft202012Validator)
+
+    def test_the_codes_are_declared(self) -> None:
+        for name, code in self.backend.codes.items():
+            assert code.code == name
+            assert code.title, name
+            assert code.explanation, name
+
+    def test_tools_are_found_without_an_exception(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """With and without them; a missing tool says how to install it."""
+        monkeypatch.setenv("PATH", os.devnull)
+        self.forget_tools()
+        try:
+            for tool in self.backend.tools():
+                assert tool.present or tool.install, f"{tool.name} does not say how it is installed"
+        finally:
+            self.forget_tools()
+
+    def test_seeds_of_both_kinds(self) -> None:
+        every = [verdict for case in self.seeded for verdict in case.verdicts.values()]
+        assert any(verdict.supports for verdict in every), "no seeded claim is supported"
+        bad = [v for v in every if (not v.supports if self.never_refutes else v is Verdict.REFUTED)]
+        assert bad, "no seeded claim is refuted"
+
+    # -- verdicts ------------------------------------------------------------------------------------------------------
+
+    def test_seeded_verdicts(self, case: Seeded, job: Job, tmp_path: Path) -> None:
+        """Each claim gets the verdict that is right for it; a refutation says why; the system's folder is untouched."""
+        errors = [d for d in self.backend.check(job) if d.is_error]
+        assert not any(v.supports for v in case.verdicts.values()) or not errors, errors
+        before = _tree(job.root)
+        children = _children()
+        report = settle(self.backend, job, tmp_path / "made", _ENOUGH)
+        found = verdicts(job, report)
+        absent = [t for t in self.backend.tools() if not t.present]
+        if absent and Verdict.NOT_RUN in found.values():
+            pytest.skip(f"{absent[0].name} is not here: {absent[0].install}")
+        assert found == dict(case.verdicts), [(o.obligation, o.verdict, o.summary) for o in report.outcomes]
+        assert _tree(job.root) == before, "a discharge changes nothing in the system's folder"
+        assert _children() <= children, "a discharge leaves no process behind"
+        assert report.tool
+        for outcome in report.outcomes:
+            self.is_sound(outcome)
+
+    def is_sound(self, outcome: Outcome) -> None:
+        """What holds of any outcome."""
+        assert outcome.summary.strip(), f"{outcome.verdict} without a word"
+        assert "Traceback" not in outcome.summary
+        if outcome.verdict is Verdict.REFUTED:
+            assert outcome.counterexample is not None, "a refutation needs a counterexample"
+        if outcome.verdict is Verdict.PROVED:
+            assert self.backend.strength is Verdict.PROVED, "proved is for methods that prove"
+        if outcome.verdict in (Verdict.CHECKED, Verdict.TESTED, Verdict.MONITORED):
+            assert outcome.bound, "an answer within bounds names them"
+
+    def test_twice_the_same(self, job: Job, tmp_path: Path) -> None:
+        once = verdicts(job, settle(self.backend, job, tmp_path / "once", _ENOUGH))
+        assert verdicts(job, settle(self.backend, job, tmp_path / "twice", _ENOUGH)) == once
+
+    def test_one_obligation_at_a_time(self, job: Job, tmp_path: Path) -> None:
+        """A part of the obligations gets the verdicts that it gets among all, and none is answered unasked."""
+        assert self.backend.discharge(replace(job, obligations=()), tmp_path, _ENOUGH).outcomes == ()
+        whole = verdicts(job, settle(self.backend, job, tmp_path / "all", _ENOUGH))
+        for k, obligation in enumerate(job.obligations):
+            one = replace(job, obligations=(obligation,))
+            found = verdicts(one, settle(self.backend, one, tmp_path / str(k), _ENOUGH))
+            assert found == {obligation.name: whole[obligation.name]}
+
+    # -- export --------------------------------------------------------------------------------------------------------
+
+    def test_export_is_pure(self, job: Job, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Same job, same bytes, wherever and whenever; names stay in the folder; nothing is written."""
+        before = _tree(job.root)
+        once = dict(self.backend.export(job))
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setenv("TZ", "Pacific/Auckland")
+        assert dict(self.backend.export(job)) == once
+        assert _tree(job.root) == before
+        for name, text in once.items():
+            assert isinstance(text, str)
+            assert not Path(name).is_absolute()
+            assert ".." not in Path(name).parts
+            assert str(job.root) not in text, f"{name} holds this machine's paths"
+
+    def test_translations(self, job: Job) -> None:
+        """Every notation says something or what it lacks; input at fault is Rejected, with a place or a reason."""
+        for notation, words in self.backend.translations.items():
+            assert words.strip()
+            try:
+                made = self.backend.translate(notation, job.system, job.node)
+            except Rejected as rejected:
+                self.codes_are_known(rejected.diagnostics)
+                continue
+            assert made.files or made.missing
+            assert made == self.backend.translate(notation, job.system, job.node)
+            self.codes_are_known(made.missing)
+
+    # -- hostile input -------------------------------------------------------------------------------------------------
+
+    @pytest.mark.parametrize("word", _HOSTILE)
+    def test_hostile_names(self, case: Seeded, word: str, tmp_path: Path) -> None:
+        """A node and guarantees that are called like a tool's or Python's own words: the verdicts stay as they are."""
+        node = {} if self.files_name_the_node else {case.node: f"{word}_n"}
+        names = {**node, **{old: f"{word}{k}" if k else word for k, old in enumerate(case.verdicts)}}
+        other = case.renamed(names)
+        try:
+            job = other.written(self.backend, tmp_path / "system")
+        except Rejected:
+            pytest.skip("no name of the contract language")
+        found = verdicts(job, settle(self.backend, job, tmp_path / "made", _ENOUGH))
+        assert found == dict(other.verdicts) or self.is_absent(found)
+
+    def test_a_hostile_folder(self, case: Seeded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Paths are data, also those that a shell would take for commands."""
+        monkeypatch.chdir(tmp_path)
+        job = case.written(self.backend, tmp_path / _FOLDER)
+        found = verdicts(job, settle(self.backend, job, tmp_path / "made", _ENOUGH))
+        assert found == dict(case.verdicts) or self.is_absent(found)
+        assert not (tmp_path / "broken").exists()
+
+    def test_hostile_options(self, case: Seeded, tmp_path: Path) -> None:
+        """Odd values that pass the schema, one after the other: what `check` refuses supports nothing, and neither
+        raises. (What does not pass the schema, the pipeline refuses.)"""
+        if not isinstance(case.options, Mapping):
+            pytest.skip("the options are no mapping")
+        for k, (key, value) in enumerate((key, value) for key in case.options for value in _ODD_VALUES):
+            if key in COMMON_OPTIONS:
+                continue
+            folder = tmp_path / str(k)
+            odd = replace(case, options={**case.options, key: value})
+            try:
+                job = odd.written(self.backend, folder)
+            except Rejected:  # YAML cannot say it, or the plan's reader refuses it already
+                continue
+            schema = jsonschema.Draft202012Validator(self.backend.options_schema)
+            if schema.is_valid(job.options) and any(d.is_error for d in self.backend.check(job)):
+                self.is_refused(job, folder / "made")
+
+    def test_files_that_are_missing(self, case: Seeded, job: Job, tmp_path: Path) -> None:
+        """Without a file, and with a broken one, nothing is supported that rests on it, and nothing raises."""
+        for name in case.files:
+            kept = (job.root / name).read_bytes()
+            for broken in (None, b"", b"\xff\xfe\x00\x01", b"(" * 5000):
+                (job.root / name).unlink(missing_ok=True)
+                if broken is not None:
+                    (job.root / name).write_bytes(broken)
+                self.is_refused(job, tmp_path / "made")
+            (job.root / name).write_bytes(kept)
+
+    def is_refused(self, job: Job, folder: Path) -> None:
+        self.codes_are_known(self.backend.check(job))
+        for path in self.backend.files(job):
+            assert path.is_absolute()
+        try:
+            report = settle(self.backend, job, folder, _ENOUGH)
+        except Rejected:  # of export: what check says
+            report = self.backend.discharge(job, folder, _ENOUGH)
+        for name, verdict in verdicts(job, report).items():
+            assert not verdict.supports, f"{name} is {verdict} although the input is at fault"
+
+    def codes_are_known(self, diagnostics: tuple[Diagnostic, ...]) -> None:
+        known = {*self.backend.codes, *registry.every_code()}
+        for diagnostic in diagnostics:
+            assert diagnostic.code in known, f"{diagnostic.code} is not declared"
+            assert diagnostic.message.strip()
+
+    # -- tools and time ------------------------------------------------------------------------------------------------
+
+    def test_hardly_any_time(self, case: Seeded, job: Job, tmp_path: Path) -> None:
+        """It comes back soon, with a verdict for each claim: the right one, or one that says that it gave up."""
+        begun, children = time.monotonic(), _children()
+        found = verdicts(job, settle(self.backend, job, tmp_path / "made", _HARDLY))
+        assert time.monotonic() - begun < _PATIENCE
+        gave_up = (Verdict.UNKNOWN, Verdict.ERROR, Verdict.NOT_RUN)
+        for name, verdict in found.items():
+            assert verdict in (case.verdicts[name], *gave_up), (name, verdict)
+        assert _children() <= children, "a discharge leaves no process behind"
+
+    def test_tools_that_are_missing_or_lie(
+        self, case: Seeded, job: Job, answer: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Without its outside tools, or with others under their names, a claim is not supported that was not: no exit
+        code, and no silence, is an answer."""
+        outside = [Path(tool.path).name for tool in self.backend.tools() if tool.path]
+        place = tmp_path / "bin"
+        place.mkdir()
+        for name in outside if answer is not None else ():
+            (place / name).write_text(f"#!/bin/sh\n{answer}\n")
+            (place / name).chmod(0o755)
+        monkeypatch.setenv("PATH", f"{place}:/usr/bin:/bin" if answer is not None else str(place))
+        self.forget_tools()
+        try:
+            report = settle(self.backend, job, tmp_path / "made", _ENOUGH)
+        finally:
+            self.forget_tools()
+        for outcome in report.outcomes:
+            if outcome.verdict.supports:
+                right = case.verdicts[job_name(job, outcome)]
+                assert right.supports, f"{outcome.obligation} is {outcome.verdict} without its tool"
+                required = [t for t in self.backend.tools() if t.path and not t.optional]
+                assert not required, f"{required[0].name} is required, and was not there"
+
+    def forget_tools(self) -> None:
+        """Called when the PATH changes. Override it where a backend remembers its tools by itself."""
+        find_tool.cache_clear()
+
+    def is_absent(self, found: Mapping[str, Verdict]) -> bool:
+        return set(found.values()) == {Verdict.NOT_RUN} and any(not t.present for t in self.backend.tools())
+
+    # -- staleness -----------------------------------------------------------------------------------------------------
+
+    def test_its_files_are_named(self, case: Seeded, job: Job) -> None:
+        """Every file that the answer depends on is in `files`, or a change of it would go unnoticed."""
+        named = {path.resolve() for path in self.backend.files(job)}
+        for path in named:
+            assert path.is_relative_to(job.root.resolve()), f"{path} is outside the system's folder"
+        for name in case.files:
+            assert (job.root / name).resolve() in named, f"a change of {name} would go unnoticed"
+
+    def test_what_it_says_not_to_look_at(self, case: Seeded, job: Job, tmp_path: Path) -> None:
+        """`uses_scenario`, `uses_steps` and `uses_wiring` are believed: where one is False, export and verdicts are the
+        same whatever stands there. What is looked at moves the key."""
+        whole = self.backend.export(job)
+        found = verdicts(job, settle(self.backend, job, tmp_path / "made", _ENOUGH))
+        for name, looked, system in _others(self.backend, job):
+            other = replace(job, system=system)
+            if looked:
+                assert surroundings(self.backend, other, "") != surroundings(self.backend, job, ""), name
+            else:
+                assert self.backend.export(other) == whole, f"it does look at the {name}"
+                assert verdicts(other, settle(self.backend, other, tmp_path / name, _ENOUGH)) == found, name
+
+    def test_suits_any_node(self, job: Job) -> None:
+        """A guess, but never an exception."""
+        nodes: tuple[Node, ...] = job.contract.nodes
+        assert all(isinstance(self.backend.suits(node), bool) for node in nodes)
+
+
+def job_name(job: Job, outcome: Outcome) -> str:
+    return next(o.name for o in job.obligations if o.id == outcome.obligation)
+
+
+def _others(backend: Backend, job: Job) -> Iterator[tuple[str, bool, System]]:
+    """What is looked at or not, whether the backend says that it looks, and a system that differs only there."""
+    plan = job.system.plan
+    scenario = plan.scenario
+    if scenario is not None:
+        other = replace(scenario, steps=(scenario.steps or 0) + 7, digest=scenario.digest + "'")
+        if backend.uses_scenario:
+            yield "steps", backend.uses_steps, replace(job.system, plan=replace(plan, scenario=other))
+        else:
+            yield "scenario", False, replace(job.system, plan=replace(plan, scenario=None))
+    if not backend.uses_wiring:
+        alone = replace(job.system.contract, nodes=(job.node,))
+        yield "wiring", False, replace(job.system, contract=alone)
+
+
+def _tree(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def _children() -> set[int]:
+    """The processes that this one started and that still run; none where the system does not tell."""
+    if sys.platform != "linux":
+        return set()
+    found = set()
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if fields[1] == str(os.getpid()) and fields[0] != "Z":
+            found.add(int(stat.parent.name))
+    return found

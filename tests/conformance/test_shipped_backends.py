@@ -1,0 +1,254 @@
+"""Every shipped backend passes the suite that a third party's has to pass."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from avow.backend_kit.registry import installed
+from avow.backends.ajpf import BACKEND as AJPF
+from avow.backends.ajpf import spin
+from avow.backends.dafny import BACKEND as DAFNY
+from avow.backends.experiment import BACKEND as EXPERIMENT
+from avow.backends.hoare import BACKEND as HOARE
+from avow.backends.hypothesis import BACKEND as HYPOTHESIS
+from avow.backends.review import BACKEND as REVIEW
+from avow.backends.review.stamp import stamp
+from avow.backends.rosmonitoring import BACKEND as ROSMONITORING
+from avow.base.verdict import Verdict
+from avow.conformance import Conformance, Seeded
+
+CONTRACT = """\
+node sensor {
+  inputs( r : REAL )
+  outputs( high : BOOL )
+  topics( p/R r matches(in.r), p/H high matches(out.high) )
+  guarantee warns "It warns above 120" ( in.r > 120 -> out.high )
+  guarantee calm "It is silent below 10" ( in.r < 10 -> not out.high )
+}
+"""
+SCENARIO = {"scenario": {"domains": {"sensor.r": [0, 5, 125]}, "steps": 3}}
+
+
+def one_refuted(good: Verdict) -> dict[str, Verdict]:
+    return {"warns": Verdict.REFUTED, "calm": good}
+
+
+def both(good: Verdict) -> dict[str, Verdict]:
+    return {"warns": good, "calm": good}
+
+
+class TestHoare(Conformance):
+    backend = HOARE
+    seeded = (
+        Seeded(
+            "right",
+            CONTRACT,
+            {"program": "models/sensor.imp"},
+            both(Verdict.PROVED),
+            {"models/sensor.imp": "IF (r > 100) THEN high := TRUE ELSE high := FALSE\n"},
+            SCENARIO,
+        ),
+        Seeded(
+            "wrong",
+            CONTRACT,
+            {"program": "models/sensor.imp"},
+            one_refuted(Verdict.PROVED),
+            {"models/sensor.imp": "IF (r > 121) THEN high := TRUE ELSE high := FALSE\n"},
+        ),
+    )
+
+
+@pytest.mark.slow
+class TestHypothesis(Conformance):
+    backend = HYPOTHESIS
+    seeded = (
+        Seeded(
+            "right",
+            CONTRACT,
+            {"subject": "models/sensor.py:step", "cases": 40},
+            both(Verdict.TESTED),
+            {
+                "models/sensor.py": "import limit\ndef step(r): return {'high': r > limit.LIMIT}\n",
+                "models/limit.py": "LIMIT = 100\n",
+            },
+            SCENARIO,
+        ),
+        Seeded(
+            "wrong",
+            CONTRACT,
+            {"subject": "models/sensor.py:step", "cases": 40},
+            one_refuted(Verdict.TESTED),
+            {"models/sensor.py": "def step(r):\n    return {'high': False}\n"},
+        ),
+    )
+
+
+DAFNY_PROGRAM = """\
+include "sensor_spec.dfy"
+module {:options "--function-syntax:3"} SensorImpl refines SensorSpec {
+  predicate Env(in_r: real) { true }
+  lemma EnvNotEmpty() returns (in_r: real) { in_r := 0.0; }
+  method Step(in_r: real) returns (out_high: bool) { out_high := in_r > LIMIT; }
+}
+"""
+
+
+@pytest.mark.slow
+class TestDafny(Conformance):
+    backend = DAFNY
+    files_name_the_node = True
+    never_refutes = True
+    seeded = (
+        Seeded(
+            "right",
+            CONTRACT,
+            {"implementation": "sensor.dfy"},
+            both(Verdict.PROVED),
+            {"sensor.dfy": DAFNY_PROGRAM.replace("LIMIT", "100.0")},
+            SCENARIO,
+        ),
+        Seeded(
+            "wrong",
+            CONTRACT,
+            {"implementation": "sensor.dfy"},
+            {"warns": Verdict.UNKNOWN, "calm": Verdict.PROVED},
+            {"sensor.dfy": DAFNY_PROGRAM.replace("LIMIT", "121.0")},
+        ),
+    )
+
+
+def trace(*events: tuple[float, bool]) -> str:
+    lines = [
+        {"topic": topic, "time": at, "data": value}
+        for at, pair in enumerate(events)
+        for topic, value in zip(("r", "high"), pair, strict=True)
+    ]
+    return "".join(json.dumps(line) + "\n" for line in lines)
+
+
+class TestRosMonitoring(Conformance):
+    backend = ROSMONITORING
+    seeded = (
+        Seeded(
+            "right",
+            CONTRACT,
+            {"traces": ["run.jsonl"], "mapping": {"in.r": "data", "out.high": "data"}},
+            both(Verdict.MONITORED),
+            {"run.jsonl": trace((5, False), (50, True), (125, True))},
+            SCENARIO,
+        ),
+        Seeded(
+            "wrong",
+            CONTRACT,
+            {"traces": ["run.jsonl"], "mapping": {"in.r": "data", "out.high": "data"}},
+            one_refuted(Verdict.MONITORED),
+            {"run.jsonl": trace((5, False), (125, False))},
+        ),
+    )
+
+
+class TestExperiment(Conformance):
+    backend = EXPERIMENT
+    seeded = (
+        Seeded(
+            "right",
+            CONTRACT,
+            {"data": "runs.csv", "measure": "late", "within": "5", "at_least": 0.9},
+            both(Verdict.TESTED),
+            {"runs.csv": "late\n" + "1\n" * 40},
+            SCENARIO,
+        ),
+        Seeded(
+            "wrong",
+            CONTRACT,
+            {"data": "runs.csv", "measure": "late", "within": "5"},
+            both(Verdict.REFUTED),
+            {"runs.csv": "late\n" + "1\n" * 40 + "6\n"},
+        ),
+    )
+
+
+RECORD = """\
+reviewer: Ada
+role: engineer
+date: 2026-11-20
+read: [code.py]
+checklist: [{question: "Is it?", answer: yes}]
+conclusion: CONCLUSION
+"""
+
+
+def stamped(folder: Path) -> None:
+    words = (folder / "system.rcl").read_text().split()
+    stamp(folder, words[words.index("node") + 1])
+
+
+class TestReview(Conformance):
+    backend = REVIEW
+    seeded = (
+        Seeded(
+            "accepted",
+            CONTRACT,
+            {"record": "review.yaml"},
+            both(Verdict.REVIEWED),
+            {"review.yaml": RECORD.replace("CONCLUSION", "accepted"), "code.py": "pass\n"},
+            SCENARIO,
+            stamped,
+        ),
+        Seeded(
+            "rejected",
+            CONTRACT,
+            {"record": "review.yaml"},
+            both(Verdict.REFUTED),
+            {"review.yaml": RECORD.replace("CONCLUSION", "rejected"), "code.py": "pass\n"},
+            prepare=stamped,
+        ),
+    )
+
+
+LIFT = Path(__file__).parents[1] / "ajpf" / "fixtures" / "lift"
+LIFT_OPTIONS = {
+    "program": "cabin.gwen",
+    "environment": "cabin.yaml",
+    "engine": "builtin",
+    "instances": {"f": [1, 2]},
+    "predicates": {
+        "in.call(f)": "B(cabin, call(f))",
+        "in.door == shut": "B(cabin, shut)",
+        "in.door == open": "B(cabin, open)",
+        "out.motion == go(f)": "D(cabin, go(f))",
+        "exists(n in NATURAL | out.motion == halt(n))": "D(cabin, halt(_))",
+    },
+}
+
+
+@pytest.mark.slow
+class TestAjpf(Conformance):
+    backend = AJPF
+    files_name_the_node = True
+    seeded = tuple(
+        Seeded(
+            name,
+            (LIFT / "system.rcl").read_text(),
+            LIFT_OPTIONS,
+            {"answers": Verdict.CHECKED, "halts": verdict},
+            {
+                "cabin.gwen": (LIFT / "cabin.gwen").read_text().replace("halt(0)", deed),
+                "cabin.yaml": (LIFT / "cabin.yaml").read_text(),
+            },
+        )
+        for name, deed, verdict in (("right", "halt(0)", Verdict.CHECKED), ("wrong", "print(0)", Verdict.REFUTED))
+    )
+
+    def forget_tools(self) -> None:
+        super().forget_tools()
+        spin.version.cache_clear()
+
+
+def test_none_is_left_out() -> None:
+    held = {cls.backend.name for cls in Conformance.__subclasses__()}
+    ours = {name for name, point in installed().items() if point.value.startswith("avow.backends.")}
+    assert ours <= held

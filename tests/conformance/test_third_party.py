@@ -1,0 +1,61 @@
+"""A third party's backend passes the suite in an environment of its own kind, and one that lies fails it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+
+
+def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    for name in ("rows_backend.py", "test_rows_backend.py"):
+        (tmp_path / name).write_text((EXAMPLES / name).read_text())
+    return tmp_path
+
+
+def test_the_examples_pass(place: Path) -> None:
+    """The one in the folder, and the one on the page."""
+    page = (EXAMPLES.parent / "adding-a-backend.md").read_text()
+    (found,) = re.findall(r"^```python conformance\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    (place / "test_page.py").write_text(found)
+    done = run(place)
+    assert done.returncode == 0, done.stdout[-3000:]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("return (path,) if path is not None else ()", "return ()", "test_its_files_are_named"),
+        ('Verdict.TESTED, f"{len', 'Verdict.PROVED, f"{len', "test_seeded_verdicts"),
+        ("Counterexample(tuple(", "None and Counterexample(tuple(", "test_seeded_verdicts"),
+        ("for o in job.obligations)", "for o in job.obligations[:1])", "test_seeded_verdicts"),
+        ("Verdict.ERROR, told(", "Verdict.TESTED, told(", "test_files_that_are_missing"),
+        ('    version = "1"\n', "", "test_it_keeps_the_promise"),
+        ("uses_scenario = False", "uses_scenario = 0", "test_it_keeps_the_promise"),
+        ('"additionalProperties": False', '"additionalProperties": "no"', "test_the_schema_is_one"),
+        (
+            '        return Report(outcomes, "rows"',
+            '        (job.root / "x").touch()\n        return Report(outcomes, "rows"',
+            "test_seeded_verdicts",
+        ),
+    ],
+)
+def test_a_seeded_fault_is_told(place: Path, old: str, new: str, told: str) -> None:
+    path = place / "rows_backend.py"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    done = run(place, "-k", told)
+    assert done.returncode == 1, done.stdout[-3000:]
