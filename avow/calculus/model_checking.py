@@ -19,7 +19,8 @@ from avow.calculus.node_outputs import Doubts, Stuck
 from avow.calculus.node_outputs import judge as judge_formula
 from avow.calculus.open_values import Holds
 from avow.calculus.questions import Answer
-from avow.calculus.scenario import CannotRun, world
+from avow.calculus.replaying import completions, holds, truths, unsupported
+from avow.calculus.scenario import CannotRun, restrictions, world
 from avow.calculus.transition import Machine, Step, Walk
 from avow.calculus.variables import Frame, system_term
 from avow.formulas.formula import free_variables
@@ -119,10 +120,12 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
         told = f"the system cannot take a first step: {explored.cannot_start.text()}"
         verdict = Verdict.REFUTED if explored.cannot_start.genuine else Verdict.UNKNOWN
         return Answer(verdict, told, Counterexample(explanation=told), bound=_bound(explored))
+    within = restrictions(explored.machine.world)
     if done and not machine.short:
         return Answer(
             Verdict.CHECKED,
             f"every run within the scenario has it: {len(explored.steps)} kinds of steps, all looked at",
+            hypotheses=within,
             bound=_bound(explored),
             details={"exhaustive": True},
         )
@@ -130,6 +133,7 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
     return Answer(
         Verdict.TESTED,
         f"no run of the first {explored.depth} steps was found to break it; not exhaustive: {why}",
+        hypotheses=(*within, f"scenario.steps: no run breaks it after its first {explored.depth} steps"),
         bound=_bound(explored) | {"n": len(explored.steps)},
         details={"exhaustive": False},
     )
@@ -166,7 +170,7 @@ def refuting_run(machine: Machine, name: str, claim: Term, bounds: Bounds) -> tu
 
 
 def _false_at_the_end(machine: Machine, name: str, claim: Term, steps: list[Step], doubts: Doubts) -> Answer | None:
-    if doubts.inexact or any(True for step in steps for _ in machine.unconfirmed(step)):
+    if doubts.inexact or any(True for _ in unsupported(machine, steps, None)):
         return None
     spoken = [v.qualified for v in sorted(free_variables(claim), key=lambda v: v.qualified)]
     outputs = [f"{node}.{port.name}" for node in machine.order for port in machine.frame.node(node).outputs]
@@ -303,16 +307,37 @@ def _shown_run(
     if broken:
         told += f"; on the way an assumption does not hold: {', '.join(broken)}"
     shown = Counterexample(trace[-1] if trace else (), told, trace, back)
-    doubt = ""
     if stuck is not None and not stuck.genuine:
         doubt = "perhaps only because the scenario lacks the value"
     else:
-        inexact = sorted({name for step in steps for name in machine.unconfirmed(step)})
-        doubt = f"but over the scenario's values only is it sure that {', '.join(inexact)} holds" if inexact else ""
+        doubt = _doubt(machine, formula, steps, back, stays=stuck is not None, cut=false is not None)
     if doubt:
         summary = f"{told}: {doubt}"
         return Answer(Verdict.UNKNOWN, summary, shown, bound=bound, details={"exhaustive": False})
     return Answer(Verdict.REFUTED, f"a run of the composed contracts breaks {name}: {told}", shown, bound=bound)
+
+
+def _doubt(
+    machine: Machine, formula: Property, steps: Sequence[Step], back: int | None, *, stays: bool, cut: bool
+) -> str:
+    """Why the run may be none, or none that breaks the property, once it is replayed; nothing where both are sure."""
+    doubts = [_doubt_of(machine, formula, run, back, stays, cut) for run in completions(machine, steps)]
+    return "" if "" in doubts else doubts[0]
+
+
+def _doubt_of(
+    machine: Machine, formula: Property, steps: Sequence[Step], back: int | None, stays: bool, cut: bool
+) -> str:
+    loose = tuple(unsupported(machine, steps, None if stays or cut else back))
+    if loose:
+        return f"but over the scenario's values only is it sure that {', '.join(loose[:4])} holds"
+    run = [truths(machine, formula, step) for step in steps]
+    known = [truth for truth in run if truth is not None]
+    if len(known) < len(run):
+        return "but over the scenario's values only is it sure that the property is broken"
+    # of ``always F``, up to a step at which F is false, it is broken however the run goes on
+    end = len(known) - 1 if cut else back
+    return "" if end is not None and not holds(formula, known, end) else "but replayed it does not break the property"
 
 
 def _false_at(machine: Machine, frame: Frame, formula: Property, steps: Sequence[Step]) -> int | None:

@@ -92,6 +92,16 @@ def decided(value: Value, point: Point, result: Value) -> Value:
     raise AssertionError("only functions and sequences are open")
 
 
+def closed(value: Value, result: Value) -> Value:
+    """The open value with all its open places decided alike."""
+    match value:
+        case FunctionValue(table=table):
+            return FunctionValue(table, result)
+        case values_.Sequence(items=items):
+            return values_.Sequence(tuple(result if item is ANY else item for item in items))
+    raise AssertionError("only functions and sequences are open")
+
+
 def _order(entry: tuple[Point, Value]) -> tuple[object, ...]:
     return tuple((0, a, "") if isinstance(a, int | Fraction) else (1, 0, str(a)) for a in entry[0])
 

@@ -220,6 +220,37 @@ def world(frame: Frame) -> World:
     return found
 
 
+def restrictions(world: World) -> tuple[str, ...]:
+    """What a bounded check supposes of the values that the contracts leave open, by its name in the plan: a range that
+    leaves out values of its sort, a relation or function that is a table's, and the sorts of which it tries some."""
+    scenario, found = world.scenario, list[str]()
+    named = {**_SORTS, **dict(world.frame.system.contract.types)}
+    for name, texts in scenario.domains.items():
+        ports = ports_named(name, world.frame.system.contract.nodes)
+        sort = named.get(name) or (ports[0][1].sort if ports else None)
+        everything = None if sort is None or isinstance(sort, FunctionSort) else finite_values(sort)
+        if everything is None or sort is None or not set(everything) <= {world.parse(text, sort) for text in texts}:
+            shown = ", ".join(texts[:_SHOWN]) + (f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else "")
+            found.append(f"scenario.domains.{name}: it is one of {shown}")
+    for name, (table, columns) in scenario.interpret.items():
+        found.append(f"scenario.interpret.{name}: it is as {table}({', '.join(columns)}) has it")
+    for node in world.frame.system.contract.nodes:
+        for port in (*node.inputs, *node.outputs):
+            role = "in" if port in node.inputs else "out"
+            said = {f"{role}.{port.name}", f"{node.name}.{port.name}"} & {*scenario.domains, *scenario.interpret}
+            if not said and port.sort not in world.domains and _is_sampled(world, port.sort):
+                found.append(f"scenario: {node.name}.{port.name} has one of the values that are tried")
+    return tuple(dict.fromkeys(found))
+
+
+def _is_sampled(world: World, sort: Sort) -> bool:
+    """Whether not all of a sort's values are tried, though no range for it is written down."""
+    if isinstance(sort, FunctionSort):
+        return any(finite_values(s) is None for s in (*sort.parameters, sort.result))
+    return finite_values(sort) is None
+
+
+_SHOWN = 8
 _LARGE = 3
 _KEYS: dict[int, tuple[FunctionValue, object]] = {}
 

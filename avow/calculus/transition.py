@@ -15,14 +15,12 @@ from random import Random
 from avow.calculus.choices import Values, by_variable, search
 from avow.calculus.narrowing import Narrowing, Unknown, forcings
 from avow.calculus.node_outputs import MAX_ANSWERS, Answerer, Doubts, Stuck, judge, possible
-from avow.calculus.open_values import Holds, Undecided, decided, is_open
+from avow.calculus.open_values import Holds, Undecided, decided
 from avow.calculus.scenario import CannotRun, World, key
-from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
 from avow.language.terms import Role, Term
-from avow.solving.questions import replay
 from avow.system.formulas import initial_condition, ports_of
 from avow.system.graph import components, cycles_in
 from avow.system.plan import Endpoint
@@ -221,26 +219,6 @@ class Machine:
     def judge(self, formula: Term) -> Holds:
         """Whether a formula holds of a step, with quantifiers over the scenario's values. It raises Undecided."""
         return judge(self.world, formula, finite=True)
-
-    def unconfirmed(self, step: Step) -> Iterator[str]:
-        """The clauses that are taken to hold of a step, though that could not be evaluated exactly, nor be proved."""
-        for label in sorted(self.doubts.inexact):
-            node, _, clause = label.partition(".")
-            environment = self.frame.environment().get(label)
-            if environment is not None:
-                formula, found = environment, dict(step.values)
-            elif node in self.nodes and clause in {c.name for c in self.frame.node(node).clauses}:
-                if any(name.partition(".")[0] == node for name in step.broken):
-                    continue  # it is free to answer anything
-                formula = self.frame.node(node).clause(clause).formula
-                ports = {f"out.{p.name}": step.values[f"{node}.{p.name}"] for p in self.frame.node(node).outputs}
-                found = self._inputs(node, dict(step.values)) | ports
-            else:
-                yield label
-                continue
-            values = {v: found[v.name if v.role is Role.BOUND else v.qualified] for v in free_variables(formula)}
-            if any(map(is_open, values.values())) or not replay((formula,), values, timeout_ms=1_000):
-                yield label
 
     # -- one run -------------------------------------------------------------------------------------------------------
 

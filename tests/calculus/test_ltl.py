@@ -8,6 +8,7 @@ from itertools import product
 
 import pytest
 
+from avow.calculus import replaying
 from avow.calculus.ltl import TooLong, demands_progress, violation
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Variable
@@ -96,6 +97,16 @@ def test_against_the_definition(seed: int) -> None:
         assert run[0] == 0
         assert all(b in graph[a] for a, b in zip(run, [*run[1:], run[len(found.prefix)]], strict=True))
         assert not holds(formula, [truth[k] for k in run], len(found.prefix)), "the run that it shows breaks it"
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_run_is_replayed_by_the_definition(seed: int) -> None:
+    chance = random.Random(seed)
+    for _ in range(40):
+        run = [{P: chance.random() < 0.5, Q: chance.random() < 0.5} for _ in range(chance.randint(1, 6))]
+        back = chance.randrange(len(run))
+        formula = random_property(chance, chance.randint(1, 3))
+        assert replaying.holds(formula, run, back) is holds(formula, run, back), (formula, run, back)
 
 
 def test_wanting_something_to_happen() -> None:
