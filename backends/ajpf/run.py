@@ -12,16 +12,15 @@ from typing import Any
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
-from avow.base.files import write
 from avow.base.verdict import Counterexample, Verdict
 
 from . import ajpf_tool, spin
-from .ajpf_tool import Answer, Said
+from .ajpf_tool import Said
+from .asking import ask
 from .automaton import TooLarge
 from .beliefs import TooDeep
 from .checker import Checker, OutOfTime, Property, asks_for_percepts
 from .explore import explore
-from .files import ail_file, jpf_file
 from .instances import Instantiation, instances
 from .interpreter import Agent
 from .options import Setup, read
@@ -75,7 +74,7 @@ class _Run:
         self.engine = ENGINE
         self.logs: dict[str, str] = {}
         self.command: tuple[str, ...] = ()
-        self.ajpf = ajpf_tool.find() if setup.environment_class and setup.semantics == "mcapl" else None
+        self.ajpf = ajpf_tool.find() if setup.semantics == "mcapl" else None
 
     def version(self, own: str) -> str:
         if self.setup.engine == "ajpf":
@@ -89,8 +88,8 @@ class _Run:
         checkers = self.own()
         if checkers and self.setup.engine in ("auto", "spin"):
             self.ask_spin(checkers)
-        if self.setup.engine == "ajpf" or (self.setup.engine == "auto" and self.ajpf is not None):
-            self.ask_ajpf(instead=self.setup.engine == "ajpf")
+        if self.setup.engine == "ajpf":
+            self.ask_ajpf()
         return Frame(self.setup, self.made, self.results, self.counterexamples, self.engine, self.bound)
 
     # Our own engine
@@ -205,35 +204,28 @@ class _Run:
         else:
             self.results[key] = replace(result, opinions=opinions)
 
-    def ask_ajpf(self, *, instead: bool) -> None:
-        """AJPF's answers, beside ours or instead of them. Vacuity and runs in words stay our own engine's."""
-        if instead:
-            self.engine = "AJPF"
+    def ask_ajpf(self) -> None:
+        """AJPF's answers instead of ours. Vacuity and runs in words stay our own engine's."""
+        self.engine = "AJPF"
         if self.ajpf is None:
             reason = f"AJPF is not here: {ajpf_tool.INSTALL}"
             self.results = {p.key: Settled(Verdict.NOT_RUN, reason) for p in self.made.properties}
             self.counterexamples = {}
             return
-        name = self.setup.program.name
-        paths = {ending: self.folder.resolve() / f"ajpf-run.{ending}" for ending in ("ail", "jpf")}
-        write(paths["ail"], ail_file(self.setup, str(self.folder.resolve() / f"{name}.gwen")))
+        answers = ask(self.ajpf, self.setup, self.made.properties, self.left(), self.limits.megabytes)
+        named = {answer.framework for answer in answers.values() if answer.framework}
+        self.bound["ajpf"] = f"{self.ajpf.version}, {' and '.join(sorted(named)) or 'which did not name itself'}"
         for p in self.made.properties:
-            if self.left() <= 1:
-                answer = Answer(Said.TIMEOUT, "no time left")
-            else:
-                properties = str(self.folder.resolve() / f"{name}.psl")
-                write(paths["jpf"], jpf_file(str(paths["ail"]), properties, p.key))
-                answer = ajpf_tool.check(self.ajpf, paths["jpf"], self.left(), self.limits.megabytes)
+            answer = answers[p.key]
             if answer.log:
                 self.logs[f"{p.key}.ajpf.txt"] = answer.log
-            if instead:
-                own = self.results[p.key]
-                verdict, reason = self.judged(p, _SAID[answer.said], own.refutes and own.answer is not None)
-                opinions = {} if own.answer is None else {ENGINE: str(own.answer)}
-                result = replace(own, verdict=verdict, reason=reason or answer.reason, opinions=opinions)
-                self.results[p.key] = result
-            else:
-                self.second(p.key, "AJPF", answer.said)
+            if answer.said is Said.VIOLATED and self.setup.environment.fair:
+                reason = "AJPF knows no fairness: a run on which it fails may be unfair"
+                answer = replace(answer, said=Said.INCONCLUSIVE, reason=reason)
+            own = self.results[p.key]
+            verdict, reason = self.judged(p, _SAID[answer.said], own.refutes and own.answer is not None)
+            opinions = {} if own.answer is None else {ENGINE: str(own.answer)}
+            self.results[p.key] = replace(own, verdict=verdict, reason=reason or answer.reason, opinions=opinions)
 
 
 def _trace(found: Counterexample) -> str:

@@ -152,8 +152,10 @@ def show_event(event: Event) -> str:
 
 def show_deed(deed: Deed) -> str:
     match deed.kind:
-        case DeedKind.ACTION:
+        case DeedKind.ACTION | DeedKind.SEND:
             return show(deed.term)
+        case DeedKind.LOCK | DeedKind.UNLOCK | DeedKind.NULL:
+            return str(deed.kind)
         case DeedKind.ADD_GOAL | DeedKind.DROP_GOAL:
             return f"{deed.kind}{show(deed.term)} [{deed.goal}]"
         case _:

@@ -180,7 +180,7 @@ BAD_OPTIONS = {
     "empty range": ({"instances": {"f": "3..1"}}, "empty"),
     "no numbers": ({"instances": {"f": ["one"]}}, "natural numbers"),
     "class with a line": ({"environment_class": "lift.Env\nmas.file = x"}, "does not match"),
-    "AJPF without class": ({"engine": "ajpf"}, "environment_class"),
+    "AJPF with other percepts": ({"engine": "ajpf", "semantics": "edge"}, "semantics"),
 }
 
 

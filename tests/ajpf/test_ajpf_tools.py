@@ -6,10 +6,19 @@ import os
 from pathlib import Path
 
 import pytest
+from small_agents import case
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND, ajpf_tool, spin
 from avow.backends.ajpf.ajpf_tool import Said, judge
+from avow.backends.ajpf.asking import ask
+from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
+from avow.backends.ajpf.environment import read_environment
+from avow.backends.ajpf.explore import explore
+from avow.backends.ajpf.interpreter import Agent, Semantics
+from avow.backends.ajpf.options import Setup
+from avow.backends.ajpf.parser import parse_program
+from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 from avow.base.process import Completed
 from avow.base.verdict import Verdict
 
@@ -35,6 +44,7 @@ def completed(stdout="", stderr="", code=0):
         (completed(HOLDS + "error #1: gov.nasa.jpf.vm.NoUncaughtExceptionsProperty"), Said.ERROR),
         (completed(HOLDS, "line 1:14 mismatched input '<>' expecting '('"), Said.ERROR),
         (completed(HOLDS, "line 1:3 extraneous input ')'"), Said.ERROR),
+        (completed(HOLDS, "line 13:0 missing RR_NEWLINE at ':Initial Goals:'"), Said.HOLDS),
         (completed("search constraint: depth\n" + HOLDS), Said.INCONCLUSIVE),
         (completed(HOLDS, code=None), Said.TIMEOUT),
         (completed("Exception in thread main", code=0), Said.ERROR),
@@ -86,18 +96,8 @@ def test_ajpf_as_the_engine(lift, tmp_path, monkeypatch, answer, verdict):
     assert {o.verdict for o in report.outcomes} == {verdict}
     assert report.tool == "AJPF"
     assert len((tmp_path / "asked").read_text().splitlines()) == 3
-    assert "env = lift.Env" in (folder / "ajpf-run.ail").read_text()
-
-
-def test_a_contradiction_between_engines_is_an_error(lift, tmp_path, monkeypatch):
-    _installed(tmp_path, monkeypatch, VIOLATED)
-    job = lift({"engine": "auto", "environment_class": "lift.Env", "semantics": "mcapl"})
-    monkeypatch.setattr(spin, "version", lambda: None)
-    report = BACKEND.discharge(job, tmp_path, Limits(seconds=60))
-    (halts,) = [o for o in report.outcomes if o.obligation.endswith("halts")]
-    assert halts.verdict is Verdict.ERROR
-    assert report.tool != "AJPF"
-    assert "AJPF says violated" in halts.summary
+    assert "env = lift.Env" in (folder / "cabin.ail").read_text()
+    assert "MCAPL without a version, Java 11.0.13" in report.outcomes[0].bound["ajpf"]
 
 
 def test_ajpf_missing_is_not_run_and_says_how_to_get_it(lift, tmp_path, monkeypatch):
@@ -158,3 +158,25 @@ def test_spin_missing_is_no_second_opinion(lift, tmp_path, monkeypatch):
     assert "Spin" not in report.tool
     report = BACKEND.discharge(lift({"engine": "spin"}), tmp_path, Limits(seconds=60))
     assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}
+
+
+@pytest.mark.needs_ajpf
+@pytest.mark.parametrize("seed", range(3))
+def test_ajpf_agrees_on_small_agents(tmp_path, seed):
+    """Programs printed anew, environments generated: AJPF runs them, and says what we say."""
+    made = case(seed)
+    (tmp_path / "e.yaml").write_text(made.environment)
+    program, draws = parse_program(made.program, "ag.gwen"), read_environment(tmp_path / "e.yaml")
+    wanted = [Property(f"f{n}", instantiate(parse_psl(text), {})) for n, text in enumerate(made.formulas)]
+    setup = Setup(
+        program, tmp_path, "", draws, tmp_path, (), {}, (), Semantics.MCAPL, "ajpf", 5_000, environment_class=None
+    )
+    installation = ajpf_tool.find()
+    assert installation is not None
+    answers = ask(installation, setup, wanted, seconds=240, megabytes=2_000)
+    for p in wanted:
+        graph = explore(Agent(program, draws, Semantics.MCAPL, probed=asks_for_percepts(p)), states=5_000)
+        assert graph.unfinished is None
+        expected = Said.HOLDS if Checker(graph, (p,)).check(p).holds else Said.VIOLATED
+        assert answers[p.key].said is expected, answers[p.key].log
+        assert answers[p.key].framework

@@ -1,0 +1,58 @@
+"""AJPF asked for all properties of an agent: in a folder of our own, several at a time, each with its own limit."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from math import ceil
+from pathlib import Path
+
+from .ajpf_tool import Answer, Installation, Said, check, prepare
+from .checker import Property
+from .files import ail_file, psl_file
+from .java import CLASS, environment_class
+from .options import Setup
+from .printer import program_text
+
+
+def files(setup: Setup, properties: Sequence[Property]) -> Mapping[str, str]:
+    """What AJPF needs of one agent, under names that it can read whatever the plan's are called."""
+    made = {
+        "agent.gwen": program_text(setup.program),
+        "agent.psl": psl_file(properties),
+        "agent.ail": ail_file(setup, "agent.gwen"),
+    }
+    if not setup.environment_class:
+        made[f"{CLASS}.java"] = environment_class(setup.environment)
+    return made
+
+
+def ask(
+    installation: Installation, setup: Setup, properties: Sequence[Property], seconds: float, megabytes: int
+) -> dict[str, Answer]:
+    """An answer for each property, by its key. What is left of `seconds` is shared out among those still to come, so
+    that one that takes for ever costs the others nothing."""
+    deadline = time.monotonic() + seconds
+    workers = max(1, min(len(properties), os.cpu_count() or 1))
+    waiting, lock = len(properties), threading.Lock()
+    with tempfile.TemporaryDirectory(prefix="avow-ajpf-") as temporary:
+        folder = Path(temporary)
+        wrong = prepare(installation, folder, files(setup, properties))
+        if wrong is not None:
+            return {p.key: Answer(Said.ERROR, wrong) for p in properties}
+
+        def one(p: Property) -> Answer:
+            nonlocal waiting
+            with lock:
+                limit = (deadline - time.monotonic()) / ceil(waiting / workers)
+                waiting -= 1
+            if limit <= 1:
+                return Answer(Said.TIMEOUT, "no time left")
+            return check(installation, folder, p.key, limit, max(256, megabytes // workers))
+
+        with ThreadPoolExecutor(workers) as pool:
+            return dict(zip([p.key for p in properties], pool.map(one, properties), strict=True))
