@@ -19,6 +19,7 @@ sys.dont_write_bytecode = False
 
 _NEEDS = {
     "needs_ajpf": lambda: "AJPF_HOME" in os.environ,
+    "needs_chromium": lambda: any(map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
     "needs_cvc5": lambda: importlib.util.find_spec("cvc5") is not None,
     "needs_dafny": lambda: shutil.which("dafny") is not None,
     "needs_dot": lambda: shutil.which("dot") is not None,

@@ -207,6 +207,8 @@ class Answers:
     listed: tuple[str, ...]
     """The requirements that have a row of their own: all of them, or the worst."""
     based_on: tuple[NodeBasis, ...]
+    bases: tuple[NodeBasis, ...]
+    """Of every node, by name."""
     more_nodes: str
     weakest: WeakestEvidence | None
     next_weakest: str

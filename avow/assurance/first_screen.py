@@ -95,8 +95,8 @@ def answers(
     by_how = tuple((how, number[how]) for how in _HOW_ORDER if number[how])
     good = sum(gate.passed for gate in gates)
     kinds = len(weakenings)
-    basis = [_basis(node, views, relied) for node in nodes]
-    basis.sort(key=lambda b: min((tone.rank for _, tone in b.squares), default=0)) if len(basis) > NODES else None
+    ranked = [_basis(node, views, relied) for node in nodes]
+    basis = [b for b, _ in (sorted(ranked, key=lambda pair: pair[1]) if len(ranked) > NODES else ranked)]
     owned = sum(s.owned for s in suppositions)
     return Answers(
         headline=headline,
@@ -108,6 +108,7 @@ def answers(
         gates=f"policy: {good} of {count(len(gates), 'gate')} pass" + ("es" if len(gates) == 1 else ""),
         listed=_listed(requirements),
         based_on=tuple(basis[:NODES]),
+        bases=tuple(sorted(basis, key=lambda b: b.node)),
         more_nodes=f"and {count(len(basis) - NODES, 'node')} on no less" if len(basis) > NODES else "",
         weakest=weakest,
         next_weakest=f"{following.title}, {following.words}" if following else "",
@@ -159,13 +160,24 @@ def _listed(requirements: Sequence[RequirementView]) -> tuple[str, ...]:
     return tuple(r.id for r in sorted(requirements, key=badness)[:WORST])
 
 
-def _basis(node: NodeView, views: Sequence[ObligationView], relied: Mapping[str, Relied]) -> NodeBasis:
+def _basis(
+    node: NodeView, views: Sequence[ObligationView], relied: Mapping[str, Relied]
+) -> tuple[NodeBasis, tuple[int, float]]:
+    """A node's line, and how weak it is: its worst colour, then how much of it has that colour."""
     own = [v for v in views if v.obligation.kind is Kind.GUARANTEE and v.obligation.node == node.name]
     marks = [(_mark(view, relied), view) for view in own]
     number = Counter(said for (said, _), _ in marks)
     words = ", ".join(f"{many} {said}" for said, many in number.items()) or "no guarantees"
     squares = tuple((LETTERS.get(said, "✘"), tone) for (said, tone), _ in marks)
-    return NodeBasis(node.name, node.title, squares if len(squares) <= SQUARES else (), words)
+    worst = min((tone.rank for _, tone in squares), default=Tone.GREEN.rank)
+    share = sum(tone.rank == worst for _, tone in squares) / max(1, len(squares))
+    return NodeBasis(node.name, node.title, squares if len(squares) <= SQUARES else (), words), (worst, -share)
+
+
+def basis_of(node: NodeView, case: Case) -> NodeBasis:
+    """A node's line of the first screen, for any node of a finished case."""
+    found = next((b for b in case.answers.bases if b.node == node.name), None)
+    return found or NodeBasis(node.name, node.title, (), "no guarantees")
 
 
 def _mark(view: ObligationView, relied: Mapping[str, Relied]) -> tuple[str, Tone]:

@@ -206,6 +206,8 @@ def _key(assessment: Assessment) -> str:
 
 
 def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, str], ...]) -> Result:
+    from avow.report.short import terminal_lines
+
     explain = bool(os.environ.get(EXPLAIN))
     gates = []
     for g in case.gates:
@@ -213,7 +215,17 @@ def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, st
         gates.append((g.title, g.passed, "; ".join([g.reason, *(f"next: {text}" for text in closes)])))
     index = assessment.workspace.relative(assessment.workspace.report(assessment.system) / "index.html")
     counts = Counter(view.status.value for view in case.obligations if not view.obligation.advisory)
-    return Result(case.system, case.exit_code, dict(counts), case.grade.value, index, tuple(gates), left_out)
+    return Result(
+        case.system,
+        case.exit_code,
+        dict(counts),
+        case.grade.value,
+        index,
+        tuple(gates),
+        left_out,
+        case.answers.verdict,
+        tuple(terminal_lines(case)),
+    )
 
 
 def _read(assessment: Assessment) -> dict[str, Any] | None:

@@ -20,6 +20,10 @@ class Result:
     gates: tuple[tuple[str, bool, str], ...]
     """(title, passed, reason and what would close it)."""
     left_out: tuple[tuple[str, str], ...] = ()
+    verdict: str = ""
+    """The case's verdict in words."""
+    lines: tuple[str, ...] = ()
+    """The five answers, for a terminal."""
 
     def json(self) -> dict[str, Any]:
         return {
@@ -30,6 +34,8 @@ class Result:
             "report": self.report,
             "gates": [list(g) for g in self.gates],
             "left_out": [list(pair) for pair in self.left_out],
+            "verdict": self.verdict,
+            "lines": list(self.lines),
         }
 
 
@@ -43,6 +49,8 @@ def read_result(data: Mapping[str, Any]) -> Result:
         data["report"],
         tuple((title, passed, reason) for title, passed, reason in data["gates"]),
         tuple((name, why) for name, why in data["left_out"]),
+        data["verdict"],
+        tuple(data["lines"]),
     )
 
 

@@ -19,6 +19,7 @@ def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, s
     if not results and not broken:
         return
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     console = Console(file=out, highlight=False, soft_wrap=True, width=None if out.isatty() else 150)
@@ -29,12 +30,16 @@ def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, s
         table.add_column(word, justify="right", style="red" if word in ("refuted", "contradictory", "error") else None)
     table.add_column("verdict")
     for r in sorted(results, key=lambda r: r.system):
-        verdict = "[green]every gate passes[/]" if r.exit_code == 0 else "[red]a gate fails[/]"
+        colour = "green" if r.exit_code == 0 else "red"
+        verdict = f"[{colour}]{escape(r.verdict or _gates(r))}[/]"
         table.add_row(r.system, *(str(r.counts.get(word, "")) or "" for word in shown), verdict)
     for name in broken:
         table.add_row(name, *("" for _ in shown), "[red]not done: see above[/]")
     console.print()
-    console.print(table)
+    if len(results) == 1 and not broken and results[0].lines:
+        console.print("\n".join(results[0].lines), markup=False)
+    else:
+        console.print(table)
     for r in results:
         for title, passed, reason in r.gates:
             if not passed:
@@ -46,6 +51,10 @@ def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, s
         console.print(f"{index if len(results) > 1 else results[0].report}   ", markup=False, end="")
     idle = "nothing to do" if not broken else "nothing could be run"
     console.print(f"({f'{done} stages run' if done else idle}, {seconds:.1f} s)")
+
+
+def _gates(result: Result) -> str:
+    return "every gate passes" if result.exit_code == 0 else "a gate fails"
 
 
 def append_job_summary(results: Sequence[Result], broken: Sequence[str]) -> None:
@@ -66,7 +75,7 @@ def job_summary(results: Sequence[Result], broken: Sequence[str]) -> str:
         "|---|" + "--:|" * len(shown) + "---|",
     ]
     for r in sorted(results, key=lambda r: r.system):
-        verdict = "✅ every gate passes" if r.exit_code == 0 else "❌ a gate fails"
+        verdict = f"{'✅' if r.exit_code == 0 else '❌'} {_inline(r.verdict) or _gates(r)}"
         lines.append(f"| {r.system} | {' | '.join([*(str(r.counts.get(w, '')) for w in shown), verdict])} |")
     lines += [f"| {name} | {'| ' * len(shown)}❌ not done |" for name in broken]
     failing = [(r.system, title, reason) for r in results for title, passed, reason in r.gates if not passed]

@@ -1,8 +1,8 @@
 """The assurance report: every format rendered from one `avow.assurance.model.Case`, so that they cannot disagree.
 
-    render_all(case, folder)            writes index.html report.json report.md report.pdf report.sarif findings.sarif
-                                        junit.xml attestation.jsonl gsn.yaml gsn.svg traceability.html traceability.csv
-                                        report.tex
+    render_all(case, folder)            writes index.html claims.html report.json report.md comment.md report.pdf
+                                        report.sarif findings.sarif junit.xml attestation.jsonl gsn.yaml gsn.svg
+                                        traceability.html traceability.csv report.tex
     write_index(cases, folder)          writes <folder>/index.html over all systems, with the trend over runs
 
 Both are idempotent and write each file in one step. They return what they wrote, and what they left out and why.
@@ -56,18 +56,20 @@ def formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
 def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
     from avow.assurance.argument import Element, build_argument
     from avow.assurance.traceability import to_csv, trace
-    from avow.report import argument_svg, exchange, latex, markdown, page, wording
+    from avow.report import answers_page, argument_svg, exchange, latex, markdown, page, short, wording
 
     argument = build_argument(case)
 
     def link(element: Element) -> str | None:
-        return f"index.html#{wording.anchor(element.claim)}" if element.claim else None
+        return f"claims.html#{wording.anchor(element.claim)}" if element.claim else None
 
     rows = trace(case)
     as_json = exchange.render_json(case)
     yield "report.json", as_json
-    yield "index.html", page.render_page(case, digest(as_json))
+    yield "index.html", answers_page.render_answers(case, digest(as_json))
+    yield "claims.html", page.render_page(case, digest(as_json))
     yield "report.md", markdown.render_markdown(case)
+    yield "comment.md", short.comment(case)
     yield "report.sarif", exchange.render_sarif(case)
     yield "findings.sarif", exchange.render_sarif(case, findings_only=True)
     yield "junit.xml", exchange.render_junit(case)
@@ -93,7 +95,7 @@ def _pdf(case: Case) -> bytes | LeftOut:
 
 def write_index(cases: Sequence[Case], folder: Path) -> Rendered:
     """Write the page over all systems, `folder`/index.html; a system's own page is `folder`/<system>/index.html."""
-    from avow.report.page import render_index
+    from avow.report.answers_page import render_index
 
     path = folder / "index.html"
     write(path, render_index(cases))

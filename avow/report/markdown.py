@@ -11,8 +11,9 @@ from avow.assurance.remarks import REMARK
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
+from avow.report.short import markdown_head
 from avow.report.source import plain_lines
-from avow.report.wording import bound_text, clean, mutation, open_line, verdict_line, where, worth
+from avow.report.wording import bound_text, clean, mutation, open_line, where, worth
 
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
 _LONG = 200
@@ -26,17 +27,12 @@ _BOUNDED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
 
 
 def render_markdown(case: Case) -> str:
-    """The summary: the answer, the gates, the open items, the table, what is not shown."""
+    """The summary: the five answers, the gates, the open items, the table, what is not shown."""
     parts = [
         f"# {_md(case.title)}: assurance report",
-        f"**{_md(verdict_line(case))}** Grade {case.grade}: {_md(case.grade_reason)}.",
+        *markdown_head(case),
         _origin(case),
         _table(("file", "SHA-256"), ((_md(path), f"`{mark}`") for path, mark in case.digests)),
-        "## Requirements",
-        _table(
-            ("requirement", "status", "answer"),
-            ((f"**{_md(r.id)}** {_md(r.text)}", r.status.value, _md(r.answer)) for r in case.requirements),
-        ),
         "## Gates",
         _table(
             ("gate", "", "why"),
@@ -99,7 +95,8 @@ def _contracts(case: Case) -> Iterable[str]:
 
 def _origin(case: Case) -> str:
     run = f"run `{_code(case.run.id)}`, ledger `{case.ledger_head}`"
-    return f"System `{_code(case.system)}`, policy {_md(case.policy.name)}, {case.today}, {run}."
+    grade = f"{case.grade}: {_md(case.grade_reason)}"
+    return f"Grade {grade}. System `{_code(case.system)}`, policy {_md(case.policy.name)}, {case.today}, {run}."
 
 
 def _guarantees(case: Case) -> list[ObligationView]:

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
 from typing import Any
-from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
@@ -20,7 +19,6 @@ from avow.assurance.naming import short
 from avow.assurance.policy import techniques
 from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
-from avow.assurance.trend import trend
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.report import argument_svg, example, source, wording
@@ -102,7 +100,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
     remarks = [item for item in case.open_items if item.kind == REMARK]
     return (
         environment()
-        .get_template("report.html.j2")
+        .get_template("claims.html.j2")
         .render(
             case=case,
             line=wording.verdict_line(case),
@@ -220,23 +218,6 @@ def _by_claim(rows: Sequence[Row]) -> list[tuple[Row, list[Row]]]:
     return [(group[0], [row for row in group if row.method]) for group in found.values()]
 
 
-def render_index(cases: Sequence[Case]) -> str:
-    """The page over all systems."""
-    ranked = sorted(cases, key=lambda case: case.good)  # who opens the index wants to know what fails
-    rows = [(case, wording.verdict_line(case), _tones(case), trend(case)) for case in ranked]
-    return (
-        environment()
-        .get_template("index.html.j2")
-        .render(
-            rows=rows,
-            failing=[case for case in cases if not case.good],
-            examined=[case for case in cases if wording.banner_tone(case) == "open"],
-            style=Markup(asset("style.css")),
-            quote=quote,
-        )
-    )
-
-
 @cache
 def asset(name: str) -> str:
     """The text of a file beside the templates."""
@@ -302,13 +283,6 @@ def _counts(views: Sequence[ObligationView]) -> list[tuple[str, list[tuple[Statu
                 label = f"{kind}, as advice" if advice else kind.value
                 table.append((label, [(s, of_kind.count(s)) for s in Status if s in of_kind], len(of_kind)))
     return table
-
-
-def _tones(case: Case) -> list[tuple[str, str, int]]:
-    """(colour, word, number) of claims that hold, are open, are wrong."""
-    found = [wording.tone(view.standing) for view in case.obligations if not view.advice]
-    holding = found.count("good") + found.count("fair")
-    return [("good", "hold", holding), ("open", "open", found.count("open")), ("bad", "wrong", found.count("bad"))]
 
 
 def _used_methods(case: Case) -> list[str]:

@@ -6,17 +6,20 @@ import json
 from importlib import resources
 from typing import Any
 
-from avow.assurance.argument import build_argument
+from avow.assurance.answers import Supposition
+from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case, ObligationView, SourceView
+from avow.assurance.modules import RequirementModule, requirement_modules
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
 from avow.base.verdict import Counterexample
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report import argument_svg, example
+from avow.report import example
+from avow.report.answers_page import TONE_MARKS, full_reason, some
 from avow.report.maps import map_picture
 from avow.report.source import plain_lines
-from avow.report.wording import MARKS, banner_tone, bound_text, clean, in_lines, protocol, tone, verdict_line, worth
+from avow.report.wording import MARKS, bound_text, clean, in_lines, protocol, tone, worth
 
 _MOST = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
@@ -26,7 +29,6 @@ _LINES = 1200
 
 _MOST_COLUMNS = 9
 """Columns of a run that fit on a page; a wider one is told by its reason alone."""
-_MOST_IN_A_PICTURE = 90
 _GATE = {
     "passes": {"word": "passes", "tone": "good"},
     "fails": {"word": "fails", "tone": "bad"},
@@ -61,14 +63,12 @@ def _data(case: Case) -> dict[str, Any]:
     more = [f"{left_out} obligations are left out of this document: see report.json."] if left_out else []
     found: dict[str, Any] = {
         "title": case.title,
-        "tone": banner_tone(case),
         "grade": str(case.grade),
-        "line": verdict_line(case),
         "facts": [*facts, *case.digests],
-        "requirements": [
-            {"id": r.id, "text": r.text or r.formula or r.temporal, "answer": r.answer, "status": _chip(r.status)}
-            for r in case.requirements
-        ],
+        "first": _first(case),
+        "suppositions": [_supposition(s) for s in case.suppositions],
+        "weakenings": [[str(w.count), w.words, w.why] for w in case.weakenings],
+        "modules": [_module(module) for module in requirement_modules(case)],
         "gates": [
             {
                 "title": g.title,
@@ -98,7 +98,6 @@ def _data(case: Case) -> dict[str, Any]:
             }
             for node in nodes
         ],
-        "pictures": _pictures(case),
         "derivations": [
             {
                 "name": d.derivation.name,
@@ -133,15 +132,75 @@ def _source(source: SourceView) -> dict[str, Any]:
     return {"path": source.path, "lines": [[str(at), line] for at, line in enumerate(lines[:_LINES], 1)], "more": more}
 
 
-def _pictures(case: Case) -> list[dict[str, str]]:
-    """The arguments that fit on a page."""
-    argument = build_argument(case)
-    drawn = []
-    for name, start in argument.goals:
-        if len(argument.below(start)) <= _MOST_IN_A_PICTURE:
-            svg = argument_svg.draw(argument, start, lambda _: None, name, alone=True)
-            drawn.append({"name": name, "svg": svg.replace("font:12px system-ui,", "font:12px 'Libertinus Serif',")})
-    return drawn
+def _first(case: Case) -> dict[str, Any]:
+    """The first sheet: the page's first screen."""
+    a = case.answers
+    listed = [r for r in case.requirements if r.id in a.listed]
+    many = len(listed) < len(case.requirements)
+    return {
+        "kicker": f"{case.today} · {a.signed}",
+        "verdict": f"{TONE_MARKS[a.tone]} {a.verdict}",
+        "tone": a.tone.value,
+        "counts": f"{a.counts} · {a.weakened} · {a.gates}",
+        "by_how": [
+            [f"{number} {how}", ", ".join(r.id for r in case.requirements if r.how is how)] for how, number in a.by_how
+        ]
+        if many
+        else [],
+        "listed": [
+            [
+                r.id,
+                r.text or r.formula or r.temporal,
+                {"word": f"{TONE_MARKS[r.tone]} {r.how}", "tone": r.tone.value},
+                f"{r.weakest_evidence.status}: {r.weakest_evidence.title}" if r.weakest_evidence else "none",
+                str(len(r.supposes)),
+            ]
+            for r in listed
+        ],
+        "based_on": [[b.title, [[letter, tone.value] for letter, tone in b.squares], b.words] for b in a.based_on],
+        "more_nodes": a.more_nodes,
+        "weakest": a.refuted or _weakest(case),
+        "next": f"Next: {a.next_weakest}." if a.next_weakest and not a.refuted else "",
+        "supposed": [[f"{line.count} of {line.sort}", line.says] for line in a.supposed],
+        "owned": f"{a.owned} with owner and date" if a.owned else "Nothing.",
+        "changed_against": a.changed_against,
+        "changed": [f"{mark} {words}".strip() for mark, words in a.changed],
+        "statement": a.statement,
+        "signed": a.signed if a.signed.startswith("signed") else "",
+        "content": f"What is signed has the digest {baseline_of(case).content[:16]}…",
+    }
+
+
+def _weakest(case: Case) -> str:
+    found = case.answers.weakest
+    if found is None:
+        return "There is no evidence."
+    rests = f" On it rest {some(found.needed_by)}." if found.needed_by else ""
+    return f"{found.title}: “{found.quote}”. {found.words[:1].upper()}{found.words[1:]}.{rests}"
+
+
+def _supposition(supposition: Supposition) -> list[str]:
+    s = supposition
+    reason = full_reason(s)
+    owner = f"expired {s.until}" if s.expired else f"{s.who}, {s.until}" if s.owned else "no owner or no date"
+    return [s.number, f"{s.words}. {reason}".strip(), str(s.sort), some(s.needed_by), owner]
+
+
+def _module(module: RequirementModule) -> dict[str, Any]:
+    r = module.requirement
+    lines = [f"{title}: {words}" for _, title, words in module.away]
+    lines += [f"composition: {module.conditions}"] if module.conditions else []
+    lines += [f"supposes {', '.join(module.supposes)}"] if module.supposes else []
+    return {
+        "id": r.id,
+        "text": r.text or r.formula or r.temporal,
+        "formula": in_lines(r.formula or r.temporal),
+        "status": {"word": f"{TONE_MARKS[r.tone]} {r.how}", "tone": r.tone.value},
+        "because": module.because,
+        "strategy": module.strategy,
+        "lines": lines,
+        "failing": ", ".join(map(short, module.failing[:12])),
+    }
 
 
 def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:

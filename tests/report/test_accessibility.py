@@ -13,8 +13,9 @@ from assurance.sample import rover_case, system
 
 from avow.assurance.compare import compare, of_case
 from avow.assurance.traceability import trace
+from avow.report.answers_page import render_answers, render_index
 from avow.report.comparison import render_comparison
-from avow.report.page import asset, render_index, render_page, render_traceability
+from avow.report.page import asset, render_page, render_traceability
 from report.hostile import hostile_case
 
 STYLE = asset("style.css")
@@ -127,6 +128,7 @@ def pages() -> dict[str, str]:
     rover, hostile, empty = rover_case(), hostile_case(), make_case(system({}), [], [])
     changes = [("rover", c) for c in compare(of_case(empty), of_case(rover))]
     return {
+        "answers": render_answers(rover),
         "report": render_page(rover),
         "hostile": render_page(hostile),
         "empty": render_page(empty),

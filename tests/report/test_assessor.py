@@ -19,7 +19,8 @@ from avow.assurance.remarks import REMARK
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
 from avow.report import argument_svg, formats, wording
-from avow.report.page import asset, render_index
+from avow.report.answers_page import render_index
+from avow.report.page import asset
 from avow.report.pdf import _data as pdf_data
 from avow.system.plan import Finding, Requirement
 
@@ -50,7 +51,7 @@ def test_a_vacuous_pass_is_called_so_in_every_format() -> None:
     assert '"hoare: proved"' not in made["pdf"]
     assert r"hoare: \textit{vacuous}" in made["report.tex"]
     assert not re.search(r'class="(chip|mini) good"[^>]*>(<span[^>]*>✔</span>)? *proved', made["traceability.html"])
-    body = made["index.html"].split('id="list"')[1].split("</section>")[0]
+    body = made["claims.html"].split('id="list"')[1].split("</section>")[0]
     assert "the tool said: proved" in body
     assert 'class="chip good" title="for all behaviours' not in body
 
@@ -147,9 +148,9 @@ def test_what_the_language_checker_remarks_is_in_the_report_brackets_first() -> 
     assert f"RCL401, {PATH}:9" in told[0].text
     assert any("unused" in i.title for i in told)
     made = texts(found)
-    for name in ("report.md", "index.html", "pdf"):
+    for name in ("report.md", "claims.html", "pdf"):
         assert "another bracketing means something else" in made[name], name
-    assert "<b>Remark:</b>" in made["index.html"].split('id="list"')[1]  # and beside the claim itself
+    assert "<b>Remark:</b>" in made["claims.html"].split('id="list"')[1]  # and beside the claim itself
     assert found.exit_code == remarked("lints_off: [RCL401, RCL402]\n").exit_code  # nothing fails for them
 
 
@@ -181,7 +182,7 @@ def test_what_a_method_remarks_of_its_input_is_in_the_report_once() -> None:
         (G1.id, "the program compares with 10", "HOARE410, models/p.imp:2; method hoare", True),
         (G1.id, "<b>bold</b>", "X; method hoare", True),
     ]
-    assert "<b>bold</b>" not in texts(found)["index.html"]
+    assert "<b>bold</b>" not in texts(found)["claims.html"]
     sources = {"contracts/rover/plan.yaml": "system: rover\nlints_off: [HOARE410]\n"}
     silent = case(SUBJECT, [G1, G2], records, sources=sources, digests={})
     assert [i.title for i in silent.open_items if i.kind == REMARK] == ["<b>bold</b>"]
@@ -193,7 +194,7 @@ def test_tested_says_on_how_many_cases_at_first_sight() -> None:
     bound = {"cases": 271, "seed": 0}
     records = [evidence(G1, method="hoare"), evidence(G2, Verdict.TESTED, "hypothesis", bound=bound)]
     made = texts(case(SUBJECT, [G1, G2], records))
-    answer = made["index.html"].split('id="answer"')[1].split("How to read this")[0]
+    answer = made["claims.html"].split('id="answer"')[1].split("How to read this")[0]
     assert "cases 271" in answer
     assert "It rests on 1 proved, 1 tested." in answer
     assert "hypothesis tested (cases 271, seed 0)" in made["report.md"]
@@ -214,7 +215,7 @@ def test_a_requirement_that_was_only_checked_says_within_what() -> None:
     found = case(formal, [G1, own, away], records)
     made = texts(found)
     assert any("system/requirement/R: checked exhaustively, but only" in line for line in found.not_shown)
-    answer = made["index.html"].split('id="answer"')[1].split("How to read this")[0]
+    answer = made["claims.html"].split('id="answer"')[1].split("How to read this")[0]
     assert "depth 28, scenario a1a1a1a1a1a1" in answer
     assert "a1" * 32 not in answer
     # what the record names and the claim rests on is a claim with a status of its own, no hypothesis
@@ -227,7 +228,7 @@ def test_measured_runs_say_how_they_were_made() -> None:
     found = case(SUBJECT, [G1, G2], records)
     assert "agent.g1: measured under this protocol, and not beyond it: 47 runs in a simulation." in found.not_shown
     made = texts(found)
-    assert "how it was measured: 47 runs in a simulation." in made["index.html"]
+    assert "how it was measured: 47 runs in a simulation." in made["claims.html"]
     assert "How it was measured: 47 runs in a simulation." in made["pdf"]
 
 
@@ -276,7 +277,7 @@ def test_all_formats_count_alike(found: Case) -> None:
     standing = Counter(v.standing.value for v in found.obligations)
     data = json.loads(made["report.json"])
     assert Counter(v["standing"] for v in data["obligations"]) == standing
-    assert Counter(re.findall(r'class="ob"[^>]*data-status="([^"]+)"', made["index.html"])) == standing
+    assert Counter(re.findall(r'class="ob"[^>]*data-status="([^"]+)"', made["claims.html"])) == standing
     results = json.loads(made["report.sarif"])["runs"][0]["results"]
     assert Counter(r["properties"]["standing"] for r in results) == standing
     holding = sum(v.standing.supports for v in found.obligations)
@@ -289,7 +290,7 @@ def test_all_formats_count_alike(found: Case) -> None:
     assert len(cases) == len(found.obligations)
     assert sum(not len(t) for t in cases) == holding
     items = sum(not i.advice for i in found.open_items)
-    assert f'Open items <span class="n">{items}</span>' in made["index.html"]
+    assert f'Open items <span class="n">{items}</span>' in made["claims.html"]
     rows = made["report.md"].split("## Open items")[1].split("\n## ")[0]
     assert len(re.findall(r"^\| ", rows, re.MULTILINE)) == items + 2  # the head and its line
     assert len(json.loads(made["pdf"])["open"]) == items

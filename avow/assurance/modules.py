@@ -1,0 +1,110 @@
+"""The argument in modules, as GSN has them: one for each requirement, one for each node, nothing twice.
+
+A requirement's module points at nodes by *away goals*; a node's module holds its guarantees with their evidence. CAE
+(claims, arguments, evidence) is the same tree in other words: what a tool derived is a decomposition, what a person
+says is a substitution, and a record is incorporated as evidence.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from avow.assurance.answers import How
+from avow.assurance.model import Case, NodeView, ObligationView, RequirementView
+from avow.assurance.relied import word
+from avow.base.plain import count
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status
+
+
+@dataclass(frozen=True, slots=True)
+class RequirementModule:
+    requirement: RequirementView
+    because: str
+    """How it comes to hold, as a sentence."""
+    strategy: str
+    away: tuple[tuple[str, str, str], ...]
+    """(node, what people call it, how many of its guarantees count here and how they stand)."""
+    conditions: str
+    """How many conditions of the composition are met here; empty where there are none."""
+    supposes: tuple[str, ...]
+    """Numbers of suppositions."""
+    failing: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NodeModule:
+    node: NodeView
+    guarantees: tuple[ObligationView, ...]
+
+
+def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
+    views = {view.id: view for view in case.obligations}
+    numbers = {s.key: s.number for s in case.suppositions}
+    found = []
+    for r in case.requirements:
+        under = [views[name] for name in r.closure if name in views]
+        away = []
+        for node in case.nodes:
+            own = [v for v in under if v.obligation.kind is Kind.GUARANTEE and v.obligation.node == node.name]
+            if own:
+                away.append((node.name, node.title, f"{len(own)} of its guarantees: {_standings(own)}"))
+        side = [v for v in under if v.obligation.kind is Kind.COMPOSITION]
+        shown = [v for v in side if v.standing.supports]
+        conditions = f"{len(shown)} of {count(len(side), 'condition')} met" if side else ""
+        supposes = tuple(numbers[key] for key in r.supposes)
+        failing = r.failing or r.below
+        found.append(
+            RequirementModule(r, _because(case, r), _strategy(r, len(away)), tuple(away), conditions, supposes, failing)
+        )
+    return tuple(found)
+
+
+def node_modules(case: Case) -> tuple[NodeModule, ...]:
+    return tuple(
+        NodeModule(
+            node,
+            tuple(
+                v for v in case.obligations if v.obligation.kind is Kind.GUARANTEE and v.obligation.node == node.name
+            ),
+        )
+        for node in case.nodes
+    )
+
+
+def _standings(views: Sequence[ObligationView]) -> str:
+    number = Counter(word(view.standing) if view.standing.supports else _wrong(view) for view in views)
+    return ", ".join(f"{many} {said}" for said, many in number.items())
+
+
+def _wrong(view: ObligationView) -> str:
+    return "refuted" if view.status in (Status.REFUTED, Status.CONTRADICTORY) else "open"
+
+
+def _because(case: Case, r: RequirementView) -> str:
+    match r.how:
+        case How.ARGUED:
+            said = next((s.because for s in case.statements if s.place == f"requirements.{r.id}.amounts"), "")
+            reason = f" The reason given: {said}." if said else ""
+            told = "Argued: a person says that the guarantees below amount to the sentence. No tool has looked at that."
+            return told + reason
+        case How.DERIVED:
+            return "Derived: a tool concluded the formula from the guarantees below."
+        case How.BOUNDED:
+            return (
+                "Derived within bounds: every case of the plan's finite scenario was looked at, and nothing outside it."
+            )
+        case How.OPEN:
+            late = [s for s in case.suppositions if s.expired and r.id in s.needed_by]
+            if late:
+                return f"Open: what it supposes has expired ({', '.join(s.number for s in late)})."
+            return "Open: it is not shown."
+
+
+def _strategy(r: RequirementView, nodes: int) -> str:
+    over = count(nodes, "node contract")
+    if not (r.formula or r.temporal):
+        return f"A person's judgement over {over}"
+    return f"Composition of {over}"

@@ -1,0 +1,191 @@
+"""The report's first page: five answers on one screen, the argument behind them in folds. One file, no network."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+from urllib.parse import quote
+
+from markupsafe import Markup, escape
+
+from avow.assurance.answers import How, NodeBasis, Supposition, Tone
+from avow.assurance.changes import baseline_of
+from avow.assurance.first_screen import badness, basis_of
+from avow.assurance.model import Case, Grade, ObligationView
+from avow.assurance.modules import NodeModule, RequirementModule, node_modules, requirement_modules
+from avow.assurance.relied import word
+from avow.assurance.trend import trend
+from avow.evidence.record import Evidence
+from avow.evidence.status import Status, weigh
+from avow.report import wording
+from avow.report.page import asset, environment
+
+TONE_MARKS = {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}
+_BOXES = 12
+"""So many guarantees of a node have a box each; more are grouped by where they stand."""
+_REASON = 300
+"""Characters of a gate's reason; all of it stands in claims.html."""
+_ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
+WORDS = (
+    ("proved", "for all inputs, by a sound method"),
+    ("checked", "every case of a bounded model was looked at"),
+    ("tested", "on a number of cases"),
+    ("observed", "by a monitor, on recorded runs"),
+    ("reviewed", "read by a person who says what was read"),
+    ("supposed", "no evidence; a reason, an owner and a date"),
+    ("derived", "a tool concluded the requirement's formula from guarantees"),
+    ("argued", "a person says that guarantees amount to the requirement's sentence"),
+    ("open", "refuted, missing or stale, or resting on something that is, or on a supposition that has expired"),
+    ("guarantee", "what a node's contract promises, if its assumptions hold"),
+    ("supposition", "something that requirements rest on without its being shown"),
+    ("weakening", "a reason for which the report says less than it seems to"),
+    ("policy, gate", "what this system's owners ask of the evidence, demand by demand"),
+)
+
+
+def render_answers(case: Case, json_digest: str = "") -> str:
+    """The page. Deterministic: same case, same bytes."""
+    known = {view.id for view in case.obligations}
+    listed = set(case.answers.listed)
+    order = {r.id: badness(r) for r in case.requirements}
+    rows = sorted(
+        (r for r in case.requirements if r.id in listed), key=lambda r: order[r.id] if _many(case) else (0, 0, 0)
+    )
+    return (
+        environment()
+        .get_template("answers.html.j2")
+        .render(
+            case=case,
+            style=Markup(asset("answers.css")),
+            script=Markup(asset("answers.js")),
+            TONE_MARKS=TONE_MARKS,
+            brief=_brief,
+            by_how=[(how, [r.id for r in case.requirements if r.how is how]) for how, _ in case.answers.by_how],
+            content=baseline_of(case).content,
+            freshness=freshness(case),
+            full_reason=full_reason,
+            known=known,
+            listed=rows,
+            many=_many(case),
+            modules=[_requirement(case, m) for m in requirement_modules(case)],
+            node_modules=[_node(case, m) for m in node_modules(case)],
+            json_digest=json_digest,
+            refuted=_refuted,
+            said_of=lambda name: ((said := case.said(name)) and said.reason) or "",
+            some=some,
+            titles={node.name for node in case.nodes},
+            tone_of_how={how: _tone_of(case, how) for how in How},
+            word=_word,
+            words=WORDS,
+        )
+    )
+
+
+def freshness(case: Case) -> str:
+    """How fresh the answers are, in words (the grade's own name says nothing to a reader)."""
+    if case.grade is Grade.CERTIFIED:
+        return case.grade_reason
+    return f"partly from earlier records ({case.grade_reason})"
+
+
+def full_reason(supposition: Supposition) -> str:
+    """All that is said for a supposition beyond its plain words."""
+    parts = [supposition.because] if supposition.because else []
+    parts += [text for text in supposition.text.split("\n") if text not in (supposition.because, supposition.says)]
+    told = list(dict.fromkeys(p for p in parts if p and not any(p != q and p in q for q in parts)))
+    return "; ".join(told)
+
+
+def some(names: Sequence[str], most: int = 8) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def _many(case: Case) -> bool:
+    return len(case.answers.listed) < len(case.requirements)
+
+
+def _tone_of(case: Case, how: How) -> Tone:
+    return min((r.tone for r in case.requirements if r.how is how), key=lambda t: t.rank, default=Tone.GREY)
+
+
+def _requirement(case: Case, module: RequirementModule) -> dict[str, Any]:
+    own = []
+    for name in module.requirement.obligations:
+        view = case.obligation(name)
+        own += [(view, item.entry.evidence) for item in view.counting]
+    fields = {name: getattr(module, name) for name in RequirementModule.__slots__}
+    return {**fields, "own": own}
+
+
+def _node(case: Case, module: NodeModule) -> dict[str, Any]:
+    basis = basis_of(module.node, case)
+    cells = [_guarantee(case, view) for view in module.guarantees]
+    return {"node": module.node, "basis": basis, "guarantees": cells, "boxes": _boxes(cells, basis)}
+
+
+def _guarantee(case: Case, view: ObligationView) -> dict[str, Any]:
+    said = case.said(view.id)
+    good = view.standing.supports
+    wrong = view.status in (Status.REFUTED, Status.CONTRADICTORY)
+    sure = view.standing in (Status.PROVED, Status.CHECKED)
+    return {
+        "view": view,
+        "word": word(view.standing) if good else "refuted" if wrong else "open",
+        "tone": Tone.GREEN if sure else Tone.AMBER if good else Tone.RED,
+        "where": wording.where(view),
+        "reason": said.reason if said else "",
+        "records": [item.entry.evidence for item in view.counting],
+        "history": len(view.evidence) - len(view.counting),
+    }
+
+
+def _boxes(cells: Sequence[dict[str, Any]], basis: NodeBasis) -> list[tuple[Tone, tuple[str, str]]]:
+    if len(cells) <= _BOXES:
+        return [(cell["tone"], (cell["word"], cell["view"].obligation.claim)) for cell in cells]
+    tones = {cell["word"]: cell["tone"] for cell in cells}
+    return [(tones.get(part.split(" ", 1)[1], Tone.RED), (part, "")) for part in basis.words.split(", ")]
+
+
+def _word(record: Evidence) -> str:
+    status = weigh(record).status
+    return word(status) if status.supports else status.value
+
+
+def _brief(text: str) -> str:
+    return text if len(text) <= _REASON else text[: _REASON - 1] + "…"
+
+
+def _refuted(text: str) -> Markup:
+    """What is refuted, its quotation marked as one."""
+    before, mark, rest = text.partition("“")
+    quote, end, after = rest.rpartition("”")
+    if not mark or not end:
+        return escape(text)
+    return Markup('<b>{}</b> <span class="said">“{}”</span>{}').format(before.strip(), quote, after)
+
+
+def render_index(cases: Sequence[Case]) -> str:
+    """The page over all systems: a row each, the worst first."""
+    ranked = sorted(cases, key=lambda case: (case.good, _ORDER.index(case.answers.tone)))
+    relied = [case for case in cases if case.answers.tone is not Tone.GREY]
+    failing = [case for case in relied if case.answers.tone is Tone.RED]
+    if failing:
+        line, tone = f"{len(failing)} of {wording.count(len(cases), 'system')} not shown", Tone.RED
+    elif not relied:
+        line, tone = "None is relied upon", Tone.GREY
+    else:
+        rest = f"; {len(cases) - len(relied)} only examined" if len(relied) < len(cases) else ""
+        tone = min((case.answers.tone for case in relied), key=lambda t: t.rank)
+        line = f"{wording.count(len(relied), 'system')} {'holds' if len(relied) == 1 else 'hold'}{rest}"
+    return (
+        environment()
+        .get_template("systems.html.j2")
+        .render(
+            rows=[(case, trend(case)) for case in ranked],
+            line=line,
+            tone=tone,
+            TONE_MARKS=TONE_MARKS,
+            style=Markup(asset("answers.css")),
+            quote=quote,
+        )
+    )

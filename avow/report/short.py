@@ -1,0 +1,145 @@
+"""The five answers in few words: on a terminal of 24 lines, as a comment of 150 words, at the head of the Markdown."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
+
+from avow.assurance.answers import Tone
+from avow.assurance.model import Case, RequirementView
+from avow.report.wording import clean
+
+LINES, WIDTH, WORDS = 24, 80, 150
+_MARKS = {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}
+_MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
+
+
+def terminal_lines(case: Case, command: str = "") -> list[str]:
+    """At most 24 lines of 80 columns, in the order of the first page; `command` is the one thing to do next."""
+    a = case.answers
+    verdict = f": {a.verdict}"
+    title = _cut(f"{_MARKS[a.tone]} {case.title}", WIDTH - len(verdict))
+    lines = [title + verdict]
+    lines += _cut_lines(f"{a.counts} · {a.weakened} · {a.gates}", 2)
+    lines += ["1 Claimed"]
+    listed = [r for r in case.requirements if r.id in a.listed][:6]
+    lines += [_cut(f"  {_MARKS[r.tone]} {r.id} {r.how}, {_weakest(r)}: {_one(r)}") for r in listed]
+    if len(listed) < len(case.requirements):
+        lines += [f"  the worst of {len(case.requirements)}"]
+    shown = a.based_on[:4]
+    more = f"; and {len(a.bases) - len(shown)} more nodes" if len(a.bases) > len(shown) else ""
+    lines += ["2 Based on", *_cut_lines("; ".join(f"{b.title} {b.words}" for b in shown) + more, 2)]
+    lines += ["3 Weakest evidence", *_cut_lines(_weakest_words(case), 3)]
+    lines += [f"4 Supposed{f' ({a.owned} with owner and date)' if a.owned else ': nothing'}"]
+    lines += [_cut(f"  {line.count} of {line.sort}: {line.says}") for line in a.supposed]
+    head = f" {a.changed_against.lower()}" if a.changed_against else ""
+    lines += [_cut(f"5 Changed{head.removesuffix(':')}")]
+    lines += [_cut(f"  {mark} {words}".rstrip()) for mark, words in a.changed]
+    over = len(lines) - (LINES - 1)
+    if over > 0:  # a sort of suppositions, or two, whose number stands in the verdict
+        at = next(n for n, line in enumerate(lines) if line.startswith("5 Changed"))
+        lines = [*lines[: at - over - 1], "  …", *lines[at:]]
+    return [*lines, _cut(f"next: {command or _next(case)}")]
+
+
+def comment(case: Case) -> str:
+    """A comment for a change under review: at most 150 words outside its fold. The first line finds it again."""
+    a = case.answers
+    was = f"{case.baseline.verdict} → " if case.baseline else ""
+    lines = [
+        f"<!-- avow {_md(case.system)} -->",
+        f"**{_MARKS[a.tone]} {_md(case.title)}: {_md(was + a.verdict)}**",
+        f"{_md(a.counts)} · {_md(a.weakened)} · {_md(a.gates)}",
+        _md(a.changed_against) or "No report has been signed yet.",
+        "\n".join(f"- {mark} {_md(_few(words))}" for mark, words in a.changed if mark),
+        f"Weakest evidence: {_md(_few(_weakest_words(case)))}",
+        "<details><summary>Requirements and suppositions</summary>",
+        "\n".join(f"- {_MARKS[r.tone]} **{_md(r.id)}** {r.how}: {_md(_one(r))}" for r in case.requirements[:40]),
+        "\n".join(f"- {s.number} {_md(s.words)}" for s in case.suppositions[:40]),
+        "</details>",
+    ]
+    return "\n\n".join(line for line in lines if line) + "\n"
+
+
+def markdown_head(case: Case) -> Iterator[str]:
+    """The five answers as paragraphs of Markdown."""
+    a = case.answers
+    yield f"**{_MARKS[a.tone]} {_md(a.verdict)}**"
+    yield _md(f"{a.counts} · {a.weakened} · {a.gates} · {a.signed}")
+    yield "## 1 What is claimed?"
+    rows = [
+        f"| **{_md(r.id)}** {_md(_one(r))} | {_MARKS[r.tone]} {r.how} | {_md(_weakest(r))} | {len(r.supposes)} |"
+        for r in case.requirements
+    ]
+    head = "| requirement | how it stands | weakest evidence | supposes |\n| --- | --- | --- | --- |\n"
+    yield head + "\n".join(rows) if rows else "No requirement is named."
+    yield "## 2 What is it based on?"
+    yield "\n".join(f"- {_md(b.title)}: {_md(b.words)}" for b in a.bases) or "Nothing."
+    yield "## 3 What is the weakest evidence?"
+    yield _md(_weakest_words(case))
+    yield "## 4 What is supposed, not shown?"
+    owned = f"{a.owned} with owner and date.\n\n" if a.owned else ""
+    yield owned + (
+        "\n".join(f"- {s.number} ({s.sort}) {_md(s.words)}{_md(_owner(s.who, s.until))}" for s in case.suppositions)
+        or "Nothing."
+    )
+    yield "## 5 What changed since the last signed report?"
+    if a.changed_against:
+        yield _md(a.changed_against)
+    yield "\n".join(f"- {mark} {_md(words)}" if mark else _md(words) for mark, words in a.changed)
+    yield "## Weakenings"
+    yield "\n".join(f"- {w.count} {_md(w.words)}. {_md(w.why)}" for w in case.weakenings) or "None."
+
+
+def _owner(who: str, until: str) -> str:
+    return f" — {who}, until {until}" if who and until else f" — {who or 'no owner'}, {until or 'no date'}"
+
+
+def _weakest(r: RequirementView) -> str:
+    found = r.weakest_evidence
+    return f"{found.status}: {found.title}" if found else "no evidence"
+
+
+def _weakest_words(case: Case) -> str:
+    a = case.answers
+    if a.refuted:
+        return a.refuted
+    if a.weakest is None:
+        return "There is none."
+    following = f" Next: {a.next_weakest}." if a.next_weakest else ""
+    return f"{a.weakest.title}: “{a.weakest.quote}”: {a.weakest.words}.{following}"
+
+
+def _next(case: Case) -> str:
+    failing = [gate for gate in case.gates if not gate.passed]
+    steps = [s.text for gate in failing for s in gate.suggestions]
+    if steps:
+        return steps[0]
+    return f"open reports/{case.system}/index.html"
+
+
+def _one(r: RequirementView) -> str:
+    return " ".join((r.text or r.formula or r.temporal).split())
+
+
+def _cut(line: str, most: int = WIDTH) -> str:
+    margin = "  " if line.startswith("  ") else ""
+    line = margin + " ".join(clean(line).split())
+    return line if len(line) <= most else line[: most - 1] + "…"
+
+
+def _cut_lines(text: str, most: int) -> list[str]:
+    lines = textwrap.wrap(" ".join(clean(text).split()), WIDTH - 2, initial_indent="  ", subsequent_indent="  ") or [
+        "  –"
+    ]
+    return lines if len(lines) <= most else [*lines[: most - 1], _cut(lines[most - 1][: WIDTH - 1] + "…")]
+
+
+def _few(text: str, most: int = 24) -> str:
+    words: Sequence[str] = text.split()
+    return " ".join(words) if len(words) <= most else " ".join(words[:most]) + " …"
+
+
+def _md(text: str) -> str:
+    return _MARKDOWN.sub(r"\\\1", " ".join(clean(text).split()))

@@ -1,0 +1,138 @@
+"""The first page: what stands on it, and how it is laid out in a browser."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+from assurance.sample import case as make_case
+from assurance.sample import evidence, guarantee, node_plan, rover_case, system
+
+from avow.assurance.model import Case
+from avow.base.plain import identifiers
+from avow.base.verdict import Verdict
+from avow.report.answers_page import render_answers
+from avow.report.page import render_page
+from avow.system.plan import Requirement, Statement
+from report.chromium import dark, frames_of, measure
+from report.hostile import hostile_case
+from report.test_page import Page
+
+
+@cache
+def large_case(nodes: int = 12, requirements: int = 30) -> Case:
+    """Nodes with many guarantees, and more requirements than rows."""
+    names = [f"arm{n}Joint" for n in range(nodes)]
+    made = {name: [f"g_{i}" for i in range(1 + at * 2)] for at, name in enumerate(names)}
+    said = "What this node promises of its output, whatever the input is that it is given in a step"
+    claims = [guarantee(n, g, said, f"in.{g} > 0 -> out.{n}.{g} < in.{g} + 1") for n, gs in made.items() for g in gs]
+    records = []
+    for at, claim in enumerate(claims):
+        drawn = at % 3 == 0
+        records.append(
+            evidence(
+                claim,
+                Verdict.TESTED if drawn else Verdict.PROVED,
+                "hypothesis" if drawn else "hoare",
+                hypotheses=("the inputs are drawn as they will be",) if drawn else (),
+                bound={
+                    "cases": 300,
+                    "triggered": 12,
+                    "failure_probability_when_triggered_below": 0.22,
+                    "confidence": 0.95,
+                }
+                if drawn
+                else {},
+            )
+        )
+    asked = [
+        Requirement(
+            f"REQ_{n}",
+            f"The robot does what sentence {n} of its list of requirements asks of it.",
+            None,
+            None,
+            tuple(names[: 1 + n % nodes]),
+        )
+        for n in range(requirements)
+    ]
+    subject = system(made, plans=[node_plan(n, "low", "hoare", "hypothesis") for n in names], requirements=asked)
+    words = Statement(
+        "suppositions.hypothesis.drawn", "Inputs are drawn as the robot will meet them", "", "A. Person", "2030-01-01"
+    )
+    subject = replace(subject, plan=replace(subject.plan, statements=(words,)))
+    return make_case(subject, claims, records)
+
+
+CASES = {
+    "rover": rover_case,
+    "large": large_case,
+    "hostile": hostile_case,
+    "empty": lambda: make_case(system({}), [], []),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_elements_nest_ids_are_unique_and_links_lead_somewhere(name: str) -> None:
+    found = CASES[name]()
+    page, claims = Page(render_answers(found)), Page(render_page(found))
+    assert page.faults == []
+    assert page.open == []
+    assert {name for name in page.ids if page.ids.count(name) > 1} == set()
+    for _, attribute, value in page.attributes:
+        if attribute == "href" and value.startswith("#"):
+            assert value[1:] in page.ids, value
+        elif attribute == "href" and value.startswith("claims.html#"):
+            assert value.removeprefix("claims.html#") in claims.ids, value
+
+
+def test_texts_of_contract_and_plan_are_data() -> None:
+    text = render_answers(hostile_case())
+    assert "<script>alert" not in text
+    assert "<img" not in text
+    assert text.count("<script>") == 1
+
+
+def test_each_supposition_stands_in_full_once_and_counts_agree() -> None:
+    found = large_case()
+    text = render_answers(found)
+    assert text.count('class="supposition"') == len(found.suppositions)
+    assert found.answers.verdict in text
+    assert len(re.findall(r'<details id="requirement', text)) == len(found.requirements)
+    assert len(re.findall(r'<details id="node', text)) == len(found.nodes)
+
+
+FAULTS = {
+    "line": (".v b{width:90px;white-space:nowrap;display:block}", "closed"),
+    "box": (".five>section{height:40px}", "closed"),
+    "picture": (".pic .b{width:60px;white-space:nowrap}", "open"),
+    "shifted": (".m{position:relative;left:-60px}", "closed"),
+    "square": (".sq i{width:2px}", "closed"),
+}
+
+
+@pytest.mark.needs_chromium
+@pytest.mark.parametrize("name", ["rover", pytest.param("large", marks=pytest.mark.slow)])
+def test_in_a_browser_nothing_is_clipped_and_the_budgets_hold(name: str, tmp_path: Path) -> None:
+    text = render_answers(CASES[name]())
+    asked = frames_of(text)
+    if name == "rover":
+        asked |= {"dark": (dark(text), 1400)}
+        asked |= {key: (text.replace("</style>", css + "</style>"), 420) for key, (css, _) in FAULTS.items()}
+    measured = measure(asked, tmp_path)
+    for fault in FAULTS.keys() & measured.keys():
+        assert measured.pop(fault)[FAULTS[fault][1]], f"the fault {fault!r} is not found"
+    for width, said in measured.items():
+        assert said["closed"] == [], width
+        assert said["open"] == [], width
+        assert (said["scroll"], said["openScroll"]) == (0, 0), width
+        assert said["contrast"][0] >= 4.5, (width, said["contrast"])
+        assert said["openContrast"][0] >= 4.5, (width, said["openContrast"])
+    wide = measured["1400"]
+    assert [head[0] for head in wide["heads"]] == ["1", "2", "3", "4", "5"]
+    assert wide["own"] <= 280
+    assert wide["all"] <= 3000
+    assert wide["bottom"] <= 900
+    assert identifiers(wide["ownText"]) == ()
