@@ -285,6 +285,12 @@ _SORTS = (
         "RCL is first-order: variables range over values.",
         "guarantee(exists(f in Marked | f(1)))",
     ),
+    Code(
+        "RCL311",
+        "divisor not written down",
+        "`mod` and `div` divide by a positive whole number that is written down, so that they always have a value.",
+        "guarantee(mod(in.count, in.count) == 0)",
+    ),
 )
 
 

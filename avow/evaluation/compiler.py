@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import product
-from typing import Any, Protocol
+from typing import Any, Protocol, assert_never
 
 from avow.evaluation.disjunctions import Part
 from avow.formulas import values
 from avow.formulas.values import Data, Element, FunctionValue, Value
+from avow.language.operators import OPERATORS, implementation
 from avow.language.sorts import (
     BoolSort,
     DataSort,
@@ -30,6 +31,7 @@ from avow.language.terms import (
     Apply,
     Arithmetic,
     Compare,
+    Conditional,
     Construct,
     EnumValue,
     Iff,
@@ -40,6 +42,7 @@ from avow.language.terms import (
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Quantified,
     SequenceRange,
@@ -98,15 +101,6 @@ def _tuples(sorts: Sequence[Sort], domains: Domains | None) -> tuple[tuple[Value
     if len(known) != len(ranges) or math.prod(len(r) for r in known) > ENUMERATION_LIMIT:
         return None
     return tuple(product(*known))
-
-
-_NUMERIC: dict[str, Callable[[Any, Any], Any]] = {"+": operator.add, "-": operator.sub, "*": operator.mul}
-_ORDER: dict[str, Callable[[Any, Any], bool]] = {
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-}
 
 
 class Candidates(Protocol):
@@ -205,6 +199,12 @@ class Compiler:
                 return lambda env: -inner(env)
             case Arithmetic():
                 return self._arithmetic(term)
+            case Operation(operator=name, arguments=arguments):
+                codes, act = tuple(map(self.code, arguments)), implementation(OPERATORS[name].evaluate)
+                return lambda env: act(*[c(env) for c in codes])
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                test, yes, no = self.code(condition), self.code(then), self.code(otherwise)
+                return lambda env: yes(env) if test(env) else no(env)
             case Compare():
                 return self._compare(term)
             case In():
@@ -225,6 +225,8 @@ class Compiler:
                 for variable in term.variables:
                     self.bind(variable)
                 return self.quantifiers.code(self, term)
+            case _:
+                assert_never(term)
 
     def _apply(self, term: Apply) -> Code:
         function = self.code(term.function)
@@ -268,31 +270,27 @@ class Compiler:
 
     def _arithmetic(self, term: Arithmetic) -> Code:
         left, right = self.code(term.left), self.code(term.right)
+        act = implementation(OPERATORS[term.operator].evaluate)
         if term.operator == "/":
 
             def divide(env: Env) -> Any:
                 divisor = right(env)
                 if divisor == 0:
                     raise NotEvaluable("division by zero")
-                return Fraction(left(env)) / divisor
+                return act(left(env), divisor)
 
             return divide
-        act = _NUMERIC[term.operator]
         return lambda env: act(left(env), right(env))
 
     def _compare(self, term: Compare) -> Code:
         left, right = self.code(term.left), self.code(term.right)
-        if term.operator in _ORDER:
-            act = _ORDER[term.operator]
-            return lambda env: act(left(env), right(env))
         if isinstance(term.left.sort, FunctionSort):
             ranges = [finite_values(sort) for sort in term.left.sort.parameters]
             size = None if None in ranges else math.prod(len(r) for r in ranges if r is not None)
             wanted = term.operator == "=="
             return lambda env: _same_function(left(env), right(env), size) is wanted
-        if term.operator == "==":
-            return lambda env: left(env) == right(env)
-        return lambda env: left(env) != right(env)
+        act = implementation(OPERATORS[term.operator].evaluate)
+        return lambda env: act(left(env), right(env))
 
     def _member(self, term: In) -> Code:
         item = self.code(term.item)

@@ -9,17 +9,19 @@ from avow.formulas.renaming import bound_names
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.terms import (
     And,
+    Builtin,
     Compare,
+    Conditional,
     Iff,
     Implies,
     Literal,
     Not,
+    Operation,
     Or,
     Quantified,
     Quantifier,
     Term,
     Variable,
-    children,
 )
 
 
@@ -91,8 +93,16 @@ def alternatives(term: Term, positive: bool) -> tuple[tuple[Term, bool], ...] | 
             if positive:
                 return ((And((left, right)), True), (And((Not(left), Not(right))), True))
             return ((And((left, Not(right))), True), (And((Not(left), right)), True))
+        case Operation(operator=Builtin.XOR, arguments=(left, right)):
+            return alternatives(Iff(left, right), not positive)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            return ((_both(condition, then, positive), True), (_both(Not(condition), otherwise, positive), True))
         case _:
             return None
+
+
+def _both(condition: Term, branch: Term, positive: bool) -> Term:
+    return And((condition, branch if positive else Not(branch)))
 
 
 def occurring(parts: Sequence[Part], unbound: set[str]) -> list[Variable]:
@@ -103,7 +113,7 @@ def occurring(parts: Sequence[Part], unbound: set[str]) -> list[Variable]:
         term = stack.pop()
         if isinstance(term, Variable) and term.qualified in unbound:
             found[term.name] = term
-        stack.extend(children(term))
+        stack.extend(term.children)
     return [found[name] for name in sorted(found)]
 
 
@@ -113,4 +123,4 @@ def relations(term: Term) -> Iterator[Variable]:
         term = stack.pop()
         if isinstance(term, Variable) and isinstance(term.sort, FunctionSort) and term.sort.result == BOOL:
             yield term
-        stack.extend(children(term))
+        stack.extend(term.children)

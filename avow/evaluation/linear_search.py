@@ -20,6 +20,7 @@ from avow.language.terms import (
     And,
     Arithmetic,
     Compare,
+    Conditional,
     Implies,
     Negative,
     Not,
@@ -76,6 +77,11 @@ def _formula(compiler: Compiler, term: Term, positive: bool, unknown: frozenset[
             return _formula(compiler, Or((Not(left), right)), positive, unknown)
         case Compare():
             return _comparison(compiler, term, positive, unknown)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            cases = (And((condition, then)), And((Not(condition), otherwise)))
+            if not positive:
+                cases = (And((condition, Not(then))), And((Not(condition), Not(otherwise))))
+            return _formula(compiler, Or(cases), True, unknown)
         case Quantified(quantifier=Quantifier.FORALL) if positive:
             return _for_all(compiler, term, False, unknown)
         case Quantified(quantifier=Quantifier.EXISTS) if not positive:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import Value
-from avow.language.terms import Role, Term, Variable, children
+from avow.language.terms import Role, Term, Variable
 
 
 def judge(term: Term, valuation: Mapping[str, Value], *, timeout_ms: int = 5_000) -> bool | None:
@@ -34,5 +34,5 @@ def _free_sorts(term: Term) -> dict[str, Variable]:
         term = stack.pop()
         if isinstance(term, Variable) and term.role is not Role.BOUND:
             found[term.qualified] = Variable(term.role, term.name, term.sort)
-        stack.extend(children(term))
+        stack.extend(term.children)
     return found

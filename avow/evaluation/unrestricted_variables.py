@@ -41,7 +41,6 @@ from avow.language.terms import (
     Term,
     TupleTerm,
     Variable,
-    children,
 )
 
 _LIMIT = 2_000
@@ -156,7 +155,7 @@ class _Survey:
                     return False
                 return self.formula(body, inner | {v.name for v in variables})
             case _:
-                return all(self.formula(child, inner) for child in children(term))
+                return all(self.formula(child, inner) for child in term.children)
 
     def operand(self, term: Term, inner: frozenset[str]) -> bool:
         """A term that is compared for equality or given to a function."""
@@ -198,7 +197,7 @@ class _Survey:
                 return False
             if isinstance(term, Variable) and term.qualified in own:
                 return False
-            stack.extend(children(term))
+            stack.extend(term.children)
         return True
 
 

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
+from typing import assert_never
 
-from avow.formulas.traversal import Steps, rebuild, run, subterms, transform
+from avow.formulas.traversal import Steps, run, subterms, transform
 from avow.language.contract import Clause, Node
 from avow.language.sorts import (
     BOOL,
@@ -34,7 +35,9 @@ from avow.language.terms import (
     And,
     Apply,
     Arithmetic,
+    Builtin,
     Compare,
+    Conditional,
     Construct,
     EnumValue,
     Iff,
@@ -45,6 +48,7 @@ from avow.language.terms import (
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Quantified,
     Quantifier,
@@ -56,7 +60,6 @@ from avow.language.terms import (
     TupleTerm,
     Variable,
     Widen,
-    children,
 )
 
 __all__ = [
@@ -132,7 +135,7 @@ def free_variables(term: Term) -> frozenset[Variable]:
             continue
         if isinstance(current, Quantified):
             bound = bound | frozenset(current.variables)
-        stack.extend((child, bound) for child in children(current))
+        stack.extend((child, bound) for child in current.children)
     return frozenset(free)
 
 
@@ -159,10 +162,10 @@ def substitute(term: Term, mapping: Mapping[Variable, Term]) -> Term:
             body: Term = yield steps(current.body, inner)
             return Quantified(current.quantifier, tuple(fresh), body, current.span)
         parts: list[Term] = []
-        for child in children(current):
+        for child in current.children:
             part: Term = yield steps(child, active)
             parts.append(part)
-        return rebuild(current, tuple(parts)) if parts else current
+        return current.rebuild(tuple(parts)) if parts else current
 
     return run(steps(term, dict(mapping)))
 
@@ -256,7 +259,7 @@ def _normal(term: Term, scope: Mapping[Variable, Variable], level: int) -> Steps
         junction: _Keyed = yield _normal_junction(term, scope, level)
         return junction
     parts: list[_Keyed] = []
-    for child in children(term):
+    for child in term.children:
         part: _Keyed = yield _normal(child, scope, level)
         parts.append(part)
     match term:
@@ -266,7 +269,9 @@ def _normal(term: Term, scope: Mapping[Variable, Variable], level: int) -> Steps
             return _iff(*parts)
         case Compare(operator=operator):
             return _compare(operator, *parts)
-        case Arithmetic(operator="+" | "*"):
+        case Operation(operator=Builtin.XOR):
+            return _not(_iff(*parts))
+        case Arithmetic(operator="+" | "*") | Operation(operator=Builtin.MIN | Builtin.MAX):
             return _make(term, sorted(parts, key=_key))
         case SetTerm():
             return _make(term, sorted({key: (part, key) for part, key in parts}.values(), key=_key))
@@ -355,7 +360,7 @@ def _key(part: _Keyed) -> str:
 
 def _make(term: Term, parts: Iterable[_Keyed]) -> _Keyed:
     parts = tuple(parts)
-    return rebuild(term, tuple(part for part, _ in parts)), _hash(*_head(term), *(key for _, key in parts))
+    return term.rebuild(tuple(part for part, _ in parts)), _hash(*_head(term), *(key for _, key in parts))
 
 
 def _keyed(term: Term) -> _Keyed:
@@ -367,7 +372,7 @@ def _term_key(term: Term) -> str:
 
     def steps(current: Term) -> Steps[str]:
         keys: list[str] = []
-        for child in children(current):
+        for child in current.children:
             key: str = yield steps(child)
             keys.append(key)
         return _hash(*_head(current), *keys)
@@ -399,8 +404,25 @@ def _head(term: Term) -> tuple[str, ...]:
             return (quantifier, *(sort_digest(v.sort) for v in variables))
         case SequenceTerm(sort=sort) | SequenceRange(sort=sort) | SetTerm(sort=sort) | TupleTerm(sort=sort):
             return (type(term).__name__, sort_digest(sort))
-        case Apply() | Index() | Length() | Widen() | Negative() | In() | Not() | And() | Or() | Implies() | Iff():
+        case Operation(operator=operator, sort=sort):
+            return ("operation", operator, sort_digest(_integers(sort)))
+        case (
+            Apply()
+            | Index()
+            | Length()
+            | Widen()
+            | Negative()
+            | In()
+            | Not()
+            | And()
+            | Or()
+            | Implies()
+            | Iff()
+            | Conditional()
+        ):
             return (type(term).__name__,)
+        case _:
+            assert_never(term)
 
 
 def _integers(sort: Sort) -> Sort:

@@ -1,4 +1,4 @@
-"""Negation normal form: `not` only before atoms, no `->`; `<=>` stays."""
+"""Negation normal form: `not` only before atoms, no `->`; `<=>` and `if` stay, which may double what they hold."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from avow.formulas.traversal import Steps, run
 from avow.language.sorts import BOOL
 from avow.language.terms import (
     And,
+    Builtin,
     Compare,
+    Conditional,
     Iff,
     Implies,
     Literal,
     Not,
+    Operation,
     Or,
     Quantified,
     Quantifier,
@@ -47,6 +50,15 @@ def _push(term: Term, positive: bool) -> Steps[Term]:
             one = yield _push(left, True)
             other = yield _push(right, positive)
             return _iff(one, other)
+        case Operation(operator=Builtin.XOR, arguments=(left, right)):
+            one = yield _push(left, True)
+            other = yield _push(right, not positive)
+            return _iff(one, other)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            test: Term = yield _push(condition, True)
+            one = yield _push(then, positive)
+            other = yield _push(otherwise, positive)
+            return Conditional(test, one, other, BOOL, term.span)
         case Compare(operator="==" | "!=" as operator, left=left, right=right) if left.sort == BOOL:
             one = yield _push(left, True)
             other = yield _push(right, positive == (operator == "=="))

@@ -4,23 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any
 
-from avow.language.terms import Quantified, Role, Term, Variable, children
+from avow.language.terms import Quantified, Role, Term, Variable
 
 
 def map_children(term: Term, change: Callable[[Term], Term]) -> Term:
     """The term with its direct subterms changed; a quantifier's variables stay."""
-    changed: dict[str, Any] = {}
-    for item in dataclasses.fields(term):
-        if item.name in ("sort", "span", "variables"):
-            continue
-        value = getattr(term, item.name)
-        if isinstance(value, Term):
-            changed[item.name] = change(value)
-        elif isinstance(value, tuple) and value and isinstance(value[0], Term):
-            changed[item.name] = tuple(change(v) for v in value)
-    return dataclasses.replace(term, **changed) if changed else term
+    return term.rebuild(tuple(map(change, term.children)))
 
 
 def bound_names(term: Term) -> frozenset[str]:
@@ -28,7 +18,7 @@ def bound_names(term: Term) -> frozenset[str]:
     if isinstance(term, Variable):
         return frozenset((term.name,)) if term.role is Role.BOUND else frozenset()
     found: frozenset[str] = frozenset()
-    for child in children(term):
+    for child in term.children:
         found |= bound_names(child)
     if isinstance(term, Quantified):
         found -= {v.name for v in term.variables}
@@ -42,7 +32,7 @@ def has_variables(term: Term) -> bool:
         term = stack.pop()
         if isinstance(term, Variable):
             return True
-        stack.extend(children(term))
+        stack.extend(term.children)
     return False
 
 

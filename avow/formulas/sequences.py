@@ -19,13 +19,14 @@ from avow.formulas.renaming import map_children
 from avow.formulas.traversal import depth, subterms
 from avow.formulas.values import FunctionValue, Value
 from avow.formulas.values import Sequence as SequenceValue
-from avow.language.sorts import INTEGER, NATURAL, REAL, FunctionSort, SequenceSort, SetSort, Sort
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SequenceSort, SetSort, Sort
 from avow.language.terms import (
     TRUE,
     And,
     Apply,
     Arithmetic,
     Compare,
+    Conditional,
     Iff,
     Implies,
     In,
@@ -177,7 +178,12 @@ def defined(term: Term, sequences: Collection[Variable] | None = None) -> Term:
         case Quantified(variables=variables, body=body):
             inner = defined(body, sequences)
             return inner if inner == TRUE else Quantified(Quantifier.FORALL, variables, inner)
-        case _:
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            yes, no = defined(then, sequences), defined(otherwise, sequences)
+            branches = (Implies(condition, yes), Implies(negation(condition), no))
+            safe = (branch for branch, inner in zip(branches, (yes, no), strict=True) if inner != TRUE)
+            return conjunction((defined(condition, sequences), *safe))
+        case _:  # an atom: all of it matters
             return conjunction(_risks(term, sequences))
 
 
@@ -194,10 +200,17 @@ def _in_turn(items: Sequence[Term], guards: Sequence[Term], sequences: Collectio
 
 
 def _risks(atom: Term, sequences: Collection[Variable] | None) -> Iterator[Term]:
-    for part in subterms(atom):
-        match part:
-            case Index(sequence=sequence, index=index) if sequences is None or sequence in sequences:
-                yield Compare("<=", Literal(0, INTEGER), index)
-                yield Compare("<", index, Length(sequence, NATURAL))
-            case Arithmetic(operator="/", right=right) if sequences is None and not isinstance(right, Literal):
-                yield Compare("!=", right, Literal(Fraction(0), REAL))
+    """What an atom needs to be defined; of a formula within it, what that formula needs."""
+    match atom:
+        case Index(sequence=sequence, index=index) if sequences is None or sequence in sequences:
+            yield Compare("<=", Literal(0, INTEGER), index)
+            yield Compare("<", index, Length(sequence, NATURAL))
+        case Arithmetic(operator="/", right=right) if sequences is None and not isinstance(right, Literal):
+            yield Compare("!=", right, Literal(Fraction(0), REAL))
+    for part in atom.children:
+        if part.sort == BOOL or isinstance(part, Conditional):
+            inner = defined(part, sequences)
+            if inner != TRUE:
+                yield inner
+        else:
+            yield from _risks(part, sequences)

@@ -10,30 +10,7 @@ from collections.abc import Callable, Generator
 from typing import Any, TypeVar
 
 from avow.language.terms import (
-    And,
-    Apply,
-    Arithmetic,
-    Compare,
-    Construct,
-    EnumValue,
-    Iff,
-    Implies,
-    In,
-    Index,
-    Length,
-    Literal,
-    Negative,
-    Not,
-    Or,
-    Quantified,
-    SequenceRange,
-    SequenceTerm,
-    SetTerm,
     Term,
-    TupleTerm,
-    Variable,
-    Widen,
-    children,
 )
 from avow.language.terms import subterms as subterms
 
@@ -67,53 +44,8 @@ def depth(term: Term) -> int:
     while stack:
         current, level = stack.pop()
         deepest = max(deepest, level)
-        stack.extend((child, level + 1) for child in children(current))
+        stack.extend((child, level + 1) for child in current.children)
     return deepest
-
-
-def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
-    """The term with other direct subterms, given in the order of `children`."""
-    match term:
-        case Literal() | EnumValue() | Variable():
-            return term
-        case Construct():
-            return Construct(term.constructor, parts, term.sort, term.span)
-        case Apply():
-            return Apply(parts[0], parts[1:], term.sort, term.span)
-        case Index():
-            return Index(parts[0], parts[1], term.sort, term.span)
-        case Length():
-            return Length(parts[0], term.sort, term.span)
-        case Widen():
-            return Widen(parts[0], term.sort, term.span)
-        case Negative():
-            return Negative(parts[0], term.sort, term.span)
-        case Arithmetic():
-            return Arithmetic(term.operator, parts[0], parts[1], term.sort, term.span)
-        case Compare():
-            return Compare(term.operator, parts[0], parts[1], term.span)
-        case Implies():
-            return Implies(parts[0], parts[1], term.span)
-        case Iff():
-            return Iff(parts[0], parts[1], term.span)
-        case TupleTerm():
-            return TupleTerm(parts, term.sort, term.span)
-        case SequenceTerm():
-            return SequenceTerm(parts, term.sort, term.span)
-        case SetTerm():
-            return SetTerm(parts, term.sort, term.span)
-        case And():
-            return And(parts, term.span)
-        case Or():
-            return Or(parts, term.span)
-        case SequenceRange():
-            return SequenceRange(parts[0], parts[1], term.sort, term.span)
-        case In():
-            return In(parts[0], parts[1], term.span)
-        case Not():
-            return Not(parts[0], term.span)
-        case Quantified():
-            return Quantified(term.quantifier, term.variables, parts[0], term.span)
 
 
 def transform(term: Term, function: Callable[[Term], Term]) -> Term:
@@ -124,9 +56,9 @@ def transform(term: Term, function: Callable[[Term], Term]) -> Term:
 
     def steps(current: Term) -> Steps[Term]:
         parts: list[Term] = []
-        for child in children(current):
+        for child in current.children:
             part: Term = yield steps(child)
             parts.append(part)
-        return function(rebuild(current, tuple(parts)) if parts else current)
+        return function(current.rebuild(tuple(parts)) if parts else current)
 
     return run(steps(term))

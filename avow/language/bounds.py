@@ -8,16 +8,18 @@ from fractions import Fraction
 
 from avow.language.terms import (
     Arithmetic,
+    Builtin,
     Compare,
+    Conditional,
     Iff,
     Implies,
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Term,
     Widen,
-    children,
 )
 
 OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
@@ -53,10 +55,12 @@ def bounds(formula: Term) -> Iterator[Bound]:
                     yield Bound(term, FLIPPED[sign], number, turned)
             case Implies(left=left, right=right):
                 stack += [(right, turned), (left, True)]
-            case Iff() | Or() | Not():
-                stack += [(part, True) for part in reversed(children(term))]
-            case _:
-                stack += [(part, turned) for part in reversed(children(term))]
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                stack += [(otherwise, turned), (then, turned), (condition, True)]
+            case Iff() | Or() | Not() | Operation(operator=Builtin.XOR):
+                stack += [(part, True) for part in reversed(term.children)]
+            case _:  # what holds of its parts is not turned round by anything else
+                stack += [(part, turned) for part in reversed(term.children)]
 
 
 def constant(term: Term) -> Fraction | None:

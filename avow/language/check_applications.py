@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from avow.language.check_base import count
 from avow.language.check_names import Names
 from avow.language.conversions import WHOLE, common, joined
+from avow.language.operators import Mistyped, operation
 from avow.language.printer import show_sort
 from avow.language.sorts import (
     INTEGER,
@@ -32,6 +33,7 @@ from avow.language.syntax import (
 )
 from avow.language.terms import (
     Apply,
+    Builtin,
     Construct,
     EnumValue,
     Index,
@@ -42,6 +44,9 @@ from avow.language.terms import (
     Term,
     TupleTerm,
 )
+
+_BUILTINS = frozenset(Builtin)
+"""Words that are operators directly before a parenthesis, unless the contract gives them another meaning."""
 
 
 class Applications(Names):
@@ -56,6 +61,8 @@ class Applications(Names):
             if self.scope.taken(name) is None:
                 if name == "length":
                     return self.length(tree, arguments)
+                if name in _BUILTINS:
+                    return self.builtin_operation(tree, Builtin(name), arguments)
                 if name not in self.scope.nodes:
                     self.undeclared(name, head, "function or constructor")
                     if name.casefold() not in ("forall", "exists", "exist"):  # whose variables are unknown
@@ -138,6 +145,19 @@ class Applications(Names):
             self.error("RCL303", message, arguments[0])
             return None
         return Length(made[0], NATURAL, self.span(tree))
+
+    def builtin_operation(self, tree: Syntax, name: Builtin, arguments: Sequence[TermSyntax]) -> Term | None:
+        made = [self.formula(a) if name is Builtin.XOR else self.term(a) for a in arguments]
+        terms = [m for m in made if m is not None]
+        if len(terms) != len(made):
+            return None
+        found = operation(name, terms, self.span(tree))
+        if not isinstance(found, Mistyped):
+            return found
+        at = tree if found.at is None else arguments[found.at]
+        shown = "" if found.at is None else show_sort(terms[found.at].sort)
+        self.error(found.code, found.message.format(shown), at, hint=found.hint)
+        return None
 
     # --- collections -------------------------------------------------------------------------------------------------
 

@@ -16,6 +16,8 @@ from avow.language.check_relations import Relations
 from avow.language.environment import did_you_mean
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
+from avow.language.operators import conditional
+from avow.language.printer import show_sort
 from avow.language.sorts import (
     BOOL,
     REAL,
@@ -31,6 +33,7 @@ from avow.language.syntax import (
     Calculation,
     Comparison,
     Connective,
+    IfThenElse,
     Minus,
     Name,
     Negation,
@@ -94,6 +97,8 @@ class Checker(Relations):
                 return self.negative(tree)
             case Quantification():
                 return self.quantified(tree)
+            case IfThenElse():
+                return self.if_then_else(tree, expected)
             case NodePort():
                 return self.node_port(tree)
             case TupleDisplay():
@@ -130,6 +135,25 @@ class Checker(Relations):
                 return equivalence(items, self.places(tree.items))
             case _:
                 assert_never(tree.sign)
+
+    def if_then_else(self, tree: IfThenElse, expected: Sort | None) -> Term | None:
+        condition = self.formula(tree.condition)
+        then, otherwise = self.term(tree.then, expected), self.term(tree.otherwise, expected)
+        if condition is None or then is None or otherwise is None:
+            return None
+        made = conditional(condition, then, otherwise, self.span(tree))
+        if made is not None:
+            return made
+        shown = show_sort(then.sort)
+        if isinstance(then.sort, FunctionSort | SetSort):
+            message = f"a branch of `if` is a value, and this is of type {shown}"
+            self.error(
+                "RCL302", message, tree.then, hint="apply the function, or say what is in the set, in each branch"
+            )
+        else:
+            message = f"the branches of `if` are of one type: this is {show_sort(otherwise.sort)}, the first is {shown}"
+            self.error("RCL302", message, tree.otherwise)
+        return None
 
     # --- quantifiers -------------------------------------------------------------------------------------------------
 

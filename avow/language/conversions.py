@@ -17,7 +17,7 @@ from avow.language.sorts import (
     Sort,
     TupleSort,
 )
-from avow.language.terms import Literal, SequenceTerm, Term, TupleTerm, Widen
+from avow.language.terms import Conditional, Literal, SequenceTerm, Term, TupleTerm, Widen
 
 WHOLE = (IntegerSort, NaturalSort)
 NUMERIC = (IntegerSort, NaturalSort, RealSort)
@@ -68,6 +68,10 @@ def convert(term: Term, wanted: Sort) -> Term | None:
             if all(m is not None for m in made):
                 kept = tuple(m for m in made if m is not None)
                 return replace(term, items=kept, sort=TupleSort(tuple(m.sort for m in kept)))
+        case Conditional(then=then, otherwise=otherwise), _:
+            one, other = convert(then, wanted), convert(otherwise, wanted)
+            if one is not None and other is not None:
+                return replace(term, then=one, otherwise=other, sort=joined([one, other]))
         case SequenceTerm(items=items), SequenceSort(item=item):
             made = [convert(i, item) for i in items]
             if all(m is not None for m in made):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from avow.language.expectations_types import in_topics, in_types
 from avow.language.foreign import FIELDS, OPERATORS
-from avow.language.lexer import SYMBOLS, Token
+from avow.language.lexer import KEYWORDS, SYMBOLS, Token
 from avow.language.source import Reports
 
 _WORDS = {
@@ -21,6 +21,8 @@ _WORDS = {
     "OUT": "`out`",
     "MATCHES": "`matches`",
     "UPTO": "`upto`",
+    "THEN": "`then`",
+    "ELSE": "`else`",
 }
 _TERM = frozenset(("NAME", "NUMBER", "LBRACE", "LPAR"))
 
@@ -47,7 +49,7 @@ def _expected(start: str, expected: frozenset[str]) -> str:
     end = {"declaration": "`;`"}.get(start, "`)`")
     ending = {end} if "$END" in expected else set()
     if {"AND", "OR", "IMPLIES", "PLUS"} & expected:
-        closing = ending | {_WORDS[k] for k in expected & {"COMMA", "RPAR", "BAR", "RBRACE", "UPTO"}}
+        closing = ending | {_WORDS[k] for k in expected & {"COMMA", "RPAR", "BAR", "RBRACE", "UPTO", "THEN", "ELSE"}}
         if "GT" in expected and "EQ" not in expected:
             closing.add("`>`")
         return " or ".join(["an operator", *sorted(closing)])
@@ -175,8 +177,12 @@ def _in_general(
         return "no `:` here: `x in S` says that x is in S; a type is said in `inputs`, `outputs`, or the quantifier"
     if found.type == "BAR":
         return "the bar stands in quantifiers only; the length of a sequence is `length(s)`, and or is `or`"
-    if earlier and earlier[0].text in ("if", "If", "IF", "when", "When", "while"):
+    if earlier and earlier[0].text in ("If", "IF", "when", "When", "while"):
         return "write `A -> B` for: if A then B"
+    if ({"THEN", "ELSE"} & expected and found.type == "$END") or found.type in ("THEN", "ELSE"):
+        return "write `if F then s else t`; and `A -> B` for: if A then B"
+    if found.type == "IF" and "NAME" in expected:
+        return "put parentheses around it: `x == (if c then a else b)`"
     if found.type == "COMMA":
         if before is not None and any(t.type in ("IN", "NOT_IN") for t in earlier[-3:]):
             return "join formulas by `and`; a set has braces: `x in {a, b}`"
@@ -184,7 +190,11 @@ def _in_general(
     if found.type == "LBRACE" or (found.type == "BUILTIN" and before is not None):
         return "`{ … }` is a set: formulas are grouped by `( … )`" if found.type == "LBRACE" else None
     for token in (found, before):
-        if token is not None and token.type == "NAME" and (token.text in OPERATORS or token.text.lower() in OPERATORS):
+        if (
+            token is not None
+            and token.type in ("NAME", "IF")
+            and (token.text in OPERATORS or token.text.lower() in OPERATORS)
+        ):
             return OPERATORS.get(token.text) or OPERATORS[token.text.lower()]
     if before is not None and before.text == "length":
         return "write `length(s)`"
@@ -198,11 +208,7 @@ def _in_general(
 
 
 def _about_keyword(found: Token) -> str | None:
-    if found.type in ("CONTEXT", "NODE", "INPUTS", "OUTPUTS", "TOPICS", "MATCHES", "ASSUME", "GUARANTEE", "UPTO"):
-        return f"`{found.text}` is a keyword and cannot be a name"
-    if found.text in ("in", "out", "not", "and", "or", "forall", "exists", "exists_unique", "TRUE", "FALSE"):
-        return f"`{found.text}` is a keyword and cannot be a name"
-    return None
+    return f"`{found.text}` is a keyword and cannot be a name" if found.text in KEYWORDS else None
 
 
 _BAR = "a bar stands between the variables and the formula: `forall(x in REAL | …)`"

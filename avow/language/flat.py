@@ -17,6 +17,7 @@ from avow.language.syntax import (
     ConstantDeclaration,
     Element,
     FunctionType,
+    IfThenElse,
     Minus,
     Name,
     NamedType,
@@ -87,6 +88,8 @@ def flat(tree: Syntax) -> str:
             return f"<{flat(low)} upto {flat(high)}>"
         case Quantification():
             return f"{quantifier_head(tree)} {flat(tree.body)})"
+        case IfThenElse(condition=condition, then=then, otherwise=otherwise):
+            return f"if {flat(condition)} then {flat(then)} else {flat(otherwise)}"
         case Binder(names=names, domain=domain):
             return f"{_texts(names)} in {flat(domain)}"
         case FunctionType(parameters=left, result=right):

@@ -72,7 +72,7 @@ SIGNS: dict[str, Foreign] = {
     **_hint("the empty set is written `{}`", "∅"),
     **_hint("RCL has no powers: write `x * x`", "²", "³"),
     **_hint("RCL has no roots: say what its square is", "√"),
-    **_hint("write `(c -> a) and (not c -> b)` for: a if c, else b", "?"),
+    **_hint("write `if c then a else b`", "?"),
     **_as("SLASH", "/", "::", hint="write `package/Type` (a ROS type), `in.v`, or `|` after a quantifier's variables"),
     **_hint("write operators as words: `in`, `and`, `or`, `not`, `forall`, `exists`", "\\"),
     **_hint("the length of a sequence is written `length(s)`; a comment begins with `//`", "#"),
@@ -134,7 +134,8 @@ def invisible(character: str) -> str | None:
 
 FIELDS = "give the variable the type of the field that is meant; the plan says which field of the message it is"
 _ONE_STEP = "a contract speaks of one step; properties of whole runs stand in the plan"
-_ARITHMETIC = "RCL has `+`, `-`, `*` and `/`, and no other functions of numbers: say it by comparisons"
+_CONDITIONAL = "write `if c then a else b`"
+_ARITHMETIC = "RCL has `+ - * /`, `abs`, `min`, `max`, `mod`, `div`, and no other functions of numbers: compare them"
 
 FOREIGN_NAMES = {
     **dict.fromkeys(("true", "True"), "write `TRUE`"),
@@ -143,17 +144,20 @@ FOREIGN_NAMES = {
     **dict.fromkeys(("always", "globally", "eventually", "finally", "next", "until", "once"), _ONE_STEP),
     **dict.fromkeys(("historically", "previously", "since", "G", "F", "X", "old", "pre", "post"), _ONE_STEP),
     **dict.fromkeys(("prev", "previous", "last"), _ONE_STEP),
-    "abs": "for `abs(r) < 3` write `-3 < r < 3`",
+    **dict.fromkeys(("Abs", "ABS", "magnitude"), "write `abs(r)`"),
     **dict.fromkeys(("fabs", "sqrt", "sin", "cos", "tan", "atan2", "pow", "exp", "log", "floor", "ceil"), _ARITHMETIC),
-    **dict.fromkeys(("round", "norm", "hypot", "dist", "distance", "mod"), _ARITHMETIC),
-    **dict.fromkeys(("min", "max"), "for `max(a, b) < c` write `a < c and b < c`"),
+    **dict.fromkeys(("round", "norm", "hypot", "dist", "distance"), _ARITHMETIC),
+    **{word: f"write `{word.lower()[:3]}(a, b)`" for word in ("Min", "MIN", "minimum", "Max", "MAX", "maximum")},
+    **dict.fromkeys(("modulo", "remainder", "rem", "quotient"), "write `mod(n, 3)` and `div(n, 3)`"),
     **dict.fromkeys(("len", "size", "count", "card"), "the length of a sequence is written `length(s)`"),
     **dict.fromkeys(("range", "Range", "seq"), "write a range as `<a upto b>`, both ends included"),
     **dict.fromkeys(("And", "Or", "Not", "Implies", "Iff", "Xor"), "write `a and b`, `a or b`, `not a`, `a -> b`"),
     **dict.fromkeys(("ForAll", "Forall", "forAll"), _QUANTIFIER.format("forall")),
     **dict.fromkeys(("Exists", "exist"), _QUANTIFIER.format("exists")),
     "_": "where any value will do, say that there is one: `exists(x in REAL | c == f(x))`",
-    **dict.fromkeys(("ite", "cond", "If", "if"), "write `(c -> a) and (not c -> b)` for: a if c, else b"),
+    **dict.fromkeys(("ite", "cond", "If", "IF"), _CONDITIONAL),
+    **{word: f"directly before a parenthesis it is an operator: `{word}(a, b)`" for word in ("xor", "mod", "div")},
+    **{word: f"directly before a parenthesis it is an operator: `{word}(…)`" for word in ("abs", "min", "max")},
     **dict.fromkeys(("None", "null", "nullptr", "NULL", "nil", "NaN", "nan"), "every variable has a value of its type"),
     **dict.fromkeys(("inf", "Inf", "INFINITY", "infinity"), "a REAL is finite"),
 }
@@ -162,13 +166,14 @@ FOREIGN_NAMES = {
 OPERATORS = {
     **dict.fromkeys(("true", "True"), "write `TRUE`"),
     **dict.fromkeys(("false", "False"), "write `FALSE`"),
-    **dict.fromkeys(("implies", "then", "THEN", "IMPLIES", "Implies"), "write `->`"),
+    **dict.fromkeys(("implies", "THEN", "IMPLIES", "Implies"), "write `->`"),
     **dict.fromkeys(("iff", "IFF", "equiv"), "write `<=>`"),
     **{w: f"write `{w.lower()}`" for w in ("AND", "OR", "NOT", "IN", "FORALL", "EXISTS", "And", "Or", "Not")},
     "is": "write `==` (or `!=`, `<`, `<=`, `>`, `>=`)",
     **dict.fromkeys(("equals", "eq"), "write `==`"),
-    **dict.fromkeys(("xor", "XOR"), "write `(a) != (b)` for: either a or b"),
-    **dict.fromkeys(("mod", "div", "rem"), "RCL has no remainder and no whole division"),
+    **dict.fromkeys(("xor", "XOR", "Xor"), "write `xor(a, b)` for: either a or b"),
+    **dict.fromkeys(("mod", "rem", "modulo"), "write `mod(a, 3)`"),
+    "div": "write `div(a, 3)`",
     "unless": "write `not B -> A` for: A unless B",
     "between": "write `low <= x <= high`",
     "to": "write a range as `<a upto b>`, both ends included",
@@ -177,8 +182,8 @@ OPERATORS = {
     "for": "write `forall(x in S | …)` or `exists(x in S | …)`",
     **dict.fromkeys(("contains", "has", "includes"), "write `x in S`"),
     **dict.fromkeys(("less", "greater", "more", "bigger", "smaller"), "write `<`, `<=`, `>` or `>=`"),
-    **dict.fromkeys(("else", "otherwise"), "write `(c -> a) and (not c -> b)` for: a if c, else b"),
-    "if": "write `A -> B` for: if A then B, `A <=> B` for: A if and only if B",
+    **dict.fromkeys(("otherwise", "ELSE", "elif", "IF", "If"), _CONDITIONAL),
+    **dict.fromkeys(("if", "when", "whenever"), "write `A -> B` for: if A then B, `A <=> B` for: A if and only if B"),
     "let": "RCL has no `let`: write the term itself, or `forall(x in REAL | x == … -> …)`",
     "as": "RCL converts whole numbers to reals by itself, and nothing else",
 }

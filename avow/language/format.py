@@ -21,6 +21,7 @@ from avow.language.syntax import (
     Connective,
     ConstantDeclaration,
     Declaration,
+    IfThenElse,
     Negation,
     Parentheses,
     PortList,
@@ -299,6 +300,11 @@ def _lay(tree: TermSyntax, indent: int, width: int) -> list[str]:
         case Quantification(body=inner):
             body = _enclosed(" " * (indent + _STEP), _lay(inner, indent + _STEP, width - 1), ")")
             return [quantifier_head(tree), *body]
+        case IfThenElse(condition=condition, then=then, otherwise=otherwise):
+            pad = " " * indent
+            lines = _enclosed("if ", _lay(condition, indent + 3, width), "")
+            lines += _enclosed(f"{pad}then ", _lay(then, indent + 5, width), "")
+            return [*lines, *_enclosed(f"{pad}else ", _lay(otherwise, indent + 5, width), "")]
         case _:  # a term, which stays on its line
             return [line]
 

@@ -32,6 +32,7 @@ KEYWORDS = {
     **{word: word.upper() for word in ("assume", "guarantee", "forall", "exists", "in", "out", "not", "and", "or")},
     "exists_unique": "UNIQUE",
     "upto": "UPTO",
+    **{word: word.upper() for word in ("if", "then", "else")},
     "TRUE": "TRUE",
     "FALSE": "FALSE",
     **dict.fromkeys(("REAL", "INTEGER", "NATURAL", "BOOL", "STRING"), "BUILTIN"),

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from avow.language.sorts import DataSort, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
-from avow.language.terms import Term, children
+from avow.language.terms import Term
 
 MAX_DECLARED = 20_000
 """So many parts a constant or a type may have, written out."""
@@ -44,7 +44,7 @@ def extent(root: _Part, parts: Callable[[_Part], tuple[_Part, ...]]) -> tuple[in
 
 def term_extent(term: Term) -> tuple[int, int]:
     """A term's parts and depth."""
-    return extent(term, children)
+    return extent(term, lambda part: part.children)
 
 
 def sort_extent(sort: Sort) -> tuple[int, int]:

@@ -26,6 +26,7 @@ from avow.language.terms import (
     TRUE,
     And,
     Compare,
+    Conditional,
     EnumValue,
     Implies,
     In,
@@ -260,6 +261,8 @@ def _always(term: Term) -> bool:
             return _always(right)
         case Quantified(quantifier=Quantifier.FORALL, body=body):
             return _always(body)
+        case Conditional(then=then, otherwise=otherwise):
+            return _always(then) and _always(otherwise)
     return False
 
 

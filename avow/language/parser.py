@@ -28,6 +28,7 @@ from avow.language.syntax import (
     Declaration,
     Element,
     FunctionType,
+    IfThenElse,
     Minus,
     Name,
     NamedType,
@@ -394,6 +395,9 @@ class _Build:
         binders: _Binders = c[2]
         depth = max(_deepest(binders) + 1, c[4].depth + 1)
         return Quantification(c[0].start, c[5].end, depth, QUANTIFIERS[c[0].type], binders, c[4])
+
+    def if_then_else(self, c: list[Any]) -> IfThenElse:
+        return IfThenElse(c[0].start, c[5].end, _deepest(c[1::2]), c[1], c[3], c[5])
 
     def binders(self, c: list[Any]) -> _Binders:
         return tuple(c[::2])

@@ -6,7 +6,9 @@ Printing in the style ``rcl`` and reading that again gives the equal term (tests
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import assert_never
 
+from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import (
     REAL,
     BoolSort,
@@ -31,6 +33,7 @@ from avow.language.terms import (
     Apply,
     Arithmetic,
     Compare,
+    Conditional,
     Construct,
     EnumValue,
     Iff,
@@ -41,6 +44,7 @@ from avow.language.terms import (
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Quantified,
     Role,
@@ -53,9 +57,7 @@ from avow.language.terms import (
     Widen,
 )
 
-# How tightly a form binds; a part is put in parentheses where it binds less tightly than its place demands.
-IFF, IMPLIES, OR, AND, NOT, COMPARE, SUM, PRODUCT, UNARY, ATOM = range(10)
-_LOOSEST = -1
+_LOOSEST, IFF, IMPLIES, OR, AND, NOT, COMPARE, SUM, PRODUCT, UNARY, ATOM = Level
 _UP, _DOWN = frozenset(("<", "<=", "==")), frozenset((">", ">=", "=="))
 
 
@@ -187,8 +189,15 @@ class _Printer:
                 return f"{self.side(left, IFF)}{words['<=>']}{self.side(right, IMPLIES)}", IFF
             case Quantified():
                 return self.quantified(term)
+            case Operation(operator=operator, arguments=arguments):
+                return f"{words[operator]}({self.listed(arguments, _LOOSEST)})", ATOM
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                whole = words["if"] + self.show(condition, IFF) + words["then"] + self.show(then, IFF)
+                return whole + words["else"] + self.show(otherwise, _LOOSEST), _LOOSEST
             case Widen(term=inner):
                 return self.form(inner, real)
+            case _:
+                assert_never(term)
 
     def variable(self, term: Variable) -> str:
         """``in.r``; of another node, ``sensor.r`` (in RCL ``sensor.in.r``, which has one meaning always)."""
@@ -230,7 +239,7 @@ class _Printer:
         return self.style.comma.join(self.show(i, place, real=real) for i in items)
 
     def arithmetic(self, term: Arithmetic) -> tuple[str, int]:
-        level = SUM if term.operator in "+-" else PRODUCT
+        level = OPERATORS[term.operator].level
         divided = term.operator == "/"
         left = self.show(term.left, level, real=divided or _shows_real(term.right))
         right = self.show(term.right, level + 1, real=divided or _shows_real(term.left))
@@ -301,7 +310,11 @@ def _shows_real(term: Term) -> bool:
             return sort == REAL and (_shows_real(left) or _shows_real(right))
         case Negative(term=inner):
             return _shows_real(inner)
-        case _:
+        case Operation(arguments=terms) if term.sort == REAL:
+            return any(map(_shows_real, terms))
+        case Conditional(then=then, otherwise=otherwise) if term.sort == REAL:
+            return _shows_real(then) or _shows_real(otherwise)
+        case _:  # what is no number that was written down has its sort from its name
             return bool(term.sort == REAL)
 
 

@@ -37,7 +37,12 @@ class RclLexer(RegexLexer):  # type: ignore[misc]  # pygments has no types
             ),
             (r"\b[AG](?=\s*[\"(])", Keyword.Declaration),
             (rf"(in|out)(\s*\.\s*)({_NAME})", bygroups(Name.Variable.Instance, Punctuation, Name.Variable)),
-            (words(("forall", "exists_unique", "exists", "matches", "upto"), suffix=r"\b"), Keyword),
+            (
+                words(
+                    ("forall", "exists_unique", "exists", "matches", "upto", "if", "then", "else"), suffix=r"\b(?!')"
+                ),
+                Keyword,
+            ),
             (r"!\s*in\b", Operator.Word),
             (words(("and", "or", "not", "in"), suffix=r"\b(?!')"), Operator.Word),
             (words(("REAL", "INTEGER", "NATURAL", "BOOL", "STRING"), suffix=r"\b(?!')"), Keyword.Type),

@@ -18,12 +18,15 @@ from avow.language.english import LONGEST, Comparison, both_ways, comparisons, i
 from avow.language.printer import show_number, show_term
 from avow.language.sorts import BOOL, DataSort, EnumSort, components
 from avow.language.terms import (
+    Builtin,
     Compare,
+    Conditional,
     Construct,
     EnumValue,
     Iff,
     Implies,
     Literal,
+    Operation,
     Quantified,
     Quantifier,
     Term,
@@ -142,7 +145,7 @@ def _directions(sentence: str, formula: Term) -> Iterator[Mismatch]:
 
 def _is_both_ways(term: Term) -> bool:
     match term:
-        case Iff() | Quantified(quantifier=Quantifier.UNIQUE):
+        case Iff() | Conditional() | Operation(operator=Builtin.XOR) | Quantified(quantifier=Quantifier.UNIQUE):
             return True
         case Compare(operator="==" | "!=", left=left, right=right):  # ``done == TRUE`` is another way to write `done`
             return left.sort == BOOL and not isinstance(left, Literal) and not isinstance(right, Literal)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal as OneOf
 
 from avow.language.lexer import quote
+from avow.language.operators import OPERATORS
 from avow.language.terms import Quantifier
 
 StyleName = OneOf["unicode", "rcl", "latex", "text"]
@@ -93,9 +94,8 @@ def _same(text: str) -> str:
 
 
 _WORDS = {
-    **{operator: f" {operator} " for operator in ("+", "-", "*", "/", "==", "!=", "<", "<=", ">", ">=", "in", "!in")},
-    **{word: f" {word} " for word in ("and", "or", "->", "<=>", "upto")},
-    "not": "not ",
+    **{row.name: row.rcl for row in OPERATORS.values()},
+    **{word: f" {word} " for word in ("in", "!in", "upto", "then", "else")},
     "TRUE": "TRUE",
     "FALSE": "FALSE",
 }
@@ -118,18 +118,9 @@ STYLES: dict[StyleName, Style] = {
     "unicode": Style(
         words={
             **_WORDS,
-            "==": " = ",
-            "!=": " ≠ ",
-            "<=": " ≤ ",
-            ">=": " ≥ ",
+            **{row.name: row.unicode for row in OPERATORS.values()},
             "in": " ∈ ",
             "!in": " ∉ ",
-            "*": " · ",
-            "and": " ∧ ",
-            "or": " ∨ ",
-            "not": "¬",
-            "->": " → ",
-            "<=>": " ↔ ",
             "upto": " … ",
             "TRUE": "true",
             "FALSE": "false",
@@ -152,14 +143,9 @@ STYLES: dict[StyleName, Style] = {
     "text": Style(
         words={
             **_WORDS,
-            "==": " is ",
-            "!=": " is not ",
-            "<=": " <= ",
-            ">=": " >= ",
+            **{row.name: row.text for row in OPERATORS.values()},
             "in": " in ",
             "!in": " not in ",
-            "->": " implies ",
-            "<=>": " if and only if ",
             "TRUE": "true",
             "FALSE": "false",
             "upto": " to ",
@@ -182,21 +168,14 @@ STYLES: dict[StyleName, Style] = {
     "latex": Style(
         words={
             **_WORDS,
-            "==": " = ",
-            "!=": r" \neq ",
-            "<=": r" \leq ",
-            ">=": r" \geq ",
-            "*": r" \cdot ",
+            **{row.name: row.latex for row in OPERATORS.values()},
             "in": r" \in ",
             "!in": r" \notin ",
-            "and": r" \land ",
-            "or": r" \lor ",
-            "not": r"\lnot ",
-            "->": r" \Rightarrow ",
-            "<=>": r" \Leftrightarrow ",
             "upto": r" \ldots ",
             "TRUE": r"\mathit{TRUE}",
             "FALSE": r"\mathit{FALSE}",
+            "then": r"\ \mathbf{then}\ ",
+            "else": r"\ \mathbf{else}\ ",
         },
         quantifiers={
             Quantifier.FORALL: (r"\forall ", r" \bullet ", ""),

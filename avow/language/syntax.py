@@ -173,6 +173,13 @@ class Quantification(_Placed):
     body: TermSyntax
 
 
+@dataclass(frozen=True, slots=True)
+class IfThenElse(_Placed):
+    condition: TermSyntax
+    then: TermSyntax
+    otherwise: TermSyntax
+
+
 TermSyntax = (
     Connective
     | Negation
@@ -193,6 +200,7 @@ TermSyntax = (
     | SequenceDisplay
     | RangeDisplay
     | Quantification
+    | IfThenElse
 )
 
 
@@ -335,6 +343,8 @@ def children(tree: Syntax) -> tuple[Syntax, ...]:
             return (tree.domain,)
         case Quantification():
             return (*tree.binders, tree.body)
+        case IfThenElse():
+            return (tree.condition, tree.then, tree.otherwise)
         case FunctionType():
             return (tree.parameters, tree.result)
         case ProductType():

@@ -2,6 +2,9 @@
 
 The checker makes these from the surface syntax: every name is resolved, every widening explicit, every sort known.
 All later stages (Z3, Dafny, monitors, printers, hashes) read this and nothing else. Spans do not count in equality.
+
+Every node has `children`, its direct subterms in reading order (the bound variables of a quantifier are not subterms),
+and `rebuild`, itself with others in their place. A node without one of them is an error of mypy wherever it is used.
 """
 
 from __future__ import annotations
@@ -10,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from fractions import Fraction
+from typing import TypeVar
 
 from avow.base.diagnostics import Span
 from avow.language.sorts import BOOL, DataSort, EnumSort, SequenceSort, SetSort, Sort, TupleSort
@@ -30,8 +34,35 @@ class Quantifier(StrEnum):
     """Existence and uniqueness of the whole tuple of bound variables."""
 
 
+class Builtin(StrEnum):
+    """An operator that is written like a function: ``xor(p, q)``. `avow.language.operators` has what each means."""
+
+    XOR = "xor"
+    ABS = "abs"
+    MIN = "min"
+    MAX = "max"
+    MOD = "mod"
+    DIV = "div"
+
+
+class _Leaf:
+    """A term without subterms."""
+
+    __slots__ = ()
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return ()
+
+    def rebuild(self: _Self, parts: tuple[Term, ...]) -> _Self:
+        return self
+
+
+_Self = TypeVar("_Self")
+
+
 @dataclass(frozen=True, slots=True)
-class Literal:
+class Literal(_Leaf):
     """A truth value, number or string; decimals are exact fractions."""
 
     value: bool | int | Fraction | str
@@ -40,7 +71,7 @@ class Literal:
 
 
 @dataclass(frozen=True, slots=True)
-class EnumValue:
+class EnumValue(_Leaf):
     """An element of an enumeration."""
 
     name: str
@@ -49,7 +80,7 @@ class EnumValue:
 
 
 @dataclass(frozen=True, slots=True)
-class Variable:
+class Variable(_Leaf):
     """An input, an output or a bound variable; `name` has no prefix."""
 
     role: Role
@@ -72,6 +103,13 @@ class Construct:
     sort: DataSort
     span: Span | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return self.arguments
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Construct(self.constructor, parts, self.sort, self.span)
+
 
 @dataclass(frozen=True, slots=True)
 class Apply:
@@ -81,6 +119,13 @@ class Apply:
     arguments: tuple[Term, ...]
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.function, *self.arguments)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Apply(parts[0], parts[1:], self.sort, self.span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +137,13 @@ class Index:
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.sequence, self.index)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Index(parts[0], parts[1], self.sort, self.span)
+
 
 @dataclass(frozen=True, slots=True)
 class Length:
@@ -101,6 +153,13 @@ class Length:
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.sequence,)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Length(parts[0], self.sort, self.span)
+
 
 @dataclass(frozen=True, slots=True)
 class Widen:
@@ -109,6 +168,13 @@ class Widen:
     term: Term
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.term,)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Widen(parts[0], self.sort, self.span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +187,13 @@ class Arithmetic:
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.left, self.right)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Arithmetic(self.operator, parts[0], parts[1], self.sort, self.span)
+
 
 @dataclass(frozen=True, slots=True)
 class Negative:
@@ -130,12 +203,26 @@ class Negative:
     sort: Sort
     span: Span | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.term,)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Negative(parts[0], self.sort, self.span)
+
 
 @dataclass(frozen=True, slots=True)
 class TupleTerm:
     items: tuple[Term, ...]
     sort: TupleSort
     span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return self.items
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return TupleTerm(parts, self.sort, self.span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +232,13 @@ class SequenceTerm:
     items: tuple[Term, ...]
     sort: SequenceSort
     span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return self.items
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return SequenceTerm(parts, self.sort, self.span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +250,13 @@ class SequenceRange:
     sort: SequenceSort
     span: Span | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.low, self.high)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return SequenceRange(parts[0], parts[1], self.sort, self.span)
+
 
 @dataclass(frozen=True, slots=True)
 class SetTerm:
@@ -164,6 +265,13 @@ class SetTerm:
     items: tuple[Term, ...]
     sort: SetSort
     span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return self.items
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return SetTerm(parts, self.sort, self.span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +284,13 @@ class Compare:
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.left, self.right)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Compare(self.operator, parts[0], parts[1], self.span)
+
 
 @dataclass(frozen=True, slots=True)
 class In:
@@ -186,12 +301,26 @@ class In:
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.item, self.collection)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return In(parts[0], parts[1], self.span)
+
 
 @dataclass(frozen=True, slots=True)
 class Not:
     body: Term
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.body,)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Not(parts[0], self.span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,12 +329,26 @@ class And:
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return self.items
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return And(parts, self.span)
+
 
 @dataclass(frozen=True, slots=True)
 class Or:
     items: tuple[Term, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return self.items
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Or(parts, self.span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,6 +358,13 @@ class Implies:
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
 
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.left, self.right)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Implies(parts[0], parts[1], self.span)
+
 
 @dataclass(frozen=True, slots=True)
 class Iff:
@@ -222,6 +372,13 @@ class Iff:
     right: Term
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.left, self.right)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Iff(parts[0], parts[1], self.span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,6 +390,50 @@ class Quantified:
     body: Term
     span: Span | None = field(default=None, compare=False, repr=False)
     sort: Sort = BOOL
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.body,)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Quantified(self.quantifier, self.variables, parts[0], self.span)
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """``min(a, b)``: a built-in operator applied to arguments that have been brought to the sorts it wants.
+
+    Of `mod` and `div` the second argument is a positive whole number that is written down, so that both are total."""
+
+    operator: Builtin
+    arguments: tuple[Term, ...]
+    sort: Sort
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return self.arguments
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Operation(self.operator, parts, self.sort, self.span)
+
+
+@dataclass(frozen=True, slots=True)
+class Conditional:
+    """``if F then s else t``; both branches have the sort of the whole, up to NATURAL within INTEGER."""
+
+    condition: Term
+    then: Term
+    otherwise: Term
+    sort: Sort
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return (self.condition, self.then, self.otherwise)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        return Conditional(parts[0], parts[1], parts[2], self.sort, self.span)
 
 
 Term = (
@@ -258,41 +459,12 @@ Term = (
     | Implies
     | Iff
     | Quantified
+    | Operation
+    | Conditional
 )
 
 TRUE = Literal(True, BOOL)
 FALSE = Literal(False, BOOL)
-
-
-def children(term: Term) -> tuple[Term, ...]:
-    """The direct subterms, in reading order (the bound variables of a quantifier are not subterms)."""
-    match term:
-        case Literal() | EnumValue() | Variable():
-            return ()
-        case Construct(arguments=arguments):
-            return arguments
-        case Apply(function=function, arguments=arguments):
-            return (function, *arguments)
-        case Index(sequence=sequence, index=index):
-            return (sequence, index)
-        case Length(sequence=sequence):
-            return (sequence,)
-        case Widen(term=inner) | Negative(term=inner):
-            return (inner,)
-        case Arithmetic(left=left, right=right) | Compare(left=left, right=right):
-            return (left, right)
-        case Implies(left=left, right=right) | Iff(left=left, right=right):
-            return (left, right)
-        case TupleTerm(items=items) | SequenceTerm(items=items) | SetTerm(items=items):
-            return items
-        case And(items=items) | Or(items=items):
-            return items
-        case SequenceRange(low=low, high=high):
-            return (low, high)
-        case In(item=item, collection=collection):
-            return (item, collection)
-        case Not(body=body) | Quantified(body=body):
-            return (body,)
 
 
 def subterms(term: Term) -> Iterator[Term]:
@@ -301,4 +473,4 @@ def subterms(term: Term) -> Iterator[Term]:
     while stack:
         current = stack.pop()
         yield current
-        stack.extend(reversed(children(current)))
+        stack.extend(reversed(current.children))

@@ -29,7 +29,7 @@ from avow.language.sorts import (
     TupleSort,
 )
 from avow.language.styles import StyleName
-from avow.language.terms import Construct, EnumValue, Literal, Term, children
+from avow.language.terms import Conditional, Construct, EnumValue, Literal, Operation, Quantified, Term, subterms
 
 
 def to_rcl(contract: Contract) -> str:
@@ -70,10 +70,12 @@ def _hidden_elements(node: Node) -> Iterator[Diagnostic]:
     """Elements that the node's formulas speak of by way of constants only: their own names mean a port here."""
     ports = {port.name: port for port in (*node.inputs, *node.outputs)}
     for clause in node.clauses:
-        stack = [clause.formula]
-        while stack:
-            term = stack.pop()
-            stack.extend(children(term))
+        bound = {v.name for part in subterms(clause.formula) if isinstance(part, Quantified) for v in part.variables}
+        for term in subterms(clause.formula):
+            if isinstance(term, Operation) and (term.operator in ports or term.operator in bound):
+                message = f"a constant in `{clause.name}` applies `{term.operator}`, which is another name here"
+                yield Diagnostic("RCL202", message, clause.span, hint="rename one of the two")
+                break
             name = term.name if isinstance(term, EnumValue) else term.constructor if isinstance(term, Construct) else ""
             if name in ports and not (isinstance(term, Construct) and term.arguments):
                 what = f"a constant in `{clause.name}` stands for the element `{name}`"
@@ -102,7 +104,8 @@ def _declarations(contract: Contract) -> Iterator[str]:
 def _value(term: Term) -> str:
     """A constant's value as a declaration takes it: a formula has parentheses."""
     shown = show_term(term, "rcl")
-    return f"({shown})" if term.sort == BOOL and not isinstance(term, Literal) else shown
+    bare = isinstance(term, Conditional) or (term.sort == BOOL and not isinstance(term, Literal))
+    return f"({shown})" if bare else shown
 
 
 def _head(clause: Clause) -> str:

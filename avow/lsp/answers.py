@@ -17,7 +17,7 @@ from avow.language.outline import FileSyntax, NodeSyntax, read
 from avow.language.printer import show_sort, show_term, show_type
 from avow.language.source import Reports, Source
 from avow.language.syntax import TypeDeclaration
-from avow.language.terms import Quantified, Variable, children
+from avow.language.terms import Quantified, Variable
 
 StatusLookup = Callable[[str, str], str | None]
 """(node, clause) → what the ledger says of it, in a few words; None where it says nothing."""
@@ -205,7 +205,7 @@ def _bound(clause: Clause, name: str, document: Document) -> Variable | None:
             for variable in term.variables:
                 if variable.name == name:
                     return variable
-        stack.extend(children(term))
+        stack.extend(term.children)
     return None
 
 

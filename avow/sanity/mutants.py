@@ -11,10 +11,24 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from avow.formulas.formula import conjunction, normalise
-from avow.formulas.traversal import rebuild
 from avow.language.sorts import REAL, EnumSort, RealSort
-from avow.language.terms import And, Compare, EnumValue, Implies, Literal, Not, Or, Quantified, Term, children
+from avow.language.terms import (
+    And,
+    Builtin,
+    Compare,
+    Conditional,
+    EnumValue,
+    Iff,
+    Implies,
+    Literal,
+    Not,
+    Operation,
+    Or,
+    Quantified,
+    Term,
+)
 
+_TAKEN_FOR = {Builtin.MIN: Builtin.MAX, Builtin.MAX: Builtin.MIN}
 _FLIPPED = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
 
 
@@ -76,13 +90,16 @@ def _everywhere(formula: Term) -> Iterator[Mutant]:
         term, put = stack.pop()
         for change, new in _here(term):
             yield Mutant(change, put(new))
-        parts = children(term)
+        parts = term.children
+        if isinstance(term, Operation) and term.operator in (Builtin.MOD, Builtin.DIV):
+            stack.append((parts[0], _at(term, parts, 0, put)))  # its divisor stays positive
+            continue
         for place in reversed(range(len(parts))):
             stack.append((parts[place], _at(term, parts, place, put)))
 
 
 def _at(term: Term, parts: tuple[Term, ...], place: int, put: Callable[[Term], Term]) -> Callable[[Term], Term]:
-    return lambda new: put(rebuild(term, (*parts[:place], new, *parts[place + 1 :])))
+    return lambda new: put(term.rebuild((*parts[:place], new, *parts[place + 1 :])))
 
 
 def _here(term: Term) -> Iterator[tuple[str, Term]]:
@@ -113,6 +130,13 @@ def _here(term: Term) -> Iterator[tuple[str, Term]]:
                 )
         case Not(body=body):
             yield "a negation is dropped", body
+        case Operation(operator=operator, arguments=arguments) if operator in _TAKEN_FOR:
+            other_operator = _TAKEN_FOR[operator]
+            yield f"{operator} becomes {other_operator}", Operation(other_operator, arguments, term.sort, term.span)
+        case Operation(operator=Builtin.XOR, arguments=(left, right)):
+            yield "xor becomes <=>", Iff(left, right, term.span)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            yield "the branches of an `if` change places", Conditional(condition, otherwise, then, term.sort, term.span)
         case Implies(right=right):  # notices a conclusion that a table maps to what always holds
             yield "a condition is dropped", right
         case _:

@@ -32,6 +32,7 @@ from avow.language.terms import (
     Apply,
     Arithmetic,
     Compare,
+    Conditional,
     Iff,
     Implies,
     In,
@@ -153,6 +154,10 @@ def _visit(
                 _remember(found, other, known)
                 _visit(found, one, known, (*conditions, other), open_variables)
                 _visit(found, push_negations(Not(one)), known, (*conditions, negation(other)), open_variables)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            _remember(found, condition, known)
+            _visit(found, then, known, (*conditions, condition), open_variables)
+            _visit(found, otherwise, known, (*conditions, negation(condition)), open_variables)
         case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
             for item in body.items if isinstance(body, And) else (body,):
                 guards = [negation(o) for o in _alternatives(item) if not found.mentions(o)]

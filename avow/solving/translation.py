@@ -12,10 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
-from typing import Any
+from typing import Any, assert_never
 
 from avow.base.diagnostics import Span
 from avow.formulas.traversal import Steps, run
+from avow.language.operators import OPERATORS, implementation
 from avow.language.sorts import (
     INTEGER,
     FunctionSort,
@@ -29,6 +30,7 @@ from avow.language.terms import (
     Apply,
     Arithmetic,
     Compare,
+    Conditional,
     Construct,
     EnumValue,
     Iff,
@@ -39,6 +41,7 @@ from avow.language.terms import (
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Quantified,
     Quantifier,
@@ -140,6 +143,12 @@ class Translator(Sorts):
             case Negative(term=inner):
                 value = yield self._term(inner, bound, meanings)
                 return -value
+            case Operation(operator=name, arguments=terms):
+                arguments = yield self._terms(terms, bound, meanings)
+                return implementation(OPERATORS[name].z3)(z3, *(self._fit(a, term.sort) for a in arguments))
+            case Conditional(sort=sort):
+                condition, then, otherwise = yield self._terms(term.children, bound, meanings)
+                return z3.If(condition, self._fit(then, sort), self._fit(otherwise, sort))
             case Arithmetic(operator=operator, left=left, right=right):
                 one, other = yield self._terms((left, right), bound, meanings)
                 return self._arithmetic(operator, one, other)
@@ -185,6 +194,8 @@ class Translator(Sorts):
                 return self._range(low, high, sequence, term.span)
             case SetTerm():
                 raise Unsupported("a set outside the right-hand side of `in`", term.span)
+            case _:
+                assert_never(term)
 
     def _terms(
         self, terms: Iterable[Term], bound: Mapping[Variable, Expr], meanings: Mapping[Variable, Meaning]
@@ -234,20 +245,7 @@ class Translator(Sorts):
         left, right = yield self._terms((term.left, term.right), bound, meanings)
         if left.sort() != right.sort():
             left, right = self._real(left), self._real(right)
-        match term.operator:
-            case "==":
-                return left == right
-            case "!=":
-                return left != right
-            case "<":
-                return left < right
-            case "<=":
-                return left <= right
-            case ">":
-                return left > right
-            case ">=":
-                return left >= right
-        raise Unsupported(f"the comparison {term.operator}", term.span)
+        return implementation(OPERATORS[term.operator].z3)(z3, left, right)
 
     def _same_function(self, sort: FunctionSort, one: Callable[..., Expr], other: Callable[..., Expr]) -> Expr:
         arguments = [self.fresh("k", parameter) for parameter in sort.parameters]
@@ -359,16 +357,7 @@ class Translator(Sorts):
     def _arithmetic(self, operator: str, left: Expr, right: Expr) -> Expr:
         if operator == "/" or left.sort() != right.sort():
             left, right = self._real(left), self._real(right)
-        match operator:
-            case "+":
-                return left + right
-            case "-":
-                return left - right
-            case "*":
-                return left * right
-            case "/":
-                return left / right
-        raise Unsupported(f"the operator {operator}")
+        return implementation(OPERATORS[operator].z3)(z3, left, right)
 
 
 def _is_written_out(term: SequenceRange) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Node
 from avow.language.sorts import BOOL
-from avow.language.terms import Role, Term, Variable, children
+from avow.language.terms import Role, Term, Variable
 from avow.system.folding import holders
 from avow.system.graph import Edge, Graph
 from avow.system.plan import Endpoint, System
@@ -147,7 +147,7 @@ def ports_of(term: Term) -> tuple[Variable, ...]:
         current = stack.pop()
         if isinstance(current, Variable) and current.role is not Role.BOUND:
             found[current] = None
-        stack.extend(children(current))
+        stack.extend(current.children)
     return tuple(found)
 
 

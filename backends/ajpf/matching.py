@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from avow.formulas.traversal import rebuild
 from avow.language.sorts import NATURAL, IntegerSort, NaturalSort, Sort
 from avow.language.terms import (
     And,
@@ -18,7 +17,6 @@ from avow.language.terms import (
     SetTerm,
     Term,
     Variable,
-    children,
 )
 
 Binding = Mapping[str, Term]
@@ -43,7 +41,7 @@ def match(pattern: Term, term: Term, names: frozenset[str], binding: Binding) ->
         assert isinstance(term, Quantified)
         yield from _match_quantified(pattern, term, names, binding)
     elif isinstance(pattern, And | Or | SetTerm):
-        ours, theirs = pattern.items, children(term)
+        ours, theirs = pattern.items, term.children
         if len(ours) == len(theirs):
             for found, _ in choose(ours, theirs, names, binding):
                 yield found
@@ -53,8 +51,8 @@ def match(pattern: Term, term: Term, names: frozenset[str], binding: Binding) ->
             for sides in ((term.left, term.right), (term.right, term.left)):
                 yield from _match_all((pattern.left, pattern.right), sides, names, binding)
     else:
-        ours, theirs = children(pattern), children(term)
-        if len(ours) == len(theirs) and (not ours or rebuild(pattern, theirs) == term) and (ours or pattern == term):
+        ours, theirs = pattern.children, term.children
+        if len(ours) == len(theirs) and (not ours or pattern.rebuild(theirs) == term) and (ours or pattern == term):
             yield from _match_all(ours, theirs, names, binding)
 
 

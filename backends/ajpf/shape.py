@@ -9,20 +9,23 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from avow.formulas.traversal import depth, rebuild
+from avow.formulas.traversal import depth
 from avow.language.sorts import BOOL, INTEGER, NATURAL, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import (
     FALSE,
     TRUE,
     And,
     Arithmetic,
+    Builtin,
     Compare,
+    Conditional,
     Iff,
     Implies,
     In,
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Quantified,
     Quantifier,
@@ -31,7 +34,6 @@ from avow.language.terms import (
     Term,
     Variable,
     Widen,
-    children,
 )
 
 MAX_DEPTH = 120
@@ -94,6 +96,11 @@ def _formula(term: Term, positive: bool) -> Term:
             return disjunction(made) if positive else conjunction(made)
         case Iff(left=left, right=right):
             return _equivalence(left, right, positive)
+        case Operation(operator=Builtin.XOR, arguments=(left, right)):
+            return _equivalence(left, right, not positive)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            yes = disjunction([_formula(condition, False), _formula(then, positive)])
+            return conjunction([yes, disjunction([_formula(condition, True), _formula(otherwise, positive)])])
         case Quantified(quantifier=quantifier, variables=variables, body=body):
             if quantifier is Quantifier.UNIQUE:
                 inner = Quantified(quantifier, variables, _formula(body, True), term.span)
@@ -148,8 +155,8 @@ def _value(term: Term) -> Term:
         if isinstance(term.sort, IntegerSort | NaturalSort) and isinstance(term.value, int):
             return _integer(term.value)
         return Literal(Fraction(term.value), term.sort) if isinstance(term.sort, RealSort) else term
-    parts = tuple(_formula(p, True) if p.sort == BOOL and children(p) else _value(p) for p in children(term))
-    made = rebuild(term, parts)
+    parts = tuple(_formula(p, True) if p.sort == BOOL and p.children else _value(p) for p in term.children)
+    made = term.rebuild(parts)
     match made:
         case Widen(term=Literal(value=value)) if not isinstance(value, str):
             return Literal(Fraction(value), made.sort)
@@ -176,7 +183,7 @@ def free(term: Term) -> frozenset[str]:
             return
         if isinstance(part, Quantified):
             inner = inner | {v.name for v in part.variables}
-        for child in children(part):
+        for child in part.children:
             walk(child, inner)
 
     walk(term, frozenset())

@@ -6,7 +6,7 @@ from __future__ import annotations
 from avow.formulas.traversal import subterms
 from avow.language.contract import Node
 from avow.language.sorts import DataSort, EnumSort, FunctionSort, RealSort, Sort
-from avow.language.terms import Arithmetic, Compare, Negative, Term
+from avow.language.terms import Arithmetic, Compare, Negative, Operation, Term
 
 
 def looks_like_an_agent(node: Node) -> bool:
@@ -25,7 +25,7 @@ def _is_measured(sort: Sort) -> bool:
 def _measures(formula: Term) -> bool:
     for term in subterms(formula):
         match term:
-            case Arithmetic(sort=RealSort()) | Negative(sort=RealSort()):
+            case Arithmetic(sort=RealSort()) | Negative(sort=RealSort()) | Operation(sort=RealSort()):
                 return True
             case Compare(operator="<" | "<=" | ">" | ">=", left=left) if isinstance(left.sort, RealSort):
                 return True

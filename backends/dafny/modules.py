@@ -28,6 +28,15 @@ _HELPERS = """\
     decreases b - a
   { if b < a then [] else [a] + Upto(a + 1, b) }
 """
+_NUMERIC = {
+    "AbsInt": "(a: int): nat { if a < 0 then 0 - a else a }",
+    "AbsReal": "(a: real): real { if a < 0.0 then 0.0 - a else a }",
+    "MinInt": "(a: int, b: int): int { if b < a then b else a }",
+    "MinReal": "(a: real, b: real): real { if b < a then b else a }",
+    "MaxInt": "(a: int, b: int): int { if a < b then b else a }",
+    "MaxReal": "(a: real, b: real): real { if a < b then b else a }",
+}
+"""Functions that are generated where a formula uses them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +134,8 @@ def _types(words: Vocabulary) -> str:
         for sort in pending:
             done.add(sort)
             body.append(_type(sort, words))
-    return "\n".join([*lines, *body, _HELPERS.rstrip("\n"), "}", ""])
+    used = (f"  function {name}{rest}" for name, rest in _NUMERIC.items() if name in words.functions)
+    return "\n".join([*lines, *body, _HELPERS.rstrip("\n"), *used, "}", ""])
 
 
 def _type(sort: object, words: Vocabulary) -> str:

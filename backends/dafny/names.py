@@ -22,6 +22,7 @@ RESERVED = frozenset(
     provides reads real refines requires return returns reveal reveals seq set static string then this to trait true
     twostate type unchanged using var where while witness yield yields
     array0 array1 array2 array3 array4 Main Env EnvNotEmpty Step Types Contract Base Upto Divide DivideByZero Nth Beyond
+    AbsInt AbsReal MinInt MinReal MaxInt MaxReal
         """,
     )
 )

@@ -11,10 +11,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import reduce
+from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.formulas.formula import free_variables
 from avow.formulas.traversal import Steps, run
+from avow.language.operators import OPERATORS, Level, Operator
 from avow.language.sorts import (
     REAL,
     BoolSort,
@@ -36,6 +39,7 @@ from avow.language.terms import (
     Apply,
     Arithmetic,
     Compare,
+    Conditional,
     Construct,
     EnumValue,
     Iff,
@@ -46,6 +50,7 @@ from avow.language.terms import (
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Quantified,
     Quantifier,
@@ -92,6 +97,8 @@ class Vocabulary:
     ports: tuple[Variable, ...]
     types: dict[Sort, str] = field(default_factory=dict)
     """Declared sorts that occur, in order of first use."""
+    functions: set[str] = field(default_factory=set)
+    """The functions of numbers that are called, without their module."""
 
     def local(self, variable: Variable) -> str:
         wanted = None if variable.role == "bound" else f"{variable.role}_{variable.name}"
@@ -217,12 +224,14 @@ class _Printer:
                 inner = yield self.operand(inner_term, scope)
                 # Of a natural, Dafny 2.3 takes `-n` to be one too, and then complains that it may not be.
                 return (f"-{inner}" if sort == REAL or isinstance(inner_term, Literal) else f"0 - {inner}"), False
-            case Arithmetic(operator="/", left=left, right=right):
-                inner = yield self.list((left, right), scope)
-                return f"Types.Divide({inner})", True
-            case Arithmetic(operator=operator, left=left, right=right):
-                whole = yield self.infix(operator, (left, right), scope)
+            case Arithmetic(operator=operator) | Operation(operator=operator):
+                whole = yield self.operation(OPERATORS[operator], term, scope)
                 return whole
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                test, _ = yield self.term(condition, scope)
+                yes, _ = yield self.term(then, scope)
+                no, _ = yield self.term(otherwise, scope)
+                return f"(if {test} then {yes} else {no})", True
             case TupleTerm(items=items):
                 if len(items) < 2:
                     raise NotExpressible("a tuple of fewer than two items", term.span)
@@ -240,7 +249,7 @@ class _Printer:
             case SetTerm():
                 raise NotExpressible("a set outside 'in'", term.span)
             case Compare(operator=operator, left=left, right=right):
-                whole = yield self.infix(operator, (left, right), scope)
+                whole = yield self.infix(OPERATORS[operator].dafny, (left, right), scope)
                 return whole
             case In(item=item, collection=collection):
                 whole = yield self.membership(item, collection, scope)
@@ -249,20 +258,37 @@ class _Printer:
                 inner = yield self.operand(body, scope)
                 return f"!{inner}", True
             case And(items=items):
-                whole = (yield self.infix("&&", items, scope)) if items else ("true", True)
+                whole = (yield self.infix(OPERATORS["and"].dafny, items, scope)) if items else ("true", True)
                 return whole
             case Or(items=items):
-                whole = (yield self.infix("||", items, scope)) if items else ("false", True)
+                whole = (yield self.infix(OPERATORS["or"].dafny, items, scope)) if items else ("false", True)
                 return whole
             case Implies(left=left, right=right):
-                whole = yield self.infix("==>", (left, right), scope)
+                whole = yield self.infix(OPERATORS["->"].dafny, (left, right), scope)
                 return whole
             case Iff(left=left, right=right):
-                whole = yield self.infix("<==>", (left, right), scope)
+                whole = yield self.infix(OPERATORS["<=>"].dafny, (left, right), scope)
                 return whole
             case Quantified():
                 whole = yield self.quantified(term, scope)
                 return whole
+            case _:
+                assert_never(term)
+
+    def operation(self, operator: Operator, term: Arithmetic | Operation, scope: tuple[Variable, ...]) -> Steps[_Text]:
+        whole: _Text
+        if not operator.dafny.startswith("Types."):
+            whole = yield self.infix(operator.dafny, term.children, scope)
+            return whole
+        texts = []
+        for argument in term.children:
+            text, _ = yield self.term(argument, scope)
+            texts.append(text)
+        if operator.level is not Level.ATOM:
+            return f"{operator.dafny}({', '.join(texts)})", True
+        name = f"{operator.dafny}{'Real' if term.sort == REAL else 'Int'}"
+        self.words.functions.add(name.removeprefix("Types."))
+        return (f"{name}({texts[0]})" if len(texts) == 1 else reduce(lambda a, b: f"{name}({a}, {b})", texts)), True
 
     def membership(self, item: Term, collection: Term, scope: tuple[Variable, ...]) -> Steps[_Text]:
         left = yield self.operand(item, scope)

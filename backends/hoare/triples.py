@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evidence.obligation import Obligation
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
-from avow.formulas.traversal import Steps, rebuild, run
+from avow.formulas.traversal import Steps, run
 from avow.language.contract import Clause, Node
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort
 from avow.language.terms import (
@@ -30,7 +30,6 @@ from avow.language.terms import (
     Role,
     Term,
     Variable,
-    children,
 )
 
 from .checker import Checked
@@ -189,12 +188,12 @@ def rename_bound(term: Term, taken: Iterable[str]) -> Term:
                 used.add(name)
                 inner[bound] = variable(name, bound.sort)
         parts: list[Term] = []
-        for child in children(current):
+        for child in current.children:
             part: Term = yield steps(child, inner)
             parts.append(part)
         if isinstance(current, Quantified):
             return Quantified(current.quantifier, tuple(inner[v] for v in current.variables), parts[0], current.span)
-        return rebuild(current, tuple(parts)) if parts else current
+        return current.rebuild(tuple(parts)) if parts else current
 
     return run(steps(term, {}))
 
@@ -236,10 +235,10 @@ def translate_formula(formula: Term, reading: Reading, clause: Clause) -> Term:
                     arguments.append(argument)
                 return _instance(predicate, arguments)
         parts: list[Term] = []
-        for child in children(current):
+        for child in current.children:
             part: Term = yield steps(child)
             parts.append(part)
-        return rebuild(current, tuple(parts)) if parts else current
+        return current.rebuild(tuple(parts)) if parts else current
 
     result = run(steps(formula))
     if missing:

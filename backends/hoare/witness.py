@@ -26,7 +26,6 @@ from avow.language.terms import (
     Term,
     Variable,
     Widen,
-    children,
 )
 from avow.solving.questions import replay, solve
 
@@ -153,7 +152,7 @@ def _observed(formulas: Sequence[Term], program: Program) -> list[Term]:
         while stack:
             part = stack.pop()
             if isinstance(part, Arithmetic | Negative | Widen):
-                stack.extend(children(part))
+                stack.extend(part.children)
             is_application = isinstance(part, Apply) and all(isinstance(a, Variable) for a in part.arguments)
             named = isinstance(part, Variable) or is_application
             if named and part.sort in NUMERIC and free_variables(part) <= inputs:

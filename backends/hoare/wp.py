@@ -34,7 +34,6 @@ from avow.language.terms import (
     Term,
     TupleTerm,
     Variable,
-    children,
 )
 
 from .program import Assign, Block, If, Match, Skip, Statement, Update, While, statements, variable
@@ -261,7 +260,7 @@ def defined(term: Term) -> Term:
             return conjunction(conditions)
         case Implies(left=left, right=right):
             return conjunction((defined(left), _when(left, defined(right))))
-    parts = [defined(child) for child in children(term)]
+    parts = [defined(child) for child in term.children]
     match term:
         case Arithmetic(operator="/", right=right):
             parts.append(Compare("!=", right, Literal(Fraction(0), REAL)))

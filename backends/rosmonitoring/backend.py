@@ -268,12 +268,12 @@ def _traces(job: Job) -> list[str]:
 
 
 def _mentions(formula: Any, qualified: str) -> bool:
-    from avow.language.terms import Variable, children
+    from avow.language.terms import Variable
 
     stack = [formula]
     while stack:
         term = stack.pop()
         if isinstance(term, Variable) and term.qualified == qualified:
             return True
-        stack.extend(children(term))
+        stack.extend(term.children)
     return False

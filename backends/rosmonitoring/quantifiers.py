@@ -13,7 +13,10 @@ from fractions import Fraction
 
 from avow.evaluation.disjunctions import Part, alternatives, conjunction
 from avow.evaluation.evaluate import finite_values
+from avow.formulas.cases import LIMIT as CASES
+from avow.formulas.cases import TooManyCases, lifted
 from avow.formulas.renaming import bound_names, rename_apart
+from avow.language.operators import OPERATORS, Why
 from avow.language.sorts import (
     BOOL,
     BoolSort,
@@ -26,6 +29,7 @@ from avow.language.terms import (
     Apply,
     Arithmetic,
     Compare,
+    Conditional,
     Construct,
     EnumValue,
     Iff,
@@ -34,6 +38,7 @@ from avow.language.terms import (
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Quantified,
     Quantifier,
@@ -63,6 +68,8 @@ from .symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, e
 LIMIT = 600
 """Comparisons in a condition; a larger one is refused, since it is checked at every event."""
 
+_NOT_LIFTED = "it stands in a quantified formula within a term"
+
 Bound = Mapping[str, Symbol]
 
 
@@ -76,7 +83,9 @@ class Eliminator:
     def condition(self, formula: Term) -> Condition:
         """Raises NotRml with the reason why the formula is none."""
         try:
-            found = self._formula(rename_apart(formula), {})
+            found = self._formula(rename_apart(lifted(formula)), {})
+        except TooManyCases:
+            raise NotRml(f"its conditionals (`if`, `min`, `max`, `abs`) make more than {CASES} comparisons") from None
         except RecursionError:
             raise NotRml("the formula is nested too deeply") from None
         if size(found) > LIMIT:
@@ -188,6 +197,11 @@ class Eliminator:
                 found = self._value(term, bound)
                 if isinstance(found, Scalar):
                     return found.number
+            case Operation(operator=name):
+                said = OPERATORS[name].rml
+                raise NotRml(f"`{name}`: {said.reason if isinstance(said, Why) else _NOT_LIFTED}")
+            case Conditional():
+                raise NotRml(f"`if`: {_NOT_LIFTED}")
         raise NotRml(f"{type(term).__name__.lower()} terms of this sort are not expressible in RML")
 
     def _calculate(self, operator: str, left: Numeric, right: Numeric, term: Term) -> Numeric:

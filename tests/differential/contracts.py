@@ -13,6 +13,7 @@ from differential.language import (
     DAFNY,
     FIELDS,
     INPUTS,
+    ORDER,
     OUTPUTS,
     TYPES,
     WRITTEN,
@@ -24,6 +25,7 @@ from differential.language import (
     dafny_lines,
     imp_lines,
     inp,
+    is_expression,
     num,
     out,
     python_lines,
@@ -395,7 +397,7 @@ class Writer:
     def assumption(self) -> Expr:
         return self.pick(self.comparison(), self.chain(), self.test(0))
 
-    def contract(self) -> Contract:
+    def contract(self, *, spiced: bool = False) -> Contract:
         blocks = {name: self.block(name, self.rng.choice((0, 1, 1, 2, 2))) for name in self.outputs}
         guarantees: dict[str, Expr] = {}
         for name, block in blocks.items():
@@ -408,6 +410,8 @@ class Writer:
         tried = grid(made, random.Random(0), 60)
         if not any(all(truth(a, inputs) for a in assumptions.values()) for inputs in tried):
             made.assumptions = {}
+        if spiced:
+            guarantees.update({name: self.spiced(g) for name, g in guarantees.items()})
         chance = self.rng.random()
         if chance < 0.5:
             made.program = self.mutated(made.program)
@@ -415,6 +419,41 @@ class Writer:
             name = self.rng.choice(sorted(guarantees))
             guarantees[name] = self.mutated(guarantees[name])
         return made
+
+    # -- operators that programs do not have
+
+    def spiced(self, e: Any, *, inside: bool = False) -> Any:
+        """A claim with operators of contracts alone, here and there: most change nothing, some make it another one."""
+        if not isinstance(e, tuple):
+            return e
+        if e[0] in ("forall", "exists", "exists_unique", "each", "some"):
+            return (*e[:-1], self.spiced(e[-1], inside=True))
+        if e[0] == "cmp":
+            e = (*e[:3], *(self.spiced(p, inside=inside) for p in e[3:]))
+        elif e[0] not in ("app", "nth", "len", "near", "within", "in", "!in"):
+            e = tuple(self.spiced(p, inside=inside) if is_expression(p) else p for p in e)
+        if self.rng.random() > 0.2:
+            return e
+        sort = e[1]
+        if sort == "B":
+            other = self.test(0)
+            return self.pick(
+                ("not", "B", ("xor", "B", e, ("true", "B"))) if self.rng.random() < 0.5 else ("xor", "B", e, other),
+                ("ite", "B", other, e, self.pick(e, ("not", "B", ("not", "B", e)), self.test(0))),
+            )
+        if sort not in ORDER:
+            return e
+        if self.rng.random() < 0.3:
+            return ("ite", sort, self.test(0), e, self.pick(e, self.constant(sort)))
+        if sort != "R" and self.rng.random() < 0.4:
+            by = num(self.pick(2, 3, 5))
+            whole = ("+", "I" if sort == "I" else "N", ("*", sort, by, ("div", sort, e, by)), ("mod", "N", e, by))
+            return self.pick(whole, whole, widen(("mod", "N", e, by), sort))
+        if self.rng.random() < 0.3:
+            absolute = ("abs", "R" if sort == "R" else "N", e)
+            return widen(absolute, sort)
+        other = self.pick(e, self.constant(sort))
+        return (self.pick("min", "max"), sort, e, other)
 
     # -- near misses
 

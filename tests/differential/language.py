@@ -155,6 +155,10 @@ def _text(e: Expr, to: str) -> str:
             return f"{opening}{', '.join(sub)}{closing}"
         case "pair":
             return f"({', '.join(sub)})"
+        case "ite":
+            return f"(if {sub[0]} then {sub[1]} else {sub[2]})"
+        case "xor" | "abs" | "min" | "max" | "mod" | "div":
+            return f"{op}({', '.join(sub)})"
         case "forall" | "exists" | "exists_unique":
             names = ", ".join(f"{name} in {WRITTEN[s]}" for name, s in parts[0])
             return f"{op}({names} | {_text(parts[1], to)})"

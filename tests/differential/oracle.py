@@ -54,9 +54,12 @@ def truth(e: Expr, state: State) -> bool | None:
         case "not":
             inner = truth(parts[0], state)
             return None if inner is None else not inner
-        case "<=>":
+        case "<=>" | "xor":
             one, other = truth(parts[0], state), truth(parts[1], state)
-            return None if None in (one, other) else one == other
+            return None if None in (one, other) else (one == other) is (op == "<=>")
+        case "ite":
+            test = truth(parts[0], state)
+            return None if test is None else truth(parts[1 if test else 2], state)
         case "forall" | "exists" | "exists_unique" | "each" | "some":
             return _quantified(op, parts, state)
     try:
@@ -107,7 +110,7 @@ def _numbers(values: Any) -> Any:
 def value(e: Expr, state: State) -> Any:
     """Raises Undefined."""
     op, _, *parts = e
-    if op in {"and", "or", "not", "->", "<=>", "forall", "exists", "exists_unique", "each", "some"}:
+    if op in {"and", "or", "not", "->", "<=>", "xor", "forall", "exists", "exists_unique", "each", "some"}:
         found = truth(e, state)
         if found is None:
             raise Undefined
@@ -123,8 +126,22 @@ def value(e: Expr, state: State) -> Any:
         return state[parts[0]]
     if op == "data":
         return (parts[0], *(value(p, state) for p in parts[1:]))
+    if op == "ite":
+        test = truth(parts[0], state)
+        if test is None:
+            raise Undefined
+        return value(parts[1 if test else 2], state)
     sub = [value(p, state) for p in parts]
     match op:
+        case "abs":
+            return max(sub[0], -sub[0])
+        case "min":
+            return sorted(sub)[0]
+        case "max":
+            return sorted(sub)[-1]
+        case "mod" | "div":
+            rest = next(r for r in range(int(sub[1])) if (sub[0] - r) / Fraction(sub[1]) == (sub[0] - r) // sub[1])
+            return rest if op == "mod" else (sub[0] - rest) // sub[1]
         case "widen":
             return sub[0]
         case "neg":

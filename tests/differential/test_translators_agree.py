@@ -39,7 +39,7 @@ State = Mapping[str, Any]
 
 def written(seed: int) -> Contract | None:
     """None where RCL cannot tell the type of an empty sequence."""
-    made = Writer(seed).contract()
+    made = Writer(seed).contract(spiced=seed % 2 == 1)
     _, faults = check_text(made.rcl, "n.rcl")
     errors = [f for f in faults if f.is_error]
     assert all(f.code == "RCL306" for f in errors), (made.rcl, errors)

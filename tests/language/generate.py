@@ -64,6 +64,11 @@ class Formulas:
         if form < 6:
             text = f"{self.number(depth - 1, names)} {choice('+-*/')} {self.number(depth - 1, names)}"
             return f"({text})" if self.random.random() < 0.5 else text
+        if form == 6 and self.random.random() < 0.6:
+            first, second = self.number(depth - 1, names), self.number(depth - 1, names)
+            whole = choice(("in.i", "k", "length(sq)"))
+            calls = (f"{choice(('min', 'max'))}({first}, {second})", f"abs({first})", f"mod({whole}, 3)")
+            return choice((*calls, f"div({whole}, 2)", f"(if in.b then {first} else {second})"))
         if form == 6:
             return f"-({self.number(depth - 1, names)})"
         if form == 7:
@@ -102,7 +107,10 @@ class Formulas:
         if depth <= 0:
             return self.atom(0, names)
         inner = [self.formula(depth - 1, names) for _ in range(self.random.randrange(2, 4))]
-        match self.random.randrange(10):
+        choice = self.random.choice
+        match self.random.randrange(11):
+            case 10:
+                return choice((f"xor({inner[0]}, {inner[1]})", f"(if {inner[0]} then {inner[1]} else {inner[-1]})"))
             case 0 | 1:
                 return " and ".join(inner)
             case 2 | 3:

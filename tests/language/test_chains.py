@@ -27,7 +27,6 @@ from avow.language.terms import (
     Term,
     Variable,
     Widen,
-    children,
 )
 from avow.language.translate import FORMATS
 
@@ -123,7 +122,7 @@ def depth(term: Term) -> int:
     while stack:
         part, level = stack.pop()
         deepest = max(deepest, level)
-        stack += [(child, level + 1) for child in children(part)]
+        stack += [(child, level + 1) for child in part.children]
     return deepest
 
 

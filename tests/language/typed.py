@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from avow.language.lexer import KEYWORDS
+from avow.language.terms import Builtin
 
 WORDS = tuple(
     word
@@ -52,7 +53,7 @@ Names = Mapping[str, Type]
 class Contracts:
     def __init__(self, seed: int) -> None:
         self.random = random.Random(seed)
-        self.used = {*KEYWORDS, "x", "length"}
+        self.used = {*KEYWORDS, *Builtin, "x", "length"}
         self.types: dict[str, Type] = {}
         self.constants: dict[str, Type] = {}
         self.sets: dict[str, Type] = {}
@@ -191,13 +192,19 @@ class Contracts:
         return f"{signs[0]}{items}{signs[1]}"
 
     def number(self, of: Type, depth: int, names: Names) -> str:
-        form, choice = self.random.randrange(6 if depth > 0 else 2), self.random.choice
+        form, choice = self.random.randrange(8 if depth > 0 else 2), self.random.choice
         if form < 2:
             numbers = ["0", "1", "7", str(10**20), str(10**40)]
             numbers += ["-1", "(-2)", "- -3"] if of.kind != "NATURAL" else []
             numbers += ["1.50", "0.001", "-0.5", "1/3", "123456789.987654321", "0.0"] if of.kind == "REAL" else []
             return choice(numbers)
         left, right = self.term(of, depth - 1, names), self.term(of, depth - 1, names)
+        if form == 6:
+            return f"(if {self.formula(depth - 1, names)} then {left} else {right})"
+        if form == 7:
+            whole = self.term(choice((INTEGER, NATURAL)) if of.kind != "NATURAL" else NATURAL, depth - 1, names)
+            calls = [f"{choice(('min', 'max'))}({left}, {right})", f"abs({left})"]
+            return choice((*calls, f"{choice(('mod', 'div'))}({whole}, {choice((1, 2, 7))})"))
         if form < 4:
             return f"({left} {choice('+*' if of.kind == 'NATURAL' else '+-*')} {right})"
         if form == 4 and of.kind == "REAL":
@@ -239,7 +246,10 @@ class Contracts:
         count = self.random.randint(2, 4)
         inner = [self.formula(depth - 1, names) for _ in range(count)]
         parts = [f"({p})" if self.random.random() < 0.7 else p for p in inner]
-        match self.random.randrange(9):
+        match self.random.randrange(10):
+            case 9:
+                whole = f"if {inner[0]} then {inner[1]} else {inner[-1]}"
+                return self.random.choice((f"xor({inner[0]}, {inner[1]})", f"({whole})"))
             case 0 | 1:
                 return self.random.choice((" and ", " or ")).join(parts)
             case 2 | 3:

@@ -30,6 +30,7 @@ from avow.language.terms import (
     Apply,
     Arithmetic,
     Compare,
+    Conditional,
     Construct,
     EnumValue,
     Iff,
@@ -40,6 +41,7 @@ from avow.language.terms import (
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Quantified,
     Quantifier,
@@ -177,6 +179,10 @@ class Enumeration:
                 if sign == "/":
                     return Fraction(one) / other if other else self._stray(term.sort)
                 return _OPERATIONS[sign](one, other)
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                return self.value(then if self.holds(condition, values) else otherwise, values)
+            case Operation(operator=name, arguments=arguments):
+                return _builtin(name, [self.value(a, values) for a in arguments])
         raise AssertionError(term)
 
     def _stray(self, sort: Sort) -> Any:
@@ -212,6 +218,21 @@ class Enumeration:
                 ranges.append(list(dict.fromkeys(members)))
         for choice in product(*ranges):
             yield dict(zip(term.variables, choice, strict=True))
+
+
+def _builtin(name: str, given: list[Any]) -> Any:
+    match name:
+        case "xor":
+            return (given[0] or given[1]) and not (given[0] and given[1])
+        case "abs":
+            return given[0] if given[0] >= 0 else -given[0]
+        case "min":
+            return sorted(given)[0]
+        case "max":
+            return sorted(given)[-1]
+    whole, divisor = given
+    quotient = next(q for q in chain.from_iterable((k, -k) for k in range(10**6)) if 0 <= whole - q * divisor < divisor)
+    return quotient if name == "div" else whole - quotient * divisor
 
 
 def _range_of(variable: Variable, term: Quantified) -> Term:

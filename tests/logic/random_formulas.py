@@ -8,12 +8,15 @@ from avow.language.sorts import BOOL, EnumSort, FunctionSort, SetSort, Sort
 from avow.language.terms import (
     And,
     Apply,
+    Builtin,
     Compare,
+    Conditional,
     EnumValue,
     Iff,
     Implies,
     In,
     Not,
+    Operation,
     Or,
     Quantified,
     Quantifier,
@@ -47,7 +50,7 @@ def formulas(draw: st.DrawFn, free: tuple[Variable, ...] = INPUTS + OUTPUTS, dep
 def _formula(draw: st.DrawFn, scope: tuple[Variable, ...], depth: int, level: int) -> Term:
     kinds = ["boolean", "equal", "apply", "in"]
     if depth:
-        kinds += ["not", "and", "or", "implies", "iff", "quantified"] * 2
+        kinds += ["not", "and", "or", "implies", "iff", "quantified"] * 2 + ["xor", "if"]
     match draw(st.sampled_from(kinds)):
         case "boolean":
             found = [v for v in scope if v.sort == BOOL]
@@ -70,6 +73,16 @@ def _formula(draw: st.DrawFn, scope: tuple[Variable, ...], depth: int, level: in
             return Or((_formula(draw, scope, depth - 1, level), _formula(draw, scope, depth - 1, level)))
         case "implies":
             return Implies(_formula(draw, scope, depth - 1, level), _formula(draw, scope, depth - 1, level))
+        case "xor":
+            parts = (_formula(draw, scope, depth - 1, level), _formula(draw, scope, depth - 1, level))
+            return Operation(Builtin.XOR, parts, BOOL)
+        case "if":
+            return Conditional(
+                _formula(draw, scope, depth - 1, level),
+                _formula(draw, scope, depth - 1, level),
+                _formula(draw, scope, depth - 1, level),
+                BOOL,
+            )
         case "iff":
             return Iff(_formula(draw, scope, depth - 1, level), _formula(draw, scope, depth - 1, level))
     variable = Variable(Role.BOUND, f"x{level}", COLOUR)
@@ -80,6 +93,10 @@ def _formula(draw: st.DrawFn, scope: tuple[Variable, ...], depth: int, level: in
 def _colour(draw: st.DrawFn, scope: tuple[Variable, ...]) -> Term:
     options: list[Term] = [v for v in scope if v.sort == COLOUR]
     options += [EnumValue(member, COLOUR) for member in COLOUR.members]
+    truths = [v for v in scope if v.sort == BOOL]
+    if truths and draw(st.integers(0, 9)) == 0:
+        condition = draw(st.sampled_from(truths))
+        return Conditional(condition, draw(st.sampled_from(options)), draw(st.sampled_from(options)), COLOUR)
     return draw(st.sampled_from(options))
 
 

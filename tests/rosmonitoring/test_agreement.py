@@ -25,6 +25,7 @@ from avow.language.terms import (
     Apply,
     Arithmetic,
     Compare,
+    Conditional,
     Construct,
     EnumValue,
     Iff,
@@ -33,6 +34,7 @@ from avow.language.terms import (
     Literal,
     Negative,
     Not,
+    Operation,
     Or,
     Quantified,
     Quantifier,
@@ -80,13 +82,21 @@ MAPPING: dict[str, Any] = {
 
 def formula(rng: random.Random, depth: int, reals: tuple[str, ...] = (), naturals: tuple[str, ...] = ()) -> str:
     def real() -> str:
-        return rng.choice(("in.r", "out.s", "0", "1", "2.5", "(0 - 1.5)", *reals, *reals))
+        plain = ("in.r", "out.s", "0", "1", "2.5", "(0 - 1.5)", *reals, *reals)
+        if rng.random() < 0.15:
+            calls = ("min({}, {})", "max({}, {})", "(if out.flag then {} else {})")
+            return rng.choice(calls).format(rng.choice(plain), rng.choice(plain))
+        return rng.choice(plain)
 
     def natural() -> str:
-        return rng.choice(("in.k", "0", "1", "in.k + 1", *naturals, *naturals))
+        plain = ("in.k", "0", "1", "in.k + 1", *naturals, *naturals)
+        if rng.random() < 0.15:
+            calls = ("min({}, {})", "max({}, {})", "abs({})", "(if in.colour == red then {} else {})", "mod({}, 2)")
+            return rng.choice(calls).format(rng.choice(plain), rng.choice(plain))
+        return rng.choice(plain)
 
     def colour() -> str:
-        return rng.choice(("red", "green", "in.colour", "out.light"))
+        return rng.choice(("red", "green", "in.colour", "out.light", "(if out.flag then red else in.colour)"))
 
     if depth == 0:
         order = rng.choice(("<", "<=", ">", ">=", "==", "!="))
@@ -119,6 +129,8 @@ def formula(rng: random.Random, depth: int, reals: tuple[str, ...] = (), natural
             lambda: f"{sub()} -> {sub()}",
             lambda: f"{sub()} <=> {sub()}",
             lambda: f"not {sub()}",
+            lambda: f"xor({sub()}, {sub()})",
+            lambda: f"if {sub()} then {sub()} else {sub()}",
             lambda: f"forall({x} in REAL | (in.command == move({x})) -> {sub((x,))})",
             lambda: f"exists({x} in REAL, {n} in NATURAL | in.at({x}, {n}) and {sub((x,), (n,))})",
             lambda: f"forall({n} in NATURAL | (out.marks({n}) <=> in.last({n})) or {sub((), (n,))})",
@@ -256,6 +268,16 @@ def truth(term: Term, snapshot: Snapshot, bound: dict[str, Any], reals: set[Any]
             return -value(inner)
         case Arithmetic(operator=operator, left=left, right=right):
             return value(left) + value(right) if operator == "+" else value(left) - value(right)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            return value(then) if value(condition) else value(otherwise)
+        case Operation(operator=name, arguments=arguments):
+            given = [value(a) for a in arguments]
+            match name:
+                case "xor":
+                    return given[0] is not given[1]
+                case "mod":
+                    return given[0] - given[1] * (given[0] // given[1])
+            return {"min": min, "max": max, "abs": lambda a: max(a, -a)}[name](*given)
         case Compare(operator=operator, left=left, right=right):
             a, b = value(left), value(right)
             if operator in ("==", "!="):
@@ -332,10 +354,10 @@ def brute_force(system: System, events: list[dict[str, Any]], when: str = "outpu
 
 
 def names_of(term: Term) -> set[str]:
-    from avow.language.terms import Role, children
+    from avow.language.terms import Role
 
     found = {term.qualified} if isinstance(term, Variable) and term.role is not Role.BOUND else set()
-    for child in children(term):
+    for child in term.children:
         found |= names_of(child)
     return found
 

@@ -1,0 +1,96 @@
+"""Conditionals lifted to the atom: ``max(a, b) < c`` as ``(b > a -> b < c) and (not b > a -> a < c)``.
+
+For targets whose terms have no conditionals (RML's conditions, say). `xor`, `abs`, `min`, `max` and conditionals are
+gone afterwards, but for those in a quantified formula within a term; `mod` and `div` stay, for they are no choice
+between terms. The meaning is the same, the size may double with each conditional in one atom, and more than `LIMIT`
+atoms are refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+from avow.formulas.traversal import Steps, run
+from avow.language.sorts import BOOL, INTEGER, REAL, RealSort
+from avow.language.terms import (
+    And,
+    Builtin,
+    Compare,
+    Conditional,
+    Iff,
+    Implies,
+    Literal,
+    Negative,
+    Not,
+    Operation,
+    Or,
+    Quantified,
+    Term,
+)
+
+LIMIT = 500
+"""Atoms made, at most."""
+
+
+class TooManyCases(Exception):  # noqa: N818 - it names what the formula has
+    """Its conditionals make more than `LIMIT` atoms."""
+
+
+def lifted(formula: Term) -> Term:
+    """The formula without operators that choose between terms. Raises TooManyCases."""
+    return run(_formula(formula, iter(range(LIMIT))))
+
+
+def _formula(term: Term, left: Iterator[int]) -> Steps[Term]:
+    match term:
+        case Operation(operator=Builtin.XOR, arguments=(one, other)):
+            same: Term = yield _formula(Iff(one, other, term.span), left)
+            return Not(same, term.span)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            parts = (Implies(condition, then, term.span), Implies(Not(condition), otherwise, term.span))
+            cases: Term = yield _formula(And(parts, term.span), left)
+            return cases
+        case Not() | And() | Or() | Implies() | Iff() | Quantified():
+            made: list[Term] = []
+            for child in term.children:
+                part: Term = yield _formula(child, left)
+                made.append(part)
+            return term.rebuild(tuple(made))
+        case _:  # an atom
+            if next(left, None) is None:
+                raise TooManyCases
+            chosen = _choice(term)
+            if chosen is None:
+                return term
+            condition, one, other = chosen
+            result: Term = yield _formula(Conditional(condition, one, other, BOOL, term.span), left)
+            return result
+
+
+def _choice(term: Term) -> tuple[Term, Term, Term] | None:
+    """The first choice within a term: on which condition it is which of two terms; None where there is none."""
+    match term:
+        case Conditional():
+            return term.condition, term.then, term.otherwise
+        case Operation(operator=Builtin.XOR, arguments=(one, other)):
+            return one, Not(other), other
+        case Operation(operator=Builtin.ABS, arguments=(inner,)):
+            real = isinstance(inner.sort, RealSort)
+            zero = Literal(Fraction(0), REAL) if real else Literal(0, INTEGER)
+            return Compare("<", inner, zero), Negative(inner, REAL if real else INTEGER), inner
+        case Operation(operator=Builtin.MIN | Builtin.MAX as operator, arguments=(one, other, *rest)):
+            better = Compare("<" if operator is Builtin.MIN else ">", other, one)
+            first, second = (Operation(operator, (kept, *rest), term.sort) if rest else kept for kept in (other, one))
+            return better, first, second
+        case Quantified():
+            return None  # a formula within a term: what it chooses depends on its variables
+        case _:  # no choice itself: the first one within it
+            parts = term.children
+            for place, part in enumerate(parts):
+                inside = _choice(part)
+                if inside is not None:
+                    condition, yes, no = inside
+                    before, after = parts[:place], parts[place + 1 :]
+                    return condition, term.rebuild((*before, yes, *after)), term.rebuild((*before, no, *after))
+            return None

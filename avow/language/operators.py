@@ -1,0 +1,256 @@
+"""The table of operators: how each is written, how tightly it binds, what it takes and yields, what it means.
+
+Every pass reads its column here: printers, the checker, evaluation, the translation to Z3 (whose printing is our
+SMT-LIB), Dafny, RML, and programs proved by Hoare triples. An entry has every column or a `Why`; one that is forgotten
+is an error at import. What is no operator but structure (quantifiers, application, membership, tuples, sequences) is
+told apart by a `match` with `assert_never` in each pass.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from fractions import Fraction
+from functools import reduce
+from typing import Any, assert_never
+
+from avow.base.diagnostics import Span
+from avow.language.conversions import NUMERIC, WHOLE, common, joined
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SetSort, Sort
+from avow.language.terms import Builtin, Conditional, Literal, Operation, Term
+
+
+class Level(IntEnum):
+    """How tightly a form binds; a part is put in parentheses where it binds less tightly than its place demands."""
+
+    LOOSEST = -1
+    IFF = 0
+    IMPLIES = 1
+    OR = 2
+    AND = 3
+    NOT = 4
+    COMPARE = 5
+    SUM = 6
+    PRODUCT = 7
+    UNARY = 8
+    ATOM = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Why:
+    """In the place of an entry: the reason why there is none. A backend refuses the operator by name with it."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Operator:
+    """One operator. Signs between operands carry their spaces; of what is written like a function there is the name."""
+
+    name: str
+    """As RCL writes it; in a table of operators, its key."""
+    level: Level
+    typing: str
+    """What it takes and yields, for people."""
+    text: str
+    unicode: str
+    latex: str
+    evaluate: Callable[..., Any] | Why
+    """Of values (`avow.formulas.values`) to a value."""
+    z3: Callable[..., Any] | Why
+    """Of the module z3 and expressions to an expression."""
+    smtlib: str
+    """The head of its form in the scripts that Z3 prints."""
+    dafny: str
+    """The sign between its operands, or the function of the generated module that it is a call of."""
+    rml: str | Why
+    """The sign in an RML condition; or `lifted`: conditions tell the cases apart."""
+    program: str | Why
+    """How a program to be proved by Hoare triples writes it."""
+
+    @property
+    def rcl(self) -> str:
+        """How RCL writes it between or before its operands."""
+        return self.text.replace(self.text.strip(), self.name) if self.level is not Level.ATOM else self.name
+
+
+LIFTED = "lifted"
+_IN_PARTS = Why("its parts are evaluated one after another, as far as they are needed")
+_NO_WHOLE_DIVISION = Why("RML's conditions have neither whole division nor remainder")
+_NOT_COMPUTED = Why("programs say it with IF")
+
+
+def _infix(
+    name: str,
+    level: Level,
+    typing: str,
+    words: tuple[str, str, str],
+    evaluate: Callable[..., Any] | Why,
+    z3: Callable[..., Any],
+    smtlib: str,
+    dafny: str,
+    rml: str,
+) -> Operator:
+    text, unicode, latex = (f" {word} " for word in words)
+    return Operator(name, level, typing, text, unicode, latex, evaluate, z3, smtlib, dafny, rml, name)
+
+
+def _function(
+    name: Builtin,
+    typing: str,
+    evaluate: Callable[..., Any],
+    z3: Callable[..., Any],
+    smtlib: str,
+    dafny: str,
+    rml: str | Why,
+) -> Operator:
+    latex = rf"\mathrm{{{name}}}"
+    return Operator(
+        name, Level.ATOM, typing, name, name, latex, evaluate, z3, smtlib, dafny, rml, _NOT_COMPUTED
+    )  # fmt: skip
+
+
+def _exact(left: Any, right: Any) -> Any:
+    return Fraction(left) / right
+
+
+_FORMULAS, _NUMBERS, _WHOLE = "formulas → formula", "numbers → number", "whole number, positive literal → whole number"
+_ROWS = (
+    _infix("<=>", Level.IFF, _FORMULAS, ("if and only if", "↔", r"\Leftrightarrow"), operator.eq,
+           lambda z, a, b: a == b, "=", "<==>", LIFTED),
+    _infix("->", Level.IMPLIES, _FORMULAS, ("implies", "→", r"\Rightarrow"), _IN_PARTS,
+           lambda z, a, b: z.Implies(a, b), "=>", "==>", LIFTED),
+    _infix("or", Level.OR, _FORMULAS, ("or", "∨", r"\lor"), _IN_PARTS,
+           lambda z, *parts: z.Or(parts), "or", "||", "||"),
+    _infix("and", Level.AND, _FORMULAS, ("and", "∧", r"\land"), _IN_PARTS,
+           lambda z, *parts: z.And(parts), "and", "&&", "&&"),
+    Operator("not", Level.NOT, "formula → formula", "not ", "¬", r"\lnot ", operator.not_,
+             lambda z, a: z.Not(a), "not", "!", LIFTED, "not"),
+    _infix("==", Level.COMPARE, "terms of one type → formula", ("is", "=", "="), operator.eq,
+           lambda z, a, b: a == b, "=", "==", "=="),
+    _infix("!=", Level.COMPARE, "terms of one type → formula", ("is not", "≠", r"\neq"), operator.ne,
+           lambda z, a, b: a != b, "distinct", "!=", "!="),
+    _infix("<", Level.COMPARE, "numbers → formula", ("<", "<", "<"), operator.lt, lambda z, a, b: a < b, "<", "<", "<"),
+    _infix("<=", Level.COMPARE, "numbers → formula", ("<=", "≤", r"\leq"), operator.le,
+           lambda z, a, b: a <= b, "<=", "<=", "<="),
+    _infix(">", Level.COMPARE, "numbers → formula", (">", ">", ">"), operator.gt, lambda z, a, b: a > b, ">", ">", ">"),
+    _infix(">=", Level.COMPARE, "numbers → formula", (">=", "≥", r"\geq"), operator.ge,
+           lambda z, a, b: a >= b, ">=", ">=", ">="),
+    _infix("+", Level.SUM, _NUMBERS, ("+", "+", "+"), operator.add, lambda z, a, b: a + b, "+", "+", "+"),
+    _infix("-", Level.SUM, _NUMBERS, ("-", "-", "-"), operator.sub, lambda z, a, b: a - b, "-", "-", "-"),
+    _infix("*", Level.PRODUCT, _NUMBERS, ("*", "·", r"\cdot"), operator.mul, lambda z, a, b: a * b, "*", "*", "*"),
+    _infix("/", Level.PRODUCT, "numbers → REAL", ("/", "/", "/"), _exact,
+           lambda z, a, b: a / b, "/", "Types.Divide", "/"),
+    _function(Builtin.XOR, _FORMULAS, operator.ne, lambda z, a, b: z.Xor(a, b), "xor", "!=", LIFTED),
+    _function(Builtin.ABS, "number → number", abs, lambda z, a: z.If(a < 0, -a, a), "ite", "Types.Abs", LIFTED),
+    _function(Builtin.MIN, _NUMBERS, min, lambda z, *all: reduce(lambda a, b: z.If(b < a, b, a), all), "ite",
+              "Types.Min", LIFTED),
+    _function(Builtin.MAX, _NUMBERS, max, lambda z, *all: reduce(lambda a, b: z.If(b > a, b, a), all), "ite",
+              "Types.Max", LIFTED),
+    _function(Builtin.MOD, _WHOLE, operator.mod, lambda z, a, b: a % b, "mod", "%", _NO_WHOLE_DIVISION),
+    _function(Builtin.DIV, _WHOLE, operator.floordiv, lambda z, a, b: a / b, "div", "/", _NO_WHOLE_DIVISION),
+    Operator("if", Level.LOOSEST, "formula, two terms of one type → that type", "if ", "if ", r"\mathbf{if}\ ",
+             _IN_PARTS, lambda z, c, a, b: z.If(c, a, b), "ite", "if", LIFTED, _NOT_COMPUTED),
+)  # fmt: skip
+# Division and remainder are Euclid's, as in SMT-LIB and Dafny: with a positive divisor that is Python's floor.
+
+OPERATORS: Mapping[str, Operator] = {row.name: row for row in _ROWS}
+
+
+def _complete() -> None:
+    """Raises where an operator of the terms has no row, or a row an empty column."""
+    missing = [name for name in Builtin if name not in OPERATORS]
+    empty = [f"{row.name}: {f.name}" for row in _ROWS for f in fields(row) if getattr(row, f.name) in ("", None)]
+    twice = len(OPERATORS) != len(_ROWS)
+    if missing or empty or twice:
+        raise TypeError(
+            f"the table of operators is not whole: {missing} {empty}{' an operator twice' if twice else ''}"
+        )
+
+
+_complete()
+
+
+def implementation(column: Callable[..., Any] | Why) -> Callable[..., Any]:
+    """The function of a column of an operator that has one."""
+    assert not isinstance(column, Why), column.reason
+    return column
+
+
+# --- typing ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Mistyped:
+    """Why arguments do not fit: a code, a message, and which argument it is about (None: how many there are)."""
+
+    code: str
+    message: str
+    at: int | None
+    hint: str | None = None
+
+
+_COUNTS: Mapping[Builtin, tuple[int, int | None]] = {
+    Builtin.XOR: (2, 2),
+    Builtin.ABS: (1, 1),
+    Builtin.MIN: (2, None),
+    Builtin.MAX: (2, None),
+    Builtin.MOD: (2, 2),
+    Builtin.DIV: (2, 2),
+}
+
+
+def wrong_count(name: Builtin, given: int) -> Mistyped | None:
+    """That an operator has too few or too many arguments."""
+    least, most = _COUNTS[name]
+    if given >= least and (most is None or given <= most):
+        return None
+    wanted = f"{least} argument{'' if least == 1 else 's'}{'' if most else ' or more'}"
+    return Mistyped("RCL305", f"`{name}` takes {wanted} and is given {given or 'none'}", None)
+
+
+def operation(name: Builtin, arguments: Sequence[Term], span: Span | None) -> Term | Mistyped:
+    """The operator applied to arguments, which are widened where they have to be; or why that means nothing."""
+    counted = wrong_count(name, len(arguments))
+    if counted is not None:
+        return counted
+    match name:
+        case Builtin.XOR:
+            for k, argument in enumerate(arguments):
+                if argument.sort != BOOL:
+                    return Mistyped("RCL301", "`xor` is of formulas, and this is of type {}", k)
+            return Operation(name, tuple(arguments), BOOL, span)
+        case Builtin.ABS | Builtin.MIN | Builtin.MAX:
+            for k, argument in enumerate(arguments):
+                if not isinstance(argument.sort, NUMERIC):
+                    return Mistyped("RCL308", f"`{name}` is of numbers, and this is of type {{}}", k)
+            made = common(list(arguments))
+            assert made is not None, "numbers have a common sort"
+            sort = joined(made)
+            if name is Builtin.ABS:
+                sort = REAL if sort == REAL else NATURAL
+            return Operation(name, tuple(made), sort, span)
+        case Builtin.MOD | Builtin.DIV:
+            for k, argument in enumerate(arguments):
+                if not isinstance(argument.sort, WHOLE):
+                    hint = None if k else "reals have no remainder; `/` divides them"
+                    return Mistyped("RCL308", f"`{name}` is of whole numbers, and this is of type {{}}", k, hint)
+            dividend, divisor = arguments
+            if not (isinstance(divisor, Literal) and isinstance(divisor.value, int) and divisor.value > 0):
+                hint = f"write a number that is known, as in `{name}(n, 3)`"
+                return Mistyped("RCL311", f"`{name}` divides by a positive whole number that is written down", 1, hint)
+            whole: Sort = NATURAL if name is Builtin.MOD or dividend.sort == NATURAL else INTEGER
+            return Operation(name, (dividend, divisor), whole, span)
+        case _:
+            assert_never(name)
+
+
+def conditional(condition: Term, then: Term, otherwise: Term, span: Span | None) -> Term | None:
+    """``if condition then … else …`` of branches brought to one sort; None where they have none in common, or one that
+    no value of a term has (functions, sets)."""
+    made = common([then, otherwise])
+    if made is None or isinstance(made[0].sort, FunctionSort | SetSort):
+        return None
+    return Conditional(condition, made[0], made[1], joined(made), span)

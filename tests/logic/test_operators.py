@@ -1,0 +1,280 @@
+"""The table of operators: it is whole, and every pass gives an operator the meaning that enumeration gives it."""
+
+from __future__ import annotations
+
+import dataclasses
+import random
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+import pytest
+
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Verdict
+from avow.evaluation.evaluate import NotEvaluable, evaluate
+from avow.formulas.cases import TooManyCases, lifted
+from avow.formulas.formula import digest, normalise
+from avow.formulas.negation_normal_form import push_negations
+from avow.formulas.sequences import defined
+from avow.formulas.traversal import subterms
+from avow.language.contract import Node
+from avow.language.load import check_text, parse_formula
+from avow.language.operators import OPERATORS, Operator, Why
+from avow.language.printer import show_term
+from avow.language.styles import STYLES
+from avow.language.terms import Arithmetic, Builtin, Compare, Conditional, Literal, Operation, Term, Variable
+from avow.sanity.mutants import mutants
+from avow.solving.questions import entails, solve
+from avow.solving.smtlib import ask_cvc5, export
+
+from .enumeration import Enumeration
+
+CONTRACT = (
+    "node n { inputs( a : INTEGER, k : NATURAL, p : BOOL, x : REAL ) outputs( q : BOOL ) topics() guarantee( q ) }"
+)
+
+
+def node() -> Node:
+    contract, _ = check_text(CONTRACT, "f")
+    assert contract is not None
+    return contract.nodes[0]
+
+
+NODE = node()
+GRID = [
+    dict(zip(("a", "k", "p", "x", "q"), values, strict=True))
+    for values in product(
+        (-7, -1, 0, 2, 6), (0, 3), (False, True), (Fraction(-3, 2), Fraction(0), Fraction(6)), (False,)
+    )
+]
+
+
+class Writer:
+    """Random formulas in which nearly everything is one of the operators of the table."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = random.Random(seed)
+
+    def whole(self, depth: int) -> str:
+        choice = self.random.choice
+        if depth == 0:
+            return choice(("a", "k", "0", "1", "-2", "5"))
+        one, other = self.whole(depth - 1), self.whole(depth - 1)
+        return choice(
+            (
+                f"min({one}, {other})",
+                f"max({one}, {other}, {self.whole(0)})",
+                f"abs({one})",
+                f"mod({one}, {choice((1, 2, 3))})",
+                f"div({one}, {choice((1, 2, 5))})",
+                f"({one} {choice('+-*')} {other})",
+                f"-({one})",
+                f"(if {self.formula(depth - 1)} then {one} else {other})",
+            )
+        )
+
+    def real(self, depth: int) -> str:
+        choice = self.random.choice
+        if depth == 0:
+            return choice(("x", "0.5", "-1.5", "a", "k"))
+        one, other = self.real(depth - 1), self.real(depth - 1)
+        return choice(
+            (
+                f"min({one}, {other})",
+                f"max({one}, {other})",
+                f"abs({one})",
+                f"({one} / 2)",
+                f"({one} / x)",
+                f"({one} + {other})",
+                f"(if {self.formula(depth - 1)} then {one} else {other})",
+            )
+        )
+
+    def formula(self, depth: int) -> str:
+        choice = self.random.choice
+        if depth == 0:
+            return choice(("p", "TRUE", "a < 2", "k != 3", "x >= 0", "0 < a <= k"))
+        one, other = self.formula(depth - 1), self.formula(depth - 1)
+        sign = choice(("==", "!=", "<", "<=", ">", ">="))
+        return choice(
+            (
+                f"({self.whole(depth)} {sign} {self.whole(depth)})",
+                f"({self.real(depth)} {sign} {self.real(depth)})",
+                f"xor({one}, {other})",
+                f"(if {one} then {other} else {self.formula(depth - 1)})",
+                f"({one} {choice(('and', 'or', '->', '<=>'))} {other})",
+                f"(not {one})",
+            )
+        )
+
+
+def valuation(term: Term, values: dict[str, Any]) -> dict[Variable, Any]:
+    return {part: values[part.name] for part in subterms(term) if isinstance(part, Variable)}
+
+
+def named(values: dict[str, Any]) -> dict[str, Any]:
+    return {("out." if name == "q" else "in.") + name: value for name, value in values.items()}
+
+
+def made(seed: int, depth: int = 3) -> Term:
+    return parse_formula(Writer(seed).formula(depth), NODE)
+
+
+# -- the table ---------------------------------------------------------------------------------------------------------
+
+
+def test_every_operator_has_every_column_or_a_reason() -> None:
+    assert set(OPERATORS) >= {*map(str, Builtin), "if", "and", "or", "not", "->", "<=>", "==", "+", "/"}
+    for row in OPERATORS.values():
+        for column in dataclasses.fields(Operator):
+            entry = getattr(row, column.name)
+            assert entry is not None, (row.name, column.name)
+            assert not isinstance(entry, Why) or len(entry.reason) > 10, (row.name, column.name)
+        assert all(row.name in style.words for style in STYLES.values())
+
+
+def test_an_operator_without_a_row_is_an_error_at_import(monkeypatch: pytest.MonkeyPatch) -> None:
+    from avow.language import operators
+
+    monkeypatch.setattr(operators, "OPERATORS", {k: v for k, v in OPERATORS.items() if k != "xor"})
+    with pytest.raises(TypeError, match="xor"):
+        operators._complete()
+    monkeypatch.undo()
+    with pytest.raises(TypeError, match="required positional"):
+        dataclasses.replace(OPERATORS["xor"]).__class__("nand")  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize("name", sorted(OPERATORS))
+def test_the_columns_of_one_operator_agree(name: str) -> None:
+    """What evaluation computes of small values, Z3 proves; and its script has the head that the table says."""
+    left, right = {"not": ("p", "p"), "if": ("p", "p")}.get(name, ("a", "k"))
+    texts = {
+        **{sign: f"({left} {sign} {right}) == (2 {sign} 3)" for sign in ("+", "-", "*")},
+        "/": "a / 4 == 2 / 4",
+        **{sign: f"(a {sign} k) <=> (p)" for sign in ("==", "!=", "<", "<=", ">", ">=")},
+        **{sign: f"p {sign} (a < 0)" for sign in ("and", "or", "->", "<=>")},
+        "not": "not p", "xor": "xor(p, a < 0)", "if": "if p then a < 2 else a > 3",
+        "abs": "abs(a) == 2", "min": "min(a, k) == 2", "max": "max(a, k) == 2", "mod": "mod(a, 3) == 2",
+        "div": "div(a, 3) == -3",
+    }  # fmt: skip
+    formula = parse_formula(texts[name], NODE)
+    row = OPERATORS[name]
+    script = export([formula])
+    assert f"({row.smtlib} " in script or ((name in ("!=", "if") and "not" in script) or "ite" in script), script
+    checked = 0
+    for values in GRID:
+        held = Enumeration().holds(formula, valuation(formula, values))
+        assert evaluate(formula, named(values)) is held
+        checked += held
+    assert entails([], formula).verdict is not Verdict.PROVED
+    assert checked or name in ("+", "-", "*", "/")
+
+
+def test_the_words_are_names_wherever_they_can_be() -> None:
+    """`min`, `mod`, … are operators only directly before a parenthesis, and not where a contract declares them."""
+    names = ", ".join(f"{name} : BOOL" for name in Builtin)
+    contract, found = check_text(
+        f"context {{ E : {{{', '.join(f'{n}_e' for n in Builtin)}}}; F : INTEGER --> INTEGER; }}\n"
+        f"node n {{ inputs( {names} ) outputs( abs' : BOOL ) topics()\n"
+        "guarantee( xor and abs and min and max and (mod or div) -> out.abs' ) }\n"
+        "node m { inputs( mod : F, abs : INTEGER ) outputs( b : BOOL ) topics()\n"
+        "guarantee( out.b <=> mod(in.abs) == 1 )\n"
+        "guarantee( forall(max in INTEGER | max < 3 -> min(max, 3) == max) ) }\n",
+        "f",
+    )
+    assert contract is not None, [d.message for d in found]
+    first = contract.nodes[1].guarantees[0].formula
+    assert not any(isinstance(part, Operation) for part in subterms(first))
+
+
+@pytest.mark.parametrize("word", ["if", "then", "else"])
+def test_the_words_of_a_conditional_are_reserved(word: str) -> None:
+    contract, found = check_text(CONTRACT.replace("k :", f"{word} :"), "f")
+    assert contract is None
+    assert any("keyword" in (d.hint or "") for d in found), [(d.message, d.hint) for d in found]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["mod(a, 0) == 0", "mod(a, -1) == 0", "div(a, k) == 0", "mod(x, 2) == 0", "abs(p)", "xor(a, p)", "min(a) == 0",
+     "a == if p then 1 else 2", "(if p then a else p) == a", "if p then a", "(if a then 1 else 2) == 1", "abs() == 1"],
+)  # fmt: skip
+def test_what_means_nothing_is_refused_with_a_place(text: str) -> None:
+    with pytest.raises(Rejected) as rejected:
+        parse_formula(text, NODE)
+    assert all(d.span is not None for d in rejected.value.diagnostics)
+
+
+def test_a_divisor_stays_positive_in_mutants() -> None:
+    for mutant in mutants(parse_formula("mod(a, 1) == 0 and div(a - 1, 2) > mod(k, 3)", NODE)):
+        for part in subterms(mutant.formula):
+            if isinstance(part, Operation) and part.operator in (Builtin.MOD, Builtin.DIV):
+                assert isinstance(part.arguments[1], Literal)
+                assert int(part.arguments[1].value) > 0
+
+
+# -- generated formulas ------------------------------------------------------------------------------------------------
+
+
+def wherever_defined(term: Term, values: dict[str, Any]) -> bool | None:
+    """The truth by enumeration; None where it may depend on what a division by zero yields."""
+    enumeration = Enumeration()
+    held = enumeration.holds(term, valuation(term, values))
+    return None if enumeration.strayed else held
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_evaluation_normal_forms_and_lifting_keep_the_meaning(seed: int) -> None:
+    term = made(seed)
+    forms = [term, push_negations(term), normalise(term)]
+    try:
+        forms.append(lifted(term))
+        kept = [p for p in subterms(forms[-1]) if isinstance(p, Conditional | Operation)]
+        assert all(isinstance(p, Operation) and p.operator in (Builtin.MOD, Builtin.DIV) for p in kept)
+    except TooManyCases:
+        pass
+    condition = defined(term)
+    for values in GRID[seed % 3 :: 3]:
+        held = wherever_defined(term, values)
+        if held is None:
+            continue
+        for form in forms:
+            try:
+                assert evaluate(form, named(values)) is held, (show_term(form, "rcl"), values)
+            except NotEvaluable:
+                assert form is not term or any(isinstance(p, Arithmetic) and p.operator == "/" for p in subterms(term))
+        assert wherever_defined(condition, values) is not None  # the condition itself asks for nothing undefined
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_what_is_printed_reads_back(seed: int) -> None:
+    term = made(seed)
+    again = parse_formula(show_term(term, "rcl"), NODE)
+    assert again == term
+    assert digest(again) == digest(term)
+
+
+def fixed(values: dict[str, Any], term: Term) -> list[Term]:
+    return [Compare("==", v, Literal(values[v.name], v.sort)) for v in valuation(term, values)]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_z3_agrees_with_enumeration(seed: int) -> None:
+    term = made(seed)
+    for values in random.Random(seed).sample(GRID, 3):
+        held = wherever_defined(term, values)
+        if held is not None:
+            status = solve([term, *fixed(values, term)], timeout_ms=20_000).status
+            assert status == ("sat" if held else "unsat"), (show_term(term, "rcl"), values)
+
+
+@pytest.mark.needs_cvc5
+@pytest.mark.parametrize("seed", range(5))
+def test_cvc5_agrees_with_enumeration(seed: int) -> None:
+    term = made(seed)
+    for values in random.Random(seed).sample(GRID, 2):
+        held = wherever_defined(term, values)
+        if held is not None:
+            answer = ask_cvc5(export([term, *fixed(values, term)]), timeout_ms=10_000)
+            assert answer in ("sat" if held else "unsat", "unknown"), (show_term(term, "rcl"), values)
