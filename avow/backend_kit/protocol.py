@@ -140,6 +140,10 @@ class Backend(ABC):
     """Whether an answer may depend on the scenario's `steps`; likewise."""
     uses_wiring: bool = True
     """Whether an answer may depend on topics, connections or other nodes; likewise."""
+    portable: bool = False
+    """Whether an answer depends on the job and the bytes of `files` alone: not on the exported files, on other files of
+    the system's folder, or on what they start. Such a work can be sent to another machine; others run where the
+    workspace is."""
     codes: Mapping[str, Code] = {}
     """The diagnostic codes that `check` and `translate` use (`avow.base.codes.register`)."""
     translations: Mapping[str, str] = {}
@@ -190,6 +194,7 @@ _REQUIRED: Mapping[str, type | tuple[type, ...]] = {
     "uses_scenario": bool,
     "uses_steps": bool,
     "uses_wiring": bool,
+    "portable": bool,
     "codes": Mapping,
     "translations": Mapping,
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from avow.calculus.variables import Frame
 from avow.formulas.finite import Ranges
 from avow.formulas.values import Element, FunctionValue, Value
 from avow.language.contract import Node
@@ -18,7 +19,7 @@ from avow.language.sorts import (
     StringSort,
 )
 from avow.language.terms import Variable
-from avow.system.plan import Scenario, System
+from avow.system.plan import Scenario
 
 
 def interpretation(node: Node, scenario: Scenario | None) -> dict[Variable, Value]:
@@ -41,16 +42,16 @@ def interpretation(node: Node, scenario: Scenario | None) -> dict[Variable, Valu
     return found
 
 
-def ranges(system: System, node: Node) -> Ranges:
+def ranges(whole: Frame, node: Node) -> Ranges:
     """The few values that the scenario gives to sorts, and to this node's inputs that are not functions. Values that
     cannot be read give no range (the plan's checks report them)."""
     from avow.calculus.scenario import CannotRun, world
-    from avow.calculus.variables import frame
 
-    if system.plan.scenario is None or not system.plan.scenario.domains:
+    scenario = whole.system.plan.scenario
+    if scenario is None or not scenario.domains:
         return Ranges()
     try:
-        found = world(frame(system))
+        found = world(whole)
     except CannotRun:
         return Ranges()
     inputs: dict[Variable, tuple[Value, ...]] = {}

@@ -15,7 +15,7 @@ from itertools import chain
 from avow.base.diagnostics import Severity
 from avow.base.files import digest as sha256
 from avow.base.verdict import Outcome, Verdict
-from avow.calculus.variables import Frame
+from avow.calculus.variables import Frame, indexed
 from avow.formulas.formula import digest, free_variables
 from avow.language.contract import Clause, Node
 from avow.language.printer import show_term
@@ -34,12 +34,20 @@ class ProviderClaim:
     claim: Claim
     digest: str
     """SHA-256 of the assumption, the providers' contracts and what the plan assumes of the environment."""
-    clause: str
-    """The assumption's name."""
     assumed: Mapping[str, Term]
     """The assumption, and what the plan assumes of the environment that bears on it, by label."""
     promised: tuple[Mapping[str, Term], ...]
     """The contracts of the providers of its inputs, each by ``node.clause``."""
+
+    @property
+    def clause(self) -> str:
+        """The assumption's name."""
+        return self.claim.subject or ""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the digest is that of the formulas."""
+        return self.digest == _meaning(self.assumed, (indexed(part).digest for part in self.promised))
 
     @property
     def formulas(self) -> dict[str, Term]:
@@ -90,9 +98,14 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
         Severity.ERROR,
         clause.span,
     )
+    meaning = _meaning(assumed, (p.digest for p in given.values()))
+    return ProviderClaim(claim, meaning, assumed, tuple(p.terms for p in given.values()))
+
+
+def _meaning(assumed: Mapping[str, Term], promised: Iterable[str]) -> str:
+    """`promised`: the providers' digests (`avow.calculus.variables.Facts.digest`)."""
     meanings = sorted(f"{label} {digest(fact)}" for label, fact in assumed.items())
-    meaning = sha256("\n".join(["providers", *meanings, *sorted(p.digest for p in given.values())]))
-    return ProviderClaim(claim, meaning, clause.name, assumed, tuple(p.terms for p in given.values()))
+    return sha256("\n".join(["providers", *meanings, *sorted(promised)]))
 
 
 def _bearing(whole: Frame, spoken: frozenset[Variable]) -> dict[str, Term]:

@@ -48,11 +48,12 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
 
     def settle(node: Node) -> tuple[SanityResult, ...]:
         scenario = interpretation(node, system.plan.scenario)
-        own = analyse(node, system.contract, scenario=scenario, ranges=ranges(system, node), bounds=bounds)
+        own = analyse(node, system.contract, scenario=scenario, ranges=found[node.name], bounds=bounds)
         return own + providers.settle(linked[node.name], node, bounds)
 
     whole = frame(system)
     chosen = [node for node in system.contract.nodes if not nodes or node.name in nodes]
+    found = {node.name: ranges(whole, node) for node in chosen}
     linked = {node.name: providers.provider_claims(whole, node) for node in chosen}
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # Z3 lets other threads run while it searches
         results = [result for found in pool.map(settle, chosen) for result in found]

@@ -20,7 +20,7 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY, Evidence
 from avow.isolation.level import Isolation
 from avow.isolation.observed import ISOLATION, OBSERVED, to_json
-from avow.pipeline import worker
+from avow.pipeline import asking
 from avow.pipeline.export import folder
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
@@ -58,7 +58,7 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     place.mkdir(parents=True, exist_ok=True)
     started = datetime.now(UTC).isoformat(timespec="milliseconds")
     clock = time.monotonic()
-    report = _language(todo) if work.engine == LANGUAGE else worker.run(workspace, work, todo, place)
+    report = _language(todo) if work.engine == LANGUAGE else asking.run(workspace, work, todo, place)
     seconds = time.monotonic() - clock
     outputs = _keep_logs(workspace, work, todo, report)
     strength, link = _promise(work)

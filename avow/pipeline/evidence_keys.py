@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +20,62 @@ from avow.backend_kit.protocol import Backend, Job
 from avow.base.diagnostics import Rejected
 from avow.formulas.formula import digest, sort_digest
 from avow.language.contract import Contract, Node
+from avow.language.sorts import DataSort, EnumSort, Sort, components
+from avow.language.terms import Term
 from avow.system.graph import dataflow
-from avow.system.plan import System
+from avow.system.plan import Method, System
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """Which of the contract's words a method's options and files name."""
+
+    texts: tuple[bytes, ...]
+
+    @classmethod
+    def of(cls, options: str, files: Iterable[Path]) -> Named:
+        return cls((options.encode(), *map(_read, files)))
+
+    def __call__(self, name: str) -> bool:
+        word = re.compile(rb"(?<!\w)" + re.escape(name.encode()) + rb"(?!\w)")
+        return any(word.search(text) for text in self.texts)
+
+    def types(self, contract: Contract) -> tuple[tuple[str, Sort], ...]:
+        """Those that are named, or one of whose elements or constructors is. (The ports' own are known anyhow.)"""
+        return tuple((name, sort) for name, sort in contract.types if any(map(self, (name, *_words(sort)))))
+
+    def constants(self, contract: Contract) -> tuple[tuple[str, Term], ...]:
+        return tuple((name, value) for name, value in contract.constants if self(name))
+
+
+def _words(sort: Sort) -> Iterable[str]:
+    for part in components(sort):
+        match part:
+            case EnumSort(members=members):
+                yield from members
+            case DataSort(constructors=constructors):
+                yield from (c.name for c in constructors)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+def method_options(method: Method) -> str:
+    """A method's options, as they enter its key."""
+    options = method.options.data if isinstance(method.options.data, Mapping) else {}
+    return json.dumps({k: v for k, v in options.items() if k not in {"id", "guarantees"}}, sort_keys=True, default=str)
 
 
 def surroundings(tool: Backend, job: Job, options: str) -> str:
     """As text; `options` are the method's, as they enter its key."""
-    parts: list[Any] = [_ports(job.node), list(_constants(job.contract, options, tool.files(job)))]
+    named = Named.of(options, tool.files(job))
+    constants = sorted([name, digest(value)] for name, value in named.constants(job.contract))
+    types = sorted([name, sort_digest(sort)] for name, sort in named.types(job.contract))
+    parts: list[Any] = [_ports(job.node), sorted(a.name for a in job.node.assumptions), constants, types]
     scenario = job.system.plan.scenario
     if tool.uses_scenario and scenario:
         parts.append(scenario.digest if tool.uses_steps else scenario.content)
@@ -36,21 +86,6 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
 
 def _ports(node: Node) -> list[list[str]]:
     return sorted([p.variable.qualified, sort_digest(p.sort)] for p in (*node.inputs, *node.outputs))
-
-
-def _constants(contract: Contract, options: str, files: Iterable[Path]) -> Iterable[list[str]]:
-    texts = [options.encode(), *map(_read, files)]
-    for name, value in sorted(contract.constants, key=lambda item: item[0]):
-        word = re.compile(rb"(?<!\w)" + re.escape(name.encode()) + rb"(?!\w)")
-        if any(word.search(text) for text in texts):
-            yield [name, digest(value)]
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError:
-        return b""
 
 
 def _wiring(system: System, node: Node, backend: str) -> list[Any]:

@@ -23,7 +23,7 @@ from avow.base.verdict import Link, Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY, Evidence
-from avow.pipeline import worker
+from avow.pipeline import asking
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.mutant_systems import Altered, chosen
 from avow.pipeline.run_info import Run
@@ -108,7 +108,7 @@ def _score(workspace: Workspace, task: _Task, run: Run, limit: int) -> Score:
     for number, mutant in enumerate(mutants):
         folder = Path(tempfile.mkdtemp(prefix="avow-mutant-"))
         try:
-            report = worker.run(workspace, work, (obligation,), folder, Altered(obligation.name, number, limit))
+            report = asking.run(workspace, work, (obligation,), folder, Altered(obligation.name, number, limit))
         finally:
             shutil.rmtree(folder, ignore_errors=True)
         match _noticed(report.outcomes[0], record):

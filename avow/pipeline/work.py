@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
@@ -23,12 +23,13 @@ from avow.formulas.formula import node_digest, sort_digest
 from avow.language.contract import Contract, Node
 from avow.language.printer import show_term
 from avow.pipeline.engine_code import backend_digest, engine_digest
-from avow.pipeline.evidence_keys import surroundings
+from avow.pipeline.evidence_keys import method_options, surroundings
 from avow.system.plan import Method, System
 
 if TYPE_CHECKING:
     from avow.calculus.composition import Composition
     from avow.calculus.variables import Frame
+    from avow.pipeline.slices import SanitySlice, Slice
 
 LANGUAGE = "language"
 SANITY = "sanity"
@@ -49,6 +50,16 @@ class Work:
     obligations: tuple[Obligation, ...]
     keys: Mapping[str, str]
     limits: Limits = field(default_factory=Limits)
+    cut: Callable[[], Slice] | None = field(default=None, compare=False, repr=False)
+    """What the engine gets to see; none for what needs no engine."""
+    files: tuple[Path, ...] = field(default=(), compare=False, repr=False)
+    """The plan's files that the answer depends on."""
+    texts: str = field(default="", compare=False, repr=False)
+    """The digest of the plan's and the contract's texts."""
+
+    def changed(self) -> bool:
+        """Whether contract or plan are not what they were when this work was found."""
+        return bool(self.texts) and self.texts != texts_digest(self.system)
 
     @property
     def name(self) -> str:
@@ -77,16 +88,24 @@ def language_work(system: System) -> Work:
 
 def sanity_work(whole: Frame, node: Node) -> Work:
     """Is this node's contract worth verifying? `whole` is its system's frame: made once for all nodes."""
-    from avow.calculus.providers import provider_claims
+    from avow.pipeline.slices import sanity_slice
+
+    cut = sanity_slice(whole, node)
+    obligations, keys = sanity_claims(cut)
+    return Work(whole.system, node.name, SANITY, SANITY, obligations, keys, cut=lambda: cut)
+
+
+def sanity_claims(cut: SanitySlice) -> tuple[tuple[Obligation, ...], Mapping[str, str]]:
+    """The obligations that a slice is of, and their keys."""
+    from avow.pipeline.blobs import encode
     from avow.sanity.claims import claims, node_key
 
-    system = whole.system
-    meaning = node_key(node)
+    node, meaning = cut.node, node_key(cut.node)
     of_the_node = [(claim, meaning) for claim in claims(node)]
-    of_its_providers = [(asked.claim, asked.digest) for asked in provider_claims(whole, node)]
+    of_its_providers = [(asked.claim, asked.digest) for asked in cut.linked]
     obligations = tuple(
         Obligation(
-            system.name,
+            cut.system,
             node.name,
             Kind.SANITY,
             claim.name,
@@ -99,16 +118,19 @@ def sanity_work(whole: Frame, node: Node) -> Work:
         )
         for claim, digest in (*of_the_node, *of_its_providers)
     )
-    return _work(system, node.name, SANITY, obligations, _z3_version(), _scenario(system))
+    scenario = encode((cut.given, cut.ranges), Path()).decode()
+    return obligations, _keys(obligations, SANITY, _z3_version(), scenario)
 
 
 def compose_work(composition: Composition) -> Work:
     """The calculus' side conditions, start-up and persistence, and the requirements that have a formula."""
     from avow.calculus.obligations import all_obligations
+    from avow.pipeline.slices import compose_slice
 
     system = composition.frame.system
     obligations = all_obligations(composition)
-    return _work(system, SYSTEM_LEVEL, COMPOSE, obligations, _z3_version(), _scenario(system))
+    parts = (_z3_version(), _scenario(system))
+    return _work(system, SYSTEM_LEVEL, COMPOSE, obligations, *parts, cut=lambda: compose_slice(system))
 
 
 def method_works(system: System) -> tuple[Work, ...]:
@@ -121,21 +143,31 @@ def method_works(system: System) -> tuple[Work, ...]:
 
 
 def method_work(system: System, node: Node, method: Method) -> Work:
+    from avow.pipeline.slices import method_slice
+
     tool = method_backend(system, method)
     job = method_job(system, node, method)
     options = method.options.data if isinstance(method.options.data, Mapping) else {}
-    told = json.dumps({k: v for k, v in options.items() if k not in {"id", "guarantees"}}, sort_keys=True, default=str)
+    told = method_options(method)
     parts = (
         tool.name,
         tool.version,
         backend_digest(tool),
-        json.dumps([(t.name, t.version, _program(t.path)) for t in tool.tools()]),
+        json.dumps(tool_identities(tool)),
         told,
         _files(tool, job),
         surroundings(tool, job, told),
     )
     return _work(
-        system, node.name, method.id, job.obligations, *parts, engine=tool.name, limits=_limits(method, options)
+        system,
+        node.name,
+        method.id,
+        job.obligations,
+        *parts,
+        engine=tool.name,
+        limits=_limits(method, options),
+        cut=lambda: method_slice(tool, job),
+        files=tool.files(job),
     )
 
 
@@ -162,6 +194,11 @@ def _limits(method: Method, options: Mapping[str, Any]) -> Limits:
 def planned_method(work: Work) -> Method:
     """The plan's method that a work is of; not for the core's own engines."""
     return next(m for m in work.system.plan.node(work.node).methods if m.id == work.method)
+
+
+def tool_identities(tool: Backend) -> tuple[tuple[str, str, str], ...]:
+    """Name, version and program's digest of each outside tool that a backend can use; empty where it is missing."""
+    return tuple((t.name, t.version or "", _program(t.path)) for t in tool.tools())
 
 
 def method_backend(system: System, method: Method) -> Backend:
@@ -210,12 +247,14 @@ def catalogue(system: System) -> Catalogue:
     from avow.calculus.composition import compose
 
     composition = compose(system)
+    texts = texts_digest(system)
     works = (
         language_work(system),
         *(sanity_work(composition.frame, node) for node in system.contract.nodes),
         compose_work(composition),
         *method_works(system),
     )
+    works = tuple(replace(work, texts=texts) for work in works)
     guarantees = (guarantee(system, node, c.name) for node in system.contract.nodes for c in node.guarantees)
     every = {o.id: o for work in works if work.is_engine for o in work.obligations}
     every |= {o.id: o for o in guarantees}
@@ -230,13 +269,25 @@ def _work(
     *parts: str,
     engine: str | None = None,
     limits: Limits | None = None,
+    cut: Callable[[], Slice] | None = None,
+    files: tuple[Path, ...] = (),
 ) -> Work:
-    keys = {o.id: digest(json.dumps([o.id, o.digest, method, *parts])) for o in obligations}
-    return Work(system, node, method, engine or method, obligations, keys, limits or Limits())
+    keys = _keys(obligations, method, *parts)
+    return Work(system, node, method, engine or method, obligations, keys, limits or Limits(), cut, files)
+
+
+def _keys(obligations: Iterable[Obligation], method: str, *parts: str) -> dict[str, str]:
+    return {o.id: digest(json.dumps([o.id, o.digest, method, *parts])) for o in obligations}
 
 
 def _files(tool: Backend, job: Job) -> str:
     return json.dumps([[path.name, _digest(path)] for path in tool.files(job)])
+
+
+def texts_digest(system: System) -> str:
+    """Of the files that contract and plan were read from: comments count."""
+    plan = system.plan
+    return digest(json.dumps(list(map(_digest, (plan.path, *plan.contract_files, *plan.included)))))
 
 
 def _contract_digest(contract: Contract) -> str:

@@ -8,144 +8,89 @@ that into a verdict. Two workers use two cores, whatever Python's lock says.
 from __future__ import annotations
 
 import json
+import os
+import platform
 import sys
+import tempfile
 import traceback
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from avow import __version__
-from avow.backend_kit.protocol import Limits, Report
+from avow.backend_kit.protocol import Report
 from avow.base import process
 from avow.base.diagnostics import Rejected
 from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
-from avow.base.workspace import Workspace
 from avow.calculus.composition import compose
-from avow.calculus.variables import frame
-from avow.evidence.encoding import Unreadable
+from avow.calculus.obligations import settle_all
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
-from avow.isolation.observed import Seen
-from avow.pipeline import forks
-from avow.pipeline.mutant_systems import Altered, alter
+from avow.pipeline.asking import CHANGED
+from avow.pipeline.blobs import Garbled, decode
+from avow.pipeline.engines import discharge_sanity
+from avow.pipeline.mutant_systems import alter
 from avow.pipeline.remarks import remarked
+from avow.pipeline.requests import (
+    Request,
+    Response,
+    Tools,
+    lay_out,
+    read_request,
+    request_digest,
+    response_bytes,
+)
+from avow.pipeline.slices import ComposeSlice, MethodSlice, SanitySlice, Slice
 from avow.pipeline.wire import report_from_json, report_to_json
-from avow.pipeline.work import Work, compose_work, method_backend, method_job, method_work, planned_method, sanity_work
-from avow.system.load import load_system
+from avow.pipeline.work import (
+    COMPOSE,
+    SANITY,
+    Work,
+    compose_work,
+    method_backend,
+    method_job,
+    method_work,
+    planned_method,
+    sanity_claims,
+    tool_identities,
+)
+from avow.solving.questions import z3_version
 from avow.system.plan import System
 
-GRACE = 90.0
-"""Seconds above the tool's own limits that a worker gets to load, translate and write."""
 
-CHANGED = 75
-"""Exit code: what was to be verified is not what stands on the disk any more, so that the answer is of neither."""
-
-
-def run(
-    workspace: Workspace, work: Work, obligations: tuple[Obligation, ...], folder: Path, altered: Altered | None = None
-) -> Report:
-    """Settle the obligations in a process of their own. Never raises for what that process does."""
-    request, response = folder / ".request.json", folder / ".response.json"
-    response.unlink(missing_ok=True)
-    write(
-        request,
-        json.dumps(
-            {
-                "system": str(work.system.plan.root),
-                "node": work.node,
-                "method": work.method,
-                "engine": work.engine,
-                "keys": {o.id: work.keys[o.id] for o in obligations},
-                "folder": str(folder),
-                "limits": asdict(work.limits),
-                "altered": asdict(altered) if altered else None,
-            }
-        ),
-    )
-    limit = work.limits.seconds * max(2, len(obligations)) + GRACE
-    done = forks.run([str(request), str(response)], cwd=workspace.root, seconds=limit)
-    log = {"worker.log": done.stderr} if done.stderr.strip() else {}
-    try:
-        if done.timed_out:
-            return _failed(obligations, work, Verdict.UNKNOWN, f"no answer within {limit:.0f} s", log)
-        if done.code == CHANGED:
-            why = "contract, plan or a model changed while it was being verified; run it again"
-            return _failed(obligations, work, Verdict.ERROR, why, log)
-        if done.code != 0 or not response.is_file():
-            last = done.stderr.strip().splitlines()[-1:] or [f"the worker ended with code {done.code}"]
-            return _failed(obligations, work, Verdict.ERROR, f"the engine crashed: {last[0][:300]}", log)
-        report = report_from_json(json.loads(response.read_text()))
-    except (Unreadable, ValueError, TypeError, LookupError) as error:
-        return _failed(obligations, work, Verdict.ERROR, f"the engine's answer is not one: {error}"[:300], log)
-    finally:
-        request.unlink(missing_ok=True)
-        response.unlink(missing_ok=True)
-    return _complete(report, obligations)
-
-
-def _complete(report: Report, obligations: tuple[Obligation, ...]) -> Report:
-    """An obligation without an outcome, or with two, must not pass for settled."""
-    answers: dict[str, list[Outcome]] = {}
-    for outcome in report.outcomes:
-        answers.setdefault(outcome.obligation, []).append(outcome)
-    outcomes = []
-    for obligation in obligations:
-        match answers.get(obligation.id, []):
-            case [outcome]:
-                outcomes.append(_declared(outcome, report))
-            case []:
-                outcomes.append(Outcome(obligation.id, Verdict.ERROR, "the engine gave no answer for this obligation"))
-            case _:
-                outcomes.append(
-                    Outcome(obligation.id, Verdict.ERROR, "the engine gave several answers for this obligation")
-                )
-    return replace(report, outcomes=tuple(outcomes))
-
-
-def _declared(outcome: Outcome, report: Report) -> Outcome:
-    """What was answered from something that cannot be recorded could come out otherwise tomorrow, unnoticed."""
-    outside = [o.path for o in report.observed if o.kind is Seen.OUTSIDE]
-    if not outside or not outcome.verdict.supports:
-        return outcome
-    summary = f"undeclared input: the subject used {', '.join(outside[:3])}, which cannot be recorded"
-    return replace(outcome, verdict=Verdict.UNKNOWN, summary=f"{summary} (else: {outcome.summary})")
-
-
-def _failed(
-    obligations: tuple[Obligation, ...], work: Work, verdict: Verdict, why: str, logs: dict[str, str]
-) -> Report:
-    outcomes = tuple(Outcome(o.id, verdict, why, details={RETRY: True}) for o in obligations)
-    return Report(outcomes, work.engine, __version__, logs=logs)
-
-
-class Changed(Exception):  # noqa: N818 - it names what happened
-    """The files are no longer those that the keys are of."""
+class Refused(Exception):  # noqa: N818 - it names what happened
+    """What was asked is not what the keys are of; says why."""
 
 
 def entry(arguments: Sequence[str]) -> int:
     """The whole work of the process; its exit code."""
     process.adopt_orphans()
     try:
-        _main(arguments)
-    except Changed:
-        return CHANGED
+        asked = Path(arguments[0]).read_bytes()
+        write(Path(arguments[1]), answer(asked).decode())
     except Exception:
         traceback.print_exc()
         return 1
     return 0
 
 
-def _main(arguments: Sequence[str]) -> None:
-    request = json.loads(Path(arguments[0]).read_text())
-    system, work = _asked(request)
-    report = _execute(request, system, work)
-    if process.ended_by_others():
-        report = replace(report, outcomes=tuple(map(_asked_again, report.outcomes)))
-    process.end_orphans()  # nothing that a tool or a subject left running outlives its answer
-    _asked(request)  # tools read the plan's files by themselves, at any time until now
-    write(Path(arguments[1]), json.dumps(report_to_json(report), default=str))
+def answer(asked: bytes) -> bytes:
+    """Do the work, in this process. Raises whatever an engine raises."""
+    request, digest = read_request(asked), request_digest(asked)
+    with tempfile.TemporaryDirectory(prefix="avow-work-") as place:
+        root = Path(request.root) if request.root else Path(place, request.home)
+        try:
+            lay_out(request.files, root)
+            report = _execute(request, root)
+        except Refused as refused:
+            return response_bytes(Response(digest, None, str(refused), platform.node()))
+        if process.ended_by_others():
+            report = replace(report, outcomes=tuple(map(_asked_again, report.outcomes)))
+        process.end_orphans()  # nothing that a tool or a subject left running outlives its answer
+        told = json.dumps(report_to_json(report), default=str).replace(f"{place}/", "")
+        spent = os.times()
+        cpu = spent.user + spent.system + spent.children_user + spent.children_system
+    return response_bytes(Response(digest, report_from_json(json.loads(told)), "", platform.node(), round(cpu, 3)))
 
 
 def _asked_again(outcome: Outcome) -> Outcome:
@@ -155,64 +100,81 @@ def _asked_again(outcome: Outcome) -> Outcome:
     return replace(outcome, details={**outcome.details, RETRY: True})
 
 
-def _asked(request: dict[str, Any]) -> tuple[System, Work]:
-    """The work as the disk has it now. Raises Changed where that is not the work that was asked for: its answer would
-    be recorded under a key that it does not answer."""
+def _execute(request: Request, root: Path) -> Report:
+    """Raises Refused."""
     try:
-        system = load_system(Path(request["system"]))
-        work = _work(request, system)
-    except (Rejected, KeyError) as problem:
-        raise Changed from problem
-    if any(work.keys.get(name) != key for name, key in request["keys"].items()):
-        raise Changed
-    return system, work
-
-
-def _work(request: dict[str, Any], system: System) -> Work:
-    """Raises KeyError for a node or method that there is not any more."""
-    match request["engine"]:
-        case "sanity":
-            return sanity_work(frame(system), system.contract.node(request["node"]))
-        case "compose":
-            return compose_work(compose(system))
+        cut = decode(request.cut, root)
+    except Garbled as error:
+        raise Refused(f"the work came garbled: {error}") from error
+    match cut:
+        case SanitySlice() if request.engine == SANITY:
+            claims = _claims(request, sanity_claims(cut)[0], keys_of(cut))
+            return discharge_sanity(cut, claims, request.limits)
+        case ComposeSlice() if request.engine == COMPOSE:
+            composition = compose(cut.system)
+            work = compose_work(composition)
+            claims = _claims(request, work.obligations, work.keys)
+            return Report(settle_all(composition, claims, request.limits), "z3", z3_version())
+        case MethodSlice(system=system, node=node, method=method):
+            return _discharge(request, system, _method_work(system, node, method))
         case _:
-            node = system.contract.node(request["node"])
-            for method in system.plan.node(node.name).methods:
-                if method.id == request["method"]:
-                    return method_work(system, node, method)
-            raise KeyError(request["method"])
+            raise Refused("the work came with another engine's slice")
 
 
-def _execute(request: dict[str, Any], system: System, work: Work) -> Report:
-    limits = Limits(**request["limits"])
-    claims = tuple(o for o in work.obligations if o.id in request["keys"])
-    match request["engine"]:
-        case "sanity":
-            from avow.pipeline.engines import discharge_sanity
+def keys_of(cut: Slice) -> Mapping[str, str]:
+    """Obligation → the key that a slice gives it. Raises Refused for a slice without what it is about."""
+    try:
+        match cut:
+            case SanitySlice(linked=linked):
+                if not all(asked.is_whole for asked in linked):
+                    raise Refused("what came is not what its digest is of")
+                return sanity_claims(cut)[1]
+            case ComposeSlice(system=system):
+                return compose_work(compose(system)).keys
+            case MethodSlice(system=system, node=node, method=method):
+                return _method_work(system, node, method).keys
+    except (KeyError, Rejected) as error:
+        raise Refused(f"what came is not what its keys are of: {error}") from error
 
-            return discharge_sanity(system, system.contract.node(work.node), claims, limits)
-        case "compose":
-            from avow.pipeline.engines import discharge_composition
 
-            return discharge_composition(system, claims, limits)
-        case _:
-            return _discharge(request, system, work, limits)
+def _method_work(system: System, node: str, method: str) -> Work:
+    planned = [m for m in system.plan.node(node).methods if m.id == method]
+    if not planned:
+        raise Refused("the work came without its method")
+    return method_work(system, system.contract.node(node), planned[0])
 
 
-def _discharge(request: dict[str, Any], system: System, work: Work, limits: Limits) -> Report:
-    folder = Path(request["folder"])
-    node = system.contract.node(work.node)
-    method = planned_method(work)
+def _shown(tools: Tools) -> str:
+    return ", ".join(f"{name} {version or 'missing'}" for name, version, *_ in tools) or "none"
+
+
+def _claims(request: Request, obligations: Sequence[Obligation], keys: Mapping[str, str]) -> tuple[Obligation, ...]:
+    """What is asked for. Raises Refused where a key is not that of what came: its answer would be recorded under a key
+    that it does not answer."""
+    if any(keys.get(name) != key for name, key in request.keys.items()):
+        raise Refused(CHANGED if request.root else "what came is not what its keys are of")
+    return tuple(o for o in obligations if o.id in request.keys)
+
+
+def _discharge(request: Request, system: System, work: Work) -> Report:
+    node, method = system.contract.node(work.node), planned_method(work)
     tool = method_backend(system, method)
-    if request["altered"]:
-        system = alter(system, node, Altered(**request["altered"]))
+    here = tool_identities(tool)
+    if here != request.tools:
+        raise Refused(f"the tools are not those of the key: {_shown(here)} here, {_shown(request.tools)} wanted")
+    claims = _claims(request, work.obligations, work.keys)
+    folder = Path(request.folder)
+    if request.altered:
+        system = alter(system, node, request.altered)
         node = system.contract.node(node.name)
         for name, text in tool.export(method_job(system, node, method)).items():
             write(folder / name, text)
-    job = method_job(system, node, method)
-    job = replace(job, obligations=tuple(o for o in job.obligations if o.id in request["keys"]))
-    report = tool.discharge(job, folder, limits)
-    return report if request["altered"] else remarked(report, tool.check(job), job)
+    job = replace(method_job(system, node, method), obligations=claims)
+    report = tool.discharge(job, folder, request.limits)
+    if request.root and not request.altered:  # tools read the plan's files by themselves, at any time until now
+        again = _method_work(system, work.node, work.method)
+        _claims(request, again.obligations, again.keys)
+    return report if request.altered else remarked(report, tool.check(job), job)
 
 
 if __name__ == "__main__":

@@ -47,6 +47,7 @@ class DafnyBackend(Backend):
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False
+    portable = True
     link = Link.GENERATED
     options_schema = SCHEMA
     codes = CODES

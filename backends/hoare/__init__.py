@@ -43,6 +43,7 @@ class Hoare(Backend):
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False
+    portable = True
     link = Link.GENERATED
     options_schema = {
         "type": "object",

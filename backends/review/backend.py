@@ -40,6 +40,7 @@ class ReviewBackend(Backend):
     strength = Verdict.REVIEWED
     uses_scenario = False
     uses_wiring = False
+    portable = True
     link = Link.GUIDED
     options_schema = SCHEMA
     codes = CODES

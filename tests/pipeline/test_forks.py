@@ -19,7 +19,7 @@ from avow.backend_kit.protocol import Limits, Report
 from avow.base import process
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
-from avow.pipeline import forks, worker
+from avow.pipeline import asking, forks
 from avow.pipeline.workload import Survey, survey
 
 BACKEND = """
@@ -93,7 +93,7 @@ def settle(root: Path, does: str) -> tuple[Outcome, Report]:
     work = found.work("odd")
     folder = root / "artifacts" / does
     folder.mkdir(parents=True, exist_ok=True)
-    report = worker.run(Workspace(root), work, work.obligations, folder)
+    report = asking.run(Workspace(root), work, work.obligations, folder)
     (outcome,) = report.outcomes
     return outcome, report
 
@@ -145,7 +145,7 @@ def test_a_work_that_hangs_is_killed_with_all_that_it_started(
     (odd / "pids").unlink(missing_ok=True)
     settle(odd, "answers")  # from here on, a server is there
     for limit in (1.0, 4.0, 16.0, 64.0):  # until the work gets far enough to hang, on a busy machine
-        monkeypatch.setattr(worker, "GRACE", limit - 2 * Limits().seconds)
+        monkeypatch.setattr(asking, "GRACE", limit - 2 * Limits().seconds)
         outcome, _ = settle(odd, "hangs")
         assert outcome.verdict is Verdict.UNKNOWN
         assert "no answer within" in outcome.summary
@@ -186,12 +186,12 @@ def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
     (odd / "pids").unlink(missing_ok=True)
     script = f"""
         from pathlib import Path
-        from avow.pipeline import worker
+        from avow.pipeline import asking
         from avow.pipeline.workload import survey
         from avow.base.workspace import Workspace
         root = Path({str(odd)!r})
         work = survey(root / "contracts" / "hangs").work("odd")
-        worker.run(Workspace(root), work, work.obligations, root)
+        asking.run(Workspace(root), work, work.obligations, root)
     """
     run = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)], cwd=odd)
     started = pids(odd)

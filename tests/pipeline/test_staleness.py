@@ -21,8 +21,10 @@ from avow.base.diagnostics import Rejected
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
 from avow.calculus.requirements import FormulaQuestion, TemporalQuestion, requirement_question
+from avow.calculus.variables import frame
 from avow.pipeline.engines import discharge_sanity
 from avow.pipeline.evidence_keys import surroundings
+from avow.pipeline.slices import sanity_slice
 from avow.pipeline.work import catalogue, method_job, planned_method
 from avow.pipeline.workload import survey
 from avow.system.load import load_system
@@ -374,7 +376,8 @@ def test_who_says_that_it_needs_no_steps_does_not_look_at_them(tmp_path: Path, m
     work = catalogue(system).work("agent", method)
     if method == "sanity":
         few = [o for o in work.obligations if o.name.startswith("consistent")] or work.obligations[:1]
-        outcomes = discharge_sanity(system, system.contract.node("agent"), few, Limits(seconds=30)).outcomes
+        cut = sanity_slice(frame(system), system.contract.node("agent"))
+        outcomes = discharge_sanity(cut, few, Limits(seconds=30)).outcomes
     else:
         planned = planned_method(work)
         job, tool = method_job(system, system.contract.node("agent"), planned), backend(method)

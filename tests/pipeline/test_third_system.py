@@ -14,7 +14,9 @@ import pytest
 from avow.backend_kit.protocol import Limits
 from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
-from avow.pipeline.engines import discharge_composition, discharge_sanity
+from avow.calculus.obligations import discharge as discharge_composition
+from avow.pipeline.engines import discharge_sanity
+from avow.pipeline.slices import SanitySlice
 from avow.pipeline.work import Work, method_backend, method_job, planned_method
 from avow.pipeline.workload import Survey, survey
 
@@ -50,10 +52,12 @@ def settle(work: Work, folder: Path) -> tuple[Outcome, ...]:
         case "language":
             return ()
         case "sanity":
-            node = work.system.contract.node(work.node)
-            return discharge_sanity(work.system, node, work.obligations, limits).outcomes
+            assert work.cut is not None
+            cut = work.cut()
+            assert isinstance(cut, SanitySlice)
+            return discharge_sanity(cut, work.obligations, limits).outcomes
         case "compose":
-            return discharge_composition(work.system, work.obligations, limits).outcomes
+            return discharge_composition(work.system, work.obligations, limits)
     method = planned_method(work)
     backend = method_backend(work.system, method)
     job = method_job(work.system, work.system.contract.node(work.node), method)

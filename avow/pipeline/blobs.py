@@ -1,0 +1,197 @@
+"""Typed data as canonical JSON, and back: what a work is sent as.
+
+Each part stands once in a table and is referred to by its place there, so that equal data has equal bytes, however its
+parts are shared in memory, and depth costs nothing. Places in files are left out, and paths are relative to the
+system's folder: neither is anything that an answer may depend on. Only the classes listed here are made again.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import functools
+import inspect
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping
+from fractions import Fraction
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from avow.base import diagnostics, verdict
+from avow.base.diagnostics import Span
+from avow.calculus import providers
+from avow.formulas import finite, values
+from avow.language import contract, sorts, terms
+from avow.pipeline import slices
+from avow.sanity import claims
+from avow.system import plan
+
+_NOWHERE = Span("", 1, 1, 1, 1)
+_MODULES: tuple[ModuleType, ...] = (
+    *(sorts, terms, contract, plan, values, finite, claims, providers, slices),
+    *(diagnostics, verdict),
+)
+
+
+class Garbled(ValueError):  # noqa: N818 - it says what they are
+    """Bytes that are not those of any value."""
+
+
+def encode(value: object, root: Path) -> bytes:
+    """Raises TypeError for what is no data of Avow's. `root` is the system's folder."""
+    table: dict[str, int] = {}
+    known: dict[int, Any] = {}
+    kept: list[object] = []
+    """Of the parts that `known` knows by their number: alive, so that no other part gets it."""
+    stack: list[tuple[object, bool]] = [(value, False)]
+    while stack:
+        current, ready = stack.pop()
+        if id(current) in known or _is_plain(current):
+            continue
+        if not ready:
+            stack.append((current, True))
+            stack.extend((child, False) for child in _children(current))
+            continue
+        text = json.dumps(_entry(current, known, root), sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+        known[id(current)] = table.setdefault(text, len(table))
+        kept.append(current)
+    head = json.dumps(_reference(value, known))
+    rows = ",\n".join(table)
+    return f'{{"root":{head},"table":[\n{rows}\n]}}'.encode("utf-8", "surrogatepass")
+
+
+def decode(data: bytes, root: Path) -> Any:
+    """The value again, with paths under `root`. Raises Garbled."""
+    try:
+        said = json.loads(data.decode("utf-8", "surrogatepass"))
+        if set(said) != {"root", "table"}:
+            raise Garbled("no value")
+        made: list[Any] = []
+        for entry in said["table"]:
+            made.append(_made(entry, made, root))
+        return _value(said["root"], made)
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        raise Garbled(f"{type(error).__name__}: {error}") from error
+
+
+def _is_plain(value: object) -> bool:
+    return value is None or isinstance(value, bool) or type(value) is str
+
+
+@functools.cache
+def _fields(kind: Any) -> tuple[str, ...]:
+    return tuple(f.name for f in dataclasses.fields(kind) if f.init and not _is_place(f.name))
+
+
+def _is_place(name: str) -> bool:
+    return name in ("span", "spans") or name.endswith("_span")
+
+
+def _children(value: Any) -> Iterable[object]:
+    if isinstance(value, enum.Enum | Fraction | Path | int | float):
+        return ()
+    if isinstance(value, Mapping):
+        return (part for pair in value.items() for part in pair)
+    if isinstance(value, tuple | list):
+        return value
+    if dataclasses.is_dataclass(value) and type(value).__name__ in _classes():
+        kind: Any = type(value)
+        return (getattr(value, name) for name in _fields(kind))
+    raise TypeError(f"{type(value).__name__} is no data of a work")
+
+
+def _reference(value: object, known: Mapping[int, int]) -> Any:
+    return value if _is_plain(value) else known[id(value)]
+
+
+def _entry(value: Any, known: Mapping[int, int], root: Path) -> Any:
+    match value:
+        case enum.Enum():
+            return ["e", type(value).__name__, value.value]
+        case Fraction():
+            return ["q", str(value.numerator), str(value.denominator)]
+        case Path():
+            return ["p", Path(os.path.relpath(value, root)).as_posix()]
+        case int():
+            return ["i", str(value)]
+        case float():
+            return ["f", value.hex()]
+        case Mapping():
+            return ["m", *(_reference(part, known) for pair in value.items() for part in pair)]
+        case tuple():
+            return ["t", *(_reference(item, known) for item in value)]
+        case list():
+            return ["l", *(_reference(item, known) for item in value)]
+        case _:
+            kind: Any = type(value)
+            return {"": kind.__name__} | {n: _reference(getattr(value, n), known) for n in _fields(kind)}
+
+
+def _value(reference: Any, made: list[Any]) -> Any:
+    if reference is None or isinstance(reference, bool | str):
+        return reference
+    if not isinstance(reference, int) or not 0 <= reference < len(made):
+        raise Garbled("a part refers to what does not stand before it")
+    return made[reference]
+
+
+def _made(entry: Any, made: list[Any], root: Path) -> Any:
+    match entry:
+        case ["e", str(name), value]:
+            return _enums()[name](value)
+        case ["q", str(numerator), str(denominator)]:
+            return Fraction(int(numerator), int(denominator))
+        case ["p", str(path)]:
+            return root / path
+        case ["i", str(digits)]:
+            return int(digits)
+        case ["f", str(text)]:
+            return float.fromhex(text)
+        case ["m", *parts]:
+            found = [_value(part, made) for part in parts]
+            return dict(zip(found[::2], found[1::2], strict=True))
+        case ["t", *items]:
+            return tuple(_value(item, made) for item in items)
+        case ["l", *items]:
+            return [_value(item, made) for item in items]
+        case {"": str(name), **rest}:
+            kind = _classes()[name]
+            if set(rest) != set(_fields(kind)):
+                raise Garbled(f"{name} has other parts")
+            arguments = {str(field): _value(part, made) for field, part in rest.items()}
+            return kind(**arguments | _places(kind))
+        case _:
+            raise Garbled("no such part")
+
+
+@functools.cache
+def _places(kind: Any) -> dict[str, Any]:
+    """For places that a class wants."""
+    wanted = (f for f in dataclasses.fields(kind) if f.init and _is_place(f.name))
+    return {
+        f.name: _NOWHERE
+        for f in wanted
+        if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
+    }
+
+
+@functools.cache
+def _classes() -> dict[str, Any]:
+    return _of(lambda kind: dataclasses.is_dataclass(kind) and kind is not Span)
+
+
+@functools.cache
+def _enums() -> dict[str, type[enum.Enum]]:
+    return _of(lambda kind: issubclass(kind, enum.Enum))
+
+
+def _of(wanted: Callable[[type], bool]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for module in _MODULES:
+        for name, kind in vars(module).items():
+            if inspect.isclass(kind) and kind.__module__ == module.__name__ and wanted(kind):
+                assert name not in found, name
+                found[name] = kind
+    return found

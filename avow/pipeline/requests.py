@@ -1,0 +1,147 @@
+"""What a worker is asked, and what it answers: bytes both ways, with a digest of all that they say."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from avow.backend_kit.protocol import Limits, Report
+from avow.pipeline.mutant_systems import Altered
+from avow.pipeline.wire import report_from_json, report_to_json
+
+_TEXTS = ("system", "node", "method", "engine", "home", "root", "folder")
+
+Tools = tuple[tuple[str, ...], ...]
+"""Name, version, … of each outside tool, as the keys have them; no version where it is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One work. It is answered where it comes to: nothing is read but what it holds, unless it names a `root`."""
+
+    system: str
+    node: str
+    method: str
+    engine: str
+    keys: Mapping[str, str]
+    """Obligation → what its answer depends on: computed again by the worker, from the slice."""
+    limits: Limits
+    cut: bytes
+    """The slice (`avow.pipeline.slices`), as `avow.pipeline.blobs` writes it."""
+    home: str
+    """The system's folder within the workspace, for messages."""
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    """The plan's files that the answer depends on, by their path in the system's folder."""
+    tools: Tools = ()
+    root: str = ""
+    """The system's folder, for a method that looks at more than those files: it runs where that folder is."""
+    folder: str = ""
+    """Where the exported files are; relative to the workspace."""
+    altered: Altered | None = None
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """The tools that are wanted on the machine."""
+        return frozenset(name for name, version, *_ in self.tools if version)
+
+    @property
+    def seconds(self) -> float:
+        """What all its obligations together may take."""
+        return self.limits.seconds * max(2, len(self.keys))
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """The answer to the request of that digest; `refused` says why there is none."""
+
+    request: str
+    report: Report | None
+    refused: str = ""
+    worker: str = ""
+    cpu: float = 0.0
+    """Processor seconds."""
+
+
+class Unanswered(ValueError):  # noqa: N818 - it says what it is
+    """Bytes that are no answer to what was asked."""
+
+
+def request_bytes(request: Request) -> bytes:
+    said = {
+        **{name: getattr(request, name) for name in _TEXTS},
+        "keys": dict(request.keys),
+        "limits": asdict(request.limits),
+        "cut": request.cut.decode("utf-8", "surrogatepass"),
+        "files": {name: base64.b64encode(data).decode() for name, data in request.files.items()},
+        "tools": request.tools,
+        "altered": asdict(request.altered) if request.altered else None,
+    }
+    return json.dumps(said, sort_keys=True).encode()
+
+
+def read_request(data: bytes) -> Request:
+    """Raises ValueError, TypeError, LookupError."""
+    said = json.loads(data)
+    return Request(
+        **{name: str(said[name]) for name in _TEXTS},
+        keys=dict(said["keys"]),
+        limits=Limits(**said["limits"]),
+        cut=said["cut"].encode("utf-8", "surrogatepass"),
+        files={name: base64.b64decode(text, validate=True) for name, text in said["files"].items()},
+        tools=tuple(tuple(map(str, tool)) for tool in said["tools"]),
+        altered=Altered(**said["altered"]) if said["altered"] else None,
+    )
+
+
+def response_bytes(response: Response) -> bytes:
+    body = {
+        "request": response.request,
+        "report": report_to_json(response.report) if response.report else None,
+        "refused": response.refused,
+        "worker": response.worker,
+        "cpu": response.cpu,
+    }
+    text = json.dumps(body, default=str, sort_keys=True)
+    return json.dumps({"body": text, "sha256": hashlib.sha256(text.encode()).hexdigest()}).encode()
+
+
+def read_response(data: object, asked: bytes) -> Response:
+    """Raises Unanswered for anything but an answer to what was asked, whole."""
+    if not isinstance(data, bytes):
+        raise Unanswered(f"an answer is bytes, not {type(data).__name__}")
+    try:
+        outer = json.loads(data)
+        text: str = outer["body"]
+        if hashlib.sha256(text.encode()).hexdigest() != outer["sha256"]:
+            raise Unanswered("its digest is not that of what it says")
+        said: dict[str, Any] = json.loads(text)
+        report = report_from_json(said["report"]) if said["report"] is not None else None
+        found = Response(said["request"], report, str(said["refused"]), str(said["worker"]), float(said["cpu"]))
+    except Unanswered:
+        raise
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+        raise Unanswered(f"{type(error).__name__}: {error}"[:300]) from error
+    if found.request != request_digest(asked):
+        raise Unanswered("it answers another request")
+    if (found.report is None) is not bool(found.refused):
+        raise Unanswered("it neither answers nor says why not")
+    return found
+
+
+def request_digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
+
+
+def lay_out(files: Mapping[str, bytes], root: Path) -> None:
+    """Write a request's files. Raises ValueError for one that would lie elsewhere."""
+    for name, data in files.items():
+        path = root / name
+        if Path(name).is_absolute() or ".." in Path(name).parts:
+            raise ValueError(f"{name} leaves the folder")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
