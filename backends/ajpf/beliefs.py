@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 
+from .builtin import compare
 from .syntax import (
     Bindings,
     Condition,
@@ -83,7 +84,9 @@ class Reasoner:
     def believes(self, beliefs: Beliefs, term: Term, bindings: Bindings, depth: int = 0) -> Iterator[Bindings]:
         """Every way to bind the term's variables so that it is believed or derivable. Raises TooDeep."""
         goal = apply(term, bindings)
-        if isinstance(goal, Var):
+        if isinstance(goal, Var):  # anything that is believed
+            for belief in sorted((b for group in beliefs.index.values() for b in group), key=plain):
+                yield {**bindings, goal.name: apart(belief, f"'{next(self.fresh)}")}
             return
         key = (goal.functor, len(goal.args))
         for belief in beliefs.index.get(key, ()):
@@ -97,8 +100,19 @@ class Reasoner:
                 raise TooDeep
             renamed = renamed_rule(rule, f"'{next(self.fresh)}")
             found = unify(goal, renamed.head, bindings)
+            if found is None:
+                continue
+            body, committed = renamed.body, False
+            while any(c.is_cut for c in body):  # what stands before a cut is met in one way
+                at = next(n for n, c in enumerate(body) if c.is_cut)
+                found = next(self.holds(beliefs, body[:at], found, (), depth + 1), None)
+                if found is None:
+                    break
+                body, committed = body[at + 1 :], True
             if found is not None:
-                yield from self.holds(beliefs, renamed.body, found, (), depth + 1)
+                yield from self.holds(beliefs, body, found, (), depth + 1)
+            if committed:
+                return
 
     def holds(
         self,
@@ -119,10 +133,21 @@ class Reasoner:
     def _one(
         self, beliefs: Beliefs, condition: Condition, bindings: Bindings, goals: Sequence[Goal], depth: int
     ) -> Iterator[Bindings]:
+        ways: Iterator[Bindings]
+        if condition.group:
+            if next(self.holds(beliefs, condition.group, bindings, goals, depth), None) is None:
+                yield bindings
+            return
         if condition.term is None:
             yield bindings
             return
-        ways: Iterator[Bindings]
+        if condition.test is not None:
+            ways = compare(condition.test, apply(condition.term, bindings), bindings)
+            if condition.positive:
+                yield from ways
+            elif next(ways, None) is None:
+                yield bindings
+            return
         if condition.is_goal:
             ways = (
                 u
@@ -140,9 +165,16 @@ class Reasoner:
 
 def renamed_rule(rule: Rule, suffix: str) -> Rule:
     """The rule with variables of its own."""
-    terms = [rule.head, *(c.term for c in rule.body if c.term is not None)]
+    terms = [rule.head, *(term for c in rule.body for term in c.terms())]
     own: Bindings = {name: Var(name + suffix) for term in terms for name in variables(term)}
-    body = tuple(c if c.term is None else Condition(rename(c.term, own), c.positive, c.is_goal) for c in rule.body)
+    body = tuple(renamed_condition(c, own) for c in rule.body)
     head = rename(rule.head, own)
     assert isinstance(head, Struct)
     return Rule(head, body, rule.span)
+
+
+def renamed_condition(condition: Condition, names: Mapping[str, Term]) -> Condition:
+    """The condition with other variables in the place of its own."""
+    term = None if condition.term is None else rename(condition.term, names)
+    group = tuple(renamed_condition(part, names) for part in condition.group)
+    return replace(condition, term=term, group=group)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from math import fmod
 
 from .syntax import Bindings, Struct, Term, Var, plain
 
@@ -22,6 +23,13 @@ _ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
     "minus": lambda x, y: x - y,
     "times": lambda x, y: x * y,
     "div": _divide,
+}
+_OPERATORS: Mapping[str, Callable[[float, float], float]] = {
+    "+": _ARITHMETIC["sum"],
+    "-": _ARITHMETIC["minus"],
+    "*": _ARITHMETIC["times"],
+    "/": _divide,
+    "%": fmod,
 }
 COMPUTING = frozenset((*_ARITHMETIC, "append", "toString"))
 
@@ -48,6 +56,31 @@ def _bound(action: Struct, at: int, value: Struct) -> Bindings:
     if not isinstance(result, Var):
         raise Crash(f"the result of {plain(action)} is no free variable")
     return {result.name: value}
+
+
+def compare(test: str, term: Term, bindings: Bindings) -> Iterator[Bindings]:
+    """Two numbers compared; ``==`` (or ``is``) with one side free binds it. What cannot be computed does not hold."""
+    assert isinstance(term, Struct)
+    left, right = term.args
+    values = (value_of(left), value_of(right))
+    if values[0] is not None and values[1] is not None:
+        if values[0] < values[1] if test == "<" else values[0] == values[1]:
+            yield bindings
+        return
+    for side, value in ((left, values[1]), (right, values[0])):
+        if test == "==" and isinstance(side, Var) and value is not None:
+            yield {**bindings, side.name: Struct(shown(value))}
+            return
+
+
+def value_of(term: Term) -> float | None:
+    """The value of an arithmetic expression; None where it has a free variable, or no value."""
+    if isinstance(term, Struct) and term.functor in _OPERATORS and len(term.args) == 2:
+        left, right = map(value_of, term.args)
+        if left is None or right is None or (term.functor == "%" and right == 0):
+            return None
+        return _OPERATORS[term.functor](left, right)
+    return number(term)
 
 
 def number(term: Term) -> float | None:

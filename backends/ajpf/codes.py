@@ -31,6 +31,13 @@ CODES = register(
         "Choose a name that starts with a small letter and is none of its words.",
     ),
     declare(
+        "AJPF105",
+        "not run",
+        "The program is Gwendolen, and has something that the checker does not run: several agents in one system, "
+        "plans for any goal or belief at all.",
+        "Leave it out, or check that agent by other means.",
+    ),
+    declare(
         "AJPF110",
         "unreadable environment",
         "The environment's file cannot be read, or lacks the form of one.",

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Generic, NamedTuple, TypeVar
 
-from .beliefs import Beliefs, Reasoner, apart
-from .builtin import COMPUTING, compute
+from .beliefs import Beliefs, Reasoner, apart, renamed_condition
+from .builtin import COMPUTING, Crash, compute
 from .intentions import (
     EMPTY,
     PERCEPTION,
@@ -20,7 +20,9 @@ from .intentions import (
     tail,
 )
 from .syntax import (
+    SENT,
     Bindings,
+    Condition,
     DeedKind,
     Event,
     Goal,
@@ -95,7 +97,7 @@ class Mind:
             bindings = unify(_own(plan.event.term, suffix), event.term, {})
             if bindings is None:
                 continue
-            guard = tuple(c if c.term is None else replace(c, term=_own(c.term, suffix)) for c in plan.guard)
+            guard = tuple(_own_condition(c, suffix) for c in plan.guard)
             met = next(self.reasoner.holds(self.beliefs.items[base], guard, bindings, self._wanted(goals)), None)
             if met is None:
                 continue
@@ -123,7 +125,13 @@ class Mind:
         deed, beliefs = top.deeds[0], self.beliefs.items[base]
         term = deed.term
         match deed.kind:
-            case DeedKind.ACTION | DeedKind.SEND:
+            case DeedKind.SEND:
+                to, force, content = term.args if isinstance(term, Struct) else ()
+                sent = Struct(SENT, (to, Struct(self.program.name), force, content))
+                action = self.actions.number(Struct("send", (content, to)))
+                base = self.base(beliefs.own | {sent}, beliefs.perceived)
+                return self.after(base, goals, intention, {}, action=action)
+            case DeedKind.ACTION:
                 action = self.actions.number(_named(term))
                 bindings = compute(self.actions.items[action]) if _functor(term) in COMPUTING else {}
                 return self.after(base, goals, intention, bindings, action=action)
@@ -234,7 +242,8 @@ class Mind:
 
 
 def _key(event: Event) -> tuple[Sign, bool, str, int]:
-    assert isinstance(event.term, Struct)
+    if isinstance(event.term, Var):
+        raise Crash("a goal is no more than a variable when it is posted")
     return event.sign, event.is_goal, event.term.functor, len(event.term.args)
 
 
@@ -270,6 +279,11 @@ def _own(term: Term, suffix: str) -> Term:
     """The term with the variables of one use of a plan."""
     names = set(variables(term))
     return rename(term, {name: Var(name + suffix) for name in names}) if names else term
+
+
+def _own_condition(condition: Condition, suffix: str) -> Condition:
+    names = {name for term in condition.terms() for name in variables(term)}
+    return renamed_condition(condition, {name: Var(name + suffix) for name in names}) if names else condition
 
 
 def _functor(term: Term) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,11 @@ from lark.exceptions import VisitError
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 from .syntax import (
+    CONS,
     MAX_DEPTH,
+    NIL,
+    RECEIVED,
+    SENT,
     Condition,
     Deed,
     DeedKind,
@@ -26,6 +31,7 @@ from .syntax import (
     Sign,
     Struct,
     Var,
+    deeper,
     is_ground,
     show,
 )
@@ -72,11 +78,21 @@ def parse_fact(text: str) -> Struct | None:
 
 
 def parse_program(text: str, file: str) -> Program:
-    """Raises Rejected with the place of the first thing that does not belong."""
+    """One agent. Raises Rejected with the place of the first thing that does not belong, or that cannot be run."""
+    first, *others = parse_system(text, file)
+    if others:
+        names = ", ".join(agent.name for agent in (first, *others))
+        message = f"a system of several agents ({names}): the checker runs one agent at a time"
+        raise Rejected(Diagnostic("AJPF105", message, others[0].name_span, hint="put each agent in a file of its own"))
+    return first
+
+
+def parse_system(text: str, file: str) -> tuple[Program, ...]:
+    """All agents of a file. Raises Rejected."""
     builder = _Builder(file)
     try:
         tree = _grammar().parse(text, start="start")
-        program: Program = builder.transform(tree)
+        agents: tuple[Program, ...] = builder.transform(tree)
     except UnexpectedInput as error:
         raise Rejected(_unexpected(error, text, file)) from None
     except RecursionError:
@@ -89,7 +105,7 @@ def parse_program(text: str, file: str) -> Program:
         raise
     if builder.problems:
         raise Rejected(*builder.problems)
-    return program
+    return agents
 
 
 @functools.cache
@@ -196,6 +212,54 @@ class _Builder(Transformer):  # type: ignore[misc]
     def beliefs(self, parts: list[Struct]) -> tuple[Struct, ...]:
         return tuple(parts)
 
+    def list_term(self, parts: list[Any]) -> Struct:
+        made = Struct(NIL)
+        for item in reversed([p for p in parts if p is not None]):
+            made = Struct(CONS, (item, made))
+        return self.measured(made)
+
+    def open_list(self, parts: list[Any]) -> Struct:
+        made = parts[-1]
+        for item in reversed(parts[:-1]):
+            made = Struct(CONS, (item, made))
+        return self.measured(made)
+
+    def measured(self, made: Struct) -> Struct:
+        if deeper(made, MAX_DEPTH):
+            raise Rejected(Diagnostic("AJPF102", f"a term nested more than {MAX_DEPTH} deep", _at(self.file, 1, 1)))
+        return made
+
+    @_build
+    def arithmetic(self, meta: Any, parts: list[Any]) -> Struct:
+        return Struct(str(parts[1]), (parts[0], parts[2]))
+
+    def equation(self, parts: list[Any]) -> tuple[str, Struct]:
+        test = "==" if str(parts[1]) == "is" else str(parts[1])
+        return test, Struct(test, (parts[0], parts[2]))
+
+    def holding(self, parts: list[Any]) -> Condition:
+        return Condition(parts[0][1], test=parts[0][0])
+
+    def not_holding(self, parts: list[Any]) -> Condition:
+        return Condition(parts[0][1], positive=False, test=parts[0][0])
+
+    def no_way(self, parts: list[Any]) -> Condition:
+        return Condition(None, positive=False, group=tuple(parts))
+
+    def cut(self, parts: list[Any]) -> Condition:
+        return Condition(None, is_cut=True)
+
+    def sent(self, parts: list[Any]) -> Condition:
+        """Without a sender: the agent itself, which is the only one there is."""
+        to, sender, force, content = parts
+        return Condition(Struct(SENT, (to, sender or self.anonymous([]), _force(force), content)))
+
+    def not_sent(self, parts: list[Any]) -> Condition:
+        return replace(self.sent(parts), positive=False)
+
+    def refuse(self, what: str, span: Span) -> None:
+        self.problems.append(Diagnostic("AJPF105", f"{what}: the checker does not run that", span))
+
     def positive(self, parts: list[Struct]) -> Condition:
         return Condition(parts[0])
 
@@ -204,7 +268,7 @@ class _Builder(Transformer):  # type: ignore[misc]
 
     @_build
     def rule(self, meta: Any, parts: list[Any]) -> Rule:
-        return Rule(parts[0], tuple(parts[1:]), self.span(meta))
+        return Rule(parts[0], tuple(p for p in parts[1:] if p is not None), self.span(meta))
 
     def rules(self, parts: list[Any]) -> tuple[Rule, ...]:
         return tuple(p for p in parts if p is not None)
@@ -225,17 +289,29 @@ class _Builder(Transformer):  # type: ignore[misc]
 
     # Plans
 
-    def belief_added(self, parts: list[Any]) -> Event:
-        return Event(Sign.ADD, parts[1])
+    @_build
+    def belief_added(self, meta: Any, parts: list[Any]) -> Event:
+        return self.trigger(Event(Sign.ADD, parts[1]), meta)
 
-    def belief_dropped(self, parts: list[Any]) -> Event:
-        return Event(Sign.DROP, parts[1])
+    @_build
+    def belief_dropped(self, meta: Any, parts: list[Any]) -> Event:
+        return self.trigger(Event(Sign.DROP, parts[1]), meta)
 
-    def goal_added(self, parts: list[Any]) -> Event:
-        return Event(Sign.ADD, parts[1], parts[2], is_goal=True)
+    def trigger(self, event: Event, meta: Any) -> Event:
+        if isinstance(event.term, Var):
+            self.refuse(f"a plan for any {'goal' if event.is_goal else 'belief'} at all", self.span(meta))
+        return event
 
-    def goal_dropped(self, parts: list[Any]) -> Event:
-        return Event(Sign.DROP, parts[1], parts[2], is_goal=True)
+    @_build
+    def goal_added(self, meta: Any, parts: list[Any]) -> Event:
+        return self.trigger(Event(Sign.ADD, parts[1], parts[2], is_goal=True), meta)
+
+    @_build
+    def goal_dropped(self, meta: Any, parts: list[Any]) -> Event:
+        return self.trigger(Event(Sign.DROP, parts[1], parts[2], is_goal=True), meta)
+
+    def received(self, parts: list[Any]) -> Event:
+        return Event(Sign.ADD, Struct(RECEIVED, (_force(parts[1]), parts[2])))
 
     def believed(self, parts: list[Any]) -> Condition:
         return Condition(parts[0])
@@ -243,10 +319,10 @@ class _Builder(Transformer):  # type: ignore[misc]
     def not_believed(self, parts: list[Any]) -> Condition:
         return Condition(parts[0], positive=False)
 
-    def wanted(self, parts: list[Any]) -> Condition:
+    def wanted_goal(self, parts: list[Any]) -> Condition:
         return Condition(parts[0], is_goal=True, goal=parts[1])
 
-    def not_wanted(self, parts: list[Any]) -> Condition:
+    def not_wanted_goal(self, parts: list[Any]) -> Condition:
         return Condition(parts[0], positive=False, is_goal=True, goal=parts[1])
 
     def anything(self, parts: list[Any]) -> Condition:
@@ -269,6 +345,9 @@ class _Builder(Transformer):  # type: ignore[misc]
 
     def wait(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind.WAIT, parts[0])
+
+    def send(self, parts: list[Any]) -> Deed:
+        return Deed(DeedKind.SEND, Struct("send", (parts[0], _force(parts[1]), parts[2])))
 
     def lock(self, parts: list[Any]) -> Deed:
         return Deed(DeedKind.LOCK, Struct(".lock"))
@@ -293,10 +372,18 @@ class _Builder(Transformer):  # type: ignore[misc]
     def plans(self, parts: list[Plan]) -> tuple[Plan, ...]:
         return tuple(parts)
 
-    def start(self, parts: list[Any]) -> Program:
+    def start(self, parts: list[Program]) -> tuple[Program, ...]:
+        return tuple(parts)
+
+    def agent(self, parts: list[Any]) -> Program:
         name, beliefs, rules, goals, plans = parts
         span = _at(self.file, name.line or 1, name.column or 1, len(name))
         return Program(str(name), beliefs, rules, goals, plans, span)
+
+
+def _force(token: Token) -> Struct:
+    """``:tell``, ``:perform`` or ``:achieve``, as a term."""
+    return Struct(str(token)[1:].strip())
 
 
 def _number(text: str) -> str:
@@ -311,7 +398,7 @@ def _number(text: str) -> str:
 def _as_tried(conditions: list[Condition]) -> tuple[Condition, ...]:
     """A guard's conditions in the order in which AIL tries them: as written, but a negated first one after the second
     if that is not negated (it may bind the variables of the first). `True` is no condition."""
-    real = [c for c in conditions if c.term is not None]
+    real = [c for c in conditions if c.term is not None or c.group]
     if len(real) > 1 and not real[0].positive and real[1].positive:
         real[:2] = real[1], real[0]
     return tuple(real)

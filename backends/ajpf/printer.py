@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import product
 
-from .syntax import Condition, DeedKind, Event, GoalKind, Plan, Program, Rule, show, show_deed
+from .syntax import SENT, Condition, DeedKind, Event, GoalKind, Plan, Program, Rule, Struct, show, show_deed, show_event
 
 _KINDS = (GoalKind.PERFORM, GoalKind.ACHIEVE)
 
@@ -43,21 +43,39 @@ def _rule(rule: Rule) -> str:
 
 
 def _literal(condition: Condition) -> str:
+    if condition.is_cut:
+        return "!"
+    sign = "" if condition.positive else "~"
+    if condition.group:
+        return f"~({', '.join(map(_literal, condition.group))})"
     assert condition.term is not None
-    return f"{'' if condition.positive else '~'}{show(condition.term)}"
+    if condition.test is not None:
+        return f"{sign}[{_comparison(condition)}]"
+    return f"{sign}{show(condition.term)}"
+
+
+def _comparison(condition: Condition) -> str:
+    assert isinstance(condition.term, Struct)
+    left, right = (show(side).removeprefix("(").removesuffix(")") for side in condition.term.args)
+    return f"{left} {condition.test} {right}"
 
 
 def _guard(condition: Condition) -> str:
     if condition.term is None:
         return "True"
+    sign = "" if condition.positive else "~"
+    if condition.test is not None:
+        return f"{sign}{_comparison(condition)}"
+    if isinstance(condition.term, Struct) and condition.term.functor == SENT:
+        to, sender, force, content = condition.term.args
+        by = "" if show(sender) == "_" else f"{show(sender)}, "
+        return f"{sign}.sent({show(to)}, {by}:{show(force)}, {show(content)})"
     kind = f" [{condition.goal}]" if condition.is_goal else ""
-    return f"{'' if condition.positive else '~'}{'G' if condition.is_goal else 'B'} {show(condition.term)}{kind}"
+    return f"{sign}{'G' if condition.is_goal else 'B'} {show(condition.term)}{kind}"
 
 
 def _plan(plan: Plan) -> str:
-    event = f"{plan.event.sign}{'!' if plan.event.is_goal else ''}{show(plan.event.term)}"
-    if plan.event.is_goal:
-        event += f" [{plan.event.goal}]"
+    event = show_event(plan.event)
     body = ", ".join(show_deed(deed) for deed in plan.deeds if deed.kind is not DeedKind.NULL)
     guard = ", ".join(map(_guard, plan.guard)) or "True"
     return f"{event} : {{ {guard} }}{f' <- {body}' if body else ''};"

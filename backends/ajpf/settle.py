@@ -13,6 +13,7 @@ from .automaton import TooLarge
 from .checker import Property
 from .instances import Claim, Instantiation
 from .options import Extra, Setup
+from .syntax import RECEIVED, Program, Struct
 from .tautology import is_valid
 
 
@@ -54,6 +55,7 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
         *_left_to_a_person(claim, attached),
         "the plan's table says truly which agent formulas stand for which contract formulas",
         *frame.setup.environment.describe(),
+        *_no_messages(frame.setup.program),
         f"percepts become events as in '{frame.setup.semantics}' percept semantics, in the order of their groups",
     )
     details: dict[str, object] = {"engine": frame.engine, "percept_semantics": str(frame.setup.semantics)}
@@ -93,6 +95,11 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
         Link.MAPPED,
         vacuous=verdict is Verdict.CHECKED and len(hollow) == len(own),
     )
+
+
+def _no_messages(program: Program) -> Iterator[str]:
+    if any(isinstance(p.event.term, Struct) and p.event.term.functor == RECEIVED for p in program.plans):
+        yield "no message ever comes to the agent"
 
 
 def _left_to_a_person(claim: Claim, attached: Sequence[tuple[Extra, Sequence[Property]]]) -> Iterator[str]:

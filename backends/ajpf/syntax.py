@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -69,6 +69,18 @@ class Condition:
     is_goal: bool = False
     goal: GoalKind | None = None
     """Of a goal: its kind; without a written kind it is either."""
+    test: str | None = None
+    """``<`` or ``==``: the term compares its two arguments as numbers."""
+    group: tuple[Condition, ...] = ()
+    """What a negated group denies: ``~(square(X, Y), ~empty(X, Y))``; it has no term."""
+    is_cut: bool = False
+    """``!`` in a reasoning rule: what was found so far stands, and no other rule is tried."""
+
+    def terms(self) -> Iterator[Term]:
+        if self.term is not None:
+            yield self.term
+        for part in self.group:
+            yield from part.terms()
 
 
 class DeedKind(StrEnum):
@@ -132,28 +144,58 @@ class Program:
     name_span: Span | None = field(default=None, compare=False, repr=False)
 
 
+CONS, NIL = "[|]", "[]"
+"""Lists are terms: ``[a, b|T]`` is ``[|](a, [|](b, T))``."""
+OPERATORS = frozenset("+-*/%")
+
+
 def show(term: Term) -> str:
     """A term as Gwendolen writes it."""
     if isinstance(term, Var):
         return "_" if term.name.startswith("_") else term.name
+    if term.functor == CONS:
+        return _list(term, show, ", ")
+    if term.functor in OPERATORS and len(term.args) == 2:
+        return f"({show(term.args[0])} {term.functor} {show(term.args[1])})"
     return f"{term.functor}({', '.join(map(show, term.args))})" if term.args else term.functor
+
+
+def _list(term: Term, say: Callable[[Term], str], comma: str) -> str:
+    items = []
+    while isinstance(term, Struct) and term.functor == CONS:
+        items.append(say(term.args[0]))
+        term = term.args[1]
+    rest = "" if term == Struct(NIL) else f"|{say(term)}"
+    return f"[{comma.join(items)}{rest}]"
 
 
 def plain(term: Term) -> str:
     """A term as AIL's own texts write it, by which it also sorts: no space after a comma."""
     if isinstance(term, Var):
         return term.name
+    if term.functor == CONS:
+        return _list(term, plain, ",")
     return f"{term.functor}({','.join(map(plain, term.args))})" if term.args else term.functor
 
 
+RECEIVED, SENT = ".received", ".sent"
+"""Names of the event of a message received, and of what an agent remembers of those that it sent."""
+
+
 def show_event(event: Event) -> str:
+    if isinstance(event.term, Struct) and event.term.functor == RECEIVED:
+        return f"+.received(:{show(event.term.args[0])}, {show(event.term.args[1])})"
     return f"{event.sign}{'!' if event.is_goal else ''}{show(event.term)}{f' [{event.goal}]' if event.goal else ''}"
 
 
 def show_deed(deed: Deed) -> str:
     match deed.kind:
-        case DeedKind.ACTION | DeedKind.SEND:
+        case DeedKind.ACTION:
             return show(deed.term)
+        case DeedKind.SEND:
+            assert isinstance(deed.term, Struct)
+            to, force, content = deed.term.args
+            return f".send({show(to)}, :{show(force)}, {show(content)})"
         case DeedKind.LOCK | DeedKind.UNLOCK | DeedKind.NULL:
             return str(deed.kind)
         case DeedKind.ADD_GOAL | DeedKind.DROP_GOAL:
@@ -168,6 +210,18 @@ def variables(term: Term) -> Iterator[str]:
         return
     for arg in term.args:
         yield from variables(arg)
+
+
+def deeper(term: Term, most: int) -> bool:
+    """Whether a term is nested deeper than that. A list nests as deep as it is long."""
+    stack = [(term, 1)]
+    while stack:
+        part, depth = stack.pop()
+        if depth > most:
+            return True
+        if isinstance(part, Struct):
+            stack.extend((arg, depth + 1) for arg in part.args)
+    return False
 
 
 def is_ground(term: Term) -> bool:

@@ -7,6 +7,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from small_agents import case
 
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import Environment, read_environment
@@ -14,6 +15,7 @@ from avow.backends.ajpf.explore import explore
 from avow.backends.ajpf.interpreter import Agent, Semantics
 from avow.backends.ajpf.mind import NONE
 from avow.backends.ajpf.parser import parse_fact, parse_program
+from avow.backends.ajpf.printer import program_text
 from avow.backends.ajpf.psl_parser import Malformed, parse_psl
 from avow.backends.ajpf.syntax import show, show_deed, show_event
 from avow.base.diagnostics import Rejected
@@ -70,6 +72,82 @@ def test_it_reads_the_subset():
     assert [show_event(p.event) for p in made.plans] == ["+!go(X) [perform]", "-p"]
     assert [show_deed(d) for d in made.plans[0].deeds] == ["+b(X, -2.5)", "*w", "-!g(X) [achieve]", 'act("a, b")']
     assert made.plans[0].span.line == 11
+
+
+CUT = "one(X) :- v(X), !, ~bad(X); one(9);"
+EVERYTHING = """\
+GWENDOLEN
+
+:name: ag
+
+:Initial Beliefs:
+
+p
+arm.at(-1.5, "x y")
+route([a, b(1), []])
+
+:Reasoning Rules:
+
+free :- ~(square(X, Y), ~empty(X, Y));
+full :- load(X), limit(Y), !, ~[X < Y - 1];
+known;
+
+:Initial Goals:
+
+go(1) [perform]
+
+:Plans:
+
++!go(N) [perform] : { ~N < 3, B full, ~.sent(boss, :tell, done) } <- .send(boss, :tell, at(N)), *~p;
++p : { M == 2 + 1, ~B G } <- +!G [achieve];
++.received(:perform, G) : { True } <- +!G [perform], -G;
+-!go(N) [achieve] : { G go(M) [perform], B route([H|T]) } <- +.lock, +route(T), -.lock;
+"""
+
+
+def test_what_is_read_is_printed_as_it_was():
+    """But for the order of a guard that starts with a denial: it is printed as it is tried."""
+    printed = program_text(parse_program(EVERYTHING, "ag.gwen"))
+    assert printed == EVERYTHING.replace("{ ~N < 3, B full,", "{ B full, ~N < 3,")
+    for seed in range(40):
+        once = program_text(parse_program(case(seed).program, "ag.gwen"))
+        assert program_text(parse_program(once, "ag.gwen")) == once
+
+
+@pytest.mark.parametrize(
+    ("plans", "beliefs", "rules", "expected"),
+    [
+        ("+p : { B n(X), X < 3, Y == X + 10 } <- a(Y);", "n(5) n(2)", "", "a(12)"),
+        ("+p : { B one(X) } <- a(X); +p : { True } <- none;", "v(1) v(2) bad(1)", CUT, "none"),
+        ("+p : { B one(X) } <- a(X);", "v(1) v(2)", CUT, "a(1)"),
+        ("+p : { B idle } <- rest; +p : { True } <- work;", "job(1)", "idle :- ~(job(X), ~done(X));", "work"),
+        ("+p : { B far(X) } <- a(X);", "at(7)", "far(X) :- at(X), [5 < X];", "a(7)"),
+    ],
+)
+def test_comparisons_bind_and_rules_cut(plans, beliefs, rules, expected):
+    assert actions(run(plans, ["p"], beliefs=beliefs, rules=rules)) == [expected]
+
+
+def test_lists_unify_by_head_and_tail():
+    plans = "+p : { B route([H|T]) } <- -route(_), +route(T), go(H); +route([X|R]) : { B p } <- then(X);"
+    assert "then(b)" in actions(run(plans, ["p"], beliefs="route([a, b])"))
+
+
+def test_what_was_sent_is_remembered():
+    plans = "+p : { ~.sent(boss, :tell, hi) } <- .send(boss, :tell, hi); +p : { True } <- again;"
+    assert actions(run(plans, ["p"]))[:2] == ["send(hi, boss)", "again"]
+
+
+def test_what_is_not_run_is_refused_with_the_reason():
+    head = "GWENDOLEN\n:name: a\n:Initial Beliefs:\n:Initial Goals:\n:Plans:\n"
+    for text, reason in (
+        (f"{head}+p : {{ True }};\n{head}", "several agents (a, a)"),
+        (f"{head}+!G [perform] : {{ True }};", "any goal at all"),
+    ):
+        with pytest.raises(Rejected) as caught:
+            parse_program(text, "a.gwen")
+        assert caught.value.diagnostics[0].code == "AJPF105"
+        assert reason in caught.value.diagnostics[0].message
 
 
 @pytest.mark.parametrize(
