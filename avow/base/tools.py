@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import functools
 import json
-import os
 import re
 import shutil
 from collections.abc import Sequence
@@ -14,6 +13,7 @@ from pathlib import Path
 
 from avow.base import process
 from avow.base.files import write
+from avow.base.notes import cache_folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +69,7 @@ def _version(path: str, arguments: tuple[str, ...], pattern: str) -> str:
 
 
 def _file() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "avow" / "tools.json"
+    return cache_folder() / "tools.json"
 
 
 def _read() -> dict[str, str]:

@@ -20,6 +20,10 @@ import click
     help="A report, an attestation or a folder of reports, kept elsewhere: the ledgers must hold what it names.",
 )
 @click.option("--new-key", type=click.Path(dir_okay=False), help="Make a key pair: FILE, and FILE.pub.")
+@click.option(
+    "--acknowledge", metavar="REASON", help="You have seen what is lost or damaged of these ledgers: no longer open."
+)
+@click.option("--as", "who", metavar="NAME", help="Who acknowledges.")
 def command(
     systems: tuple[str, ...],
     as_json: bool,
@@ -27,17 +31,21 @@ def command(
     key: str | None,
     against: str | None,
     new_key: str | None,
+    acknowledge: str | None,
+    who: str | None,
 ) -> int:
     """Re-digest everything that the ledgers of SYSTEMS (all, if none is named) refer to; name each discrepancy.
 
     Exit code 1 if the ledger or a file behind today's evidence was tampered with, or a ledger is not the one that the
     index of ledgers, the reports here or --against know; changed inputs are told, but only make evidence stale.
+    A ledger that was cut, rolled back, rewritten or begun anew fails the gate *integrity* until a person, by name,
+    says with --acknowledge that it was seen and why it happened.
     """
     from pathlib import Path
 
     from avow.base.workspace import workspace
     from avow.cli.ledgers import audit_index, audit_system, ledger_names, outside_heads, sign_all
-    from avow.pipeline.integrity import reported_heads
+    from avow.pipeline.integrity import reported_heads, settle_losses
 
     if new_key:
         from avow.evidence.signing import new_key_pair
@@ -46,6 +54,16 @@ def command(
         click.echo(f"private key {new_key} (keep it), public key {public}")
         return 0
     place = workspace()
+    if acknowledge is not None or who is not None:
+        if not (acknowledge or "").strip() or not (who or "").strip():
+            raise click.UsageError(
+                'to acknowledge takes a reason and a name: --acknowledge "disk was lost" --as "A. Name"'
+            )
+        assert acknowledge is not None
+        assert who is not None
+        for name in ledger_names(place, systems, reported_heads(place)):
+            for item in settle_losses(place, name, who.strip(), acknowledge.strip()):
+                click.echo(f"{name}: acknowledged: {item.text}")
     anchors = (*reported_heads(place), *(outside_heads(Path(against)) if against else ()))
     found = {name: audit_system(place, name, key, anchors) for name in ledger_names(place, systems, anchors)}
     index = audit_index(place, key)

@@ -2,7 +2,8 @@
 
 A ledger only grows. So whatever record anybody once named as its newest must be in it now; where it is not, lines were
 cut off the end, or the whole file was deleted, swapped or written anew. Deleting everything to begin anew is anybody's
-right, but it does not go by in silence: the index says that a ledger *began* twice.
+right, but it does not go by in silence: with the records a refutation may have gone. Whatever is found stays open until
+a person acknowledges it by name (``avow audit --acknowledge``), and is told for ever after.
 """
 
 from __future__ import annotations
@@ -26,10 +27,19 @@ def continuity(ledger: Ledger, index: Index, anchors: Sequence[Anchor] = ()) -> 
         found.append(Discrepancy(Fault.LEDGER, ledger.path.name, text))
     found += _history(ledger, statements)
     found += _reached(ledger, statements, places)
+    until = max((at for at, s in enumerate(statements) if s.event is Event.ACKNOWLEDGED), default=-1)
+    seen = {statement.head for statement in statements[: until + 1]}
     for anchor in anchors:
         if anchor.system == system and anchor.head not in places:
-            found.append(Discrepancy(Fault.REPLACED, anchor.where, _of_another(ledger, anchor)))
+            text, serious = _of_another(ledger, anchor), anchor.head not in seen
+            found.append(Discrepancy(Fault.REPLACED, anchor.where, text, serious))
     return tuple(dict.fromkeys(found))
+
+
+def acknowledged(index: Index, system: str) -> Statement | None:
+    """The newest acknowledgement."""
+    found = [s for s in index.of(system) if s.event is Event.ACKNOWLEDGED]
+    return found[-1] if found else None
 
 
 def _of_another(ledger: Ledger, anchor: Anchor) -> str:
@@ -43,34 +53,40 @@ def began(index: Index, system: str) -> bool:
 
 
 def _history(ledger: Ledger, statements: Sequence[Statement]) -> Iterable[Discrepancy]:
-    """What is told for ever after, and makes nothing unsound: what is here now was computed anew."""
+    """What was lost, told for ever after; open until a later line acknowledges it."""
     name, records = ledger.path.name, 0
+    until = max((at for at, s in enumerate(statements) if s.event is Event.ACKNOWLEDGED), default=-1)
     if statements and statements[0].event is Event.REACHED:
         text = f"the index of ledgers found {name} with records already in it: it was itself deleted, or is younger"
-        yield Discrepancy(Fault.REPLACED, name, text, serious=False)
-    for statement in statements:
+        yield Discrepancy(Fault.REPLACED, name, text, serious=until < 0)
+    for at, statement in enumerate(statements):
         match statement.event:
             case Event.BEGAN:
                 if records:
                     text = f"{name} was deleted and begun anew on {statement.time}: {records} records are lost"
-                    yield Discrepancy(Fault.REPLACED, name, text, serious=False)
+                    yield Discrepancy(Fault.REPLACED, name, text, serious=at > until)
                 records = 0
             case Event.REACHED:
                 records = statement.records
             case Event.LOST:
                 text = (
-                    f"{name} was begun anew: the report that stood here on {statement.time} was made of another "
-                    f"ledger, up to record {statement.head[:12]}…"
+                    f"{name} was begun anew, cut or rolled back: the report that stood here on {statement.time} was "
+                    f"made of another ledger, up to record {statement.head[:12]}…"
                 )
+                yield Discrepancy(Fault.REPLACED, name, text, serious=at > until)
+            case Event.ACKNOWLEDGED:
+                records = statement.records
+                text = f"what was lost before {statement.time} was acknowledged by {statement.note}"
                 yield Discrepancy(Fault.REPLACED, name, text, serious=False)
 
 
 def _reached(ledger: Ledger, statements: Sequence[Statement], places: dict[str, int]) -> Iterable[Discrepancy]:
     """How far it was seen to reach since it last began."""
-    since = max((at for at, s in enumerate(statements) if s.event is Event.BEGAN), default=0)
+    starts = (Event.BEGAN, Event.ACKNOWLEDGED)
+    since = max((at for at, s in enumerate(statements) if s.event in starts), default=0)
     name = ledger.path.name
     for statement in statements[since:]:
-        if statement.event is not Event.REACHED or statement.head == GENESIS:
+        if statement.event not in (Event.REACHED, Event.ACKNOWLEDGED) or statement.head == GENESIS:
             continue
         if not ledger.path.is_file():
             text = f"{name} is gone: on {statement.time} it had {statement.records} records"

@@ -8,6 +8,8 @@ the ledgers stands ``index``, a file of chained lines of its own:
 - ``began``: the first record of a ledger is about to be written. A second one says that the file was deleted meanwhile.
 - ``reached``: a report was made of so many records, up to that one. They must be in the ledger for ever after.
 - ``lost``: a report stood here that was made of another ledger than the one that began.
+- ``acknowledged``: a person has seen what the lines before say is lost or damaged, and why; with name and reason. What
+  comes to light later is another matter.
 
 Reports and attestations name the head as well (`stated_head`), and may be kept elsewhere. Nothing of this is secret:
 somebody who writes ledger, index *and* reports anew is only found out by a signature or by a copy kept elsewhere.
@@ -35,6 +37,7 @@ class Event(StrEnum):
     BEGAN = "began"
     REACHED = "reached"
     LOST = "lost"
+    ACKNOWLEDGED = "acknowledged"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +49,10 @@ class Statement:
     records: int
     head: str
     time: str
+    note: str = ""
+    """Who acknowledged, and why."""
+    state: str = ""
+    """Digest of the damage that was acknowledged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +104,9 @@ def read_index(path: Path) -> Index:
     return Index(tuple(found), tuple(marks), tuple(damage), True)
 
 
-def note(path: Path, event: Event, system: str, records: int = 0, head: str = GENESIS) -> None:
-    """Add a line, unless the newest of that system says the same. Raises OSError: then nothing was added."""
+def note(path: Path, event: Event, system: str, records: int = 0, head: str = GENESIS, **more: str) -> None:
+    """Add a line, unless the newest of that system says the same; `more` are `Statement.note` and `.state`. Raises
+    OSError: then nothing was added."""
     if event is not Event.BEGAN and _is_newest(read_index(path), event, system, records, head):
         return
     with locked(path) as file:
@@ -115,6 +123,7 @@ def note(path: Path, event: Event, system: str, records: int = 0, head: str = GE
             "records": records,
             "system": system,
             "time": datetime.now(UTC).isoformat(timespec="seconds"),
+            **more,
         }
         append(file, canonical({**body, "hash": digest(canonical(body))}).encode() + b"\n")
 
@@ -131,7 +140,13 @@ def _read(line: bytes) -> tuple[Statement, int, str, str] | None:
         body = {key: value for key, value in data.items() if key != "hash"}
         written = canonical({**body, "hash": digest(canonical(body))}).encode()
         statement = Statement(
-            Event(data["event"]), str(data["system"]), int(data["records"]), str(data["head"]), str(data["time"])
+            Event(data["event"]),
+            str(data["system"]),
+            int(data["records"]),
+            str(data["head"]),
+            str(data["time"]),
+            str(data.get("note", "")),
+            str(data.get("state", "")),
         )
         place, mark, follows = int(data["n"]), str(data["hash"]), str(data["prev"])
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):

@@ -132,6 +132,13 @@ class Ledger:
                 write(self._head_file, canonical({"hash": previous, "records": number}) + "\n")
             return tuple(result)
 
+    def accept_end(self) -> None:
+        """The newest record that is there is the newest that there has to be. Raises OSError."""
+        with self._lock, locked(self.path) as file:
+            self._mend(file)
+            self._refresh()
+            write(self._head_file, canonical({"hash": self._stated_head, "records": self._lines}) + "\n")
+
     # -- inside -------------------------------------------------------------------------------------------------
 
     def _forget(self) -> None:

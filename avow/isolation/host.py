@@ -303,7 +303,9 @@ def main() -> None:
             return
         for line in requests:
             say({"replies": [answer(subject, known, request) for request in json.loads(line)]})
+        told = seen[:]
         processes = [int(name) for name in os.listdir("/proc") if name.isdigit()] if level == "sealed" else []  # noqa: PTH208
+        seen[:] = told  # that was us
         if set(processes) - {1, os.getpid()}:
             faults.append("left processes behind")
         say({"end": True})

@@ -80,8 +80,8 @@ def _kind(event: str, path: str) -> Seen | None:
         return Seen.OUTSIDE
     if _of_python(path):
         return None
-    if path.startswith(("/proc/", "/sys/")):
-        return Seen.OUTSIDE if event == "read" else None
+    if f"{path}/".startswith(("/proc/", "/sys/")):
+        return None if event == "state" else Seen.OUTSIDE
     try:
         mode = os.stat(path).st_mode  # noqa: PTH116
     except (OSError, ValueError):

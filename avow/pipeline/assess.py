@@ -17,7 +17,8 @@ from avow import __version__
 from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Rejected
-from avow.base.files import digest, digest_file, is_intact, write
+from avow.base.files import digest, digest_file, is_intact
+from avow.base.notes import read_note, write_note
 from avow.base.workspace import Workspace
 from avow.evidence.continuity import continuity
 from avow.evidence.currency import as_of_now, stands
@@ -76,7 +77,16 @@ def is_settled() -> bool:
 
 def index_is_due() -> bool:
     """Whether the page over all systems no longer shows what its systems' reports show."""
-    return bool(_changed) or any(not (a.workspace.reports / "index.html").is_file() for a in _known if finished())
+    return bool(_changed) or any(not _overview_stands(a.workspace) for a in _known if finished())
+
+
+def _overview_stands(workspace: Workspace) -> bool:
+    known = read_note(workspace.artifacts / OVERVIEW) or {}
+    return is_intact(workspace.reports / "index.html", str(known.get("sha256")))
+
+
+OVERVIEW = ".overview.json"
+"""Beside the artifacts: the digest of the page over all systems, as it was written."""
 
 
 def render(assessment: Assessment) -> Result:
@@ -95,7 +105,7 @@ def render(assessment: Assessment) -> Result:
         rendered = render_all(case, assessment.workspace.report(assessment.system))
         result = _summarise(assessment, case, rendered.left_out)
         files = {assessment.workspace.relative(p): digest_file(p) for p in rendered.written}
-        write(assessment.stamp, json.dumps({"key": key, "files": files, **result.json()}, indent=1))
+        write_note(assessment.stamp, {"key": key, "files": files, **result.json()})
         _changed.append(assessment.system)
     confirm(assessment.workspace, ledger)
     return result
@@ -229,9 +239,9 @@ def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, st
 
 
 def _read(assessment: Assessment) -> dict[str, Any] | None:
+    data = read_note(assessment.stamp)
     try:
-        data = json.loads(assessment.stamp.read_text())
-        read_result(data)
-    except (OSError, ValueError, KeyError, TypeError):
+        read_result(data or {})
+    except (ValueError, KeyError, TypeError):
         return None
-    return data if isinstance(data, dict) and isinstance(data.get("files"), dict) else None
+    return data if data and isinstance(data.get("files"), dict) else None

@@ -11,7 +11,8 @@ from doit.exceptions import TaskError
 
 from avow.backend_kit.protocol import COMMON_OPTIONS
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
-from avow.base.files import digest_file, write
+from avow.base.files import digest_file
+from avow.base.notes import read_note, write_note
 from avow.base.workspace import Workspace
 from avow.pipeline.work import ENGINES, method_backend, method_job
 from avow.pipeline.workload import Survey
@@ -19,10 +20,8 @@ from avow.system.plan import Located, Method, System
 
 
 def is_current(workspace: Workspace, surveyed: Survey) -> bool:
-    try:
-        return bool(json.loads(_stamp(workspace, surveyed).read_text())["key"] == _key(surveyed))
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
+    stamp = read_note(_stamp(workspace, surveyed))
+    return stamp is not None and stamp.get("key") == _key(surveyed)
 
 
 def check(workspace: Workspace, surveyed: Survey) -> None:
@@ -33,10 +32,7 @@ def check(workspace: Workspace, surveyed: Survey) -> None:
         raise Rejected(*found)
     show(found)
     warnings = [f"{d.span}: {d.message} [{d.code}]" for d in found if d.severity is Severity.WARNING]
-    write(
-        _stamp(workspace, surveyed),
-        json.dumps({"key": _key(surveyed), "warnings": warnings}, indent=1),
-    )
+    write_note(_stamp(workspace, surveyed), {"key": _key(surveyed), "warnings": warnings})
 
 
 def diagnostics(system: System) -> tuple[Diagnostic, ...]:

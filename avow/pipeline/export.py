@@ -8,6 +8,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import digest, is_intact, write
+from avow.base.notes import read_note, write_note
 from avow.base.workspace import Workspace
 from avow.pipeline.work import Work, method_backend, method_job, planned_method
 
@@ -48,16 +49,13 @@ def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:
     for name, text in files.items():
         write(place / name, text)
     digests = {name: digest(text) for name, text in sorted(files.items())}
-    write(place / STAMP, json.dumps({"key": key, "files": digests}, indent=1))
+    write_note(place / STAMP, {"key": key, "files": digests})
     return tuple(sorted(files))
 
 
 def read_stamp(place: Path) -> dict[str, Any] | None:
-    try:
-        stamp = json.loads((place / STAMP).read_text())
-    except (OSError, ValueError):
-        return None
-    if not isinstance(stamp, dict) or not isinstance(stamp.get("files"), dict):
+    stamp = read_note(place / STAMP)
+    if stamp is None or not isinstance(stamp.get("files"), dict):
         return None
     # what is listed here is removed once it is generated no more: never what lies elsewhere
     return stamp if all(_is_within(name) for name in stamp["files"]) else None

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from avow.pipeline.assess import Assessment, build
+from avow.base.files import digest_file
+from avow.base.notes import write_note
+from avow.pipeline.assess import OVERVIEW, Assessment, build
 
 
 def write_overview(assessments: Sequence[Assessment]) -> None:
@@ -13,4 +15,7 @@ def write_overview(assessments: Sequence[Assessment]) -> None:
 
     cases = [build(a) for a in assessments if a.workspace.ledger(a.system).is_file()]
     if cases:
-        write_index(cases, assessments[0].workspace.reports)
+        workspace = assessments[0].workspace
+        write_index(cases, workspace.reports)
+        page = digest_file(workspace.reports / "index.html")
+        write_note(workspace.artifacts / OVERVIEW, {"sha256": page})

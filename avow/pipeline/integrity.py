@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 
 from avow.backend_kit.registry import backend, names
+from avow.base.files import digest
 from avow.base.workspace import Workspace
 from avow.evidence.audit import Discrepancy, Fault, audit
-from avow.evidence.continuity import began, continuity
-from avow.evidence.heads import Anchor, Event, index_path, note, read_index, stated_heads
-from avow.evidence.ledger import Ledger
+from avow.evidence.continuity import acknowledged, began, continuity
+from avow.evidence.heads import GENESIS, Anchor, Event, Index, index_path, note, read_index, stated_heads
+from avow.evidence.ledger import Damage, Ledger
 from avow.pipeline.workload import Survey
 
 
@@ -40,7 +43,48 @@ def discrepancies(
     )
     index = read_index(index_path(workspace.ledgers))
     unread = () if surveyed else (_unread(system),)
+    known = _known_damage(ledger, index)
+    found = tuple(replace(d, serious=False) if d.subject in known else d for d in found)
     return (*continuity(ledger, index, anchors), *found, *unread)
+
+
+def _known_damage(ledger: Ledger, index: Index) -> frozenset[str]:
+    """The damaged lines that a person has acknowledged, as the audit names them; none as soon as one is another."""
+    statement = acknowledged(index, ledger.path.stem)
+    if statement is None:
+        return frozenset()
+    old = [d for d in ledger.damage if d.line <= statement.records]
+    return frozenset(f"line {d.line}" for d in old) if _state(old) == statement.state else frozenset()
+
+
+def _state(damage: Sequence[Damage]) -> str:
+    return digest(json.dumps([[d.line, d.reason] for d in damage]))
+
+
+def settle_losses(workspace: Workspace, system: str, who: str, why: str) -> tuple[Discrepancy, ...]:
+    """A person has seen what is lost or damaged of a ledger: noted in the index, so that it is no longer open. What was
+    open; nothing is written if nothing was. Raises OSError."""
+    ledger, path = Ledger(workspace.ledger(system)), index_path(workspace.ledgers)
+    acknowledge(workspace, ledger)
+    index, anchors = read_index(path), reported_heads(workspace, system)
+    known = _known_damage(ledger, index)
+    lines = [d for d in ledger.damage if f"line {d.line}" not in known]
+    found = [d for d in continuity(ledger, index, anchors) if d.serious]
+    found += [Discrepancy(Fault.LEDGER, f"line {d.line}", f"ledger line {d.line} {d.reason}") for d in lines]
+    if not found:
+        return ()
+    if index.damage:
+        path.rename(path.with_name(f"{path.name}.damaged-{datetime.now(UTC):%Y%m%dT%H%M%S%f}"))
+        for other in index.systems:  # what the others were known to reach stays known
+            for statement in index.of(other):
+                more = {"note": statement.note, "state": statement.state} if statement.note else {}
+                note(path, statement.event, other, statement.records, statement.head, **more)
+    ledger.accept_end()
+    entries, damage = ledger.records(), ledger.damage
+    head = entries[-1].hash if entries else GENESIS
+    lines_now = max([e.number + 1 for e in entries] + [d.line for d in damage], default=0)
+    note(path, Event.ACKNOWLEDGED, system, lines_now, head, note=f"{who}: {why}", state=_state(damage))
+    return tuple(found)
 
 
 def _unread(system: str) -> Discrepancy:
@@ -67,7 +111,9 @@ def acknowledge(workspace: Workspace, ledger: Ledger) -> None:
 def confirm(workspace: Workspace, ledger: Ledger) -> None:
     """Note how far the ledger reaches, unless it is not the one that it should be. Raises OSError."""
     entries, path = ledger.records(), index_path(workspace.ledgers)
-    if entries and not ledger.damage and not any(d.serious for d in continuity(ledger, read_index(path))):
+    known = _known_damage(ledger, read_index(path))
+    damaged = any(f"line {d.line}" not in known for d in ledger.damage)
+    if entries and not damaged and not any(d.serious for d in continuity(ledger, read_index(path))):
         note(path, Event.REACHED, ledger.path.stem, entries[-1].number + 1, entries[-1].hash)
 
 

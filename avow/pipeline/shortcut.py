@@ -18,7 +18,7 @@ from datetime import datetime
 from pathlib import Path
 
 import avow.backends
-from avow.base.files import write
+from avow.base.notes import read_note, write_note
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
 from avow.isolation.observed import Observed, Seen, from_json, look, to_json
@@ -41,7 +41,7 @@ def nothing_to_do(workspace: Workspace, wanted: Sequence[str]) -> tuple[Result, 
     if not wanted or any(name.split(":")[0] != "verify" for name in wanted) or os.environ.get(FRESH):
         return None
     try:
-        kept = json.loads(_stamp(workspace).read_text())
+        kept = read_note(_stamp(workspace)) or {}
         results = tuple(read_result(r) for r in kept["results"])
         observed = from_json(kept["observed"])
         if kept["identity"] != _identity(workspace, observed):
@@ -65,7 +65,7 @@ def keep(workspace: Workspace, results: Sequence[Result]) -> None:
             "observed": to_json(observed),
             "results": [r.json() for r in results],
         }
-        write(_stamp(workspace), json.dumps(kept))
+        write_note(_stamp(workspace), kept)
     except OSError:
         return
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
+from helpers import edit
+
+from avow.base.notes import write_note
 from avow.base.workspace import Workspace
 from avow.pipeline.export import read_stamp
 from avow.pipeline.workload import Survey, survey, write_obligations
@@ -25,7 +27,9 @@ def test_obligations_that_are_no_text(workspace: Path) -> None:
 
 def test_a_stamp_names_no_file_elsewhere(tmp_path: Path) -> None:
     for name in ("../../plan.yaml", "/etc/passwd", "a/../../b"):
-        (tmp_path / ".export.json").write_text(json.dumps({"key": "k", "files": {name: "0"}}))
+        write_note(tmp_path / ".export.json", {"key": "k", "files": {name: "0"}})
         assert read_stamp(tmp_path) is None
-    (tmp_path / ".export.json").write_text(json.dumps({"key": "k", "files": {"a/b": "0"}}))
+    write_note(tmp_path / ".export.json", {"key": "k", "files": {"a/b": "0"}})
     assert read_stamp(tmp_path) is not None
+    edit(tmp_path / ".export.json", ("a/b", "a/c"))
+    assert read_stamp(tmp_path) is None, "an edited note is none"

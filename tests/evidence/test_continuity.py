@@ -105,15 +105,72 @@ def test_deleted_with_the_index_it_is_missed_by_the_report(place: Workspace) -> 
     assert "gone with the whole ledger" in text
 
 
-def test_beginning_anew_is_allowed_and_told_for_ever_after(place: Workspace) -> None:
+def test_beginning_anew_is_open_until_acknowledged_and_told_for_ever_after(place: Workspace) -> None:
     run(place, *TRUE)
     forget(place)
     run(place, evidence("n.b", run="later"))
     for _ in range(2):
-        assert told(place) == [(Fault.REPLACED, False)]
+        assert told(place) == [(Fault.REPLACED, True)]
         run(place, evidence("n.b", run="even later"))
+    assert audit()[0] == 1
+    assert audit("--acknowledge", "a disk was lost")[0] == 2, "somebody has to say it"
+    assert audit("--acknowledge", "a disk was lost", "--as", "A. Person")[0] == 0
+    run(place, evidence("n.b", run="after that"))
+    code, text = audit()
+    assert code == 0
+    assert "2 records are lost" in text
+    assert "A. Person: a disk was lost" in text
+
+
+DAMAGES = {
+    "cut": lambda data: b"".join(data.splitlines(True)[:2]),
+    "edited": lambda data: data.replace(b'"refuted"', b'"proved"', 1),
+    "a line gone": lambda data: b"".join(data.splitlines(True)[1:]),
+    "junk": lambda data: data + b"junk\n",
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_damage_is_open_until_acknowledged_and_new_damage_is_open_again(place: Workspace, name: str) -> None:
+    run(place, *TRUE, evidence("n.c", Verdict.REFUTED))
+    path = place.ledger("rover")
+    damaged = DAMAGES[name](path.read_bytes())
+    assert damaged != path.read_bytes()
+    path.write_bytes(damaged)
+    for _ in range(2):  # no run heals it
+        run(place, evidence("n.d"))
+        assert audit()[0] == 1
+    assert audit("--acknowledge", "seen", "--as", "A. Person")[0] == 0
+    run(place, evidence("n.e"))
     assert audit()[0] == 0
-    assert "2 records are lost" in audit()[1]
+    lines = path.read_bytes().splitlines(True)
+    path.write_bytes(b"".join(lines[:-1]))
+    assert audit()[0] == 1
+
+
+def test_an_old_folder_of_ledgers_that_is_restored_is_missed(place: Workspace) -> None:
+    run(place, evidence("n.a"))
+    old = {path: path.read_bytes() for path in place.ledgers.iterdir()}
+    run(place, evidence("n.b", Verdict.REFUTED))
+    for path in place.ledgers.iterdir():
+        path.unlink()
+    for path, data in old.items():
+        path.write_bytes(data)
+    for _ in range(2):
+        run(place, evidence("n.c"))
+        assert (Fault.REPLACED, True) in told(place)
+
+
+def test_an_index_that_is_damaged_is_open_until_acknowledged(place: Workspace) -> None:
+    run(place, *TRUE)
+    path = index_path(place.ledgers)
+    path.write_bytes(path.read_bytes().replace(b'"records":2', b'"records":1'))
+    run(place)
+    assert audit()[0] == 1
+    assert audit("--acknowledge", "seen", "--as", "A. Person")[0] == 0
+    assert list(place.ledgers.glob("index.damaged-*"))
+    run(place, evidence("n.e"))
+    assert audit()[0] == 0
 
 
 def test_beginning_anew_without_an_index_is_told_by_what_the_report_said(place: Workspace) -> None:
@@ -121,7 +178,7 @@ def test_beginning_anew_without_an_index_is_told_by_what_the_report_said(place: 
     forget(place, index=True)
     run(place, evidence("n.b", run="later"))
     run(place)
-    assert told(place) == [(Fault.REPLACED, False)]
+    assert told(place) == [(Fault.REPLACED, True)]
     assert began(read_index(index_path(place.ledgers)), "rover")
 
 
@@ -147,7 +204,7 @@ def test_an_index_that_was_made_later_says_so(place: Workspace) -> None:
     index_path(place.ledgers).unlink()
     assert audit()[0] == 1
     run(place)
-    assert told(place) == [(Fault.REPLACED, False)]
+    assert told(place) == [(Fault.REPLACED, True)]
 
 
 def test_whoever_writes_everything_anew_is_found_by_a_copy_kept_elsewhere(place: Workspace, tmp_path: Path) -> None:

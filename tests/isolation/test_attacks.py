@@ -114,6 +114,16 @@ def _command(process: Path) -> str:
         return ""
 
 
+@pytest.mark.parametrize("level", LEVELS)
+def test_a_subject_that_looks_at_nothing_was_seen_to_look_at_nothing(
+    tmp_path: Path, level: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(SANDBOX, level)
+    python, subject = settle(tmp_path, f"def step(**inputs):\n    {WRONG}").observed
+    assert Path(python.path).name.startswith("python")
+    assert subject.path == str(tmp_path / "s.py")
+
+
 def test_the_level_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(SANDBOX, "off")
     assert settle(tmp_path, f"def step(**inputs):\n    {WRONG}").isolation is Isolation.PROCESSES

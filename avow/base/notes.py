@@ -1,0 +1,79 @@
+"""Notes that only save time: what was found before, bound to this user by a keyed digest.
+
+Whatever a note says could be worked out again. So one that was edited, made up or carried here from another machine
+is no note at all: the long way is gone, and ends where the files say. The key lies in the user's cache folder, not in
+the workspace. It keeps a verdict from being edited; it is no signature, and nothing that is to be believed elsewhere
+rests on it.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import hmac
+import json
+import os
+import secrets
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from avow.base.files import PART, read_regular, write
+
+_MARK = "mark"
+
+
+def write_note(path: Path, data: Mapping[str, Any]) -> None:
+    """Raises OSError."""
+    body = dict(data)
+    write(path, json.dumps({**body, _MARK: _mark(path, body)}, indent=1) + "\n")
+
+
+def read_note(path: Path) -> dict[str, Any] | None:
+    """What this user's Avow wrote there, and nothing else."""
+    try:
+        data = json.loads(read_regular(path))
+        mark = data.pop(_MARK)
+        good = hmac.compare_digest(mark, _mark(path, data))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+    return data if good else None
+
+
+def cache_folder() -> Path:
+    """Where this user's caches lie."""
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(base) / "avow"
+
+
+def _mark(path: Path, body: Mapping[str, Any]) -> str:
+    """Of one place: a note that is copied to another says nothing there."""
+    text = json.dumps([str(path.absolute()), body], sort_keys=True)
+    return hmac.new(_key(str(cache_folder())), text.encode("utf-8", "surrogatepass"), hashlib.sha256).hexdigest()
+
+
+@functools.cache
+def _key(folder: str) -> bytes:
+    """Made when it is first needed; where it cannot be kept, one for this process alone."""
+    path = Path(folder) / "notes.key"
+    try:
+        return bytes.fromhex(path.read_text())
+    except (OSError, ValueError):
+        pass
+    key = secrets.token_bytes(32)
+    part = path.with_name(f".{path.name}.{os.getpid()}{PART}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(handle, "w") as file:
+            file.write(key.hex())
+        try:
+            os.link(part, path)  # of two that make one at once, the first
+        finally:
+            part.unlink()
+    except OSError:
+        pass
+    try:
+        return bytes.fromhex(path.read_text())
+    except (OSError, ValueError):
+        return key
