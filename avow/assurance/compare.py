@@ -72,7 +72,7 @@ class Change:
                 return f"gate {self.subject}: {self.before} → {self.after}"
             case "rerun":
                 return f"asked again: {self.subject} (still {self.after})"
-            case _:
+            case _:  # worse, better, gate: all are told the same way
                 return f"{self.kind}: {self.subject}: {self.before} → {self.after}"
 
 
@@ -160,7 +160,7 @@ def _gone(item: EvidenceView, view: ObligationView) -> str:
             return "the plan no longer uses the method for this claim"
         case Currency.SET_ASIDE:
             return "this run believed no earlier answer"
-        case _:
+        case _:  # current: another answer was preferred to it
             return "a newer answer takes its place"
 
 

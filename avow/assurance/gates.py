@@ -334,7 +334,7 @@ def _asked(kind: Kind, facts: Facts) -> Sequence[Status]:
             return facts.policy.composition
         case Kind.REQUIREMENT:
             return facts.policy.requirements
-        case _:
+        case _:  # its gate names no methods
             return ()
 
 

@@ -129,7 +129,7 @@ def read_policy(located: Located) -> Policy:
             found, faults = _profile(name, located.at())
         case Mapping():
             found, faults = _rules(located)
-        case _:
+        case _:  # a number or a list
             fault = "policy is a profile's name or a mapping of rules"
             found, faults = profile("default"), [Diagnostic("POLICY002", fault, located.at())]
     if faults:

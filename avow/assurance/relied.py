@@ -134,7 +134,7 @@ def seen(relied: Relied) -> str:
             return f"observed {count(bound['judged'], 'time')}{on}"
         case Status.REVIEWED:
             return "read by a person who accepts it" + (" on conditions" if relied.record.hypotheses else "")
-        case _:
+        case _:  # no status of the others bounds how often it fails
             return f"{word(relied.status)}, without a bound on failures"
 
 

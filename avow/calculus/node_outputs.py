@@ -108,7 +108,7 @@ def possible(world: World, node: str, port: Port) -> Choices:
                 unknown = f"the elements of {node}.{port.name} are not known"
                 short = f"sequences of more than {MAX_LENGTH} elements are not tried for {node}.{port.name}"
                 return Choices(world.plain_values(item), unknown, shells, short)
-            case _:
+            case _:  # any sort whose values can be tried
                 return Choices(world.candidates(node, port))
     except CannotRun as reason:
         shells = (FunctionValue({}, ANY),) if isinstance(sort, FunctionSort) else None  # type: ignore[assignment]

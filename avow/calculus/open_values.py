@@ -53,7 +53,7 @@ def is_open(value: Value) -> bool:
             return default is ANY
         case values_.Sequence(items=items):
             return any(item is ANY for item in items)
-        case _:
+        case _:  # other values are known as a whole
             return False
 
 
@@ -225,5 +225,5 @@ def asking(value: Value) -> bool:
             return isinstance(items, _OpenItems) or any(map(asking, items))
         case Data(arguments=items) | tuple(items):
             return any(map(asking, items))
-        case _:
+        case _:  # a value without parts
             return False

@@ -136,7 +136,7 @@ def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
             # The providers' own contracts leave no room for anything: a finding of theirs.
             verdict, text = Verdict.REFUTED, f"{listing(answer.core)} cannot hold together: no value comes from there"
             because = f"{_owner(answer.core)}/consistent"
-        case _:
+        case _:  # unknown
             verdict, text = Verdict.UNKNOWN, answer.reason
     return SanityResult(
         node.name,

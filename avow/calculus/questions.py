@@ -215,7 +215,7 @@ class LoopQuestion:
                 return Answer(Verdict.REFUTED, loop.note, Counterexample(explanation=loop.note), details=details)
             case _ if self.entered:
                 return Answer(Verdict.JUSTIFIED, self.entered, details=details, link=Link.GUIDED)
-            case _:
+            case _:  # neither well-founded nor shown to be circular
                 return Answer(Verdict.UNKNOWN, loop.note, details=details)
 
 
@@ -246,7 +246,7 @@ class StartQuestion:
             case "unsat":
                 summary = f"no values are as the plan says: {', '.join(solution.core)}"
                 return Answer(Verdict.REFUTED, summary, Counterexample(explanation=summary))
-            case _:
+            case _:  # unknown
                 return Answer(Verdict.UNKNOWN, f"whether there are such initial values: {solution.reason}")
 
 

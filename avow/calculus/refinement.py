@@ -128,7 +128,7 @@ def _kept_by_something(
             return replace(found, unrealizable=Counterexample(show_values(answer.inputs), what))
         case Verdict.PROVED:
             return found
-        case _:
+        case _:  # no answer: a doubt, never a proof
             return replace(found, doubt=answer.reason or "no answer in time")
 
 
@@ -252,5 +252,5 @@ def _mapped(sort: Sort, mapping: dict[Sort, Sort]) -> Sort:
             return TupleSort(tuple(_mapped(item, mapping) for item in sort.items))
         case SequenceSort():
             return SequenceSort(_mapped(sort.item, mapping))
-        case _:
+        case _:  # a sort without parts
             return sort

@@ -88,7 +88,7 @@ class Offer:
                 return f"{self.of} also had guarantee ( {shown} )"
             case "environment":
                 return f"of the environment it were also assumed that ( {shown} )"
-            case _:
+            case _:  # initial
                 return f"the first value of {self.of} met ( {shown} )"
 
     def data(self, when: str = "") -> dict[str, object]:

@@ -237,7 +237,7 @@ class _Builder:
                     if all(source in self.providers(sink) for source in sources):
                         return self.union([self.premise(source) for source in sources], sources, sink)
                 return None
-            case _:
+            case _:  # R4
                 whole = self.found()
                 return whole if any(part.rule is Rule.R4 for part in whole.walk()) else None
 

@@ -74,7 +74,7 @@ class Seeded:
                     return {value(k): value(v) for k, v in old.items()}
                 case list() | tuple():
                     return [value(item) for item in old]
-                case _:
+                case _:  # nothing in it to change
                     return old
 
         return replace(

@@ -91,7 +91,7 @@ def finite_values(sort: Sort, domains: Domains | None = None) -> tuple[Value, ..
                     return None
                 found.extend(Data(constructor.name, a) for a in arguments)
             return tuple(found)
-        case _:
+        case _:  # infinitely many, or unspecified
             return None
 
 
@@ -365,5 +365,5 @@ def member_of(sort: Sort, domains: Domains) -> Callable[[Any], bool] | None:
             return lambda value: value.__class__ is int
         case RealSort() | StringSort():
             return None
-        case _:
+        case _:  # values of the others are found within their range
             return None

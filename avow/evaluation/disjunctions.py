@@ -73,7 +73,7 @@ def conjunction(term: Term, positive: bool) -> tuple[list[Part], list[Variable]]
                 stack.append((left, positive is ((operator == "==") is value)))
             case Compare(operator="==" | "!=" as operator, left=Literal(value=bool() as value), right=right):
                 stack.append((right, positive is ((operator == "==") is value)))
-            case _:
+            case _:  # a part that is judged as a whole
                 parts.append(Part(term, positive, bound_names(term)))
     return parts, variables
 
@@ -97,7 +97,7 @@ def alternatives(term: Term, positive: bool) -> tuple[tuple[Term, bool], ...] | 
             return alternatives(Iff(left, right), not positive)
         case Conditional(condition=condition, then=then, otherwise=otherwise):
             return ((_both(condition, then, positive), True), (_both(Not(condition), otherwise, positive), True))
-        case _:
+        case _:  # no disjunction: evaluated as a whole
             return None
 
 

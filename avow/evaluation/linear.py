@@ -59,7 +59,7 @@ class Constraint:
                 return value < 0
             case "<=":
                 return value <= 0
-            case _:
+            case _:  # ==
                 return value == 0
 
 

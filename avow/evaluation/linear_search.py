@@ -86,7 +86,7 @@ def _formula(compiler: Compiler, term: Term, positive: bool, unknown: frozenset[
             return _for_all(compiler, term, False, unknown)
         case Quantified(quantifier=Quantifier.EXISTS) if not positive:
             return _for_all(compiler, term, True, unknown)
-        case _:
+        case _:  # not a system of inequalities: searched in another way
             return None
 
 
@@ -178,7 +178,7 @@ def _linear(compiler: Compiler, term: Term, unknown: frozenset[str]) -> _Sum | N
         case Arithmetic(operator="/", left=left, right=right):
             divisor = _known(compiler, right)
             return _scaled(_linear(compiler, left, unknown), 1 / divisor) if divisor else None
-        case _:
+        case _:  # not linear: searched in another way
             return None
 
 

@@ -67,7 +67,7 @@ def pattern(compiler: Compiler, term: Term, unbound: set[str]) -> Match | None:
             return lambda env, value: plain(env, -value)
         case Arithmetic():
             return _arithmetic(compiler, term, unbound)
-        case _:
+        case _:  # no unique inverse: nothing is bound by it
             return None
 
 
@@ -146,7 +146,7 @@ def _arithmetic(compiler: Compiler, term: Arithmetic, unbound: set[str]) -> Matc
                 if fixed == 0:
                     raise NotEvaluable("division by zero")
                 return match_inner(env, value * fixed)
-            case _:
+            case _:  # *
                 if fixed == 0:
                     if value == 0:
                         raise NotEvaluable("a product with zero leaves its other factor open")

@@ -261,7 +261,7 @@ class Plan:
                 return self._equation(term.left, term.right, unbound) or self._equation(term.right, term.left, unbound)
             case In() if positive:
                 return self._membership(term, unbound)
-            case _:
+            case _:  # restricts no variable to finitely many values
                 return None
 
     def _cover(

@@ -109,7 +109,7 @@ def _representatives(sort: Sort, named: set[Any], ordered: bool, copies: int) ->
         case IntegerSort():
             top, bottom = max([0, *named]), min([0, *named])
             return [*sorted(named), *(s for k in range(1, copies + 1) for s in (top + k, bottom - k))]
-        case _:
+        case _:  # REAL: the only other carrier
             points = sorted(map(Fraction, named)) or [Fraction(0)]
             found = [*points, *(points[-1] + k for k in range(1, copies + 1))]
             if ordered:
@@ -154,7 +154,7 @@ class _Survey:
                 if any(v.sort in self.compiler.domains and self._hot(v) for v in variables):
                     return False
                 return self.formula(body, inner | {v.name for v in variables})
-            case _:
+            case _:  # alike if all its parts are: a variable of the carrier alone in it is not
                 return all(self.formula(child, inner) for child in term.children)
 
     def operand(self, term: Term, inner: frozenset[str]) -> bool:
@@ -174,7 +174,7 @@ class _Survey:
             case Index(sequence=sequence, index=index) if self._closed(sequence, inner):
                 self.constants.append(self.compiler.code(sequence))
                 return self.formula(index, inner)
-            case _:
+            case _:  # its value depends on the variable: refused
                 return False
 
     def _apply(self, term: Apply, inner: frozenset[str]) -> bool:
@@ -209,7 +209,7 @@ def _carrier(sort: Sort) -> str | None:
             return "integer"
         case StringSort():
             return "string"
-        case _:
+        case _:  # no carrier: its values are told apart in another way
             return None
 
 
@@ -240,6 +240,6 @@ def _collect(value: Any, carrier: str, found: set[Any]) -> None:
         case int():
             if carrier != "string":
                 found.add(value)
-        case _:
+        case _:  # a fraction, or a value without numbers
             if carrier == "real" and hasattr(value, "denominator"):
                 found.add(value)

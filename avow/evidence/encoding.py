@@ -39,7 +39,7 @@ def plain(value: object) -> Any:
             return sorted((plain(item) for item in value), key=canonical)
         case list() | tuple():
             return [plain(item) for item in value]
-        case _:
+        case _:  # what JSON has no form for
             return str(value)
 
 

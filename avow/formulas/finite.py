@@ -78,6 +78,6 @@ def _terms(values: Sequence[Value], sort: Sort) -> list[Term]:
                 found.append(Literal(value, sort))
             case StringSort(), str():
                 found.append(Literal(value, sort))
-            case _:
+            case _:  # no simple term: the sort keeps its range
                 return []
     return found

@@ -277,7 +277,7 @@ def _normal(term: Term, scope: Mapping[Variable, Variable], level: int) -> Steps
             return _make(term, sorted({key: (part, key) for part, key in parts}.values(), key=_key))
         case Literal() | EnumValue():
             return _keyed(term)
-        case _:
+        case _:  # its normal form is that of its parts, in their order
             return _make(term, parts)
 
 

@@ -68,7 +68,7 @@ def _push(term: Term, positive: bool) -> Steps[Term]:
         case Quantified(quantifier=quantifier, variables=variables, body=body) if positive or quantifier in _DUAL:
             inner: Term = yield _push(body, positive if quantifier in _DUAL else True)
             return Quantified(quantifier if positive else _DUAL[quantifier], variables, inner, term.span)
-        case _:
+        case _:  # an atom
             return term if positive else negation(term)
 
 

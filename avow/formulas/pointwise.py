@@ -82,7 +82,7 @@ def _parts(term: Term, over: tuple[Variable, ...], values: Values) -> Iterator[t
             others = [item for item in items if item is not opens]
             for inner, part in _parts(opens, (), values):
                 yield from _parts(disjunction((*others, part)), (*over, *inner), values)
-        case _:
+        case _:  # one part, whatever it is
             yield over, term
 
 

@@ -54,7 +54,7 @@ def rename_apart(term: Term) -> Term:
                     variables=tuple(dataclasses.replace(v, name=inner[v.name]) for v in variables),
                     body=visit(part.body, inner),
                 )
-            case _:
+            case _:  # binds nothing
                 return map_children(part, lambda child: visit(child, names))
 
     return visit(term, {})

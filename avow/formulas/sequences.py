@@ -111,7 +111,7 @@ def _change(term: Term, parts: Mapping[Variable, tuple[Variable, Variable]]) -> 
                     same = _same(one, other, term, parts)
                     return same if operator == "==" else Not(same)
             return term
-        case _:
+        case _:  # says nothing of a sequence itself: its parts may
             return map_children(term, lambda child: _change(child, parts))
 
 
@@ -144,7 +144,7 @@ def _same(s: Variable, other: Term, within: Term, parts: Mapping[Variable, tuple
             other_length, other_element = parts[other]
             each = Implies(inside, Compare("==", here, Apply(other_element, (k,), _item(other))))
             return And((Compare("==", length, other_length), Quantified(Quantifier.FORALL, (k,), each)))
-        case _:
+        case _:  # no simpler form: the sequence stays, and `flatten` refuses
             return Compare("==", s, other)
 
 

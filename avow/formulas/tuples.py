@@ -80,5 +80,5 @@ def _split(term: Term) -> Term:
             return same if operator == "==" else Not(same)
         case In(item=TupleTerm() as item, collection=SetTerm(items=items)):
             return disjunction(_split(Compare("==", item, one)) for one in items)
-        case _:
+        case _:  # no tuple is compared by it: its parts may be
             return map_children(term, _split)

@@ -83,7 +83,7 @@ def show(value: Value) -> str:
             return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
         case tuple():
             return f"({', '.join(map(show, value))})"
-        case _:
+        case _:  # the others have a text of their own
             return str(value)
 
 

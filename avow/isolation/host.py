@@ -75,7 +75,7 @@ def plain(data: Any) -> Any:
             return tuple(plain(item) for item in items)
         case {"f": rows, "d": default}:
             return Table({tuple(plain(a) for a in point): plain(value) for point, value in rows}, plain(default))
-        case _:
+        case _:  # a value that is its own JSON
             return data
 
 

@@ -42,7 +42,7 @@ def wanted() -> Isolation | None:
             return Isolation.SEALED
         case "off":
             return Isolation.PROCESSES
-        case _:
+        case _:  # not said, or a word that nothing is called
             return None
 
 
@@ -53,7 +53,7 @@ def available() -> Isolation:
             return Isolation.PROCESSES
         case Isolation.SEALED if not seals():
             raise Unavailable("a sandbox is required, but bubblewrap does not run here (apt install bubblewrap)")
-        case _:
+        case _:  # as wanted, or as well as this machine can
             return Isolation.SEALED if seals() else Isolation.PROCESSES
 
 

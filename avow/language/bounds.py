@@ -87,6 +87,6 @@ def constant(term: Term) -> Fraction | None:
                     return first - second
                 case "*":
                     return first * second
-                case _:
+                case _:  # /
                     return first / second
     return None

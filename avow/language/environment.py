@@ -39,7 +39,7 @@ class Environment:
                     self.elements[constructor.name] = sort
                     for parameter in constructor.parameters:
                         self._inner(parameter)
-            case _:
+            case _:  # a sort without elements of its own
                 self._inner(sort)
 
     def _inner(self, sort: Sort) -> None:
@@ -56,7 +56,7 @@ class Environment:
                     self._inner(item)
             case SequenceSort(item=item):
                 self._inner(item)
-            case _:
+            case _:  # a sort without parts
                 pass
 
 

@@ -99,7 +99,7 @@ def show_type(sort: Sort, style: StyleName = "rcl") -> str:
             return chosen.braces(", ".join(shown))
         case OpaqueSort():
             return chosen.unspecified
-        case _:
+        case _:  # written out anyway
             return show_sort(sort, style)
 
 

@@ -141,7 +141,7 @@ def _written(sort: Sort, names: Mapping[str, Sort], declared: str | None = None)
             return f"({', '.join(_written(i, names) for i in items)})"
         case SequenceSort(item=item):
             return f"<{_written(item, names)}>"
-        case _:
+        case _:  # a built-in sort
             return show_sort(sort)
 
 

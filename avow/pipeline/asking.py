@@ -106,7 +106,7 @@ def _complete(report: Report, obligations: tuple[Obligation, ...]) -> Report:
                 outcomes.append(_declared(outcome, report))
             case []:
                 outcomes.append(Outcome(obligation.id, Verdict.ERROR, "the engine gave no answer for this obligation"))
-            case _:
+            case _:  # more than one
                 outcomes.append(
                     Outcome(obligation.id, Verdict.ERROR, "the engine gave several answers for this obligation")
                 )

@@ -124,7 +124,7 @@ def _entry(value: Any, known: Mapping[int, int], root: Path) -> Any:
             return ["t", *(_reference(item, known) for item in value)]
         case list():
             return ["l", *(_reference(item, known) for item in value)]
-        case _:
+        case _:  # a dataclass
             kind: Any = type(value)
             return {"": kind.__name__} | {n: _reference(getattr(value, n), known) for n in _fields(kind)}
 

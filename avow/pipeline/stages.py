@@ -81,7 +81,7 @@ def _system(workspace: Workspace, surveyed: Survey) -> Iterator[Task]:
                 basename, title = "sanity", f"{name}:{work.node}"
             case "compose":
                 basename, title = "compose", name
-            case _:
+            case _:  # the method of a backend
                 basename, title = "discharge", f"{name}:{work.node}:{work.method}"
                 key = exporting.key(work, surveyed.digest)
                 yield {

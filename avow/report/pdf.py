@@ -272,5 +272,5 @@ def _clean(value: Any) -> Any:
             return {key: _clean(item) for key, item in value.items()}
         case list() | tuple():
             return [_clean(item) for item in value]
-        case _:
+        case _:  # a number, a truth value or None
             return value

@@ -321,5 +321,5 @@ def _plain(value: object) -> str:
             return ", ".join(map(_plain, value))
         case str() if _DIGEST.match(value):
             return value[:12]
-        case _:
+        case _:  # shown as it is
             return str(value)

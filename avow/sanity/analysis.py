@@ -366,7 +366,7 @@ class _Analysis:
                 return _Finding(Verdict.PROVED, engine=answer.engine)
             case Verdict.PROVED:
                 return replace(unused, engine=answer.engine)
-            case _:
+            case _:  # no answer
                 return _Finding(Verdict.UNKNOWN, "whether the guarantees could be met without it is open")
 
     # -- one output ----------------------------------------------------------------------------------------------------
@@ -452,7 +452,7 @@ class _Analysis:
             case "unsat":
                 text = several if len(answer.core) > 1 else one
                 return _Finding(Verdict.REFUTED, text.format(listing(answer.core)), answer.core, engine=answer.engine)
-            case _:
+            case _:  # unknown
                 return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
 
     def _by_definitions(self, formulas: Mapping[str, Term], limit: int) -> bool:

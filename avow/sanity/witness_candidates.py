@@ -172,7 +172,7 @@ def _visit(
                 here = {v: inner[v] for v in variables}
                 replaced = substitute(item, here)
                 _visit(found, replaced, inner, conditions, open_variables)
-        case _:
+        case _:  # an atom: a suggestion is read off it if it is an equation or a bound
             _atom(found, term, known, conditions, open_variables)
 
 
@@ -182,7 +182,7 @@ def _alternatives(term: Term) -> tuple[Term, ...]:
             return items
         case Implies(left=left, right=right):
             return (push_negations(Not(left)), *_alternatives(right))
-        case _:
+        case _:  # no alternatives
             return (term,)
 
 
@@ -291,7 +291,7 @@ def _suggest(found: Candidates, left: Term, right: Term, operator: str, known: M
                     left, right = other, Arithmetic("/", right, one, sort)
             case Arithmetic(operator="/", left=one, right=other, sort=sort) if found.mentions(one):
                 left, right = one, Arithmetic("*", right, other, sort)
-            case _:
+            case _:  # not solved for an output: nothing is suggested
                 return
     if left not in found.outputs:
         return

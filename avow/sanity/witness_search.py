@@ -297,7 +297,7 @@ def meanings_of(
                 meanings[output] = translator.value(value.value, output.sort)
             case Definition():
                 continue
-            case _:
+            case _:  # a term
                 term = translator.term(value, inputs)
                 meanings[output] = z3.ToReal(term) if output.sort == REAL and z3.is_int(term) else term
     for output, value in witness.items():
@@ -331,7 +331,7 @@ def _mentioned(witness: Witness) -> frozenset[Variable]:
                 found |= free_variables(body)
             case Fixed():
                 pass
-            case _:
+            case _:  # a term
                 found |= free_variables(value)
     return found
 

@@ -228,7 +228,7 @@ def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
             if constant not in found.constants:
                 found.constants.append(constant)
             return [constant]
-        case _:
+        case _:  # nothing unspecified in it
             return seen
 
 
@@ -287,7 +287,7 @@ def _instantiate(found: Candidates, term: Term, wide: bool) -> Term:
             places = _places(found, variables, wide)
             instances = [substitute(inner, dict(zip(variables, place, strict=True))) for place in places]
             return disjunction(instances) if instances else term
-        case _:
+        case _:  # no quantifier over outputs at its head
             return term
 
 

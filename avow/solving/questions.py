@@ -162,7 +162,7 @@ def entails(
         case "sat":
             shown = Counterexample(show_values(solution.values))
             return Entailment(Verdict.REFUTED, shown, solution.values, engine=engine, seconds=seconds)
-        case _:
+        case _:  # unknown
             return Entailment(Verdict.UNKNOWN, reason=reason, engine=engine, seconds=seconds)
 
 

@@ -50,7 +50,7 @@ class Settler:
                 return True
             case "sat":
                 return False
-            case _:
+            case _:  # not settled: asked in full
                 answer = entails(hypotheses, goal, timeout_ms=timeout_ms, seed=self.seed)
                 return answer.verdict is Verdict.PROVED
 

@@ -342,7 +342,7 @@ class Translator(Sorts):
                 return z3.BoolVal(value, self.context)
             case _ if isinstance(value, Fraction) and value.denominator != 1:
                 return self.real(value)
-            case _:
+            case _:  # a whole number
                 return z3.IntVal(int(value), self.context)
 
     def _real(self, expr: Expr) -> Expr:

@@ -162,7 +162,7 @@ class Sorts:
                 return z3.ForAll([at], z3.Implies(z3.And(at >= 0, at < z3.Length(expr)), inside))
             case FunctionSort():
                 return self.function_member(sort, lambda *arguments: z3.Select(expr, *arguments))
-            case _:
+            case _:  # every value of its Z3 sort is one of it
                 return None
 
     def clamped(self, expr: Expr, sort: Sort) -> Expr:
@@ -174,7 +174,7 @@ class Sorts:
                 datatype = self.sort(sort)
                 parts = (self.clamped(datatype.accessor(0, k)(expr), item) for k, item in enumerate(items))
                 return datatype.constructor(0)(*parts)
-            case _:
+            case _:  # every value of its Z3 sort is one of it
                 return expr
 
     def function_member(self, sort: FunctionSort, function: Callable[..., Expr]) -> Expr | None:

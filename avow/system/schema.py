@@ -54,7 +54,7 @@ def _piece(options: Located, path: tuple[str | int, ...]) -> Piece:
             return Piece(span, entries=entries, keys={key: piece.span for key, piece in entries.items()})
         case list():
             return Piece(span, items=[_piece(options, (*path, place)) for place in range(len(data))])
-        case _:
+        case _:  # a scalar
             return Piece(span, data)
 
 
@@ -147,7 +147,7 @@ def _explain(error: Any, root: Piece, whole: str) -> Iterator[Diagnostic]:
                     yield from _explain(inner, root, whole)
         case "maxProperties":
             yield Diagnostic("PLAN105", f"{where}: exactly one key is wanted{wanted}", piece.span)
-        case _:
+        case _:  # said in the validator's words
             yield Diagnostic("PLAN105", f"{where}: {str(error.message)[:300]}{wanted}", piece.span)
 
 
@@ -192,5 +192,5 @@ def _show(value: Any) -> str:
             return "true" if value else "false"
         case str():
             return repr(value if len(value) <= 60 else value[:57] + "…")
-        case _:
+        case _:  # a number, a truth value or None
             return str(value)

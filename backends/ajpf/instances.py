@@ -201,7 +201,7 @@ def _implications(term: Term) -> Iterator[tuple[tuple[Variable, ...], Term, Term
         case RclImplies(left=left, right=right):
             for variables, more, final in _implications(right):
                 yield variables, left if more == TRUE else And((left, more)), final
-        case _:
+        case _:  # demanded without condition
             yield (), TRUE, term
 
 

@@ -105,7 +105,7 @@ class Mapper:
                 return self._junction(term)
             case Quantified():
                 return self._quantified(term)
-            case _:
+            case _:  # an atom: covered by a row, or NotCovered
                 return self._atom(term)
 
     def _junction(self, term: And | Or) -> Mapped:
@@ -258,7 +258,7 @@ def _only_forbids(term: Term) -> bool:
             return _has_output(term) and all(_only_forbids(item) for item in items if _has_output(item))
         case Quantified(body=body):
             return _only_forbids(body)
-        case _:
+        case _:  # an atom demands it
             return False
 
 

@@ -147,7 +147,7 @@ def negation(formula: Formula) -> Formula:
             return Truth(not value)
         case Not(body=body):
             return body
-        case _:
+        case _:  # no shorter negation
             return Not(formula)
 
 

@@ -165,7 +165,7 @@ class _Parser:
                 term = self.struct(depth)
                 self.take(")")
                 return Atom(Modality(token.text), agent.text, term)
-            case _:
+            case _:  # nothing begins so: reported below
                 shown = repr(token.text) if token.text else "the end"
                 raise Malformed(f"expected a proposition such as B(agent, fact), found {shown}", token.offset)
 
@@ -230,7 +230,7 @@ def instantiate(formula: Formula, values: Mapping[str, int]) -> Formula:
             return Until(instantiate(left, values), instantiate(right, values))
         case Release(left=left, right=right):
             return Release(instantiate(left, values), instantiate(right, values))
-        case _:
+        case _:  # an atom
             return formula
 
 

@@ -119,7 +119,7 @@ def _formula(term: Term, positive: bool) -> Term:
                 collection = _value(collection)
             made_in = In(_value(item), collection, term.span)
             return made_in if positive else Not(made_in)
-        case _:
+        case _:  # an atom: its terms normalised
             value_term = _value(term)
             return value_term if positive else Not(value_term)
 

@@ -200,7 +200,7 @@ def show_deed(deed: Deed) -> str:
             return str(deed.kind)
         case DeedKind.ADD_GOAL | DeedKind.DROP_GOAL:
             return f"{deed.kind}{show(deed.term)} [{deed.goal}]"
-        case _:
+        case _:  # belief and action: the sign before the term
             return f"{deed.kind}{show(deed.term)}"
 
 

@@ -54,7 +54,7 @@ class Wording:
                 return " ∧ ".join(self._junction(items, psl.And))
             case psl.Or(items=items):
                 return " ∨ ".join(f"({part})" if " ∧ " in part else part for part in self._junction(items, psl.Or))
-            case _:
+            case _:  # one part
                 return self._part_of(formula)
 
     def _junction(self, items: Sequence[Formula], kind: type[psl.And] | type[psl.Or]) -> Iterator[str]:

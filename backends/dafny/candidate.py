@@ -65,7 +65,7 @@ def _value(text: str, variable: Variable) -> Value | None:
             return number
         case IntegerSort() | NaturalSort() if number.denominator == 1:
             return int(number)
-        case _:
+        case _:  # no number of this sort
             return None
 
 

@@ -185,7 +185,7 @@ def _constant(term: Term) -> Fraction | None:
         case Negative(term=inner):
             value_ = _constant(inner)
             return None if value_ is None else -value_
-        case _:
+        case _:  # no number that is written down
             return None
 
 
@@ -209,5 +209,5 @@ def _number(value: object) -> Fraction | None:
             return decimal(repr(value))
         case str():
             return decimal(value)
-        case _:
+        case _:  # no quantity: refused by the caller
             return None

@@ -96,7 +96,7 @@ def _covers(term: Term, sort: Sort, used: set[Variable]) -> bool:
             return free
         case TupleTerm(items=items) if isinstance(sort, TupleSort):
             return all(_covers(item, part, used) for item, part in zip(items, sort.items, strict=True))
-        case _:
+        case _:  # no value that is written down
             return False
 
 

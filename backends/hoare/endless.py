@@ -82,7 +82,7 @@ def _reached(block: Block, loop: While, goal: Term) -> Term:
             case If(condition=condition, then=then, otherwise=otherwise):
                 yes, no = (_reached(part, loop, goal) for part in (then, otherwise))
                 inner = Or((conjunction((condition, yes)), conjunction((negation(condition), no))))
-            case _:
+            case _:  # holds no loop
                 continue
         found.append(negation(weakest(block[:at], negation(inner), Conditions(TRUE))))
     return Or((Literal(False, TRUE.sort), *found))

@@ -154,7 +154,7 @@ def _terms(statement: Statement) -> tuple[Term, ...]:
             return (condition,)
         case Match(subject=subject):
             return (subject,)
-        case _:
+        case _:  # tests nothing
             return ()
 
 

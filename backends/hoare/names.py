@@ -85,7 +85,7 @@ def vocabulary(contract: Contract, node: Node) -> Vocabulary:
                 values.update((member, EnumValue(member, sort)) for member in members)
             case DataSort(constructors=made):
                 constructors.update((c.name, (sort, c)) for c in made)
-            case _:
+            case _:  # declares no element
                 pass
     return Vocabulary(types, values, constructors)
 
@@ -150,7 +150,7 @@ def estimate(expression: Expression, names: Names, local: Mapping[str, Sort]) ->
         case Binary(operator=operator, left=left, right=right) if operator in _ARITHMETIC:
             sort = join(estimate(left, names, local), estimate(right, names, local))
             return join(INTEGER, sort) if operator == "-" else sort
-        case _:
+        case _:  # a comparison or a connective
             return BOOL
 
 
@@ -174,7 +174,7 @@ def expect(expression: Expression, sort: Sort, names: Names) -> None:
                 known = [estimate(argument, names, {}) for argument in arguments]
                 if all(k is not None for k in known):
                     names.sorts[name] = FunctionSort(tuple(k for k in known if k is not None), sort)
-        case _:
+        case _:  # says nothing of a name's sort
             pass
 
 
@@ -214,5 +214,5 @@ def assignments(body: tuple[Statement, ...], names: Names) -> Iterator[tuple[Ass
                 stack.extend((s, inner) for s in reversed(then))
             case WhileStatement(body=inside):
                 stack.extend((s, local) for s in reversed(inside))
-            case _:
+            case _:  # holds no statement
                 pass

@@ -121,7 +121,7 @@ def statements(block: Block) -> Iterator[Statement]:
                 stack.extend(reversed((*then, *otherwise)))
             case While(body=body):
                 stack.extend(reversed(body))
-            case _:
+            case _:  # holds no statement
                 pass
 
 

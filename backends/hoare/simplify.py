@@ -49,7 +49,7 @@ def opposite(term: Term) -> Term:
             return body
         case Compare(operator=operator, left=left, right=right):
             return Compare(_OPPOSITE[operator], left, right)
-        case _:
+        case _:  # no opposite of its own
             return Not(term)
 
 
@@ -91,7 +91,7 @@ def _step(term: Term) -> Term:
         case In(item=item, collection=SetTerm(items=items)):
             tests = [_compare(Compare("==", item, choice)) if item.sort != BOOL else term for choice in items]
             return TRUE if TRUE in tests else FALSE if all(test == FALSE for test in tests) else term
-        case _:
+        case _:  # nothing to simplify at its head
             return term
 
 

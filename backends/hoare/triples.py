@@ -149,7 +149,7 @@ def _split(formula: Term) -> Iterator[_Part]:
                 cause, effect = (left, right) if _is_input(left) else (right, left)
                 stack.append((outer, (*conditions, negation(cause)), negation(effect)))
                 stack.append((outer, (*conditions, cause), effect))
-            case _:
+            case _:  # proved as a whole
                 yield outer, conditions, goal
 
 

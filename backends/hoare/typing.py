@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.language.operators import OPERATORS, Why
 from avow.language.printer import show_sort as show
 from avow.language.sorts import (
     BOOL,
@@ -204,6 +205,8 @@ def _name(name: Name, scope: Scope) -> Term:
         if constructor.parameters:
             raise rejected("HOARE300", f"{name.name} needs {len(constructor.parameters)} argument(s)", name.span)
         return Construct(name.name, (), data, name.span)
+    if name.name in OPERATORS and isinstance(why := OPERATORS[name.name].program, Why):
+        raise rejected("HOARE200", f"a program has no `{name.name}`: {why.reason}", name.span)
     known = [*scope.local, *scope.names.sorts, *words.values, *words.constructors]
     raise rejected(
         "HOARE200",
@@ -269,7 +272,7 @@ def _binary(operator: str, left: Expression, right: Expression, span: Span, scop
                 return Or((one, other), span)
             case "->":
                 return Implies(one, other, span)
-            case _:
+            case _:  # <=>
                 return Iff(one, other, span)
     one, other = term(left, scope), term(right, scope)
     if operator in {"+", "-", "*", "/"}:

@@ -276,7 +276,7 @@ def defined(term: Term) -> Term:
             parts.extend(r for i in items for r in in_range(i, sort))
         case TupleTerm(items=items, sort=TupleSort(items=sorts)):
             parts.extend(r for i, s in zip(items, sorts, strict=True) for r in in_range(i, s))
-        case _:
+        case _:  # total, once its parts are defined
             pass
     return conjunction(parts)
 

@@ -100,7 +100,7 @@ def _head(data: Any) -> tuple[str | None, list[Any]]:
     match data:
         case {"t": [str(name), *arguments]}:
             return name, arguments
-        case _:
+        case _:  # nothing applied
             return None, []
 
 
@@ -121,7 +121,7 @@ def _function(data: Any, sort: FunctionSort, what: str) -> Value | None:
                 raise Malformed(f"{what} is a dict without a default (the key ...)")
             rows = [(point, value) for point, value in pairs if point != {"...": True}]
             default = given[0] if given else False
-        case _:
+        case _:  # no mapping
             return None
     other = received(default, sort.result, f"{what}'s default")
     table: dict[tuple[Value, ...], Value] = {}
@@ -159,7 +159,7 @@ def told(data: Any) -> str:
             return "a dict"
         case {"f": _}:
             return "a table"
-        case _:
+        case _:  # shown as JSON
             return repr(data)
 
 
@@ -174,7 +174,7 @@ def outputs(data: Any, ports: Mapping[str, Sort]) -> dict[str, Value]:
             found = dict(pairs)
         case _ if len(names) == 1:
             found = {next(iter(names)): data}
-        case _:
+        case _:  # several names
             listed = ", ".join(sorted(names))
             raise Malformed(f"the subject returned {told(data)}; it has to return a dict of {listed}")
     if set(found) != names:

@@ -134,7 +134,7 @@ class Generator:
                 for value in self.pools.edges.get(item, ()):
                     simple = self._number(Source(b""), item, False) if item != STRING else value
                     yield from (Sequence((value,)), Sequence((simple, value)))
-            case _:
+            case _:  # the edges of the sort itself
                 yield from self.pools.edges.get(sort, ())
 
     def _towards(self, source: Source, inputs: Inputs, near: dict[Any, Any], failing: Failing) -> None:
@@ -196,7 +196,7 @@ class Generator:
                 return Fraction(source.signed(2000), source.of((1, 2, 4, 10)))
             case NaturalSort():
                 return source.below(2001)
-            case _:
+            case _:  # INTEGER
                 return source.signed(2000)
 
     def _data(self, source: Source, sort: DataSort, near: dict[Any, Any], depth: int) -> Value:
@@ -250,7 +250,7 @@ class Generator:
                 return tuple(map(Element, members))
             case BoolSort():
                 return (False, True)
-            case _:
+            case _:  # a number or a text
                 return self.pools.near[sort]
 
     def _function(self, source: Source, sort: FunctionSort, near: dict[Any, Any], depth: int) -> Value:

@@ -115,7 +115,7 @@ def triggers(formula: Term) -> tuple[_Condition, ...]:
                     stack.append((Or(rest) if len(rest) > 1 else rest[0], outer, (*conditions, *denied)))
             case _ if conditions:
                 found.setdefault((outer, conditions))
-            case _:
+            case _:  # holds without condition: nothing to count
                 pass
     return tuple(found)
 

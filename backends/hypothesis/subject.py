@@ -104,7 +104,7 @@ def _top_level(tree: ast.Module) -> dict[str, ast.stmt]:
                 found[name] = statement
             case ast.Import(names=names) | ast.ImportFrom(names=names):
                 found.update(((a.asname or a.name).partition(".")[0], statement) for a in names)
-            case _:
+            case _:  # imports nothing
                 pass
     return found
 

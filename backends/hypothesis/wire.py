@@ -68,5 +68,5 @@ def decode(data: Any) -> Any:
             if "quantifier" in parts:
                 parts["quantifier"] = Quantifier(parts["quantifier"])
             return _CLASSES[name](**parts)
-        case _:
+        case _:  # a value that is its own JSON
             return data

@@ -385,7 +385,7 @@ def _contents(sort: Sort) -> frozenset[str]:
             return frozenset(("a truth value",))
         case EnumSort(members=members):
             return frozenset(f"word {member}" for member in members)
-        case _:
+        case _:  # any message may be one
             return frozenset((_ANYTHING,))
 
 
@@ -414,5 +414,5 @@ def _says_empty(term: Term, port: str) -> bool:
             body=Not(body=Apply(function=Variable(role=Role.OUTPUT, name=name), arguments=arguments)),
         ):
             return name == port and arguments == variables
-        case _:
+        case _:  # not of the form that is looked for
             return False

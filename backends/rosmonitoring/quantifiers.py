@@ -180,7 +180,7 @@ class Eliminator:
                     for c in sort.constructors
                 )
                 return Variant(Number(Fraction(code(sort, name))), rows)
-            case _:
+            case _:  # a number, or refused by name
                 return Scalar(self._number(term, bound))
 
     def _number(self, term: Term, bound: Bound) -> Numeric:
@@ -313,7 +313,7 @@ class Eliminator:
                         return None
                     cases.append((matched[0], [], matched[1]))
                 return cases
-            case _:
+            case _:  # fixes no variable
                 return None
 
     def _match(
@@ -346,7 +346,7 @@ class Eliminator:
                     turned = "-" if operator == "+" else "+"
                     other = self._number(right, now)
                     waiting.insert(0, (left, Scalar(self._calculate(turned, symbol.number, other, pattern))))
-                case _:
+                case _:  # not solved yet: after the others, or not at all
                     stuck += 1
                     if stuck > len(waiting) + 1:
                         return None

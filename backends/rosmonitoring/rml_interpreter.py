@@ -117,7 +117,7 @@ class Interpreter:
                 return values[str(tree.children[0])]
             case "negative":
                 return -Fraction(str(tree.children[2]))
-            case _:
+            case _:  # a number
                 return number(tree)
 
 
@@ -146,7 +146,7 @@ def _match(pattern: Any, value: Any) -> list[Binding]:
         case "variable":
             amount = _number(value)
             return [] if amount is None else [{str(pattern.children[0]): amount}]
-        case _:
+        case _:  # the wildcard
             return [{}]
 
 
@@ -166,7 +166,7 @@ def _holds(tree: Any, values: Mapping[str, Any]) -> bool:
             return all(_holds(c, values) for c in tree.children)
         case "any":
             return any(_holds(c, values) for c in tree.children)
-        case _:
+        case _:  # a comparison
             left, operator, right = tree.children
             a, b = _evaluate(left, values), _evaluate(right, values)
             return {"<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b, "==": a == b, "!=": a != b}[str(operator)]
@@ -181,5 +181,5 @@ def _evaluate(tree: Any, values: Mapping[str, Any]) -> Fraction:
             left, operator, right = tree.children
             a, b = _evaluate(left, values), _evaluate(right, values)
             return a + b if operator == "+" else a - b if operator == "-" else a * b
-        case _:
+        case _:  # a number
             return number(tree)

@@ -410,7 +410,7 @@ def _field_cases(path: Path, sort: Sort, name: str, names: dict[str, str] | obje
         case NaturalSort():
             guard = compare(">=", Name(name), Number(Fraction(0)))
             return [_Case(((path, name),), (Name(name),), (name,), guard)]
-        case _:
+        case _:  # a number without bounds
             return [_Case(((path, name),), (Name(name),), (name,))]
 
 
@@ -488,5 +488,5 @@ def _replace(number: Numeric, new: dict[str, Numeric]) -> Numeric:
             return new.get(name, number)
         case Calculation(operator=operator, left=left, right=right):
             return Calculation(operator, _replace(left, new), _replace(right, new))
-        case _:
+        case _:  # a number that is written down
             return number

@@ -193,5 +193,5 @@ def components(symbol: Symbol) -> tuple[str, ...]:
             return tuple(flags.values())
         case Points(tuples=((Comparison(left=Name(name=flag)), parts),)):
             return (flag, *(part for p in parts for part in components(p)))
-        case _:
+        case _:  # no flag of its own
             return ()

@@ -316,6 +316,7 @@ def test_a_map_that_is_an_input_may_be_assigned(tmp_path: Path) -> None:
         ("output = red", TABLE, "HOARE100", "`=` compares", "p.imp"),
         (PROGRAM.replace("input <", "inputt <", 1), TABLE, "HOARE200", "inputt", "p.imp"),
         (PROGRAM.replace(":= green", ":= gren"), TABLE, "HOARE200", "gren", "p.imp"),
+        (PROGRAM.replace("input <", "abs(input) <", 1), TABLE, "HOARE200", "programs say it with IF", "p.imp"),
         (PROGRAM.replace("input < 120", "output < 120"), TABLE, "HOARE300", "Colour is wanted", "p.imp"),
         (PROGRAM.replace("inspect(i)", "inspect(i, j)"), TABLE, "HOARE300", "1 argument", "p.imp"),
         (PROGRAM.replace("WITH inspect", "WITH inspekt"), TABLE, "HOARE300", "does not make", "p.imp"),
