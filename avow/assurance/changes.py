@@ -36,10 +36,10 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
         suppositions=tuple((s.key, s.words, s.until) for s in case.suppositions),
         weakenings=tuple((w.key, w.count) for w in case.weakenings if w.key not in _PASSING),
     )
-    return replace(found, content=_content(found))
+    return replace(found, content=content_of(found))
 
 
-def _content(of: Baseline) -> str:
+def content_of(of: Baseline) -> str:
     """SHA-256 of all that a signature speaks of: verdict, requirements, evidence, suppositions, weakenings."""
     from avow.evidence.encoding import canonical
 

@@ -17,6 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from avow.assurance.answers import Baseline
 from avow.assurance.model import Case
 from avow.base.files import write
 from avow.evidence.encoding import LATER, Unreadable, encode, plain
@@ -39,6 +40,19 @@ def from_json(data: object) -> Case:
     case = _decode(Case, {key: value for key, value in data.items() if key != "schema"}, "case")
     assert isinstance(case, Case)
     return case
+
+
+def baseline_to_json(baseline: Baseline) -> dict[str, Any]:
+    """What of a case was signed, as plain data."""
+    found: dict[str, Any] = _encode(baseline)
+    return found
+
+
+def baseline_from_json(data: object) -> Baseline:
+    """Raises Unreadable."""
+    found = _decode(Baseline, data, "baseline")
+    assert isinstance(found, Baseline)
+    return found
 
 
 def case_schema() -> dict[str, Any]:

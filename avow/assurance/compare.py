@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from avow.assurance.model import Case, Currency, EvidenceView, ObligationView
+from avow.assurance.answers import How
+from avow.assurance.model import Case, Currency, EvidenceView, ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim, short
 from avow.evidence.ledger import Entry
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, effective, roll_up
 
-ORDER = ("gate", "worse", "removed", "meaning", "added", "better", "rerun")
+ORDER = ("gate", "worse", "removed", "supposition", "meaning", "added", "better", "rerun")
 """Kinds of changes, what a reader must know first."""
 
 
@@ -34,6 +35,7 @@ class Told:
     """Method → its newest answer."""
     below: tuple[str, ...] = ()
     """Claims that it rests on and that fail."""
+    formula: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,8 @@ class Snapshot:
     told: Mapping[str, Told] = field(default_factory=dict)
     reasons: Mapping[str, str] = field(default_factory=dict)
     """Gate → why it fails or passes."""
+    suppositions: Mapping[str, str] | None = None
+    """Key → words; None where nothing is known of them (a bare ledger)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +62,18 @@ class Change:
     after: str
     title: str = ""
     why: tuple[str, ...] = ()
+    old_formula: str = ""
+    """Where the meaning changed: what it was, and what it is."""
+    new_formula: str = ""
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether less is shown than before, or more supposed."""
+        if self.kind == "gate":
+            return self.after == "fails"
+        if self.kind == "meaning":
+            return {self.before, self.after} <= set(Status) and Status(self.after).rank < Status(self.before).rank
+        return self.kind in ("worse", "removed", "supposition")
 
     @property
     def text(self) -> str:
@@ -68,6 +84,8 @@ class Change:
                 return f"gone: {self.subject} (was {self.before})"
             case "meaning":
                 return f"changed meaning: {self.subject} ({self.before} → {self.after})"
+            case "supposition":
+                return f"supposed now: {self.after}" + (f" (was: {self.before})" if self.before else "")
             case "gate":
                 return f"gate {self.subject}: {self.before} → {self.after}"
             case "rerun":
@@ -78,12 +96,32 @@ class Change:
 
 def of_case(case: Case) -> Snapshot:
     claims = {v.id: (v.obligation.digest, v.standing) for v in case.obligations if not v.advice}
-    claims |= {requirement_claim(r.id): (r.text + r.formula + r.temporal, r.status) for r in case.requirements}
-    told = {v.id: Told(v.obligation.claim, _answers(v), v.below) for v in case.obligations if not v.advice}
-    told |= {requirement_claim(r.id): Told(r.text or r.formula or r.temporal, {}, r.below) for r in case.requirements}
+    claims |= {requirement_claim(r.id): (r.text + r.formula + r.temporal, _standing(r)) for r in case.requirements}
+    told = {
+        v.id: Told(v.obligation.claim, _answers(v), v.below, v.obligation.formula)
+        for v in case.obligations
+        if not v.advice
+    }
+    told |= {
+        requirement_claim(r.id): Told(
+            r.text or r.formula or r.temporal, {}, r.below or r.failing, r.formula or r.temporal
+        )
+        for r in case.requirements
+    }
     return Snapshot(
-        case.system, claims, {g.title: g.passed for g in case.gates}, told, {g.title: g.reason for g in case.gates}
+        case.system,
+        claims,
+        {g.title: g.passed for g in case.gates},
+        told,
+        {g.title: g.reason for g in case.gates},
+        {s.key: f"{s.words}{' (expired)' if s.expired else ''}" for s in case.suppositions},
     )
+
+
+def _standing(requirement: RequirementView) -> Status:
+    """A requirement whose own evidence is good is open all the same where what it rests on fails or has expired."""
+    fallen = requirement.how is How.OPEN and requirement.status.supports
+    return Status.UNSUPPORTED if fallen else requirement.status
 
 
 def of_ledger(name: str, entries: Iterable[Entry]) -> Snapshot:
@@ -124,17 +162,29 @@ def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
             (meaning, was), (now, is_) = old.claims[name], new.claims[name]
             why = tuple(_why(before, after))
             if meaning != now:
-                changes.append(Change("meaning", name, was, is_, title, why))
+                changes.append(Change("meaning", name, was, is_, title, why, before.formula, after.formula))
             elif was is not is_:
                 changes.append(Change("better" if is_.rank > was.rank else "worse", name, was, is_, title, why))
             elif any(_asked_again(before, after)):
                 changes.append(Change("rerun", name, was, is_, title, why))
+    changes += _suppositions(old, new)
     word = {True: "passes", False: "fails"}
     for gate, passed in new.gates.items():
         if gate in old.gates and old.gates[gate] != passed:
             reason = (new.reasons[gate],) if new.reasons.get(gate) else ()
             changes.append(Change("gate", gate, word[old.gates[gate]], word[passed], "", reason))
     return tuple(sorted(changes, key=lambda change: ORDER.index(change.kind)))
+
+
+def _suppositions(old: Snapshot, new: Snapshot) -> Iterator[Change]:
+    if old.suppositions is None or new.suppositions is None:
+        return
+    for key, words in new.suppositions.items():
+        if old.suppositions.get(key) != words:
+            yield Change("supposition", key, old.suppositions.get(key, ""), words)
+    for key, words in old.suppositions.items():
+        if key not in new.suppositions:
+            yield Change("better", key, f"supposed: {words}", "supposed no more")
 
 
 def _answers(view: ObligationView) -> dict[str, Answer]:

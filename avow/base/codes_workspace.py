@@ -130,6 +130,18 @@ WORKSPACE_CODES = register(
         "`pip install 'avow[signing]'`.",
     ),
     declare(
+        "SIGN005",
+        "who, until when",
+        "A signature needs a name and a day of the calendar that is not past.",
+        'Give `--as "name, role" --until YYYY-MM-DD`.',
+    ),
+    declare(
+        "SIGN006",
+        "not what the ledger says",
+        "The report does not say what the ledger says, or contract and plan have changed since: nobody should sign it.",
+        "Run `avow verify`, read the report, and sign then.",
+    ),
+    declare(
         "REPORT001",
         "no report",
         "There is no report.json where one is needed, or it cannot be read.",

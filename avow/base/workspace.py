@@ -28,6 +28,11 @@ class Workspace:
         return self.root / "reports"
 
     @property
+    def signed(self) -> Path:
+        """Signatures of cases, a folder a system; kept with the sources."""
+        return self.root / "signed"
+
+    @property
     def ledgers(self) -> Path:
         return self.artifacts / "ledger"
 

@@ -32,6 +32,7 @@ COMMANDS = {
     "requirements": "requirements from CSV or ReqIF, as a plan's section",
     "review": "fill in the digests of a review record",
     "sanity": "is the contract worth verifying?",
+    "sign": "a person's name under a report; what changes later is told against it",
     "simulate": "run the composed contracts over the plan's scenario",
     "translate": "a contract as LaTeX, text, JSON, SMT-LIB, …",
     "verify": "everything for every system: the main job",

@@ -19,7 +19,8 @@ _SHOWN = 3
 @click.argument("new", required=False)
 @click.option("--json", "as_json", is_flag=True, help="For machines.")
 @click.option("--html", "page", type=click.Path(dir_okay=False), help="Write a page to this file, too.")
-def command(old: str, new: str | None, as_json: bool, page: str | None) -> int:
+@click.option("--fail-on", type=click.Choice(["worse"]), help="Exit code 1 where less is shown, or more supposed.")
+def command(old: str, new: str | None, as_json: bool, page: str | None, fail_on: str | None) -> int:
     """What changed from OLD to NEW, and why: claims, what they mean, where they stand, gates, what was asked again.
 
     Each is a report (its folder or report.json), a ledger (.jsonl), or a git revision of the workspace: then the
@@ -41,6 +42,9 @@ def command(old: str, new: str | None, as_json: bool, page: str | None) -> int:
                 "after": c.after,
                 "title": c.title,
                 "why": list(c.why),
+                "worse": c.is_worse,
+                "old_formula": c.old_formula,
+                "new_formula": c.new_formula,
             }
             for s, c in changes
         ]
@@ -51,13 +55,16 @@ def command(old: str, new: str | None, as_json: bool, page: str | None) -> int:
         for system in dict.fromkeys(s for s, _ in changes):
             click.echo(f"{system}:")
             _tell([change for s, change in changes if s == system])
-    return 0
+    return 1 if fail_on and any(change.is_worse for _, change in changes) else 0
 
 
 def _tell(changes: list[Change]) -> None:
     for change in changes:
         if change.kind != "rerun":
             click.echo(f"  {change.text}")
+            if change.old_formula != change.new_formula:
+                click.echo(f"      was: {change.old_formula}")
+                click.echo(f"      now: {change.new_formula}")
             for line in change.why[:_SHOWN]:
                 click.echo(f"      {line}")
     again = [change for change in changes if change.kind == "rerun"]

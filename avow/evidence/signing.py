@@ -59,7 +59,7 @@ class Signed:
 def sign(path: Path, chain: Signed, private: Path) -> Path:
     """Sign the newest line, and with it all before; the signature is written to `path`. Raises Rejected: nothing to
     sign, no such key."""
-    key = _private(private)
+    key = private_key(private)
     if not chain.marks:
         raise Rejected(Diagnostic("SIGN002", f"{chain.name} has no records: it is not signed"))
     head, count = chain.marks[-1], len(chain.marks)
@@ -82,7 +82,7 @@ def verify_signature(path: Path, chain: Signed, public: Path | None) -> tuple[st
         data = json.loads(read_regular(path))
         head, count = str(data["hash"]), int(data["records"])
         signature, own = bytes.fromhex(data["signature"]), bytes.fromhex(data["public_key"])
-        key = _public(public) if public is not None else Ed25519PublicKey.from_public_bytes(own)
+        key = public_key(public) if public is not None else Ed25519PublicKey.from_public_bytes(own)
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         return f"{path.name} cannot be read as a signature: {error}", 0
     try:
@@ -98,7 +98,8 @@ def _message(system: str, head: str, count: int) -> bytes:
     return f"{_CONTEXT}\n{system}\n{count}\n{head}\n".encode()
 
 
-def _private(path: Path) -> Ed25519PrivateKey:
+def private_key(path: Path) -> Ed25519PrivateKey:
+    """Raises Rejected where the file holds none."""
     _needs_cryptography()
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
@@ -112,7 +113,9 @@ def _private(path: Path) -> Ed25519PrivateKey:
     return key
 
 
-def _public(path: Path) -> Ed25519PublicKey:
+def public_key(path: Path) -> Ed25519PublicKey:
+    """Raises Rejected where the file holds none."""
+    _needs_cryptography()
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
     from cryptography.hazmat.primitives.serialization import load_pem_public_key
 

@@ -15,6 +15,7 @@ from doit.exceptions import TaskError
 
 from avow import __version__
 from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
+from avow.assurance.signed import KEYS
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest, digest_file, is_intact
@@ -129,6 +130,7 @@ def gate(assessment: Assessment) -> TaskError | bool:
 def build(assessment: Assessment) -> Case:
     """The case, from contract, plan and ledger. Raises Rejected for a policy that cannot be used."""
     from avow.assurance.case import build_case
+    from avow.assurance.signed import newest_signed
     from avow.pipeline.derivations import derivation_views, graph_svg
 
     system, workspace = assessment.surveyed.system, assessment.workspace
@@ -164,6 +166,7 @@ def build(assessment: Assessment) -> Case:
         ledger_head=ledger.head,
         graph_svg=graph_svg(system),
         sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
+        baseline=newest_signed(workspace.signed, system.name)[0],
     )
 
 
@@ -212,7 +215,16 @@ def _key(assessment: Assessment) -> str:
     explain = os.environ.get(EXPLAIN, "")
     root = assessment.workspace.root
     damage += [f"{e.number} is of an earlier state" for e in ledger.records() if not stands(e.evidence, root)]
-    return digest(json.dumps([SCHEMA, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]))
+    signed = [digest_file(path) for path in _signatures(assessment)]
+    return digest(
+        json.dumps([SCHEMA, signed, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain])
+    )
+
+
+def _signatures(assessment: Assessment) -> list[Path]:
+    """The files that say which report was signed last."""
+    signed = assessment.workspace.signed
+    return [p for folder in (assessment.system, KEYS) for p in sorted((signed / folder).glob("*")) if p.is_file()]
 
 
 def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, str], ...]) -> Result:

@@ -44,13 +44,26 @@ def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, s
         for title, passed, reason in r.gates:
             if not passed:
                 console.print(f"[red]✗[/] {r.system}: ", end="")
-                console.print(f"{title}: {reason}", markup=False)
+                console.print(f"{title}: {_few(reason)}", markup=False)
     console.print()
     if results:
         index = str(Path(results[0].report).parent.parent / "index.html")
         console.print(f"{index if len(results) > 1 else results[0].report}   ", markup=False, end="")
     idle = "nothing to do" if not broken else "nothing could be run"
     console.print(f"({f'{done} stages run' if done else idle}, {seconds:.1f} s)")
+
+
+_MOST = 240
+"""Characters of a failing gate's reason on the terminal."""
+
+
+def _few(reason: str) -> str:
+    """The reason as far as a person reads it there; what to do next is kept."""
+    why, mark, step = reason.partition("; next: ")
+    short = (
+        why if len(why) <= _MOST else f"{why[:_MOST].rpartition(';')[0] or why[: _MOST - 1] + '…'}; all in the report"
+    )
+    return short + mark + step.partition("; next: ")[0]
 
 
 def _gates(result: Result) -> str:

@@ -15,6 +15,7 @@ _HEADINGS = {
     "gate": "Gates of the policy",
     "worse": "Lost: claims that stand worse",
     "removed": "Gone: claims that are not made any more",
+    "supposition": "Supposed now, without being shown",
     "meaning": "Changed meaning: another claim under the same name",
     "added": "New claims",
     "better": "Gained: claims that stand better",
@@ -24,12 +25,21 @@ _WORDS = {
     "gate": "of the gates changed",
     "worse": "worse",
     "removed": "gone",
+    "supposition": "supposed now",
     "meaning": "changed meaning",
     "added": "new",
     "better": "better",
     "rerun": "asked again",
 }
-_TONES = {"worse": "bad", "removed": "open", "meaning": "open", "added": "fair", "better": "good", "rerun": "plain"}
+_TONES = {
+    "worse": "bad",
+    "removed": "open",
+    "supposition": "open",
+    "meaning": "open",
+    "added": "fair",
+    "better": "good",
+    "rerun": "plain",
+}
 FOLDED = 40
 """Longer groups are folded, but for what got worse."""
 
@@ -41,7 +51,7 @@ def render_comparison(old: str, new: str, changes: Sequence[tuple[str, Change]])
         mine = [change for name, change in changes if name == system]
         systems[system] = [(kind, [c for c in mine if c.kind == kind]) for kind in ORDER]
     counts = Counter(change.kind for _, change in changes)
-    lost = counts["worse"] + sum(c.kind == "gate" and c.after == "fails" for _, c in changes)
+    lost = sum(c.is_worse and c.kind != "removed" for _, c in changes)
     return (
         environment()
         .get_template("compare.html.j2")

@@ -1,0 +1,97 @@
+"""Signed cases: an in-toto statement over what a case claims, in ``signed/<system>/``; the newest that verifies is the
+baseline with which later cases are compared."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from avow.assurance.answers import Baseline
+from avow.assurance.changes import baseline_of, content_of
+from avow.assurance.codec import baseline_from_json, baseline_to_json
+from avow.assurance.model import Case
+from avow.base.files import read_regular, write
+from avow.evidence.encoding import Unreadable
+from avow.evidence.envelope import Opened, seal, unseal
+
+PREDICATE = "https://avow.invalid/signed-case/v1"
+KEYS = "keys"
+"""In ``signed/``: public keys (``*.pub``). Where there are any, only what one of them signed is a baseline."""
+
+
+def sign_case(
+    case: Case, report: Path, signed: Path, *, who: str, until: date, today: date, private: Path | None
+) -> Path:
+    """Write a signature of the case to ``signed/<system>/`` and return its path. Raises Rejected for an unusable key,
+    OSError where nothing can be written."""
+    told = baseline_of(case, who=who, signed_on=today.isoformat(), until=until.isoformat())
+    folder = signed / case.system
+    number = 1 + max((_number(path) for path in folder.glob("*.json")), default=0)
+    path = folder / f"{number:04d}-{today.isoformat()}.json"
+    predicate = {
+        "as": who,
+        "signedOn": today.isoformat(),
+        "until": until.isoformat(),
+        "system": case.system,
+        "says": case.answers.statement,
+        "baseline": baseline_to_json(told),
+    }
+    statement: dict[str, Any] = {
+        "_type": "https://in-toto.io/Statement/v1",
+        "subject": [
+            {"name": f"case/{case.system}", "digest": {"sha256": told.content}},
+            {"name": "report.json", "digest": {"sha256": _digest(report)}},
+            *({"name": name, "digest": {"sha256": mark}} for name, mark in case.digests),
+        ],
+        "predicateType": PREDICATE,
+        "predicate": predicate,
+    }
+    write(path, seal(statement, private))
+    return path
+
+
+def newest_signed(signed: Path, system: str) -> tuple[Baseline | None, tuple[str, ...]]:
+    """The newest signature of a system's case that verifies, and why newer ones do not. Raises Rejected for a key in
+    ``signed/keys`` that cannot be read."""
+    trusted = sorted((signed / KEYS).glob("*.pub"))
+    refused: list[str] = []
+    for path in sorted((signed / system).glob("*.json"), key=_number, reverse=True):
+        found = _read(path, system, trusted)
+        if isinstance(found, Baseline):
+            return found, tuple(refused)
+        refused.append(f"{path.name}: {found}")
+    return None, tuple(refused)
+
+
+def _read(path: Path, system: str, trusted: list[Path]) -> Baseline | str:
+    try:
+        opened = unseal(read_regular(path).decode("utf-8"), trusted)
+    except (OSError, ValueError) as error:
+        return f"it cannot be read: {error}"
+    if not isinstance(opened, Opened):
+        return opened
+    predicate = opened.statement.get("predicate")
+    if opened.statement.get("predicateType") != PREDICATE or not isinstance(predicate, dict):
+        return "it is no signature of a case"
+    try:
+        found = baseline_from_json(predicate.get("baseline"))
+    except Unreadable as error:
+        return str(error)
+    if predicate.get("system") != system:
+        return "it is of another system"
+    if found.content != content_of(found) or (found.who, found.until) != (predicate.get("as"), predicate.get("until")):
+        return "what it names is not what it signs"
+    return replace(found, name=path.name, checked=opened.checked)
+
+
+def _number(path: Path) -> int:
+    text = path.name.partition("-")[0]
+    return int(text) if text.isascii() and text.isdigit() else 0
+
+
+def _digest(path: Path) -> str:
+    from avow.base.files import digest_file
+
+    return digest_file(path)

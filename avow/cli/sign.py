@@ -1,0 +1,72 @@
+"""``avow sign``: a person's name under a report."""
+
+from __future__ import annotations
+
+import click
+
+from avow.cli.paths import PathArgument
+
+
+@click.command()
+@click.option("--report", "name", required=True, help="A system, or the folder of its report.")
+@click.option("--as", "who", required=True, help="Name and role.")
+@click.option("--until", required=True, metavar="YYYY-MM-DD", help="The last day on which the signature stands.")
+@click.option("--key", type=PathArgument(exists=True, dir_okay=False), help="A private key (`avow audit --new-key`).")
+@click.option("--json", "as_json", is_flag=True, help="For machines.")
+def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
+    """Sign a report: an in-toto statement of its verdict, suppositions and weakenings, in signed/SYSTEM/.
+
+    The report has to say what the ledger says (as `avow report --check` does). Later reports tell what changed since.
+    Without --key it is a name only. Public keys in signed/keys/*.pub make only signatures by these keys count.
+    """
+    import json
+    from datetime import date, datetime
+    from pathlib import Path
+
+    from avow.assurance.signed import sign_case
+    from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.workspace import find_workspace, workspace
+    from avow.cli.ledgers import read_case
+    from avow.evidence.ledger import Ledger
+    from avow.report.check import check
+
+    folder = Path(name)
+    place = find_workspace(folder.resolve()) if (folder / "report.json").is_file() else None
+    place = place or workspace()
+    if not (folder / "report.json").is_file():
+        folder = place.report(name)
+    case = read_case(folder)
+    today = datetime.now().astimezone().date()
+    try:
+        last = date.fromisoformat(until)
+    except ValueError:
+        raise Rejected(Diagnostic("SIGN005", f"--until: {until!r} is no date of the calendar")) from None
+    if last < today:
+        raise Rejected(Diagnostic("SIGN005", f"--until: {until} is past"))
+    if not who.strip():
+        raise Rejected(Diagnostic("SIGN005", "--as: a name is wanted"))
+    ledger = place.ledger(case.system)
+    wrong = check(folder, Ledger(ledger) if ledger.is_file() else None, place.root)
+    if wrong:
+        more = f" (and {len(wrong) - 1} more; see `avow report --check {folder}`)" if len(wrong) > 1 else ""
+        raise Rejected(Diagnostic("SIGN006", f"not signed: {wrong[0]}{more}", hint="run `avow verify` first"))
+    private = key if isinstance(key, Path) else None
+    try:
+        path = sign_case(
+            case,
+            folder / "report.json",
+            place.signed,
+            who=" ".join(who.split()),
+            until=last,
+            today=today,
+            private=private,
+        )
+    except OSError as error:
+        raise Rejected(Diagnostic("SIGN001", f"the signature cannot be written: {error.strerror}")) from None
+    if as_json:
+        click.echo(json.dumps({"system": case.system, "signed": str(path), "verdict": case.answers.verdict}, indent=1))
+    else:
+        click.echo(case.answers.statement)
+        click.echo(f"signed as {who}, until {until}: {place.relative(path)}")
+        click.echo(f"next: avow report {case.system}   (keep signed/ with the sources)")
+    return 0

@@ -1,0 +1,84 @@
+"""A statement in a DSSE envelope (https://github.com/secure-systems-lab/dsse), signed with ed25519 or by name only.
+
+Without a key a statement says whose name somebody wrote there, and that it is still the text that was written; with one
+it says that the holder of the key vouches for it.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from avow.evidence.signing import private_key, public_key
+
+PAYLOAD = "application/vnd.in-toto+json"
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A statement that verifies, and how, in words."""
+
+    statement: dict[str, Any]
+    checked: str
+
+
+def seal(statement: dict[str, Any], private: Path | None) -> str:
+    """The envelope as JSON. Raises Rejected for a key that cannot be used."""
+    payload = json.dumps(statement, ensure_ascii=True, sort_keys=True).encode()
+    signatures = []
+    if private is not None:
+        key = private_key(private)
+        public = key.public_key().public_bytes_raw()
+        signature = key.sign(_authenticated(payload))
+        signatures.append({"keyid": public.hex(), "sig": base64.b64encode(signature).decode()})
+    body = {
+        "payload": base64.b64encode(payload).decode(),
+        "payloadType": PAYLOAD,
+        "signatures": signatures,
+    }
+    return json.dumps(body, indent=1, sort_keys=True) + "\n"
+
+
+def unseal(text: str, trusted: Sequence[Path] = ()) -> Opened | str:
+    """The statement, or why it does not verify. With `trusted` public keys one of them must have signed it; without,
+    an envelope without a signature is taken at its word, and one with a signature must bear it truly.
+    Raises Rejected for a trusted key that cannot be read."""
+    try:
+        body = json.loads(text)
+        payload = base64.b64decode(body["payload"], validate=True)
+        signatures = [
+            (bytes.fromhex(s["keyid"]), base64.b64decode(s["sig"], validate=True)) for s in body["signatures"]
+        ]
+        statement = json.loads(payload)
+        if body["payloadType"] != PAYLOAD or not isinstance(statement, dict):
+            return "it is no in-toto statement"
+    except (ValueError, KeyError, TypeError, binascii.Error, RecursionError) as error:
+        return f"it is no envelope: {error}"
+    if not signatures:
+        return "no trusted key has signed it" if trusted else Opened(statement, "by name, without a key")
+    try:
+        from cryptography.exceptions import InvalidSignature
+        from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+    except ImportError:
+        return "its signature cannot be checked here: pip install 'avow[signing]'"
+    known = {public_key(path).public_bytes_raw() for path in trusted}
+    for raw, signature in signatures:
+        if known and raw not in known:
+            continue
+        try:
+            Ed25519PublicKey.from_public_bytes(raw).verify(signature, _authenticated(payload))
+        except (InvalidSignature, ValueError):
+            return "its signature is not of this text"
+        told = "a trusted key" if known else "a key that nobody here has named as trusted:"
+        return Opened(statement, f"with {told} {raw.hex()[:16]}…")
+    return "no trusted key has signed it"
+
+
+def _authenticated(payload: bytes) -> bytes:
+    """DSSE's pre-authentication encoding."""
+    return b"DSSEv1 %d %s %d %s" % (len(PAYLOAD), PAYLOAD.encode(), len(payload), payload)

@@ -1,0 +1,135 @@
+"""Signing a report, and what changed since: through the real commands, with and without keys, and with forged files."""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+import pytest
+from assurance.sample import case, evidence, guarantee, system
+from click.testing import CliRunner
+
+from avow.assurance.answers import Baseline
+from avow.assurance.model import Case
+from avow.assurance.signed import newest_signed, sign_case
+from avow.base.verdict import Verdict
+from avow.cli.diff import command as diff
+from avow.evidence.envelope import seal, unseal
+from avow.evidence.signing import new_key_pair
+from avow.report import render_all
+from avow.system.plan import Requirement
+
+G = guarantee("n", "g", "n does g", "x > 1")
+SUBJECT = system({"n": ["g"]}, requirements=[Requirement("R", "It is safe.", None, None, ("n.g",))])
+TODAY, LAST = date(2026, 11, 21), date(2027, 11, 21)
+
+
+def made(verdict: Verdict = Verdict.PROVED, baseline: Baseline | None = None) -> Case:
+    return case(SUBJECT, [G], [evidence(G, verdict)], baseline=baseline)
+
+
+def signed(
+    folder: Path, who: str = "A. Person, safety", private: Path | None = None, found: Case | None = None
+) -> Path:
+    (folder / "report.json").write_text("{}")
+    what = found or made()
+    return sign_case(what, folder / "report.json", folder / "signed", who=who, until=LAST, today=TODAY, private=private)
+
+
+def test_a_signature_by_name_is_the_baseline(tmp_path: Path) -> None:
+    path = signed(tmp_path)
+    found, refused = newest_signed(tmp_path / "signed", "rover")
+    assert found is not None
+    assert (found.who, found.until, found.name, refused) == ("A. Person, safety", "2027-11-21", path.name, ())
+    same = made(baseline=found)
+    assert same.answers.signed == "signed by A. Person, safety on 2026-11-21 until 2027-11-21"
+    worse = made(Verdict.REFUTED, found)
+    assert worse.changes.entries[0].kind == "open"
+    assert worse.answers.changed[0][0] == "✘"
+
+
+def test_the_newest_that_verifies_counts(tmp_path: Path) -> None:
+    pytest.importorskip("cryptography")
+    first, second = signed(tmp_path), signed(tmp_path, "B. Person")
+    assert (first.name[:4], second.name[:4]) == ("0001", "0002")
+    body = json.loads(second.read_text())
+    payload = json.loads(base64.b64decode(body["payload"]))
+    payload["predicate"]["baseline"]["verdict"] = "Holds"
+    second.write_text(json.dumps(body | {"payload": base64.b64encode(json.dumps(payload).encode()).decode()}))
+    found, refused = newest_signed(tmp_path / "signed", "rover")
+    assert found is not None
+    assert found.who == "A. Person, safety"
+    assert refused == (f"{second.name}: what it names is not what it signs",)
+
+
+def test_with_trusted_keys_only_theirs_count(tmp_path: Path) -> None:
+    pytest.importorskip("cryptography")
+    new_key_pair(tmp_path / "mine")
+    new_key_pair(tmp_path / "other")
+    (tmp_path / "signed" / "keys").mkdir(parents=True)
+    (tmp_path / "signed" / "keys" / "mine.pub").write_bytes((tmp_path / "mine.pub").read_bytes())
+    signed(tmp_path, "with the key", tmp_path / "mine")
+    signed(tmp_path, "another key", tmp_path / "other")
+    signed(tmp_path, "no key")
+    found, refused = newest_signed(tmp_path / "signed", "rover")
+    assert found is not None
+    assert found.who == "with the key"
+    assert found.checked.startswith("with a trusted key")
+    assert [line.partition(": ")[2] for line in refused] == ["no trusted key has signed it"] * 2
+
+
+@pytest.mark.parametrize("at", range(0, 400, 23))
+def test_no_byte_of_a_signed_statement_can_be_changed(tmp_path: Path, at: int) -> None:
+    pytest.importorskip("cryptography")
+    new_key_pair(tmp_path / "k")
+    body = json.loads(seal({"a": "b" * 200, "n": [1, 2, 3] * 20}, tmp_path / "k"))
+    payload = bytearray(base64.b64decode(body["payload"]))
+    payload[at % len(payload)] ^= 1
+    text = json.dumps(body | {"payload": base64.b64encode(bytes(payload)).decode()})
+    assert isinstance(unseal(text, [tmp_path / "k.pub"]), str)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{}", "[]", '{"payload": "x"}', '{"payload":"e30=","payloadType":"x","signatures":[]}']
+)
+def test_what_is_no_envelope_is_told(text: str, tmp_path: Path) -> None:
+    assert isinstance(unseal(text), str)
+    (tmp_path / "signed" / "rover").mkdir(parents=True)
+    (tmp_path / "signed" / "rover" / "0009-x.json").write_text(text)
+    assert newest_signed(tmp_path / "signed", "rover")[0] is None
+
+
+def test_a_signature_of_another_system_is_none(tmp_path: Path) -> None:
+    path = signed(tmp_path)
+    (tmp_path / "signed" / "crane").mkdir()
+    path.rename(tmp_path / "signed" / "crane" / path.name)
+    assert newest_signed(tmp_path / "signed", "crane") == (None, (f"{path.name}: it is of another system",))
+
+
+def test_diff_fails_on_what_is_worse_and_shows_both_formulas(tmp_path: Path) -> None:
+    other = replace(G, formula="x > 2", digest="e" * 64)
+    for name, found in (
+        ("good", made()),
+        ("bad", made(Verdict.REFUTED)),
+        ("moved", case(SUBJECT, [other], [evidence(other)])),
+    ):
+        render_all(found, tmp_path / name)
+    ask = CliRunner().invoke
+
+    def run(*arguments: str) -> tuple[int, str]:
+        done = ask(diff, arguments, standalone_mode=False)
+        return int(done.return_value), done.output
+
+    good, bad, moved = (str(tmp_path / name) for name in ("good", "bad", "moved"))
+    assert run(good, bad)[0] == 0
+    code, text = run(good, bad, "--fail-on", "worse")
+    assert code == 1
+    lines = text.splitlines()
+    assert lines[1].startswith(("  gate", "  worse")), text
+    assert run(bad, good, "--fail-on", "worse")[0] == 0
+    code, text = run(good, moved, "--fail-on", "worse")
+    assert code == 0
+    assert "      was: x > 1\n      now: x > 2" in text
