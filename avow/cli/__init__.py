@@ -16,6 +16,7 @@ import click
 from avow import __version__
 
 COMMANDS = {
+    "agent": "run an agent program, told step by step",
     "audit": "re-digest everything that the ledger refers to",
     "check": "diagnostics for .rcl files, in milliseconds",
     "compose": "the derivation and its side conditions",
@@ -39,7 +40,11 @@ COMMANDS = {
 }
 """Name → one line of help. The module of that name in this package holds the click command `command`."""
 
-_OF_BACKENDS = {"monitor": "avow.backends.rosmonitoring.command", "review": "avow.backends.review.command"}
+_OF_BACKENDS = {
+    "agent": "avow.backends.ajpf.command",
+    "monitor": "avow.backends.rosmonitoring.command",
+    "review": "avow.backends.review.command",
+}
 """Commands that belong to a backend → the module that holds them."""
 
 
