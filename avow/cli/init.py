@@ -10,16 +10,18 @@ from avow.cli.paths import PathArgument
 
 _DODO = '''"""The pipeline as doit tasks: `doit verify` does everything for every system under contracts/."""
 
+import sys
 from pathlib import Path
 
-from avow.pipeline.tasks import config, pipeline
+from avow.pipeline.tasks import Pipeline
 
-DOIT_CONFIG = config(Path(__file__).parent)
+RUN = Pipeline(Path(__file__).parent, sys.argv[1:])
+DOIT_CONFIG = RUN.config()
 
 
 def task_avow():
     """check, sanity, compose, obligations, export, discharge, report and verify, for each system, node and method"""
-    yield from pipeline(Path(__file__).parent)
+    yield from RUN.tasks()
 '''
 
 

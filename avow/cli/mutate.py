@@ -17,12 +17,11 @@ def command(system: str, method: str | None, node: str | None, limit: int, jobs:
     Scores go into the ledger and the report, which is rendered again. Evidence that notices no mutant is hollow: it
     supports nothing from then on, and the exit code is 1.
     """
-    import os
-
     from avow.base.diagnostics import Rejected
     from avow.base.workspace import system_folder, workspace
     from avow.pipeline.mutation import hunt
-    from avow.pipeline.run_info import this_run
+    from avow.pipeline.run_info import new_run
+    from avow.pipeline.tasks import execute
     from avow.pipeline.workload import survey
 
     place = workspace()
@@ -35,7 +34,7 @@ def command(system: str, method: str | None, node: str | None, limit: int, jobs:
             raise click.UsageError(f"no {what} of the plan is called '{name}'; known: {', '.join(sorted(known))}")
     works = tuple(w for w in every if method in (None, w.method) and node in (None, w.node))
     scores = []
-    for score in hunt(place, works, this_run(), limit, jobs):  # minutes may lie between two of them
+    for score in hunt(place, works, new_run(), limit, jobs):  # minutes may lie between two of them
         scores.append(score)
         lost = f"   survives: {'; '.join(score.survivors)}" if score.survivors else ""
         lost += f"   not judged: {'; '.join(score.unjudged)}" if score.unjudged else ""
@@ -50,12 +49,4 @@ def command(system: str, method: str | None, node: str | None, limit: int, jobs:
     if not scores:
         click.echo("no current evidence to examine: run `doit verify` first")
         return 0
-    os.chdir(place.root)
-    from doit.cmd_base import ModuleTaskLoader
-    from doit.doit_cmd import DoitMain
-
-    from avow.pipeline.tasks import config, pipeline
-
-    tasks = {"DOIT_CONFIG": config(place.root), "task_avow": lambda: pipeline(place.root)}
-    rendered = int(DoitMain(ModuleTaskLoader(tasks)).run(["run", f"report:{surveyed.system.name}"]) or 0)
-    return rendered or (1 if hollow else 0)
+    return execute(place.root, [f"report:{surveyed.system.name}"]) or (1 if hollow else 0)

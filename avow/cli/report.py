@@ -26,21 +26,12 @@ def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
 
     if folder is not None:
         return _check(Path(folder), as_json)
-    import os
-
     from avow.base.workspace import require_systems, workspace
+    from avow.pipeline.tasks import execute
 
     place = workspace()
     require_systems(place, systems)
-    os.chdir(place.root)
-    from doit.cmd_base import ModuleTaskLoader
-    from doit.doit_cmd import DoitMain
-
-    from avow.pipeline.tasks import config, pipeline
-
-    tasks = {"DOIT_CONFIG": config(place.root), "task_avow": lambda: pipeline(place.root)}
-    wanted = [f"report:{name}" for name in systems] or ["report"]
-    return int(DoitMain(ModuleTaskLoader(tasks)).run(["run", *wanted]))
+    return execute(place.root, [f"report:{name}" for name in systems] or ["report"])
 
 
 def _check(folder: object, as_json: bool) -> int:

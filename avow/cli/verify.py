@@ -22,6 +22,7 @@ def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool, san
     from avow.base.workspace import require_systems, workspace
     from avow.isolation.level import SANDBOX
     from avow.pipeline.run_info import EXPLAIN, FRESH
+    from avow.pipeline.tasks import execute
 
     place = workspace()
     require_systems(place, systems)
@@ -31,13 +32,4 @@ def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool, san
         os.environ[SANDBOX] = "required"
     if explain:
         os.environ[EXPLAIN] = "1"
-    os.chdir(place.root)
-    from doit.cmd_base import ModuleTaskLoader
-    from doit.doit_cmd import DoitMain
-
-    from avow.pipeline.tasks import config, pipeline
-
-    wanted = [f"verify:{name}" for name in systems] or ["verify"]
-    tasks = {"DOIT_CONFIG": config(place.root), "task_avow": lambda: pipeline(place.root, wanted)}
-    code = DoitMain(ModuleTaskLoader(tasks)).run(["run", "-n", str(jobs), *wanted])
-    return int(code or 0)
+    return execute(place.root, [f"verify:{name}" for name in systems] or ["verify"], jobs)

@@ -28,8 +28,9 @@ from avow.evidence.record import RETRY
 from avow.pipeline import check as checking
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
-from avow.pipeline.results import Result, finished, note, read_result
-from avow.pipeline.run_info import EXPLAIN, Run, seconds_so_far
+from avow.pipeline.results import Result, read_result
+from avow.pipeline.run_info import EXPLAIN, Run
+from avow.pipeline.state import State
 from avow.pipeline.workload import Survey
 
 
@@ -37,9 +38,16 @@ from avow.pipeline.workload import Survey
 class Assessment:
     """What is needed to assess one system."""
 
-    workspace: Workspace
+    state: State
     surveyed: Survey
-    run: Run
+
+    @property
+    def workspace(self) -> Workspace:
+        return self.state.workspace
+
+    @property
+    def run(self) -> Run:
+        return self.state.run
 
     @property
     def system(self) -> str:
@@ -50,35 +58,22 @@ class Assessment:
         return self.workspace.artifacts / self.system / "report.json"
 
 
-_known: list[Assessment] = []
-_changed: list[str] = []
-
-
-def register(assessment: Assessment) -> Assessment:
-    """Note a system that the page over all systems must show."""
-    _known.append(assessment)
-    return assessment
-
-
-def known() -> tuple[Assessment, ...]:
-    """Every system that could be read in this process."""
-    return tuple(_known)
-
-
-def is_settled() -> bool:
+def is_settled(state: State) -> bool:
     """Whether a later run would ask nothing again: no answer is one that it must not be content with."""
     return not any(
         records[-1].evidence.details.get(RETRY)
-        for a in _known
+        for a in state.assessments
         for work in a.surveyed.catalogue.works
         for o in work.obligations
         if (records := ledger_of(a.workspace.ledger(a.system)).current(o.id, work.keys[o.id]))
     )
 
 
-def index_is_due() -> bool:
+def index_is_due(state: State) -> bool:
     """Whether the page over all systems no longer shows what its systems' reports show."""
-    return bool(_changed) or any(not _overview_stands(a.workspace) for a in _known if finished())
+    return bool(state.changed) or bool(
+        state.assessments and state.results.all and not _overview_stands(state.workspace)
+    )
 
 
 def _overview_stands(workspace: Workspace) -> bool:
@@ -107,20 +102,20 @@ def render(assessment: Assessment) -> Result:
         result = _summarise(assessment, case, rendered.left_out)
         files = {assessment.workspace.relative(p): digest_file(p) for p in rendered.written}
         write_note(assessment.stamp, {"key": key, "files": files, **result.json()})
-        _changed.append(assessment.system)
+        assessment.state.changed.append(assessment.system)
     confirm(assessment.workspace, ledger)
     return result
 
 
 def report(assessment: Assessment) -> bool:
     """Render the report, whatever the gates say."""
-    return note(render(assessment), gated=False)
+    return assessment.state.results.note(render(assessment), gated=False)
 
 
 def gate(assessment: Assessment) -> TaskError | bool:
     """Render the report and note whether the policy's gates pass: the run's exit code follows from all of them."""
     try:
-        return note(render(assessment), gated=True)
+        return assessment.state.results.note(render(assessment), gated=True)
     except Rejected as rejected:
         return checking.refuse(rejected)
     except OSError as error:
@@ -148,7 +143,7 @@ def build(assessment: Assessment) -> Case:
         run=RunInfo(
             assessment.run.id,
             datetime.now(UTC).isoformat(timespec="seconds"),
-            round(seconds_so_far(), 1),
+            round(assessment.run.seconds, 1),
             __version__,
             assessment.run.fresh,
             f"doit verify:{system.name}",

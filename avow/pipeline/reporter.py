@@ -8,7 +8,6 @@ import shutil
 import sys
 import threading
 import time
-from pathlib import Path
 from typing import IO, Any
 
 from doit.reporter import ConsoleReporter
@@ -16,8 +15,7 @@ from doit.reporter import ConsoleReporter
 from avow.base import process
 from avow.base.files import PART
 from avow.base.workspace import Workspace
-from avow.pipeline import shortcut
-from avow.pipeline.results import exit_code, finished
+from avow.pipeline.state import State
 
 _SILENT = ("verify",)
 """Stages whose result is the final table, not a line of its own."""
@@ -27,6 +25,9 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
     """doit's reporter interface; `-r avow` is not needed, DOIT_CONFIG names it."""
 
     desc = "progress, then what was proved, checked, tested, refuted and not run"
+
+    _state: State
+    """Of the run that it tells of: set by `reporter_of`, since doit makes the instance."""
 
     def __init__(self, outstream: IO[str], options: dict[str, Any]) -> None:
         super().__init__(outstream, options)
@@ -41,9 +42,9 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
 
     def initialize(self, tasks: dict[str, Any], selected_tasks: list[str]) -> None:
         self._selected = list(selected_tasks)
-        self._run_lock = _lock_run(self.outstream)
-        if self._run_lock is not None and "avow.pipeline.stages" in sys.modules:
-            _sweep(Workspace(Path.cwd()))
+        self._run_lock = _lock_run(self._state.workspace, self.outstream)
+        if self._run_lock is not None and self._state.read:
+            _sweep(self._state.workspace)
 
     def execute_task(self, task: Any) -> None:
         with self._lock:
@@ -90,6 +91,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
     def complete_run(self) -> None:
         from avow.pipeline.summary import append_job_summary, print_obligations, print_summary
 
+        results = self._state.results
         process.kill_all()  # nothing of ours may outlive the run, also when it was interrupted
         with self._lock:
             self._clear()
@@ -98,10 +100,10 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             print_obligations(self._selected, self.outstream)
         broken = sorted(
             {f["task"].name.split(":")[1] for f in self.failures if ":" in f["task"].name}
-            - {g.system for g in finished()}
+            - set(self._state.results.finished)
         )
-        print_summary(finished(), broken, self._done, time.monotonic() - self._start, self.outstream)
-        append_job_summary(finished(), broken)
+        print_summary(results.all, broken, self._done, time.monotonic() - self._start, self.outstream)
+        append_job_summary(results.all, broken)
         if sys.exc_info()[0] is None and not self._seen.issuperset(self._selected):
             self.runtime_errors.append("not all of it was run: is the number after -n below 0?")
         for message in self.runtime_errors:
@@ -112,32 +114,32 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         if self.runtime_errors:
             raise SystemExit(2)
         # A failing gate is no failing task: doit would call its group an error (2), and it knows no code 3.
-        if not self.failures and exit_code():
-            raise SystemExit(exit_code())
+        if not self.failures and results.exit_code:
+            raise SystemExit(results.exit_code)
 
     def _write_index(self) -> None:
-        if "avow.pipeline.assess" in sys.modules:  # else nothing was read, so nothing can have changed
-            from avow.pipeline.assess import index_is_due, known
+        if self._state.read:  # else nothing can have changed
+            from avow.pipeline.assess import index_is_due
             from avow.pipeline.index_page import write_overview
 
             try:
-                if index_is_due():
-                    write_overview(known())
+                if index_is_due(self._state):
+                    write_overview(self._state.assessments)
             except OSError as error:
                 self.runtime_errors.append(f"the page over all systems cannot be written: {error}")
 
     def _keep(self) -> None:
         """Note that all is settled, for the next run, or that it is not."""
-        workspace = Workspace(Path.cwd())
-        if "avow.pipeline.assess" not in sys.modules:
+        state = self._state
+        if not state.read:
             return
-        from avow.pipeline.assess import is_settled, known
+        from avow.pipeline.assess import is_settled
 
-        complete = {a.system for a in known()} == {r.system for r in finished()}
-        plugins = any(a.surveyed.system.plan.plugins for a in known())  # their code may be anywhere
+        complete = {a.system for a in state.assessments} == set(state.results.finished)
+        plugins = any(a.surveyed.system.plan.plugins for a in state.assessments)  # their code may be anywhere
         undisturbed = complete and not plugins and not self.failures and not self.runtime_errors
-        if "verify" in self._selected and undisturbed and is_settled():
-            shortcut.keep(workspace, finished())
+        if "verify" in self._selected and undisturbed and is_settled(state):
+            state.shortcut.keep(state.results.all)
 
     def _line(self, text: str) -> None:
         self._clear()
@@ -156,6 +158,11 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             self.outstream.write("\r" + " " * (shutil.get_terminal_size().columns - 1) + "\r")
 
 
+def reporter_of(state: State) -> type[PipelineReporter]:
+    """The reporter of one run, as doit's configuration wants it: a class."""
+    return type("ReporterOfRun", (PipelineReporter,), {"_state": state})
+
+
 def _sweep(workspace: Workspace) -> None:
     """Remove what a killed run left half written; no other run is under way now."""
     for folder in (workspace.artifacts, workspace.reports):
@@ -164,11 +171,11 @@ def _sweep(workspace: Workspace) -> None:
                 left.unlink()
 
 
-def _lock_run(out: IO[str]) -> IO[str] | None:
+def _lock_run(workspace: Workspace, out: IO[str]) -> IO[str] | None:
     """One run at a time in a workspace: a second waits for the first and then finds its work done. None where nothing
     can be written: there, no two runs can be in each other's way."""
     try:
-        file = (Path("artifacts") / ".lock").open("w")
+        file = (workspace.artifacts / ".lock").open("w")
     except OSError:
         return None
     try:

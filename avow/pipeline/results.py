@@ -55,29 +55,29 @@ def read_result(data: Mapping[str, Any]) -> Result:
 
 
 @dataclass(slots=True)
-class _Run:
-    finished: list[Result] = field(default_factory=list)
-    gated: list[str] = field(default_factory=list)
+class Results:
+    """What came of a run so far."""
 
+    finished: dict[str, Result] = field(default_factory=dict)
+    """System → its result."""
+    gated: set[str] = field(default_factory=set)
+    """The systems that were to be verified, not only reported."""
 
-_run = _Run()
+    def note(self, result: Result, *, gated: bool) -> bool:
+        """Remember a result. True: an action's answer."""
+        self.finished[result.system] = result
+        if gated:
+            self.gated.add(result.system)
+        return True
 
+    @property
+    def all(self) -> tuple[Result, ...]:
+        """The systems assessed so far."""
+        return tuple(self.finished.values())
 
-def note(result: Result, *, gated: bool) -> bool:
-    """Remember a result; with `gated`, the system was to be verified, not only reported. True: an action's answer."""
-    _run.finished = [r for r in _run.finished if r.system != result.system] + [result]
-    if gated:
-        _run.gated.append(result.system)
-    return True
-
-
-def finished() -> tuple[Result, ...]:
-    """The systems assessed in this process so far."""
-    return tuple(_run.finished)
-
-
-def exit_code() -> int:
-    """0: every gate passes; 1: one fails; 3: one fails for want of a tool, and no other. Only systems that were to be
-    verified count: `doit report` shows failing gates and ends with 0."""
-    codes = {r.exit_code for r in _run.finished if r.system in _run.gated}
-    return 1 if 1 in codes else max(codes, default=0)
+    @property
+    def exit_code(self) -> int:
+        """0: every gate passes; 1: one fails; 3: one fails for want of a tool, and no other. Only systems that were to
+        be verified count: `doit report` shows failing gates and ends with 0."""
+        codes = {self.finished[name].exit_code for name in self.gated}
+        return 1 if 1 in codes else max(codes, default=0)

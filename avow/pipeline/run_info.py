@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
 EXPLAIN = "AVOW_EXPLAIN"
@@ -17,20 +16,20 @@ FRESH = "AVOW_FRESH"
 
 @dataclass(frozen=True, slots=True)
 class Run:
+    """The identity of a run, as evidence records name it."""
+
     id: str
     fresh: bool
+    """It settles everything anew."""
+    begun: float = field(default_factory=time.monotonic, compare=False)
+
+    @property
+    def seconds(self) -> float:
+        """Wall-clock seconds since it began."""
+        return time.monotonic() - self.begun
 
 
-@functools.cache
-def this_run() -> Run:
-    """The run of this process."""
+def new_run() -> Run:
+    """A run that begins now, in this process."""
     now = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%f")[:-3]
     return Run(f"{now}-{os.getpid()}", os.environ.get(FRESH, "") not in ("", "0"))
-
-
-_started = time.monotonic()
-
-
-def seconds_so_far() -> float:
-    """Wall-clock seconds since this process loaded the pipeline."""
-    return time.monotonic() - _started

@@ -29,45 +29,49 @@ _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXP
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
 """Avow's own code, wherever it is installed."""
 
-_begun: dict[Path, str] = {}
-"""Workspace → what the sources were before this process read them."""
 
+class Shortcut:
+    """The memory of a workspace's last complete run, looked at before anything is read and renewed at the end."""
 
-def nothing_to_do(workspace: Workspace, wanted: Sequence[str]) -> tuple[Result, ...] | None:
-    """The results of the last run, if only verification is `wanted` and nothing has changed since; else None.
-    Called before anything is read."""
-    with contextlib.suppress(OSError):
-        _begun[workspace.root.resolve()] = _sources(workspace)
-    if not wanted or any(name.split(":")[0] != "verify" for name in wanted) or os.environ.get(FRESH):
-        return None
-    try:
-        kept = read_note(_stamp(workspace)) or {}
-        results = tuple(read_result(r) for r in kept["results"])
-        observed = from_json(kept["observed"])
-        if kept["identity"] != _identity(workspace, observed):
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace = workspace
+        self._begun: str | None = None
+        """What the sources were before this run read them."""
+
+    def nothing_to_do(self, wanted: Sequence[str]) -> tuple[Result, ...] | None:
+        """The results of the last run, if only verification is `wanted` and nothing has changed since; else None.
+        Called before anything is read."""
+        with contextlib.suppress(OSError):
+            self._begun = _sources(self.workspace)
+        if not wanted or any(name.split(":")[0] != "verify" for name in wanted) or os.environ.get(FRESH):
             return None
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-    names = {r.system for r in results}
-    asked = {name.partition(":")[2] for name in wanted}
-    return results if asked - {""} <= names else None
+        try:
+            kept = read_note(_stamp(self.workspace)) or {}
+            results = tuple(read_result(r) for r in kept["results"])
+            observed = from_json(kept["observed"])
+            if kept["identity"] != _identity(self.workspace, observed):
+                return None
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        names = {r.system for r in results}
+        asked = {name.partition(":")[2] for name in wanted}
+        return results if asked - {""} <= names else None
 
-
-def keep(workspace: Workspace, results: Sequence[Result]) -> None:
-    """Note that everything is settled as things stand. Without effect where a link leads out of the workspace, or where
-    something was edited during the run: the results are not of what stands there now."""
-    try:
-        if _begun.get(workspace.root.resolve()) != _sources(workspace):
+    def keep(self, results: Sequence[Result]) -> None:
+        """Note that everything is settled as things stand. Without effect where a link leads out of the workspace, or
+        where something was edited during the run: the results are not of what stands there now."""
+        try:
+            if self._begun != _sources(self.workspace):
+                return
+            observed = _observed(self.workspace)
+            kept = {
+                "identity": _identity(self.workspace, observed),
+                "observed": to_json(observed),
+                "results": [r.json() for r in results],
+            }
+            write_note(_stamp(self.workspace), kept)
+        except OSError:
             return
-        observed = _observed(workspace)
-        kept = {
-            "identity": _identity(workspace, observed),
-            "observed": to_json(observed),
-            "results": [r.json() for r in results],
-        }
-        write_note(_stamp(workspace), kept)
-    except OSError:
-        return
 
 
 def _stamp(workspace: Workspace) -> Path:

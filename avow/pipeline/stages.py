@@ -14,12 +14,11 @@ from typing import Any
 from doit.exceptions import TaskError
 
 from avow.base.diagnostics import Rejected
-from avow.base.workspace import Workspace
 from avow.pipeline import check as checking
 from avow.pipeline import export as exporting
-from avow.pipeline.assess import Assessment, gate, register, report
+from avow.pipeline.assess import Assessment, gate, report
 from avow.pipeline.discharge import discharge, open_obligations
-from avow.pipeline.run_info import this_run
+from avow.pipeline.state import State
 from avow.pipeline.work import LANGUAGE, Work
 from avow.pipeline.workload import Survey, survey, write_obligations
 
@@ -37,16 +36,17 @@ STAGES = {
 }
 
 
-def stages(workspace: Workspace) -> Iterator[Task]:
+def stages(state: State) -> Iterator[Task]:
     """All tasks for all systems of a workspace."""
+    state.read = True
     for stage, doc in STAGES.items():
         yield {"basename": stage, "name": None, "doc": doc}
-    for folder in workspace.systems():
+    for folder in state.workspace.systems():
         surveyed = survey(folder)
         if isinstance(surveyed, Rejected):
             yield from _rejected(folder.name, surveyed)
         else:
-            yield from _system(workspace, surveyed)
+            yield from _system(state, surveyed)
 
 
 def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
@@ -60,8 +60,8 @@ def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
         yield {"basename": stage, "name": name, "actions": [action], "uptodate": [False]}
 
 
-def _system(workspace: Workspace, surveyed: Survey) -> Iterator[Task]:
-    name = surveyed.system.name
+def _system(state: State, surveyed: Survey) -> Iterator[Task]:
+    name, workspace = surveyed.system.name, state.workspace
     check = f"check:{name}"
     done = []
     yield {
@@ -69,9 +69,9 @@ def _system(workspace: Workspace, surveyed: Survey) -> Iterator[Task]:
         "name": name,
         "actions": [
             partial(_act, partial(checking.check, workspace, surveyed)),
-            _discharge(workspace, surveyed.work(LANGUAGE)),
+            _discharge(state, surveyed.work(LANGUAGE)),
         ],
-        "uptodate": [partial(checking.is_current, workspace, surveyed), _settled(workspace, surveyed.work(LANGUAGE))],
+        "uptodate": [partial(checking.is_current, workspace, surveyed), _settled(state, surveyed.work(LANGUAGE))],
     }
     for work in surveyed.catalogue.works:
         match work.engine:
@@ -94,9 +94,9 @@ def _system(workspace: Workspace, surveyed: Survey) -> Iterator[Task]:
         yield {
             "basename": basename,
             "name": title,
-            "actions": [_discharge(workspace, work)],
+            "actions": [_discharge(state, work)],
             "task_dep": [f"export:{title}"] if basename == "discharge" else [check],
-            "uptodate": [_settled(workspace, work)],
+            "uptodate": [_settled(state, work)],
         }
         done.append(f"{basename}:{title}")
     yield {
@@ -106,7 +106,8 @@ def _system(workspace: Workspace, surveyed: Survey) -> Iterator[Task]:
         "task_dep": [check],
         "uptodate": [partial(write_obligations, workspace, surveyed, dry=True)],
     }
-    assessment = register(Assessment(workspace, surveyed, this_run()))
+    assessment = Assessment(state, surveyed)
+    state.assessments.append(assessment)
     yield {
         "basename": "report",
         "name": name,
@@ -125,13 +126,13 @@ def _system(workspace: Workspace, surveyed: Survey) -> Iterator[Task]:
     }
 
 
-def _discharge(workspace: Workspace, work: Work) -> Callable[[], TaskError | bool]:
-    return partial(_act, partial(discharge, workspace, work, this_run()))
+def _discharge(state: State, work: Work) -> Callable[[], TaskError | bool]:
+    return partial(_act, partial(discharge, state.workspace, work, state.run))
 
 
-def _settled(workspace: Workspace, work: Work) -> Callable[[], bool]:
+def _settled(state: State, work: Work) -> Callable[[], bool]:
     def settled() -> bool:
-        return not open_obligations(workspace, work, this_run())
+        return not open_obligations(state.workspace, work, state.run)
 
     return settled
 

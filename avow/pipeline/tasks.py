@@ -3,6 +3,7 @@ the stages themselves are in `avow.pipeline.stages`."""
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -10,49 +11,68 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.workspace import Workspace
-from avow.pipeline import shortcut
-from avow.pipeline.reporter import PipelineReporter
-from avow.pipeline.results import note
+from avow.pipeline.reporter import reporter_of
+from avow.pipeline.state import State
 
 Task = dict[str, Any]
 
 
-def config(root: Path) -> dict[str, Any]:
-    """DOIT_CONFIG for a workspace. Ends with code 2 where there can be no artifacts."""
-    try:
-        (root / "artifacts").mkdir(exist_ok=True)
-    except OSError as error:
-        print(f"error: there can be no artifacts here: {error}", file=sys.stderr)
-        raise SystemExit(2) from error
-    return {
-        "default_tasks": ["verify"],
-        "reporter": PipelineReporter,
-        # doit's own memory is of no use here, and a run killed while writing it would keep the next one from starting
-        "dep_file": ":memory:",
-        "backend": "sqlite3",
-        "continue": True,
-        "num_process": 2,
-        "par_type": "thread",
-        "verbosity": 2,
-    }
+class Pipeline:
+    """A run of the pipeline in one workspace, for `dodo.py` and for commands.
+
+    `asked` is doit's command line without the program's name: it tells whether only verification is wanted, so that a
+    run with nothing to do reads no contract.
+    """
+
+    def __init__(self, root: Path, asked: Sequence[str]) -> None:
+        self._state = State(Workspace(root))
+        self._wanted = wanted(asked)
+
+    def config(self) -> dict[str, Any]:
+        """DOIT_CONFIG for the workspace. Ends with code 2 where there can be no artifacts."""
+        try:
+            self._state.workspace.artifacts.mkdir(exist_ok=True)
+        except OSError as error:
+            print(f"error: there can be no artifacts here: {error}", file=sys.stderr)
+            raise SystemExit(2) from error
+        return {
+            "default_tasks": ["verify"],
+            "reporter": reporter_of(self._state),
+            # doit's own memory is of no use, and a run killed while writing it would keep the next one from starting
+            "dep_file": ":memory:",
+            "backend": "sqlite3",
+            "continue": True,
+            "num_process": 2,
+            "par_type": "thread",
+            "verbosity": 2,
+        }
+
+    def tasks(self) -> Iterator[Task]:
+        """All tasks for all systems under contracts/."""
+        state = self._state
+        settled = state.shortcut.nothing_to_do(self._wanted)
+        if settled is not None:
+            for result in settled:
+                action = partial(state.results.note, result, gated=True)
+                yield {"basename": "verify", "name": result.system, "actions": [action], "uptodate": [False]}
+            return
+        from avow.pipeline.stages import stages
+
+        yield from stages(state)
 
 
-def pipeline(root: Path, wanted: Sequence[str] | None = None) -> Iterator[Task]:
-    """All tasks for all systems under `root`/contracts; `wanted` are the names of those that will be run (by default,
-    as doit's command line has them)."""
-    workspace = Workspace(root)
-    settled = shortcut.nothing_to_do(workspace, _wanted(sys.argv[1:]) if wanted is None else wanted)
-    if settled is not None:
-        for result in settled:
-            action = partial(note, result, gated=True)
-            yield {"basename": "verify", "name": result.system, "actions": [action], "uptodate": [False]}
-        return
-    from avow.pipeline.stages import stages
+def execute(root: Path, tasks: Sequence[str], jobs: int = 2) -> int:
+    """Run tasks of a workspace as doit does, in its folder; the exit code."""
+    from doit.cmd_base import ModuleTaskLoader
+    from doit.doit_cmd import DoitMain
 
-    yield from stages(workspace)
+    os.chdir(root)
+    asked = ["run", "-n", str(jobs), *tasks]
+    run = Pipeline(root, asked)
+    return int(DoitMain(ModuleTaskLoader({"DOIT_CONFIG": run.config(), "task_avow": run.tasks})).run(asked) or 0)
 
 
-def _wanted(arguments: Sequence[str]) -> tuple[str, ...]:
+def wanted(arguments: Sequence[str]) -> tuple[str, ...]:
     """The tasks that doit is asked to run; empty for anything that is not plainly a run."""
     names: list[str] = []
     rest = list(arguments[1:] if arguments[:1] == ["run"] else arguments)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from avow.base.workspace import Workspace
-from avow.pipeline import shortcut
 from avow.pipeline.results import Result
+from avow.pipeline.shortcut import Shortcut
 
 from .test_exit_codes import run
 
@@ -24,21 +24,21 @@ def system(workspace: Path) -> Path:
 
 
 def test_an_edit_during_the_run_is_not_kept_as_settled(workspace: Path) -> None:
-    contract, place = system(workspace) / "system.rcl", Workspace(workspace)
-    assert shortcut.nothing_to_do(place, ("verify",)) is None
+    contract, shortcut = system(workspace) / "system.rcl", Shortcut(Workspace(workspace))
+    assert shortcut.nothing_to_do(("verify",)) is None
     contract.write_text(contract.read_text().replace("out.b", "not out.b"))
-    shortcut.keep(place, (DONE,))
-    assert shortcut.nothing_to_do(place, ("verify",)) is None
+    shortcut.keep((DONE,))
+    assert shortcut.nothing_to_do(("verify",)) is None
 
 
 def test_what_stood_still_is_kept(workspace: Path) -> None:
-    contract, place = system(workspace) / "system.rcl", Workspace(workspace)
-    assert shortcut.nothing_to_do(place, ("verify",)) is None
+    contract, shortcut = system(workspace) / "system.rcl", Shortcut(Workspace(workspace))
+    assert shortcut.nothing_to_do(("verify",)) is None
     (workspace / "artifacts" / "made").write_text("by the run")
-    shortcut.keep(place, (DONE,))
-    assert shortcut.nothing_to_do(place, ("verify",)) == (DONE,)
+    shortcut.keep((DONE,))
+    assert Shortcut(Workspace(workspace)).nothing_to_do(("verify",)) == (DONE,)
     contract.write_text(contract.read_text() + "\n")
-    assert shortcut.nothing_to_do(place, ("verify",)) is None
+    assert shortcut.nothing_to_do(("verify",)) is None
 
 
 def test_a_memory_of_doit_that_was_half_written(workspace: Path) -> None:

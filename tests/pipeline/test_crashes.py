@@ -27,6 +27,7 @@ from avow.pipeline import assess
 from avow.pipeline.assess import Assessment
 from avow.pipeline.reporter import _sweep
 from avow.pipeline.run_info import Run
+from avow.pipeline.state import State
 from avow.pipeline.workload import Survey, survey
 
 TEMPLATE = Path(__file__).parents[2] / "avow" / "cli" / "template" / "contracts" / "thermostat"
@@ -41,15 +42,16 @@ def test_an_answer_that_a_killed_worker_did_not_give_is_asked_for_again(
     place = Workspace(workspace)
     surveyed = survey(Path(shutil.copytree(TEMPLATE, workspace / "contracts" / "thermostat")))
     assert isinstance(surveyed, Survey)
-    monkeypatch.setattr(assess, "_known", [Assessment(place, surveyed, Run("r", False))])
+    state = State(place, Run("r", False))
+    state.assessments.append(Assessment(state, surveyed))
     assess.ledger_of.cache_clear()
     work = surveyed.work("hoare")
     record = replace(evidence(work.obligations[0]), method="hoare", key=work.keys[work.obligations[0].id])
-    assert assess.is_settled()
+    assert assess.is_settled(state)
     Ledger(place.ledger("thermostat")).append(replace(record, verdict=Verdict.ERROR, details={"retry": True}))
-    assert not assess.is_settled()
+    assert not assess.is_settled(state)
     Ledger(place.ledger("thermostat")).append(record)
-    assert assess.is_settled()
+    assert assess.is_settled(state)
 
 
 @pytest.mark.filterwarnings("ignore:This process .*multi-threaded:DeprecationWarning")

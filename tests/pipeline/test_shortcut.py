@@ -8,17 +8,18 @@ from pathlib import Path
 import pytest
 
 from avow.base.workspace import Workspace
-from avow.pipeline import shortcut
 from avow.pipeline.results import Result
-from avow.pipeline.tasks import _wanted
+from avow.pipeline.shortcut import Shortcut
+from avow.pipeline.tasks import wanted as read_wanted
 
 RESULT = Result("crane", 0, {"proved": 3}, "CHECKED", "reports/crane/index.html", (("all", True, "fine"),))
 
 
 def run(workspace: Workspace) -> None:
     """As a whole run does: look first, and note at the end that everything is settled."""
-    assert shortcut.nothing_to_do(workspace, ("verify",)) is None
-    shortcut.keep(workspace, [RESULT])
+    shortcut = Shortcut(workspace)
+    assert shortcut.nothing_to_do(("verify",)) is None
+    shortcut.keep([RESULT])
 
 
 @pytest.fixture
@@ -28,18 +29,18 @@ def settled(tmp_path: Path) -> Workspace:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("text")
     run(workspace)
-    assert shortcut.nothing_to_do(workspace, ("verify",)) == (RESULT,)
+    assert Shortcut(workspace).nothing_to_do(("verify",)) == (RESULT,)
     return workspace
 
 
 def test_nothing_changed(settled: Workspace) -> None:
-    assert shortcut.nothing_to_do(settled, ("verify",)) == (RESULT,)
-    assert shortcut.nothing_to_do(settled, ("verify:crane",)) == (RESULT,)
+    assert Shortcut(settled).nothing_to_do(("verify",)) == (RESULT,)
+    assert Shortcut(settled).nothing_to_do(("verify:crane",)) == (RESULT,)
 
 
 @pytest.mark.parametrize("wanted", [(), ("report",), ("verify", "check"), ("verify:other",), ("obligations",)])
 def test_only_verification_of_known_systems_is_short(settled: Workspace, wanted: tuple[str, ...]) -> None:
-    assert shortcut.nothing_to_do(settled, wanted) is None
+    assert Shortcut(settled).nothing_to_do(wanted) is None
 
 
 @pytest.mark.parametrize("name", ["contracts/crane/plan.yaml", "artifacts/ledger/crane.jsonl", "reports/index.html"])
@@ -49,25 +50,26 @@ def test_an_edit_of_the_same_length_under_an_old_time_is_seen(settled: Workspace
     path.write_text("tExt")
     os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
     assert path.stat().st_mtime_ns == before.st_mtime_ns
-    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
 
 
 def test_new_and_deleted_files_are_seen(settled: Workspace) -> None:
     extra = settled.contracts / "crane" / "new.rcl"
     extra.write_text("")
-    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
     extra.unlink()
     (settled.root / "reports" / "index.html").unlink()
-    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
 
 
 def test_what_was_edited_during_the_run_is_not_settled(settled: Workspace) -> None:
     plan = settled.contracts / "crane" / "plan.yaml"
     plan.write_text("changed before")
-    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    shortcut = Shortcut(settled)
+    assert shortcut.nothing_to_do(("verify",)) is None
     plan.write_text("changed under way")
-    shortcut.keep(settled, [RESULT])
-    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    shortcut.keep([RESULT])
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
 
 
 def test_a_tool_that_appears_on_the_path_is_seen(
@@ -77,9 +79,9 @@ def test_a_tool_that_appears_on_the_path_is_seen(
     tools.mkdir()
     monkeypatch.setenv("PATH", f"{tools}:{os.environ['PATH']}")
     run(settled)
-    assert shortcut.nothing_to_do(settled, ("verify",)) == (RESULT,)
+    assert Shortcut(settled).nothing_to_do(("verify",)) == (RESULT,)
     (tools / "dafny").write_text("#!/bin/sh\n")
-    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
 
 
 def test_a_link_that_leads_elsewhere_is_never_short(tmp_path: Path, settled: Workspace) -> None:
@@ -87,15 +89,15 @@ def test_a_link_that_leads_elsewhere_is_never_short(tmp_path: Path, settled: Wor
     elsewhere.mkdir()
     (settled.contracts / "crane" / "models").symlink_to(elsewhere)
     run(settled)
-    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
 
 
 def test_fresh_runs_and_damaged_notes_go_the_long_way(settled: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AVOW_FRESH", "1")
-    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
     monkeypatch.delenv("AVOW_FRESH")
     (settled.artifacts / ".settled.json").write_text('{"identity": 7}')
-    assert shortcut.nothing_to_do(settled, ("verify",)) is None
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None
 
 
 @pytest.mark.parametrize(
@@ -113,4 +115,4 @@ def test_fresh_runs_and_damaged_notes_go_the_long_way(settled: Workspace, monkey
     ],
 )
 def test_what_doit_was_asked_for(line: str, names: tuple[str, ...]) -> None:
-    assert _wanted(line.split()) == names
+    assert read_wanted(line.split()) == names

@@ -1,0 +1,33 @@
+"""A run of the pipeline, as an object: what its tasks and its reporter share. Light: an idle run needs it too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from avow.base.workspace import Workspace
+from avow.pipeline.results import Results
+from avow.pipeline.run_info import Run, new_run
+from avow.pipeline.shortcut import Shortcut
+
+if TYPE_CHECKING:
+    from avow.pipeline.assess import Assessment
+
+
+@dataclass(slots=True)
+class State:
+    """What becomes known in a run of one workspace."""
+
+    workspace: Workspace
+    run: Run = field(default_factory=new_run)
+    results: Results = field(default_factory=Results)
+    assessments: list[Assessment] = field(default_factory=list)
+    """Every system that could be read; none where nothing had to be."""
+    changed: list[str] = field(default_factory=list)
+    """The systems whose report was written anew."""
+    read: bool = False
+    """Contracts were read: the run had something to do."""
+    shortcut: Shortcut = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.shortcut = Shortcut(self.workspace)
