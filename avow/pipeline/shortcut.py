@@ -103,7 +103,8 @@ def _sources(workspace: Workspace) -> str:
     environment = [(name, os.environ.get(name)) for name in _ENVIRONMENT]
     today = str(datetime.now().astimezone().date())
     digest.update(json.dumps([environment, today, sys.version, sys.executable, sys.path]).encode())
-    _add_files(digest, workspace.contracts, workspace.signed, *_CODE)
+    signed = (workspace.signed,) if workspace.signed.is_dir() else ()  # most workspaces have none
+    _add_files(digest, workspace.contracts, *signed, *_CODE)
     for name in dict.fromkeys([*os.environ.get("PATH", "").split(os.pathsep), *sys.path]):
         digest.update(f"{name} {_mark(name) if Path(name).is_dir() else ''}\n".encode("utf-8", "surrogateescape"))
     return digest.hexdigest()
