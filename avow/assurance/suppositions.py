@@ -19,6 +19,8 @@ from avow.evidence.status import Status
 from avow.system.plan import Requirement, Statement
 
 _SORTS = tuple(Sort)
+_SCENARIO = Statement("suppositions.compose.scenario", "Nothing occurs that the plan's finite scenario does not list")
+"""The bounds of a check within the scenario, each named by its record, are one supposition."""
 _PLATFORM = ("persistence", "one-output", "entered")
 
 
@@ -172,6 +174,8 @@ def _of_methods(
         sampled = found.status in (Status.TESTED, Status.MONITORED)
         for text in found.suppositions:
             statement = statements.of_method(found.record.method, text)
+            if not statement.place and text.startswith("scenario"):
+                statement = _SCENARIO
             place = statement.place or f"suppositions.{found.record.method}: {text}"
             sort = Sort.SAMPLING if sampled else Sort.MODELS
             yield _Raw(sort, place, text, statement, view.id, _in(closed, view.id))

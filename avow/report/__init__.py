@@ -2,7 +2,7 @@
 
     render_all(case, folder)            writes index.html claims.html report.json report.md comment.md report.pdf
                                         report.sarif findings.sarif junit.xml attestation.jsonl gsn.yaml gsn.svg
-                                        traceability.html traceability.csv report.tex
+                                        cae.yaml traceability.html traceability.csv report.tex
     write_index(cases, folder)          writes <folder>/index.html over all systems, with the trend over runs
 
 Both are idempotent and write each file in one step. They return what they wrote, and what they left out and why.
@@ -54,14 +54,8 @@ def formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
 
 
 def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
-    from avow.assurance.argument import Element, build_argument
     from avow.assurance.traceability import to_csv, trace
-    from avow.report import answers_page, argument_svg, exchange, latex, markdown, page, short, wording
-
-    argument = build_argument(case)
-
-    def link(element: Element) -> str | None:
-        return f"claims.html#{wording.anchor(element.claim)}" if element.claim else None
+    from avow.report import answers_page, exchange, gsn, gsn_svg, latex, markdown, page, short
 
     rows = trace(case)
     as_json = exchange.render_json(case)
@@ -74,8 +68,9 @@ def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
     yield "findings.sarif", exchange.render_sarif(case, findings_only=True)
     yield "junit.xml", exchange.render_junit(case)
     yield "attestation.jsonl", exchange.render_attestation(case)
-    yield "gsn.yaml", exchange.render_gsn(argument, case)
-    yield "gsn.svg", argument_svg.draw(argument, argument.root, link, f"The argument for {case.title}", alone=True)
+    yield "gsn.yaml", gsn.render_gsn(case)
+    yield "gsn.svg", gsn_svg.draw(case)
+    yield "cae.yaml", gsn.render_cae(case)
     yield "traceability.csv", to_csv(rows)
     yield "traceability.html", page.render_traceability(case, rows)
     yield "report.tex", latex.render_latex(case)

@@ -8,14 +8,13 @@ from typing import Any
 from urllib.parse import quote
 from xml.sax.saxutils import escape, quoteattr
 
-from avow.assurance.argument import Argument, Shape
 from avow.assurance.codec import to_json
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import sanity_property, short
 from avow.base.files import digest
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
-from avow.report.layout import json_text, yaml_text
+from avow.report.layout import json_text
 from avow.report.wording import MEANINGS, banner_tone, clean, tone
 
 
@@ -231,22 +230,3 @@ def _statement(case: Case, node: str, views: list[ObligationView], result: str) 
             **groups,
         },
     }
-
-
-# -- GSN ------------------------------------------------------------------------------------------------------------
-
-
-def render_gsn(argument: Argument, case: Case) -> str:
-    """The goal structure as gsn2x reads it."""
-    levels: dict[str, Any] = {"module": {"name": case.system, "brief": case.title}}
-    for element in argument.elements:
-        status = f" [{element.status}]" if element.status else ""
-        body: dict[str, Any] = {"text": f"{element.title}{status}\n{element.text}".strip()}
-        if element.supported_by:
-            body["supportedBy"] = list(element.supported_by)
-        if element.in_context_of:
-            body["inContextOf"] = list(element.in_context_of)
-        if element.shape in (Shape.GOAL, Shape.STRATEGY) and not element.supported_by:
-            body["undeveloped"] = True
-        levels[element.id] = body
-    return yaml_text(levels)

@@ -21,7 +21,7 @@ from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
-from avow.report import argument_svg, example, source, wording
+from avow.report import example, source, wording
 from avow.report.maps import draw_map
 from avow.report.support_counts import resting
 from avow.report.wording import history
@@ -36,10 +36,8 @@ _ROWS = 600
 """So many guarantees have a row of their own in the summary; beyond that a node has one."""
 _A_LINE = 240
 """Characters of a finding in the answer; all of it stands with the obligation."""
-_ON_PAPER = 1600
-"""Pixels: a taller picture would be too small to read on a sheet; on paper a sentence says where it is."""
-_DRAWN = 2500
-"""So many elements of the argument are drawn on one page; the other pictures are in gsn.svg and gsn.yaml."""
+_LISTED = 2500
+"""So many elements of the argument are listed on one page; all are in gsn.yaml."""
 
 
 _Matrix = list[tuple[str, str, list[tuple[ObligationView, list[Status | None]]]]]
@@ -106,14 +104,11 @@ def render_page(case: Case, json_digest: str = "") -> str:
             line=wording.verdict_line(case),
             style=Markup(asset("style.css")),  # our own files, in the package
             script=Markup(asset("script.js")),
-            arrows=Markup(argument_svg.ARROWS),
             views=views,
             known=known,
-            on_paper=_ON_PAPER,
             counts=_counts(case.obligations),
             matrix=matrix if rows <= _ROWS else [],
             condensed=_condensed(matrix) if rows > _ROWS else [],
-            pictures=_pictures(case, argument),
             outline_of=_outlines(argument),
             graph=_graph(case),
             places=places,
@@ -322,33 +317,11 @@ def _cell(view: ObligationView, method: str) -> Status | None:
     return roll_up((item.entry.evidence for item in mine if item.counts), outdated=bool(mine))
 
 
-_HEIGHT = re.compile(r'height="(\d+)')
-
-
-def _pictures(case: Case, argument: Argument) -> list[tuple[str, tuple[Markup, int]]]:
-    """Each requirement's picture with its height in pixels."""
-
-    def link(element: Element) -> str | None:
-        return f"#{wording.anchor(element.claim)}" if element.claim else None
-
-    drawn: list[tuple[str, tuple[Markup, int]]] = []
-    room = _DRAWN
-    for requirement, start in argument.goals:
-        room -= min(argument_svg.LIMIT, len(argument.below(start)))
-        if room < 0:
-            break
-        label = f"Argument for {requirement}, as a goal structure; the same as a list follows"
-        svg = argument_svg.draw(argument, start, link, label)
-        tall = _HEIGHT.search(svg)
-        drawn.append((requirement, (Markup(svg), int(tall[1]) if tall else 0)))  # escaped in picture.py
-    return drawn
-
-
 def _outlines(argument: Argument) -> dict[str, list[tuple[int, Element]]]:
     """Each requirement's argument as an indented list: (depth, element), for those who do not look at pictures."""
     known = {element.id: element for element in argument.elements}
     found: dict[str, list[tuple[int, Element]]] = {}
-    room = _DRAWN
+    room = _LISTED
     for requirement, start in argument.goals:
         if room <= 0:
             break

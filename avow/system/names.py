@@ -102,7 +102,9 @@ def _requirements(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[D
 
 
 def _suppositions(plan: Plan, root: Piece) -> Iterator[Diagnostic]:
-    methods = sorted({"compose", "sanity", *(method.id for node in plan.nodes for method in node.methods)})
+    methods = sorted(
+        {"compose", "sanity"} | {"compose", "sanity", *(method.id for node in plan.nodes for method in node.methods)}
+    )
     piece = root.at("suppositions")
     for name in (piece.entries or {}) if piece else ():
         method = name.partition(".")[0]

@@ -206,6 +206,14 @@ def test_a_side_condition_brings_what_its_proof_used_and_a_guarantee_what_its_no
     assert [s.key for s in nothing.suppositions if s.sort is Sort.WORLD] == ["assumption.b.input"]
 
 
+def test_bounds_of_a_scenario_are_one_supposition() -> None:
+    bounds = ("scenario.domains.N: it is one of 0, 1", "scenario: a.x has one of the values that are tried")
+    listed = [evidence(g, Verdict.CHECKED, "ajpf", hypotheses=bounds) for g in GUARANTEES]
+    (one,) = build(listed, formal=True).suppositions
+    assert one.key == "suppositions.compose.scenario"
+    assert one.text.splitlines() == list(bounds)
+
+
 def test_changes_since_the_signed_report_worst_first() -> None:
     old = build([evidence(g) for g in GUARANTEES], formal=True)
     signed = baseline_of(old, "signed/rover/1.json", "A. Person", "2026-11-20", "2027-11-20")

@@ -202,9 +202,3 @@ def test_what_the_filter_shows_is_announced() -> None:
     assert found
     assert found[0]["aria-live"] == "polite"
     assert "shown.textContent" in asset("script.js")
-
-
-def test_what_pans_is_reached_by_the_keyboard() -> None:
-    panned = [a for _, a, _, _ in Tree(PAGES["report"]).found if a.get("class") == "pan"]
-    assert panned
-    assert all(a["tabindex"] == "0" and "arrow keys" in a["aria-label"] for a in panned)

@@ -13,12 +13,11 @@ from xml.etree import ElementTree
 import pytest
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, rover_case, system
 
-from avow.assurance.argument import build_argument
 from avow.assurance.model import Case
 from avow.assurance.remarks import REMARK
 from avow.base.verdict import Verdict
 from avow.evidence.obligation import Kind
-from avow.report import argument_svg, formats, wording
+from avow.report import formats, gsn_svg, wording
 from avow.report.answers_page import render_index
 from avow.report.page import asset
 from avow.report.pdf import _data as pdf_data
@@ -257,8 +256,7 @@ def test_nothing_that_paper_hides_is_part_of_a_picture() -> None:
         for name in re.findall(r"^\.([\w-]+)$", selector.strip())
     }
     assert hidden  # the rule for filters and the like is there
-    argument = build_argument(rover_case())
-    drawn = argument_svg.draw(argument, argument.root, lambda _: None, "all")
+    drawn = gsn_svg.draw(rover_case())
     assert not hidden & {name for names in re.findall(r'class="([^"]*)"', drawn) for name in names.split()}
 
 

@@ -16,14 +16,13 @@ import pytest
 import yaml
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, rover_case, system
 
-from avow.assurance.argument import build_argument
 from avow.assurance.codec import case_schema
 from avow.assurance.model import Case
 from avow.assurance.traceability import COLUMNS, trace
 from avow.assurance.trend import trend
 from avow.base.verdict import Verdict
 from avow.evidence.status import Status
-from avow.report import LeftOut, formats, render_all, write_index
+from avow.report import LeftOut, formats, render_all, wording, write_index
 from avow.report.latex import latex
 from report.hostile import hostile_case
 
@@ -104,27 +103,45 @@ def test_attestations_are_in_toto_statements(rendered: tuple[Case, dict[str, Any
     assert sorted(named) == sorted(v.id for v in found.obligations)
 
 
-def test_gsn_yaml_obeys_gsn2x(rendered: tuple[Case, dict[str, Any]]) -> None:
+def test_gsn_yaml_obeys_gsn2x_module_by_module(rendered: tuple[Case, dict[str, Any]]) -> None:
     found, texts = rendered
-    data = yaml.safe_load(texts["gsn.yaml"])
-    module = data.pop("module")
-    assert module["name"]
-    assert len(data) == len(build_argument(found).elements)
+    modules = list(yaml.safe_load_all(texts["gsn.yaml"]))
+    assert len(modules) == 1 + len(found.requirements) + len(found.nodes)
+    names = [module.pop("module")["name"] for module in modules]
+    assert len(set(names)) == len(names)
+    every: dict[str, Any] = {}
+    for module in modules:
+        assert not every.keys() & module.keys(), "an element stands in one module"
+        every |= module
     kinds = {"supportedBy": ("G", "S", "Sn"), "inContextOf": ("A", "J", "C")}
     referred = set()
-    for name, element in data.items():
+    for name, element in every.items():
         assert re.fullmatch(r"(G|S|Sn|C|A|J)\d+", name)
         assert element["text"].strip()
         for key, allowed in kinds.items():
             for other in element.get(key, []):
-                assert other in data
+                assert other in every
                 assert re.sub(r"\d", "", other) in allowed
                 referred.add(other)
         if "supportedBy" in element:
-            assert name[0] in "GS"
-            assert not name.startswith("Sn")
+            assert re.match(r"G|S\d", name)
         assert not (element.get("undeveloped") and element.get("supportedBy"))
-    assert set(data) - referred == {"G1"}  # one root, nothing unconnected
+    alone = {name for name in set(every) - referred if name != "G1" and not name.startswith("G")}
+    assert alone == set(), "only nodes that no requirement needs stand alone"
+    assert sum(name.startswith("A") for name in every) == len(found.suppositions)
+
+
+def test_cae_is_the_same_tree(rendered: tuple[Case, dict[str, Any]]) -> None:
+    found, texts = rendered
+    every = yaml.safe_load(texts["cae.yaml"])
+    for name, body in every.items():
+        for other in (*body.get("supports", []), *body.get("from", []), *body.get("argued_by", [])):
+            assert other in every, (name, other)
+    for r in found.requirements:
+        argued = not (r.formula or r.temporal)
+        assert every[wording.clean(f"argument-{r.id}")]["kind"] == ("substitution" if argued else "decomposition")
+    records = sum(name.startswith("evidence-") for name in every)
+    assert records <= sum(len(v.counting) for v in found.obligations)
 
 
 def test_svg_is_xml_without_scripts(rendered: tuple[Case, dict[str, Any]]) -> None:

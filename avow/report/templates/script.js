@@ -55,48 +55,6 @@
       unfold.textContent = open ? "fold all" : "unfold all";
     });
   }
-  // Pictures pan with the mouse and the arrow keys, and zoom with plus, minus and Ctrl and the wheel.
-  all(".pan").forEach((box) => {
-    const picture = box.querySelector("svg");
-    const width = picture.viewBox.baseVal.width, height = picture.viewBox.baseVal.height;
-    let scale = 1;
-    const zoom = (factor) => {
-      scale = Math.min(3, Math.max(0.25, scale * factor));
-      picture.setAttribute("width", width * scale);
-      picture.setAttribute("height", height * scale);
-    };
-    if (width > box.clientWidth) zoom(Math.max(0.72, (box.clientWidth - 24) / width));
-    const root = picture.querySelector("g.goal");
-    if (root) {
-      const place = root.getBBox();
-      box.scrollTop = (place.y + place.height / 2) * scale - box.clientHeight / 2;
-    }
-    box.addEventListener("keydown", (event) => {
-      if (event.key === "+" || event.key === "=") zoom(1.2);
-      else if (event.key === "-") zoom(1 / 1.2);
-      else if (event.key === "0") zoom(1 / scale);
-    });
-    box.addEventListener("wheel", (event) => {
-      if (!event.ctrlKey) return;
-      event.preventDefault();
-      zoom(event.deltaY < 0 ? 1.1 : 1 / 1.1);
-    }, { passive: false });
-    let from = null, moved = false;
-    box.addEventListener("pointerdown", (event) => {
-      if (event.pointerType === "mouse" && event.button === 0) from = [event.clientX + box.scrollLeft, event.clientY + box.scrollTop];
-      moved = false;
-    });
-    addEventListener("pointermove", (event) => {
-      if (!from) return;
-      const x = from[0] - event.clientX, y = from[1] - event.clientY;
-      if (Math.abs(x - box.scrollLeft) + Math.abs(y - box.scrollTop) > 3) { moved = true; box.classList.add("drag"); }
-      box.scrollLeft = x;
-      box.scrollTop = y;
-    });
-    addEventListener("pointerup", () => { from = null; box.classList.remove("drag"); });
-    box.addEventListener("click", (event) => { if (moved) { event.preventDefault(); event.stopPropagation(); } }, true);
-    picture.addEventListener("dragstart", (event) => event.preventDefault());
-  });
   // What scrolls sideways can be reached and scrolled with the keyboard.
   const reachable = () => all(".scroll:not([role])").forEach((box) => {
     if (box.scrollWidth > box.clientWidth + 1) box.tabIndex = 0;

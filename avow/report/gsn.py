@@ -1,0 +1,162 @@
+"""The argument for other tools: GSN in modules as gsn2x reads them, and the same tree as CAE."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from avow.assurance.answers import How
+from avow.assurance.model import Case
+from avow.assurance.modules import node_modules, requirement_modules
+from avow.assurance.relied import word
+from avow.evidence.status import weigh
+from avow.report.layout import yaml_text
+
+_Elements = dict[str, dict[str, Any]]
+
+
+def render_gsn(case: Case) -> str:
+    """A YAML document for each module: the system with all suppositions, each requirement, each node. Elements have one
+    name in all of them, so that a goal of another module (an away goal) is named by its own."""
+    suppositions = {s.number: f"A{at}" for at, s in enumerate(case.suppositions, 1)}
+    goal_of_node = {node.name: f"G{at}" for at, node in enumerate(case.nodes, 1 + len(case.requirements) + 1)}
+    whole: _Elements = {
+        "module": {"name": case.system, "brief": case.title},
+        "G1": {"text": f"{case.title}\n{case.answers.verdict}"},
+        "C1": {"text": f"Policy {case.policy.name}: {case.policy.title}"},
+    }
+    whole["G1"]["inContextOf"] = ["C1"]
+    documents = []
+    counter = _Counter(1 + len(case.requirements) + len(case.nodes))
+    names = {}
+    for at, module in enumerate(requirement_modules(case), 2):
+        r = module.requirement
+        goal, strategy = f"G{at}", counter.next("S")
+        names[r.id] = goal
+        elements: _Elements = {"module": {"name": r.id, "brief": r.text or r.formula or r.temporal}}
+        elements[goal] = {"text": f"{r.id} [{r.how}]\n{r.text or r.formula or r.temporal}"}
+        away = [goal_of_node[node] for node, _, _ in module.away]
+        if away:
+            elements[goal]["supportedBy"] = [strategy]
+            elements[strategy] = {"text": module.strategy, "supportedBy": away}
+        else:
+            elements[goal]["undeveloped"] = True
+        context = [suppositions[number] for number in module.supposes]
+        if r.formula or r.temporal:
+            formula = counter.next("C")
+            elements[formula] = {"text": r.formula or r.temporal}
+            context.append(formula)
+        if module.conditions:
+            reason = counter.next("J")
+            elements[reason] = {"text": f"Composition: {module.conditions}"}
+            context.append(reason)
+        if context:
+            elements[goal]["inContextOf"] = context
+        documents.append(elements)
+    for node in node_modules(case):
+        goal = goal_of_node[node.node.name]
+        elements = {"module": {"name": f"node-{node.node.name}", "brief": node.node.title}}
+        elements[goal] = {"text": f"What {node.node.title} guarantees"}
+        if not node.guarantees:
+            elements[goal]["undeveloped"] = True
+        below = []
+        for view in node.guarantees:
+            one = counter.next("G")
+            below.append(one)
+            standing = word(view.standing) if view.standing.supports else view.status.value
+            elements[one] = {"text": f"{view.obligation.name} [{standing}]\n{view.obligation.claim}"}
+            solutions = []
+            for item in view.counting:
+                record = item.entry.evidence
+                solution = counter.next("Sn")
+                solutions.append(solution)
+                elements[solution] = {"text": f"{record.method} [{weigh(record).status}]\n{record.summary}"}
+            elements[one] |= {"supportedBy": solutions} if solutions else {"undeveloped": True}
+        if below:
+            elements[goal]["supportedBy"] = below
+        documents.append(elements)
+    for s in case.suppositions:
+        whole[suppositions[s.number]] = {"text": f"{s.number} ({s.sort})\n{s.words}"}
+    whole["G1"] |= {"supportedBy": ["S1"]} if names else {"undeveloped": True}
+    if names:
+        whole["S1"] = {"text": "Argument over each requirement", "supportedBy": list(names.values())}
+    return "---\n".join(yaml_text(elements) for elements in (whole, *documents))
+
+
+def render_cae(case: Case) -> str:
+    """Claims, arguments, evidence. What a tool derived is a decomposition, what a person says a substitution, a record
+    is incorporated as evidence; conditions of the composition are the side-warrant."""
+    found: _Elements = {
+        "claim-system": {"text": case.title, "verdict": case.answers.verdict, "argued_by": ["argument-system"]},
+        "argument-system": {
+            "kind": "decomposition",
+            "supports": ["claim-system"],
+            "from": [f"claim-{r.id}" for r in case.requirements],
+        },
+    }
+    for module in requirement_modules(case):
+        r = module.requirement
+        found[f"claim-{r.id}"] = {
+            "text": r.text or r.formula or r.temporal,
+            "verdict": r.how.value,
+            "argued_by": [f"argument-{r.id}"],
+        }
+        found[f"argument-{r.id}"] = {
+            "kind": "decomposition" if (r.formula or r.temporal) else "substitution",
+            "supports": [f"claim-{r.id}"],
+            "from": [f"claim-node-{node}" for node, _, _ in module.away],
+            **({"side_warrant": module.conditions} if module.conditions else {}),
+            **({"supposes": list(module.supposes)} if module.supposes else {}),
+            **({"open": True} if r.how is How.OPEN else {}),
+        }
+    for node in node_modules(case):
+        name = node.node.name
+        clauses = [f"claim-{name}.{view.obligation.name}" for view in node.guarantees]
+        found[f"claim-node-{name}"] = {
+            "text": f"What {node.node.title} guarantees",
+            "argued_by": [f"argument-node-{name}"],
+        }
+        found[f"argument-node-{name}"] = {
+            "kind": "decomposition",
+            "supports": [f"claim-node-{name}"],
+            "from": clauses,
+        }
+        for view, claim in zip(node.guarantees, clauses, strict=True):
+            records = [f"evidence-{name}.{view.obligation.name}-{item.entry.evidence.method}" for item in view.counting]
+            records = list(dict.fromkeys(records))
+            found[claim] = {"text": view.obligation.claim, "verdict": view.standing.value}
+            found[f"argument-{name}.{view.obligation.name}"] = {
+                "kind": "evidence incorporation",
+                "supports": [claim],
+                "from": records,
+            }
+            for item in view.counting:
+                record = item.entry.evidence
+                found[f"evidence-{name}.{view.obligation.name}-{record.method}"] = {
+                    "text": record.summary,
+                    "verdict": weigh(record).status.value,
+                }
+    for s in case.suppositions:
+        found[f"supposition-{s.number}"] = {"text": s.words, "sort": s.sort.value}
+    return yaml_text(_quoted(found))
+
+
+def _quoted(elements: _Elements) -> Mapping[str, Mapping[str, Any]]:
+    """Names as JSON strings, which YAML takes for what they are, whatever they hold."""
+    from avow.report.layout import quoted
+
+    def every(value: Any) -> Any:
+        return [quoted(item) for item in value] if isinstance(value, list) else value
+
+    return {quoted(name): {key: every(value) for key, value in body.items()} for name, body in elements.items()}
+
+
+class _Counter:
+    """Fresh names: goals go on after those of requirements and nodes."""
+
+    def __init__(self, goals: int) -> None:
+        self.last = {"G": goals, "S": 1, "Sn": 0, "C": 1, "J": 0}
+
+    def next(self, kind: str) -> str:
+        self.last[kind] += 1
+        return f"{kind}{self.last[kind]}"

@@ -1,0 +1,158 @@
+"""The argument in modules as one picture of 720 pixels: boxes in four columns, every text wrapped within its box.
+
+Widths are those of DejaVu Sans, one of the widest sans-serif faces, plus 8 %: with another font there is room left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from xml.sax.saxutils import escape, quoteattr
+
+from avow.assurance.answers import Tone
+from avow.assurance.model import Case
+from avow.assurance.modules import node_modules, requirement_modules
+from avow.assurance.relied import word
+from avow.report.wording import anchor, clean
+
+WIDTH, COLUMNS, GAP, SIZE = 720, 4, 8, 12
+_LINE, _PAD, _MOST = 15, 6, 12
+"""Pixels of a line and of a margin; guarantees of a node with a box each, more are grouped."""
+_WIDTHS = {
+    **dict.fromkeys("0123456789$#_?*", 640),
+    **dict.fromkeys(" ,.;:/|\\'!", 402),
+    **dict.fromkeys("ijl-", 362),
+    **dict.fromkeys('frt()[]"', 460),
+    **dict.fromkeys("abcdeghknopqsuvxyz{}", 636),
+    **dict.fromkeys("mwMW%@", 1000),
+    **dict.fromkeys("+<>=~^&", 838),
+    **dict.fromkeys("ABCDEFGHIJKLNOPQRSTUVXYZ", 788),
+}
+"""Thousandths of the font's size, rounded up by group; any other character is as wide as it is high."""
+_STYLE = (
+    "text{font:12px 'DejaVu Sans',system-ui,sans-serif;fill:#1b1f27}.b{fill:#f4f6f9;stroke:#3c4654;stroke-width:1.5}"
+    ".green{stroke:#14622c}.amber{stroke:#744600}.red{stroke:#9c1616}.asm{stroke-dasharray:4 3}"
+    ".away{stroke-width:3}.h{font-weight:bold}.stem{stroke:#3c4654;stroke-width:1.5}"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """One element: its head in bold, its text, a class for its kind, and where it leads."""
+
+    head: str
+    text: str
+    kind: str
+    link: str = ""
+
+
+def draw(case: Case) -> str:
+    """The picture. Deterministic: same case, same bytes."""
+    parts: list[str] = []
+    y = GAP
+    for root, strategy, children in _modules(case):
+        y = _panel(parts, y, root, strategy, children)
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {y}" width="{WIDTH}" height="{y}" role="img" '
+        f"aria-label={quoteattr(clean(f'The argument for {case.title}, module by module'))}>"
+    )
+    return f"{head}<style>{_STYLE}</style>{''.join(parts)}</svg>\n"
+
+
+def _modules(case: Case) -> Iterator[tuple[Box, str, Sequence[Box]]]:
+    for module in requirement_modules(case):
+        r = module.requirement
+        link = f"index.html#{anchor('requirement:' + r.id)}"
+        below = [
+            Box(title, words, "away", f"index.html#{anchor('node:' + node)}") for node, title, words in module.away
+        ]
+        if module.conditions:
+            below.append(Box("Composition", module.conditions, "sol", "claims.html#obligations"))
+        if module.supposes:
+            below.append(Box("supposes", ", ".join(module.supposes), "asm", "index.html#suppositions"))
+        yield Box(f"{r.id}: {r.how}", r.text or r.formula or r.temporal, f"goal {r.tone}", link), module.strategy, below
+    bases = {basis.node: basis for basis in case.answers.bases}
+    for node in node_modules(case):
+        link = f"index.html#{anchor('node:' + node.node.name)}"
+        root = Box(node.node.title, f"What {node.node.title} guarantees", "goal", link)
+        if len(node.guarantees) > _MOST:
+            yield root, "", [Box(part, "", "goal", link) for part in bases[node.node.name].words.split(", ")]
+            continue
+        below = []
+        for view in node.guarantees:
+            good = view.standing.supports
+            said = word(view.standing) if good else "open"
+            tone = Tone.RED if not good else Tone.GREEN if said in ("proved", "checked") else Tone.AMBER
+            below.append(Box(said, view.obligation.claim, f"goal {tone}", f"index.html#{anchor(view.id)}"))
+        yield root, "", below
+
+
+def _panel(parts: list[str], y: int, root: Box, strategy: str, children: Sequence[Box]) -> int:
+    """One module from `y` on; where the next one begins."""
+    left, wide = WIDTH // 6, WIDTH * 2 // 3
+    y = _box(parts, left, y, wide, root)
+    if strategy:
+        y = _stem(parts, y)
+        y = _box(parts, left, y, wide, Box("", strategy, "str"))
+    if children:
+        y = _stem(parts, y)
+        column = (WIDTH - GAP * (COLUMNS + 1)) // COLUMNS
+        for at in range(0, len(children), COLUMNS):
+            row = children[at : at + COLUMNS]
+            height = max(_height(box, column) for box in row)
+            for place, box in enumerate(row):
+                _box(parts, GAP + place * (column + GAP), y, column, box, height)
+            y += height + GAP
+    return y + 3 * GAP
+
+
+def _stem(parts: list[str], y: int) -> int:
+    parts.append(f'<path class="stem" d="M{WIDTH // 2} {y}v{GAP}"/>')
+    return y + GAP
+
+
+def _box(parts: list[str], x: int, y: int, width: int, box: Box, height: int = 0) -> int:
+    heads, lines = _texts(box, width)
+    height = height or _height(box, width)
+    radius = ' rx="12"' if "asm" in box.kind or "sol" in box.kind else ""
+    body = [f'<rect class="b {box.kind}"{radius} x="{x}" y="{y}" width="{width}" height="{height}"/>']
+    for at, line in enumerate((*heads, *lines)):
+        style = ' class="h"' if at < len(heads) else ""
+        body.append(f'<text{style} x="{x + _PAD}" y="{y + _PAD + SIZE + at * _LINE - 1}">{escape(line)}</text>')
+    drawn = "".join(body)
+    parts.append(f"<a href={quoteattr(clean(box.link))}>{drawn}</a>" if box.link else drawn)
+    return y + height
+
+
+def _texts(box: Box, width: int) -> tuple[list[str], list[str]]:
+    room = width - 2 * _PAD
+    return wrap(box.head, room * 0.93), wrap(box.text, room)
+
+
+def _height(box: Box, width: int) -> int:
+    return 2 * _PAD + _LINE * sum(map(len, _texts(box, width)))
+
+
+def width_of(text: str) -> float:
+    """Pixels, at least what the text takes in DejaVu Sans, and 8 % more."""
+    return 1.08 * SIZE * sum(_WIDTHS.get(c, 1000) for c in text) / 1000
+
+
+def wrap(text: str, room: float) -> list[str]:
+    """Lines that fit; a word that is too long is broken."""
+    lines: list[str] = []
+    line = ""
+    for found in clean(text).split():
+        rest = found
+        while rest:
+            longer = f"{line} {rest}".strip()
+            if width_of(longer) <= room:
+                line, rest = longer, ""
+            elif line:
+                lines.append(line)
+                line = ""
+            else:
+                cut = next((n for n in range(len(rest), 1, -1) if width_of(rest[:n]) <= room), 1)
+                lines.append(rest[:cut])
+                rest = rest[cut:]
+    return [*lines, line] if line else lines
