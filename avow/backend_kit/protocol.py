@@ -8,7 +8,7 @@ tool) and makes the evidence records; a backend never writes to the ledger and n
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,9 @@ class Job:
     method: Method
     obligations: tuple[Obligation, ...]
     """Kind GUARANTEE, one for each clause that the method takes on; `Obligation.name` is the clause's name."""
+    kept: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    """Obligation's id → cases that refuted it once, as this backend put them under `record.CASE` into an outcome's
+    details. A backend that puts any there tries them first, whatever its options say."""
 
     @property
     def contract(self) -> Contract:

@@ -20,7 +20,6 @@ from avow.calculus.derivation import ClauseName, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds
 from avow.calculus.hierarchy import innermost
 from avow.calculus.requirements import requirement_question
-from avow.calculus.resting import Resting
 from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
 from avow.calculus.variables import Frame
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
@@ -75,18 +74,14 @@ def settle_all(composition: Composition, obligations: Sequence[Obligation], limi
     """As `discharge`, of derivations that are made already (they remember what was settled)."""
     bounds = Bounds(int(limits.seconds * 1000), limits.seed)
 
-    made = tuple(_tasks(composition))
-    resting = Resting(composition, {task.obligation.name: task.obligation for task in made})
-    tasks = {task.obligation.id: task for task in (*made, *_requirements(composition))}
+    tasks = {task.obligation.id: task for task in (*_tasks(composition), *_requirements(composition))}
     outcomes: list[Outcome] = []
     for obligation in obligations:
         task = tasks.get(obligation.id)
         if task is None:
             outcomes.append(questions.vanished(obligation.id))
             continue
-        answer = task.ask(composition, bounds)
-        goal = getattr(task.ask, "goal", None) if obligation.kind is Kind.COMPOSITION else None
-        outcomes.append(answer.outcome(obligation.id, resting.behind(answer, goal)))
+        outcomes.append(task.ask(composition, bounds).outcome(obligation.id))
     return tuple(outcomes)
 
 

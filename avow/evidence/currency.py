@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from avow.base.files import digest
-from avow.evidence.ledger import Entry
+from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import Evidence
 from avow.isolation.level import Isolation, wanted
 from avow.isolation.observed import ISOLATION, OBSERVED, Observed, Seen, from_json, look
@@ -33,14 +33,25 @@ def changed(record: Evidence, root: Path) -> tuple[str, ...]:
     return tuple(o.path for o in seen if _now(o.kind, os.path.join(root, o.path)) != o.digest)  # noqa: PTH118
 
 
-def as_of_now(entries: Iterable[Entry], root: Path) -> tuple[Entry, ...]:
+def outlived(entry: Entry, refutations: Sequence[Entry]) -> bool:
+    """Whether a refutation by a case came after the entry: what was good before has to try that case, too."""
+    return entry.evidence.verdict.supports and any(r.number > entry.number for r in refutations[-1:])
+
+
+def as_of_now(ledger: Ledger, root: Path) -> tuple[Entry, ...]:
     """The entries; those that do not stand with a key that is nobody's, so that they count as of an earlier state."""
     return tuple(
         entry
-        if stands(entry.evidence, root)
+        if stands(entry.evidence, root) and not outlived(entry, refutations(ledger, entry))
         else replace(entry, evidence=replace(entry.evidence, key=digest(f"changed since: {entry.hash}")))
-        for entry in entries
+        for entry in ledger.records()
     )
+
+
+def refutations(ledger: Ledger, entry: Entry) -> tuple[Entry, ...]:
+    """By a case, of the same claim and by the same backend."""
+    record = entry.evidence
+    return ledger.refutations(record.obligation, record.obligation_digest, record.backend)
 
 
 def outside_of(entries: Iterable[Entry], root: Path) -> tuple[Observed, ...]:

@@ -22,11 +22,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base.files import digest, read_regular, write
+from avow.base.verdict import Verdict
 from avow.evidence.appending import append, locked, open_file
 from avow.evidence.encoding import Unreadable, canonical, decode, encode
 from avow.evidence.heads import GENESIS as GENESIS
 from avow.evidence.heads import Event, index_path, note
-from avow.evidence.record import Evidence
+from avow.evidence.record import CASE, Evidence
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +97,13 @@ class Ledger:
             self._refresh()
             return tuple(self._by_key.get((obligation, key), ()))
 
+    def refutations(self, obligation: str, digest: str, backend: str) -> tuple[Entry, ...]:
+        """What the backend once refuted by a case, of the obligation of that name or that meaning, oldest first."""
+        with self._lock:
+            self._refresh()
+            found = [e for name in (obligation, digest) for e in self._refuted.get((name, backend), ())]
+            return tuple({e.number: e for e in sorted(found, key=lambda e: e.number)}.values())
+
     # -- writing ------------------------------------------------------------------------------------------------
 
     def append(self, evidence: Evidence) -> Entry:
@@ -150,6 +158,7 @@ class Ledger:
         self._damage: list[Damage] = []
         self._known: dict[str, Entry] = {}
         self._by_key: dict[tuple[str, str], list[Entry]] = {}
+        self._refuted: dict[tuple[str, str], list[Entry]] = {}
 
     @property
     def _head_file(self) -> Path:
@@ -216,7 +225,11 @@ class Ledger:
             self._damage.append(Damage(number + 1, f"repeats record {self._known[identity].number + 1}"))
         self._entries.append(entry)
         self._known.setdefault(identity, entry)
-        self._by_key.setdefault((entry.evidence.obligation, entry.evidence.key), []).append(entry)
+        record = entry.evidence
+        self._by_key.setdefault((record.obligation, record.key), []).append(entry)
+        if record.verdict is Verdict.REFUTED and CASE in record.details:
+            for name in (record.obligation, record.obligation_digest):
+                self._refuted.setdefault((name, record.backend), []).append(entry)
 
     def _garbage(self) -> tuple[Damage, ...]:
         """What stands behind the last line and is not the beginning of one."""

@@ -7,9 +7,10 @@ answered whole is handed on.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from avow import __version__
 from avow.backend_kit.protocol import Report
@@ -30,11 +31,17 @@ GRACE = 90.0
 
 
 def run(
-    workspace: Workspace, work: Work, obligations: tuple[Obligation, ...], folder: Path, altered: Altered | None = None
+    workspace: Workspace,
+    work: Work,
+    obligations: tuple[Obligation, ...],
+    folder: Path,
+    altered: Altered | None = None,
+    kept: Mapping[str, Sequence[Any]] | None = None,
 ) -> Report:
-    """Settle the obligations in a process of their own. Never raises for what that process does."""
+    """Settle the obligations in a process of their own; `kept` are cases that refuted them once. Never raises for what
+    that process does."""
     try:
-        request = request_of(workspace, work, obligations, folder, altered)
+        request = replace(request_of(workspace, work, obligations, folder, altered), kept=kept or {})
     except OSError as error:
         return _failed(obligations, work, Verdict.ERROR, f"{type(error).__name__}: {error}", {})
     asked = request_bytes(request)

@@ -22,9 +22,10 @@ from avow.base.files import digest, digest_file, is_intact
 from avow.base.notes import read_note, write_note
 from avow.base.workspace import Workspace
 from avow.evidence.continuity import continuity
-from avow.evidence.currency import as_of_now, stands
+from avow.evidence.currency import as_of_now
 from avow.evidence.heads import index_path, read_index
-from avow.evidence.record import RETRY
+from avow.evidence.ledger import Ledger
+from avow.evidence.record import CASE, RETRY
 from avow.pipeline import check as checking
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
@@ -137,8 +138,8 @@ def build(assessment: Assessment) -> Case:
     return build_case(
         system,
         assessment.surveyed.catalogue.obligations,
-        as_of_now(ledger.records(), workspace.root),
-        keys=assessment.surveyed.keys,
+        as_of_now(ledger, workspace.root),
+        keys={**assessment.surveyed.keys, **_given_up(assessment, ledger)},
         today=_today(),
         run=RunInfo(
             assessment.run.id,
@@ -163,6 +164,19 @@ def build(assessment: Assessment) -> Case:
         sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
         baseline=newest_signed(workspace.signed, system.name)[0],
     )
+
+
+def _given_up(assessment: Assessment, ledger: Ledger) -> dict[tuple[str, str], str]:
+    """Refutations by a case of claim and subject as they are now, by methods that the plan no longer has: to take the
+    method out of the plan is no answer to what it found."""
+    found: dict[tuple[str, str], str] = {}
+    planned, now = assessment.surveyed.keys, {o.id: o.digest for o in assessment.surveyed.catalogue.obligations}
+    for entry in as_of_now(ledger, assessment.workspace.root):
+        record = entry.evidence
+        pair = (record.obligation, record.method)
+        if CASE in record.details and now.get(record.obligation) == record.obligation_digest and pair not in planned:
+            found[pair] = record.key
+    return found
 
 
 def _methods(assessment: Assessment) -> tuple[MethodInfo, ...]:
@@ -209,7 +223,8 @@ def _key(assessment: Assessment) -> str:
 
     explain = os.environ.get(EXPLAIN, "")
     root = assessment.workspace.root
-    damage += [f"{e.number} is of an earlier state" for e in ledger.records() if not stands(e.evidence, root)]
+    earlier = zip(ledger.records(), as_of_now(ledger, root), strict=True)
+    damage += [f"{old.number} is of an earlier state" for old, now in earlier if old is not now]
     signed = [digest_file(path) for path in _signatures(assessment)]
     return digest(
         json.dumps([SCHEMA, signed, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain])

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import functools
+import json
 import os
 import time
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from avow import __version__
 from avow.backend_kit.protocol import Report
 from avow.base.files import digest, digest_file, is_intact, write
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.base.workspace import Workspace
-from avow.evidence.currency import stands
+from avow.evidence.currency import outlived, stands
 from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import RETRY, Evidence
+from avow.evidence.record import CASE, RETRY, Evidence
 from avow.isolation.level import Isolation
 from avow.isolation.observed import ISOLATION, OBSERVED, to_json
 from avow.pipeline import asking
@@ -39,8 +41,9 @@ def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obliga
 
 
 def _is_settled(workspace: Workspace, ledger: Ledger, work: Work, obligation: Obligation, run: Run) -> bool:
-    found = [e.evidence for e in ledger.current(obligation.id, work.keys[obligation.id])]
-    records = [record for record in found if stands(record, workspace.root)]
+    refuted = ledger.refutations(obligation.id, obligation.digest, work.engine)
+    found = [e for e in ledger.current(obligation.id, work.keys[obligation.id]) if not outlived(e, refuted)]
+    records = [e.evidence for e in found if stands(e.evidence, workspace.root)]
     if not records or (run.fresh and records[-1].run != run.id):
         return False
     last = records[-1]
@@ -58,7 +61,11 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     place.mkdir(parents=True, exist_ok=True)
     started = datetime.now(UTC).isoformat(timespec="milliseconds")
     clock = time.monotonic()
-    report = _language(todo) if work.engine == LANGUAGE else asking.run(workspace, work, todo, place)
+    report = (
+        _language(todo)
+        if work.engine == LANGUAGE
+        else asking.run(workspace, work, todo, place, kept=_kept(workspace, work, todo))
+    )
     seconds = time.monotonic() - clock
     outputs = _keep_logs(workspace, work, todo, report)
     strength, link = _promise(work)
@@ -96,6 +103,20 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
         )
     ledger_of(workspace.ledger(work.system.name)).append_all(records)
     return report.outcomes
+
+
+KEPT = 50
+"""Cases of one claim that are tried again."""
+
+
+def _kept(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...]) -> dict[str, list[Any]]:
+    """Obligation → the cases that refuted it once, newest first, whatever the subject and the options were."""
+    ledger, found = ledger_of(workspace.ledger(work.system.name)), dict[str, list[Any]]()
+    for o in obligations:
+        cases = [e.evidence.details[CASE] for e in reversed(ledger.refutations(o.id, o.digest, work.engine))]
+        if cases:
+            found[o.id] = list({json.dumps(case, sort_keys=True): case for case in cases}.values())[:KEPT]
+    return found
 
 
 def _circumstances(workspace: Workspace, report: Report) -> dict[str, object]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,8 @@ class Request:
     folder: str = ""
     """Where the exported files are; relative to the workspace."""
     altered: Altered | None = None
+    kept: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    """Obligation → cases that refuted it once, as its backend wrote them (`record.CASE`): to be tried first."""
 
     @property
     def needs(self) -> frozenset[str]:
@@ -80,6 +82,7 @@ def request_bytes(request: Request) -> bytes:
         "files": {name: base64.b64encode(data).decode() for name, data in request.files.items()},
         "tools": request.tools,
         "altered": asdict(request.altered) if request.altered else None,
+        "kept": {name: list(cases) for name, cases in request.kept.items()},
     }
     return json.dumps(said, sort_keys=True).encode()
 
@@ -95,6 +98,7 @@ def read_request(data: bytes) -> Request:
         files={name: base64.b64decode(text, validate=True) for name, text in said["files"].items()},
         tools=tuple(tuple(map(str, tool)) for tool in said["tools"]),
         altered=Altered(**said["altered"]) if said["altered"] else None,
+        kept={name: tuple(cases) for name, cases in said["kept"].items()},
     )
 
 

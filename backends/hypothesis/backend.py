@@ -18,6 +18,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.process import Completed, ToolMissing
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation
+from avow.evidence.record import CASE
 from avow.isolation import judge
 from avow.isolation.level import Isolation, Unavailable, available
 from avow.isolation.observed import from_json
@@ -63,6 +64,8 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         place = Path(scratch)
         for name, text in files(job).items():
             (place / name).write_text(text, encoding="utf-8")
+        kept = [case for cases in job.kept.values() for case in cases]
+        (place / export.KEPT).write_text(json.dumps(kept), encoding="utf-8")
         done, answer = _run(job, place, limits)
     command = (Path(sys.executable).name, *done.command[1:3]) if done else ()
     logs = {"hypothesis.log": done.stdout + done.stderr} if done and (done.stdout + done.stderr).strip() else {}
@@ -120,6 +123,7 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Ou
     if own["failure"] is not None:
         values = tuple((str(name), str(value)) for name, value in own["failure"])
         shown = Counterexample(values, f"guarantee {obligation.name} does not hold of these")
+        details[CASE] = own["case"]
         return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
     if answer["crash"] is not None:
         pairs, why = answer["crash"]
@@ -145,6 +149,9 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Ou
         "below the bound; it is no probability about the robot's own inputs"
     )
     edges = f" and {answer['edges']} at thresholds" if answer["edges"] else ""
+    if answer["replayed"]:
+        bound["replayed"] = answer["replayed"]
+        edges += f", {answer['replayed']} that refuted it or a neighbour before"
     chance = f"95 %: below {failure_bound(least):.2g} of such cases fail"
     summary = f"{valid} drawn cases{edges}, none breaks it (seed {seed}; {chance})"
     if valid < wanted:

@@ -28,7 +28,8 @@ from avow.isolation.subject import PATIENCE, Subject, SubjectFailed
 from avow.language.sorts import BoolSort, FunctionSort, Sort
 
 from . import wire
-from .convention import Malformed, outputs, sent
+from .convention import Malformed, outputs, received, sent
+from .export import KEPT
 from .generate import BYTES, Failing, Generator, Impossible, Inputs, Source
 from .judging import Trigger, blamed, guarantee, judged
 from .pools import parse_cell, pools
@@ -68,6 +69,8 @@ class Bench:
         root = _root(data, folder)
         self.subject = Subject(root / data["subject"]["file"], data["subject"]["function"], PATIENCE, root)
         self._aims = tuple(_aim(t) for g in self.guarantees.values() for t in g.triggers)
+        self._kept = _kept(folder / KEPT, self.inputs_sorts)
+        self.replayed = 0
         self.valid = self.edges = self.rejected = self.undecided = 0
         self.crash: tuple[Inputs, str] | None = None
         self.end: float | None = None
@@ -152,6 +155,7 @@ class Bench:
                 self._try(cases)
 
         try:
+            self._replay()
             self._edges()
             every()
             if queue:
@@ -165,6 +169,14 @@ class Bench:
         except Impossible as error:
             return f"no values: {error}"
         return ""
+
+    def _replay(self) -> None:
+        """What refuted a guarantee once, before all else, however few cases are wanted."""
+        cases = [inputs for inputs in self._kept if self._assumed(inputs)]
+        self.replayed = len(cases)
+        for case in cases:
+            self._try([case], edge=True)
+        self.edges -= len(cases)
 
     def _edges(self) -> None:
         """The cases at thresholds, before any is drawn; no more than are drawn."""
@@ -260,6 +272,7 @@ class Bench:
         return {
             "valid": self.valid,
             "edges": self.edges,
+            "replayed": self.replayed,
             "rejected": self.rejected,
             "undecided": self.undecided,
             "wanted": self.cases,
@@ -274,6 +287,7 @@ class Bench:
                     "triggers": [t.whole.text for t in each.triggers],
                     "undecided": each.undecided,
                     "failure": _pairs(*smaller[name]) if name in smaller else None,
+                    "case": _sent(smaller[name][0]) if name in smaller else None,
                 }
                 for name, each in self.guarantees.items()
             },
@@ -352,6 +366,16 @@ def _pairs(inputs: Inputs, found: Mapping[str, Value]) -> list[tuple[str, str]]:
 
 def _sent(inputs: Inputs) -> dict[str, Any]:
     return {name: sent(value) for name, value in inputs.items()}
+
+
+def _kept(path: Path, sorts: Mapping[str, Sort]) -> tuple[Inputs, ...]:
+    """The kept cases that are inputs of the contract as it is now."""
+    found: list[Inputs] = []
+    if path.is_file():
+        for case in json.loads(path.read_text(encoding="utf-8")):
+            with contextlib.suppress(Malformed, KeyError, ValueError, TypeError, AttributeError):
+                found.append({name: received(case[name], sort, name) for name, sort in sorts.items()})
+    return tuple(found)
 
 
 def _root(data: Mapping[str, Any], folder: Path) -> Path:

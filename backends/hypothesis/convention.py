@@ -58,6 +58,8 @@ def received(data: Any, sort: Sort, what: str) -> Value:
     match sort, data:
         case BoolSort(), bool():
             return data
+        case ((IntegerSort() | NaturalSort() | RealSort()), int()) if not isinstance(data, bool):
+            return received({"q": [data, 1]}, sort, what)  # as `sent` has it
         case ((IntegerSort() | NaturalSort() | RealSort()), {"q": [numerator, denominator]}):
             number = Fraction(int(numerator), int(denominator))
             if isinstance(sort, RealSort):
