@@ -142,7 +142,7 @@ class Checker:
         """The labels of reachable states at which the formula holds."""
         return frozenset(filter(compiled(formula, self.places), set(self.reduced.labels)))
 
-    def _projected(self, wanted: Property, labels: Sequence[int]) -> tuple[Automaton, list[Fair], list[int]]:
+    def _projected(self, wanted: Property, labels: Sequence[int]) -> tuple[Automaton[Formula], list[Fair], list[int]]:
         automaton = build(Not(wanted.formula))
         low, base = len(automaton.leaves), len(self.atoms)
         tests = [compiled(leaf, self.places) for leaf in automaton.leaves]

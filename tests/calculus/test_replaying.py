@@ -56,7 +56,7 @@ def test_a_wrong_verdict_of_the_search_is_not_taken_over(tmp_path: Path, monkeyp
         while following(run[-1])[0] not in run:
             run.append(following(run[-1])[0])
         at = run.index(following(run[-1])[0])
-        return Lasso(tuple(run[:at]), tuple(run[at:]))
+        return Lasso(tuple(run), at)
 
     assert settle(tmp_path / "a", "always eventually count.n == 0").verdict is Verdict.CHECKED
     monkeypatch.setattr(model_checking, "violation", wrong)

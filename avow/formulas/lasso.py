@@ -1,0 +1,223 @@
+"""Endless runs of explicit graphs: strongly connected components, and the search for a run that an automaton accepts,
+given as a path with a loop (a lasso). Runs are endless: a way to a state without successors is none."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from avow.formulas.ltl import A, Automaton
+
+Successors = Callable[[int], Sequence[int]]
+
+
+@dataclass(frozen=True, slots=True)
+class Fair:
+    """A strong fairness assumption over labels: whoever meets all of `asking` for ever, meets `granting` for ever."""
+
+    asking: int
+    granting: int
+
+
+@dataclass(frozen=True, slots=True)
+class Lasso:
+    """A run: `path`, whose last state returns to the one at `loop`."""
+
+    path: tuple[int, ...]
+    loop: int
+
+    @property
+    def prefix(self) -> tuple[int, ...]:
+        """What comes before the loop."""
+        return self.path[: self.loop]
+
+    @property
+    def cycle(self) -> tuple[int, ...]:
+        """What is repeated for ever."""
+        return self.path[self.loop :]
+
+
+def components(roots: Iterable[int], successors: Successors) -> Iterator[list[int]]:
+    """Tarjan's strongly connected components, each after those that it can reach; found as they are asked for."""
+    index: dict[int, int] = {}
+    low: dict[int, int] = {}
+    on_stack: set[int] = set()
+    stack: list[int] = []
+    for root in roots:
+        if root in index:
+            continue
+        index[root] = low[root] = len(index)
+        stack.append(root)
+        on_stack.add(root)
+        work = [(root, iter(successors(root)))]
+        while work:
+            node, rest = work[-1]
+            for target in rest:
+                if target not in index:
+                    index[target] = low[target] = len(index)
+                    stack.append(target)
+                    on_stack.add(target)
+                    work.append((target, iter(successors(target))))
+                    break
+                if target in on_stack and index[target] < low[node]:
+                    low[node] = index[target]
+            else:
+                work.pop()
+                if work and low[node] < low[work[-1][0]]:
+                    low[work[-1][0]] = low[node]
+                if low[node] == index[node]:
+                    component = []
+                    while True:
+                        member = stack.pop()
+                        on_stack.discard(member)
+                        component.append(member)
+                        if member == node:
+                            break
+                    yield component
+
+
+def accepted_run(
+    initial: Iterable[int],
+    following: Successors,
+    label_of: Callable[[int], int],
+    automaton: Automaton[A],
+    fair: Sequence[Fair] = (),
+    tick: Callable[[], None] | None = None,
+) -> Lasso | None:
+    """A fair run of a graph that the automaton accepts, or None if there is none.
+
+    The leaves of the automaton are the low bits of the labels. The product is explored whole, decomposed, and each
+    component cut down by the fairness assumptions until it is fair or gone. `tick` is called for every state of the
+    product; what it raises ends the search.
+    """
+    width = len(automaton.positive)
+    matching: dict[int, tuple[int, ...]] = {}
+
+    def nodes(label: int) -> tuple[int, ...]:
+        found = matching.get(label)
+        if found is None:
+            pairs = zip(automaton.positive, automaton.negative, strict=True)
+            found = tuple(n for n, (yes, no) in enumerate(pairs) if label & yes == yes and not label & no)
+            matching[label] = found
+        return found
+
+    allowed: dict[tuple[int, int], tuple[int, ...]] = {}
+
+    def successors(product: int) -> list[int]:
+        if tick is not None:
+            tick()
+        state, node = divmod(product, width)
+        result = []
+        for target in following(state):
+            at_target = label_of(target)
+            key = (node, at_target)
+            ways = allowed.get(key)
+            if ways is None:
+                fitting = set(nodes(at_target))
+                ways = allowed[key] = tuple(n for n in automaton.successors[node] if n in fitting)
+            base = target * width
+            for way in ways:
+                result.append(base + way)
+        return result
+
+    roots = [state * width + node for state in initial for node in automaton.initial if node in nodes(label_of(state))]
+    cache: dict[int, list[int]] = {}
+
+    def cached(product: int) -> list[int]:
+        found = cache.get(product)
+        if found is None:
+            found = cache[product] = successors(product)
+        return found
+
+    def label(product: int) -> int:
+        return label_of(product // width)
+
+    for component in components(roots, cached):
+        core = _fair_core(component, cached, label, fair, automaton, width)
+        if core is not None:
+            return _lasso(roots, core, cached, label, fair, automaton, width)
+    return None
+
+
+def _fair_core(
+    component: list[int],
+    successors: Successors,
+    label: Callable[[int], int],
+    fair: Sequence[Fair],
+    automaton: Automaton[A],
+    width: int,
+) -> set[int] | None:
+    """A strongly connected part in which every acceptance set is met and every fairness assumption can be."""
+    work = [component]
+    while work:
+        part = work.pop()
+        members = set(part)
+        if len(part) == 1 and part[0] not in successors(part[0]):
+            continue
+        at = {product % width for product in part}
+        if not all(at & accepting for accepting in automaton.accepting):
+            continue
+        unfair = [
+            f
+            for f in fair
+            if any(label(p) & f.asking == f.asking for p in part)
+            and not any(label(p) & f.granting == f.granting for p in part)
+        ]
+        if not unfair:
+            return members
+        rest = {p for p in part if not any(label(p) & f.asking == f.asking for f in unfair)}
+        work += components(rest, lambda p, rest=rest: [t for t in successors(p) if t in rest])  # type: ignore[misc]
+    return None
+
+
+def _lasso(
+    roots: Sequence[int],
+    core: set[int],
+    successors: Successors,
+    label: Callable[[int], int],
+    fair: Sequence[Fair],
+    automaton: Automaton[A],
+    width: int,
+) -> Lasso:
+    """A short way to the core, then a round through it that meets everything that must be met."""
+    stem = _path(roots, core.__contains__, successors)
+    entry = stem[-1]
+    round_trip = [entry]
+
+    def inside(product: int) -> list[int]:
+        return [t for t in successors(product) if t in core]
+
+    wanted: list[Callable[[int], bool]] = [
+        lambda p, accepting=accepting: p % width in accepting  # type: ignore[misc]
+        for accepting in automaton.accepting
+    ]
+    wanted += [
+        lambda p, f=f: label(p) & f.granting == f.granting  # type: ignore[misc]
+        for f in fair
+        if any(label(p) & f.granting == f.granting for p in core)
+    ]
+    for meets in wanted:
+        if not any(map(meets, round_trip)):
+            round_trip += _path([round_trip[-1]], meets, inside)[1:]
+    back = _path(inside(round_trip[-1]), lambda p: p == entry, inside)
+    whole = stem[:-1] + round_trip + back[:-1]
+    return Lasso(tuple(p // width for p in whole), len(stem) - 1)
+
+
+def _path(sources: Sequence[int], meets: Callable[[int], bool], successors: Successors) -> list[int]:
+    """The shortest path from a source to something wanted; there is one."""
+    before: dict[int, int] = dict.fromkeys(sources, -1)
+    queue = deque(before)
+    while queue:
+        node = queue.popleft()
+        if meets(node):
+            path = [node]
+            while before[path[-1]] != -1:
+                path.append(before[path[-1]])
+            return path[::-1]
+        for target in successors(node):
+            if target not in before:
+                before[target] = node
+                queue.append(target)
+    raise AssertionError("unreachable")
