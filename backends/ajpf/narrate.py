@@ -76,7 +76,7 @@ def _deed(agent: Agent, state: State) -> str:
             return f"does {show_deed(deed)}"
         case DeedKind.WAIT | DeedKind.WAIT_NOT:
             return f"looks whether to wait: {show_deed(deed)}"
-        case _:
+        case _:  # acts, and changes of what it believes and wants
             return f"carries out {show_deed(deed)}"
 
 
