@@ -27,10 +27,11 @@ from enum import StrEnum
 
 from avow.base.diagnostics import Severity, Span
 from avow.base.files import digest as text_digest
+from avow.formulas.conditions import conditions
 from avow.formulas.formula import conjunction, digest, sort_digest
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_term
-from avow.language.terms import TRUE, And, Implies, Quantified, Quantifier, Term, Variable
+from avow.language.terms import TRUE, Term
 
 
 class Property(StrEnum):
@@ -126,49 +127,10 @@ def node_key(node: Node) -> str:
 
 
 def triggers(formula: Term) -> tuple[Term, ...]:
-    """For each conjoined part of a guarantee that demands something only under a condition: that the condition can
-    come about. ``forall(x | P(x) -> (Q(x) -> R))`` gives ``exists(x | P(x) and Q(x))``."""
-    found = []
-    for part in _parts(formula):
-        prefix: list[tuple[Variable, ...] | Term] = []
-        conditional = False
-        while True:
-            if isinstance(part, Quantified) and part.quantifier is Quantifier.FORALL:
-                prefix.append(part.variables)
-                part = part.body
-            elif isinstance(part, Implies):
-                prefix.append(part.left)
-                conditional = True
-                part = part.right
-            else:
-                break
-        if conditional:
-            found.append(_closed(prefix))
-    return tuple(found)
-
-
-def _parts(formula: Term) -> tuple[Term, ...]:
-    found: list[Term] = []
-    stack = [formula]
-    while stack:
-        part = stack.pop()
-        if isinstance(part, And):
-            stack.extend(reversed(part.items))
-        elif isinstance(part, Quantified) and part.quantifier is Quantifier.FORALL and isinstance(part.body, And):
-            stack.extend(Quantified(Quantifier.FORALL, part.variables, item) for item in reversed(part.body.items))
-        else:
-            found.append(part)
-    return tuple(found)
-
-
-def _closed(prefix: list[tuple[Variable, ...] | Term]) -> Term:
-    result: Term = TRUE
-    for level in reversed(prefix):
-        if isinstance(level, tuple):
-            result = Quantified(Quantifier.EXISTS, level, result)
-        else:
-            result = conjunction((level, result))
-    return result
+    """For each part of a guarantee that demands something only under a condition: that the condition can come about.
+    ``forall(x | P(x) -> (Q(x) -> R))`` gives ``exists(x | P(x) and Q(x))``, and so does whatever means the same
+    (`avow.formulas.conditions`)."""
+    return tuple(dict.fromkeys(condition.formula for condition in conditions(formula)))
 
 
 def _names(node: Node, clauses: tuple[Clause, ...]) -> tuple[str, ...]:

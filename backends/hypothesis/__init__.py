@@ -25,7 +25,7 @@ class HypothesisBackend(Backend):
 
     name = "hypothesis"
     title = "Property-based tests of a Python function, generated from the contract"
-    version = "4"
+    version = "5"
     strength = Verdict.TESTED
     uses_steps = False
     uses_wiring = False

@@ -8,10 +8,11 @@ from typing import Any
 
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.evaluation.truth import judge
+from avow.formulas.conditions import conditions
 from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.values import Value
 from avow.language.printer import show_term
-from avow.language.terms import And, Implies, Not, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
 
 from . import wire
 from .generate import Inputs
@@ -74,7 +75,7 @@ def _ready(name: str, formula: Term, text: str) -> Judged:
 
 def guarantee(clause: Judged) -> Guarantee:
     """The guarantee with its triggers."""
-    found = tuple(_trigger(clause.name, outer, conditions) for outer, conditions in triggers(clause.formula))
+    found = tuple(_trigger(clause.name, c.outer, c.parts) for c in conditions(clause.formula))
     return Guarantee(clause, found, [0] * len(found), [0] * len(found))
 
 
@@ -91,37 +92,8 @@ def blamed(parts: Iterable[Judged], values: Mapping[str, Value]) -> tuple[str, .
     return None
 
 
-_Condition = tuple[tuple[Variable, ...], tuple[Term, ...]]
-"""Variables of the quantifiers around, and what has to hold of them."""
-
-
-def triggers(formula: Term) -> tuple[_Condition, ...]:
-    """What has to be met for the formula to say anything: the antecedent of every implication that it is made of."""
-    found: dict[_Condition, None] = {}
-    stack: list[tuple[Term, tuple[Variable, ...], tuple[Term, ...]]] = [(formula, (), ())]
-    while stack:
-        part, outer, conditions = stack.pop()
-        match part:
-            case Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body):
-                stack.append((body, (*outer, *variables), conditions))
-            case And(items=items):
-                stack.extend((item, outer, conditions) for item in reversed(items))
-            case Implies(left=left, right=right):
-                stack.append((right, outer, (*conditions, left)))
-            case Or(items=items) if any(isinstance(item, Not) for item in items):
-                denied = tuple(item.body for item in items if isinstance(item, Not))
-                rest = tuple(item for item in items if not isinstance(item, Not))
-                if rest:
-                    stack.append((Or(rest) if len(rest) > 1 else rest[0], outer, (*conditions, *denied)))
-            case _ if conditions:
-                found.setdefault((outer, conditions))
-            case _:  # holds without condition: nothing to count
-                pass
-    return tuple(found)
-
-
-def _trigger(name: str, outer: tuple[Variable, ...], conditions: tuple[Term, ...]) -> Trigger:
-    joined = conjunction(conditions)
+def _trigger(name: str, outer: tuple[Variable, ...], given: tuple[Term, ...]) -> Trigger:
+    joined = conjunction(given)
     items = joined.items if isinstance(joined, And) else (joined,)
     bound = frozenset(outer)
     alone = [item for item in items if not free_variables(item) & bound]

@@ -1,0 +1,161 @@
+"""Under which conditions a formula demands something: read off its meaning, whatever connectives say it.
+
+``a -> b``, ``not a or b``, ``not (a and not b)`` and ``b or not a`` demand b under a; ``a <=> b`` and its like demand b
+under a, and ``not b`` under ``not a``. The formula is taken apart into disjunctions, each under the universal
+quantifiers around it. What of a disjunction speaks of inputs only is its condition, negated, with the denied parts of
+the rest where something else is left, which is the demand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+from avow.formulas.formula import conjunction, free_variables, negation
+from avow.formulas.renaming import rename_apart
+from avow.formulas.traversal import depth
+from avow.language.sorts import BOOL
+from avow.language.terms import TRUE, And, Compare, Iff, Implies, Not, Or, Quantified, Quantifier, Role, Term, Variable
+
+MAX_DEPTH = 150
+"""Deeper formulas are not taken apart."""
+MAX_CLAUSES = 16
+"""Nor are disjunctions of conjunctions that would become more than so many disjunctions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """`parts` hold together for some values of the `outer` variables: then something is demanded."""
+
+    outer: tuple[Variable, ...]
+    parts: tuple[Term, ...]
+
+    @property
+    def formula(self) -> Term:
+        """That it comes about."""
+        whole = conjunction(self.parts)
+        free = free_variables(whole)
+        used = tuple(v for v in self.outer if v in free)
+        return Quantified(Quantifier.EXISTS, used, whole) if used else whole
+
+
+def conditions(formula: Term) -> tuple[Condition, ...]:
+    """Every condition under which the formula demands something, each once; none where it always demands all of it."""
+    if depth(formula) > MAX_DEPTH:
+        return ()
+    found: dict[Condition, None] = {}
+    for clause in _clauses(rename_apart(formula), True):
+        parts = _parts(clause)
+        if parts:
+            found.setdefault(Condition(clause.outer, parts))
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Clause:
+    """One disjunction. `halved`: it is one direction of an equivalence."""
+
+    outer: tuple[Variable, ...]
+    items: tuple[Term, ...]
+    halved: bool = False
+
+
+def _parts(clause: _Clause) -> tuple[Term, ...]:
+    given = [item for item in clause.items if _of_inputs(item)]
+    rest = [item for item in clause.items if item not in given]
+    if not given or not rest:
+        given, rest = [], list(clause.items)
+        if clause.halved:
+            return ()
+    denials = [item for item in rest if _is_denial(item)]
+    if len(denials) < len(rest):
+        given += denials
+    return tuple(dict.fromkeys(part for item in given if (part := _denied(item)) != TRUE))
+
+
+def _of_inputs(term: Term) -> bool:
+    return all(v.role is not Role.OUTPUT for v in free_variables(term))
+
+
+def _is_denial(item: Term) -> bool:
+    return isinstance(item, Not) or (isinstance(item, Compare) and item.operator == "!=")
+
+
+def _denied(item: Term) -> Term:
+    if isinstance(item, Compare) and item.operator == "!=":
+        return Compare("==", item.left, item.right)
+    return negation(item)
+
+
+def _clauses(term: Term, positive: bool) -> Iterator[_Clause]:
+    """The disjunctions that together are the term, or its negation. Bound names are apart."""
+    match term:
+        case Not(body=body):
+            yield from _clauses(body, not positive)
+        case And(items=items) if positive:
+            for item in items:
+                yield from _clauses(item, True)
+        case Or(items=items) if not positive:
+            for item in items:
+                yield from _clauses(item, False)
+        case Or(items=items) | And(items=items):
+            yield from _joined([(item, positive) for item in items])
+        case Implies(left=left, right=right) if positive:
+            yield from _joined([(left, False), (right, True)])
+        case Implies(left=left, right=right):
+            yield from _clauses(left, True)
+            yield from _clauses(right, False)
+        case Iff(left=left, right=right):
+            yield from _halves(left, right, positive)
+        case Compare(operator="==" | "!=" as operator, left=left, right=right) if left.sort == BOOL:
+            yield from _halves(left, right, positive is (operator == "=="))
+        case Quantified(quantifier=quantifier, variables=variables, body=body) if quantifier is (
+            Quantifier.FORALL if positive else Quantifier.EXISTS
+        ):
+            for clause in _clauses(body, positive):
+                yield _Clause((*variables, *clause.outer), clause.items, clause.halved)
+        case _:
+            yield _Clause((), (term if positive else negation(term),))
+
+
+def _halves(left: Term, right: Term, same: bool) -> Iterator[_Clause]:
+    for one in (False, True):
+        for clause in _joined([(left, one), (right, same is not one)]):
+            yield _Clause(clause.outer, clause.items, True)
+
+
+def _joined(parts: list[tuple[Term, bool]]) -> Iterator[_Clause]:
+    """The disjunction of some terms. A conjunction among them is spread over the others only where it says something
+    of inputs and something of outputs: ``(a or b) -> c`` is under one condition."""
+    choices: list[list[_Clause]] = []
+    for term, positive in parts:
+        found = list(_clauses(term, positive)) if not _of_inputs(term) or not _is_junction(term, positive) else []
+        mixed = len({all(map(_of_inputs, clause.items)) for clause in found}) > 1
+        whole = _Clause((), (term if positive else negation(term),))
+        choices.append(found if len(found) == 1 or mixed else [whole])
+    count = 1
+    for some in choices:
+        count *= len(some)
+    if count > MAX_CLAUSES:
+        choices = [[_Clause((), (term if positive else negation(term),))] for term, positive in parts]
+    for chosen in product(*choices):
+        items = tuple(dict.fromkeys(item for clause in chosen for item in clause.items))
+        if not any(negation(item) in items for item in items):  # else it says nothing
+            yield _Clause(
+                tuple(v for clause in chosen for v in clause.outer), items, any(clause.halved for clause in chosen)
+            )
+
+
+def _is_junction(term: Term, positive: bool) -> bool:
+    """Whether it is, as it stands here, a conjunction: of inputs only, it stays one condition."""
+    match term:
+        case Not(body=body):
+            return _is_junction(body, not positive)
+        case And():
+            return positive
+        case Or() | Implies():
+            return not positive
+        case Iff():
+            return True
+    return False
