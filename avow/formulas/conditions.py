@@ -88,32 +88,33 @@ def _denied(item: Term) -> Term:
     return negation(item)
 
 
-def _clauses(term: Term, positive: bool) -> Iterator[_Clause]:
-    """The disjunctions that together are the term, or its negation. Bound names are apart."""
+def _clauses(term: Term, positive: bool, halve: bool = True) -> Iterator[_Clause]:
+    """The disjunctions that together are the term, or its negation. Bound names are apart. Within an equivalence
+    another one is not halved (`halve`): each would double what is said."""
     match term:
         case Not(body=body):
-            yield from _clauses(body, not positive)
+            yield from _clauses(body, not positive, halve)
         case And(items=items) if positive:
             for item in items:
-                yield from _clauses(item, True)
+                yield from _clauses(item, True, halve)
         case Or(items=items) if not positive:
             for item in items:
-                yield from _clauses(item, False)
+                yield from _clauses(item, False, halve)
         case Or(items=items) | And(items=items):
-            yield from _joined([(item, positive) for item in items])
+            yield from _joined([(item, positive) for item in items], halve)
         case Implies(left=left, right=right) if positive:
-            yield from _joined([(left, False), (right, True)])
+            yield from _joined([(left, False), (right, True)], halve)
         case Implies(left=left, right=right):
-            yield from _clauses(left, True)
-            yield from _clauses(right, False)
-        case Iff(left=left, right=right):
+            yield from _clauses(left, True, halve)
+            yield from _clauses(right, False, halve)
+        case Iff(left=left, right=right) if halve:
             yield from _halves(left, right, positive)
-        case Compare(operator="==" | "!=" as operator, left=left, right=right) if left.sort == BOOL:
+        case Compare(operator="==" | "!=" as operator, left=left, right=right) if halve and left.sort == BOOL:
             yield from _halves(left, right, positive is (operator == "=="))
         case Quantified(quantifier=quantifier, variables=variables, body=body) if quantifier is (
             Quantifier.FORALL if positive else Quantifier.EXISTS
         ):
-            for clause in _clauses(body, positive):
+            for clause in _clauses(body, positive, halve):
                 yield _Clause((*variables, *clause.outer), clause.items, clause.halved)
         case _:
             yield _Clause((), (term if positive else negation(term),))
@@ -121,16 +122,18 @@ def _clauses(term: Term, positive: bool) -> Iterator[_Clause]:
 
 def _halves(left: Term, right: Term, same: bool) -> Iterator[_Clause]:
     for one in (False, True):
-        for clause in _joined([(left, one), (right, same is not one)]):
+        for clause in _joined([(left, one), (right, same is not one)], False):
             yield _Clause(clause.outer, clause.items, True)
 
 
-def _joined(parts: list[tuple[Term, bool]]) -> Iterator[_Clause]:
+def _joined(parts: list[tuple[Term, bool]], halve: bool) -> Iterator[_Clause]:
     """The disjunction of some terms. A conjunction among them is spread over the others only where it says something
     of inputs and something of outputs: ``(a or b) -> c`` is under one condition."""
     choices: list[list[_Clause]] = []
     for term, positive in parts:
-        found = list(_clauses(term, positive)) if not _of_inputs(term) or not _is_junction(term, positive) else []
+        found = (
+            list(_clauses(term, positive, halve)) if not _of_inputs(term) or not _is_junction(term, positive) else []
+        )
         mixed = len({all(map(_of_inputs, clause.items)) for clause in found}) > 1
         whole = _Clause((), (term if positive else negation(term),))
         choices.append(found if len(found) == 1 or mixed else [whole])
