@@ -27,6 +27,8 @@ class Graph:
     unfinished: str | None = None
     """Why states are missing: the ones that were not explored any more have no successors. A run that stays within what
     was explored is still a run of the agent."""
+    settles: bool = False
+    """The states that are missing do not matter to the property that the others were explored for (`lazy`)."""
 
     def __len__(self) -> int:
         return len(self.states)

@@ -23,6 +23,7 @@ from .checker import Checker, OutOfTime, Property, asks_for_percepts
 from .explore import explore
 from .instances import Instantiation, instances
 from .interpreter import Agent
+from .lazy import open_part
 from .options import Setup, read
 from .settle import Frame, Settled, outcome
 from .words import Wording, explain
@@ -30,6 +31,10 @@ from .words import Wording, explain
 ENGINE = "Avow's own Gwendolen checker"
 GRACE = 0.5
 """Of the time limit, what may be used beyond it to look for violations in what could be explored."""
+LAZY = 20_000
+"""States after which the properties are asked for one by one, each on the part of the state space that it needs."""
+LAZY_SHARE = 0.1
+"""Of the time that is left, what one property may use for that."""
 SPIN_SHARE = 0.5
 """Of the time that is left, what Spin may use for its second opinion."""
 
@@ -110,7 +115,13 @@ class _Run:
     def explored(self, properties: Sequence[Property], probed: bool) -> Checker | None:
         setup = self.setup
         agent = Agent(setup.program, setup.environment, setup.semantics, probed=probed)
-        graph = explore(agent, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
+        graph = explore(agent, states=min(LAZY, setup.states), seconds=self.left(), megabytes=self.limits.megabytes)
+        if graph.unfinished is not None:
+            properties = [p for p in properties if not self.settled_early(agent, p)]
+            if not properties:
+                return None
+            if len(graph) > LAZY:
+                graph = explore(agent, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
         self.bound["states"] += len(graph)
         self.bound["transitions"] += graph.transitions
         if graph.unfinished is not None:
@@ -127,6 +138,20 @@ class _Run:
             self.checkers[p.key] = checker
         return checker
 
+    def settled_early(self, agent: Agent, p: Property) -> bool:
+        """Whether the property was decided on the part of the state space that it needs (`lazy.open_part`)."""
+        try:
+            part = open_part(agent, p, min(LAZY, self.setup.states), self.left() * LAZY_SHARE)
+        except (TooDeep, TooLarge, RecursionError):
+            return False
+        if part is None:
+            return False
+        self.bound["states"] += len(part)
+        self.bound["transitions"] += part.transitions
+        self.checkers[p.key] = Checker(part, [p])
+        self.results[p.key] = self.one(self.checkers[p.key], p)
+        return True
+
     def one(self, checker: Checker, p: Property) -> Settled:
         try:
             result = checker.check(p, self.deadline)
@@ -135,7 +160,7 @@ class _Run:
         except (TooLarge, RecursionError):
             return Settled(Verdict.UNKNOWN, "the property's automaton is too large")
         unfinished = checker.graph.unfinished
-        if result.holds and unfinished is not None:
+        if result.holds and unfinished is not None and not checker.graph.settles:
             return Settled(Verdict.UNKNOWN, f"not refuted, but the state space is unfinished: {unfinished}")
         refutes = p.forbidden is None or result.answered
         answer = Verdict.CHECKED if result.holds else Verdict.REFUTED

@@ -20,7 +20,7 @@ class Case:
 
 def case(seed: int) -> Case:
     rng = random.Random(seed)
-    return Case(_program(rng), _environment(rng), tuple(_formula(rng, rng.choice((1, 1, 2))) for _ in range(2)))
+    return Case(_program(rng), _environment(rng), tuple(formula(rng, rng.choice((1, 1, 2))) for _ in range(2)))
 
 
 def _kind(rng: random.Random) -> str:
@@ -116,10 +116,10 @@ def _atom(rng: random.Random) -> str:
     return f"(~{atom})" if rng.random() < 0.35 else atom
 
 
-def _formula(rng: random.Random, depth: int) -> str:
+def formula(rng: random.Random, depth: int) -> str:
     if depth == 0:
         return _atom(rng)
-    one, other = _formula(rng, depth - 1), _formula(rng, depth - 1)
+    one, other = formula(rng, depth - 1), formula(rng, depth - 1)
     forms = (
         "[] {0}",
         "<> {0}",

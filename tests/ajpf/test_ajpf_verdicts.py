@@ -1,7 +1,9 @@
-"""What the real AJPF says of small agents (`golden/verdicts`): our engine says the same of every one of them.
+"""What the real AJPF says of small agents: our engine says the same of every one of them.
 
 The programs are our own. AJPF (MCAPL of December 2025, Java 11) ran each with an environment that offers what NAME.yaml
-lists; `states` is its count, for the curious.
+lists. Those in `golden/verdicts` were written for one question each or told readings of the semantics apart; those in
+`golden/random` were drawn by `small_agents`. A remark says where AJPF errs: its answer is not what follows from
+the model that it writes down itself, and ours is.
 """
 
 from __future__ import annotations
@@ -18,21 +20,27 @@ from avow.backends.ajpf.interpreter import Agent, Semantics
 from avow.backends.ajpf.parser import read_program
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 
-GOLDEN = Path(__file__).parent / "golden" / "verdicts"
-with (GOLDEN / "verdicts.csv").open(newline="") as table:
-    ROWS = list(csv.DictReader(table))
-PROGRAMS = sorted({row["program"] for row in ROWS})
+GOLDEN = Path(__file__).parent / "golden"
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
-def test_our_verdicts_are_ajpfs(name):
-    program, draws = read_program(GOLDEN / f"{name}.gwen"), read_environment(GOLDEN / f"{name}.yaml")
-    wanted = {
-        row["property"]: (Property(row["property"], instantiate(parse_psl(row["formula"]), {})), row["ajpf"])
-        for row in ROWS
-        if row["program"] == name
-    }
-    for p, said in wanted.values():
+def _rows(folder: str) -> list[dict[str, str]]:
+    with (GOLDEN / folder / "verdicts.csv").open(newline="") as table:
+        return list(csv.DictReader(table))
+
+
+ROWS = {folder: _rows(folder) for folder in ("verdicts", "random")}
+PROGRAMS = [(folder, name) for folder, rows in ROWS.items() for name in dict.fromkeys(row["program"] for row in rows)]
+
+
+@pytest.mark.parametrize(("folder", "name"), PROGRAMS)
+def test_our_verdicts_are_ajpfs(folder, name):
+    program = read_program(GOLDEN / folder / f"{name}.gwen")
+    draws = read_environment(GOLDEN / folder / f"{name}.yaml")
+    for row in ROWS[folder]:
+        if row["program"] != name:
+            continue
+        p = Property(row["property"], instantiate(parse_psl(row["formula"]), {}))
         graph = explore(Agent(program, draws, Semantics.MCAPL, probed=asks_for_percepts(p)), states=20_000)
         assert graph.unfinished is None
-        assert Checker(graph, (p,)).check(p).holds is (said == "holds"), (p.key, said)
+        agrees = Checker(graph, (p,)).check(p).holds is (row["ajpf"] == "holds")
+        assert agrees is not bool(row.get("remark")), row

@@ -1,0 +1,125 @@
+"""The part of a state space that one property needs: runs are followed only as long as they may still break it, and a
+prefix that no continuation can mend ends the search. So an agent without bounds may have its answer."""
+
+from __future__ import annotations
+
+import time
+from array import array
+
+from .automaton import Automaton, build, compiled
+from .builtin import Crash
+from .checker import Property, label_states
+from .explore import Graph
+from .interpreter import Agent, State
+from .psl import Formula, Not, atoms
+
+TAIL = 5_000
+"""Steps that a bad prefix is followed for, till a state comes again: a run has to be shown whole."""
+
+
+class _Part:
+    """States by their numbers, with what was found of their successors."""
+
+    def __init__(self, agent: Agent) -> None:
+        self.agent = agent
+        self.numbers: dict[State, int] = {}
+        self.states: list[State] = []
+        self.successors: dict[int, tuple[int, ...]] = {}
+
+    def number(self, state: State) -> int:
+        known = self.numbers.get(state)
+        if known is None:
+            known = self.numbers[state] = len(self.states)
+            self.states.append(state)
+        return known
+
+    def after(self, number: int) -> tuple[int, ...]:
+        found = self.successors.get(number)
+        if found is None:
+            reached = self.agent.successors(self.states[number])
+            found = self.successors[number] = tuple(dict.fromkeys(map(self.number, reached)))
+        return found
+
+    def graph(self, initial: tuple[int, ...]) -> Graph:
+        offsets, targets = array("q", [0]), array("q")
+        for number in range(len(self.states)):
+            targets.extend(self.successors.get(number, ()))
+            offsets.append(len(targets))
+        why = "only as far as the property is open"
+        return Graph(self.agent, tuple(self.states), initial, offsets, targets, why, settles=True)
+
+
+def open_part(agent: Agent, wanted: Property, states: int, seconds: float) -> Graph | None:
+    """The states in which the property is neither kept nor broken for good, and those next to them: enough to decide
+    it. None where the bounds do not let it be found. Raises automaton.TooLarge, TooDeep."""
+    if agent.environment.fair:
+        return None
+    deadline = time.monotonic() + seconds
+    automaton = build(Not(wanted.formula))
+    places = {atom: at for at, atom in enumerate(dict.fromkeys(atoms(wanted.formula)))}
+    tests = [compiled(leaf, places) for leaf in automaton.leaves]
+    useful, lost = _useful(automaton), _lost(automaton)
+    part = _Part(agent)
+    labels: list[int] = []
+
+    def fits(node: int, number: int) -> bool:
+        yes, no = automaton.positive[node], automaton.negative[node]
+        return labels[number] & yes == yes and not labels[number] & no
+
+    def label_new() -> None:
+        for label in label_states(agent, part.states[len(labels) :], tuple(places)):
+            labels.append(sum(1 << at for at, test in enumerate(tests) if test(label)))
+
+    try:
+        initial = tuple(dict.fromkeys(map(part.number, agent.start())))
+        label_new()
+        level = {(s, n) for s in initial for n in automaton.initial if n in useful and fits(n, s)}
+        seen = set(level)
+        while level:
+            bad = next((s for s, n in level if n in lost), None)
+            if bad is not None:
+                return part.graph(initial) if _followed(part, bad) else None
+            if len(part.states) > states or time.monotonic() > deadline:
+                return None
+            following = [(t, n) for s, n in level for t in part.after(s)]
+            label_new()
+            level = {(t, m) for t, n in following for m in automaton.successors[n] if m in useful and fits(m, t)} - seen
+            seen |= level
+    except Crash:
+        return None
+    return part.graph(initial)
+
+
+def _followed(part: _Part, number: int) -> bool:
+    """Whether the run that takes the first way everywhere comes back to a state."""
+    seen: set[int] = set()
+    while number not in seen and len(seen) < TAIL:
+        seen.add(number)
+        number = part.after(number)[0]
+    return number in seen
+
+
+def _useful(automaton: Automaton[Formula]) -> frozenset[int]:
+    """Nodes from which each acceptance set can be reached: without one, no run from there is accepted."""
+    useful = set(range(len(automaton.successors)))
+    for accepting in automaton.accepting:
+        good = set(accepting)
+        while True:
+            more = {n for n in useful - good if good.intersection(automaton.successors[n])}
+            if not more:
+                break
+            good |= more
+        useful &= good
+    return frozenset(useful)
+
+
+def _lost(automaton: Automaton[Formula]) -> frozenset[int]:
+    """Nodes that accept whatever comes: a run that reaches one breaks the property for good."""
+    return frozenset(
+        n
+        for n, following in enumerate(automaton.successors)
+        if not automaton.positive[n]
+        and not automaton.negative[n]
+        and n in following
+        and all(n in accepting for accepting in automaton.accepting)
+    )
