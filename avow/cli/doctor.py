@@ -18,11 +18,13 @@ def command(as_json: bool) -> int:
         click.echo(json.dumps({"tools": [f.json() for f in found]}, indent=1))
     else:
         from rich.console import Console
+        from rich.markup import escape
         from rich.table import Table
 
         table = Table("for", "tool", "version", "where, or how to get it", box=None, header_style="bold")
         for f in found:
             state = f"[green]{f.tool.version}[/]" if f.tool.present else "[yellow]missing[/]"
-            table.add_row(f.used_by, f.tool.name, state, f.tool.path or "" if f.tool.present else f.tool.install)
-        Console(highlight=False).print(table)
+            where = f.tool.path or "" if f.tool.present else f.tool.install
+            table.add_row(escape(f.used_by), escape(f.tool.name), state, escape(where))
+        Console(highlight=False, soft_wrap=True).print(table)
     return 3 if any(not f.tool.present and not f.tool.optional for f in found) else 0

@@ -14,7 +14,7 @@ from avow.base.tools import Tool
 _PACKAGES = (
     ("logic", "z3-solver", "pip install z3-solver", False),
     ("second opinion", "cvc5", "pip install 'avow[cvc5]'", True),
-    ("PDF report", "typst", "pip install 'avow[pdf]'", True),
+    ("PDF report", "typst", "pip install typst", True),
     ("bag files", "rosbags", "pip install 'avow[bags]'", True),
     ("live monitoring", "websockets", "pip install 'avow[monitor]'", True),
     ("language server", "pygls", "pip install 'avow[lsp]'", True),

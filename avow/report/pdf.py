@@ -1,4 +1,4 @@
-"""The case as PDF, set by Typst (extra ``avow[pdf]``): offline, with its own fonts, same bytes every time."""
+"""The case as PDF, set by Typst: offline, with its own fonts, same bytes every time."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def render_pdf(case: Case) -> bytes:
     try:
         import typst
     except ImportError as error:
-        raise NoTypst("typst is not installed: pip install 'avow[pdf]'") from error
+        raise NoTypst("typst is not installed: pip install typst") from error
     source = resources.files("avow.report").joinpath("templates/report.typ").read_bytes()
     data: bytes = typst.compile(
         source, format="pdf", sys_inputs={"case": json.dumps(_data(case))}, ignore_system_fonts=True, timestamp=0

@@ -159,3 +159,20 @@ def test_comparison_tells_new_gone_and_changed_claims() -> None:
     assert ("meaning", obligations[1].id) in kinds
     assert ("added", obligations[0].id) in {(c.kind, c.subject) for c in compare(new, old)}
     assert of_ledger("x", ()).claims == {}
+
+
+def test_doctor_prints_install_commands_whole(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Brackets once were taken for markup, so that the extra's name was missing."""
+    import avow.pipeline.doctor as doctor
+    from avow.base.tools import Tool
+
+    told = doctor.Finding("a [use]", Tool("thing", None, None, "pip install 'avow[signing]'", True))
+    monkeypatch.setattr(doctor, "findings", lambda: (told,))
+    from avow.cli import main
+
+    with pytest.raises(SystemExit) as done:
+        main(["doctor"])
+    assert done.value.code == 0
+    assert "pip install 'avow[signing]'" in capsys.readouterr().out

@@ -221,7 +221,7 @@ def test_without_typst_the_pdf_is_left_out_and_that_is_said(tmp_path: Path, monk
     (tmp_path / "report.pdf").write_bytes(b"an older run's")
     monkeypatch.setitem(sys.modules, "typst", None)
     done = render_all(CASES["empty"](), tmp_path)
-    assert dict(done.left_out) == {"report.pdf": "typst is not installed: pip install 'avow[pdf]'"}
+    assert dict(done.left_out) == {"report.pdf": "typst is not installed: pip install typst"}
     assert not (tmp_path / "report.pdf").exists()
 
 
