@@ -138,6 +138,9 @@ def test_diff_of_reports_and_ledgers(root: Path) -> None:
         "before": "proved",
         "after": "contradictory",
         "title": "",
+        "worse": True,
+        "old_formula": "",
+        "new_formula": "",
     }
     assert why == ["hoare was asked again, with nothing changed that it depends on: proved → refuted, refuted by hoare"]
     with pytest.raises(Rejected):
