@@ -19,6 +19,7 @@ from typing import Any
 
 from avow.assurance.answers import Baseline
 from avow.assurance.model import Case
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import write
 from avow.evidence.encoding import LATER, Unreadable, encode, plain
 from avow.evidence.encoding import decode as decode_evidence
@@ -46,6 +47,18 @@ def baseline_to_json(baseline: Baseline) -> dict[str, Any]:
     """What of a case was signed, as plain data."""
     found: dict[str, Any] = _encode(baseline)
     return found
+
+
+def read_case(path: Path) -> Case:
+    """The case of a report (its folder, or report.json). Raises Rejected."""
+    file = path / "report.json" if path.is_dir() else path
+    try:
+        return from_json(json.loads(file.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise Rejected(Diagnostic("REPORT001", f"{file} cannot be read: {error.strerror}")) from None
+    except (ValueError, RecursionError, Unreadable) as error:
+        message = f"{file} is no report of this version of Avow: {error}"
+        raise Rejected(Diagnostic("REPORT002", message, hint="`doit report` renders it again")) from None
 
 
 def baseline_from_json(data: object) -> Baseline:

@@ -1,4 +1,4 @@
-"""The words for an answer (design: page "Obligations, evidence, and the assurance report").
+"""The words for an answer.
 
 A verdict says what one tool run showed about one claim. Unknown, time-out, crash and a missing tool are verdicts too.
 """

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import difflib
-import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from avow.assurance.codec import from_json
+from avow.assurance.codec import read_case
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.workspace import Workspace
 from avow.evidence.audit import Discrepancy, Fault
-from avow.evidence.encoding import Unreadable
 from avow.evidence.heads import Anchor, Index, index_path, read_index, stated_heads
 from avow.evidence.ledger import Ledger
 from avow.evidence.signing import Signed, sign, signature_path, verify_signature
@@ -110,18 +108,6 @@ def sign_all(place: Workspace, systems: Sequence[str], private_key: Path) -> Ite
         confirm(place, ledger)
     path = index_path(place.ledgers)
     yield sign(signature_path(path), Signed("index of ledgers", _index(place).marks), private_key)
-
-
-def read_case(path: Path) -> Case:
-    """The case of a report (its folder, or report.json). Raises Rejected."""
-    file = path / "report.json" if path.is_dir() else path
-    try:
-        return from_json(json.loads(file.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise Rejected(Diagnostic("REPORT001", f"{file} cannot be read: {error.strerror}")) from None
-    except (ValueError, RecursionError, Unreadable) as error:
-        message = f"{file} is no report of this version of Avow: {error}"
-        raise Rejected(Diagnostic("REPORT002", message, hint="`doit report` renders it again")) from None
 
 
 def reported_cases(place: Workspace) -> tuple[Case, ...]:

@@ -37,8 +37,8 @@ def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
 def _check(folder: object, as_json: bool) -> int:
     from pathlib import Path
 
+    from avow.assurance.codec import read_case
     from avow.base.workspace import find_workspace
-    from avow.cli.ledgers import read_case
     from avow.evidence.ledger import Ledger
     from avow.report.check import check
 

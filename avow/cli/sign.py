@@ -23,10 +23,10 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     from datetime import date, datetime
     from pathlib import Path
 
+    from avow.assurance.codec import read_case
     from avow.assurance.signed import sign_case
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.workspace import find_workspace, workspace
-    from avow.cli.ledgers import read_case
     from avow.evidence.ledger import Ledger
     from avow.report.check import check
 

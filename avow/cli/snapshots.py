@@ -11,11 +11,11 @@ from datetime import date
 from pathlib import Path
 
 from avow import __version__
+from avow.assurance.codec import read_case
 from avow.assurance.compare import Snapshot, of_case, of_ledger
 from avow.assurance.model import RunInfo
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.workspace import Workspace
-from avow.cli.ledgers import read_case
 from avow.evidence.ledger import Ledger
 
 

@@ -1,4 +1,4 @@
-"""One evidence record: one attempt by one method at one obligation (design: page "Obligations, evidence…")."""
+"""One evidence record: one attempt by one method at one obligation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The lattice: what a set of unlike evidence says of one claim (design: page 04, "Roll-up").
+"""The lattice: what a set of unlike evidence says of one claim.
 
 A claim's evidence is weighed item by item into a `Weight`; weights are joined by taking the greatest of each part, so
 joining is associative, commutative and idempotent: order and duplication cannot matter, and nothing that is joined can

@@ -1,6 +1,6 @@
 """Total functions that a contract looks up by their value, as if some arguments had none.
 
-RCL's functions are total (design: page "RCL", "Meaning"): ``REAL x REAL --> NATURAL`` gives every place a number. A
+RCL's functions are total: ``REAL x REAL --> NATURAL`` gives every place a number. A
 formula such as ``not exists(x, y in REAL | in.number(x, y) == i + 1)`` uses it the other way round, as a numbering of
 some places. It then means less than it seems to: "this place has no number" cannot be said, and no place need be the
 only one with its number. A relation (``REAL x REAL x NATURAL --> BOOL``) can say both.

@@ -1,7 +1,7 @@
 """Sorts: the types of many-sorted first-order logic that RCL's type declarations denote.
 
 A declared name is a name for a sort; sets of names become `EnumSort`, sets of constructors `DataSort`, and ``{}`` an
-`OpaqueSort`: an unspecified sort, never an empty one (design: page "RCL", section "Meaning").
+`OpaqueSort`: an unspecified sort, never an empty one.
 """
 
 from __future__ import annotations

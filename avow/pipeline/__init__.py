@@ -1,1 +1,1 @@
-"""The pipeline: every stage as a doit task. The only room that knows all stages (design: page "The house")."""
+"""The pipeline: every stage as a doit task. The only room that knows all stages."""

@@ -1,4 +1,4 @@
-"""plan.yaml as data: what a person decides about a system (design: page "plan.yaml").
+"""plan.yaml as data: what a person decides about a system.
 
 Reading, validation and located errors are in `avow.system.plan_file`; nothing here touches the disk.
 Every part that can be wrong keeps its place in the file, so that a later stage can point at it.

@@ -1,6 +1,6 @@
 """AJPF's property specification language: formulas, and how they are written so that AJPF reads what is meant.
 
-AJPF's grammar has traps (design: page "AJPF and Gwendolen", "The property file"): ``||`` binds tighter than ``&``,
+AJPF's grammar has traps: ``||`` binds tighter than ``&``,
 ``->`` associates to the left, ``<>[]p`` loses its inner operator. The printer brackets whatever is no proposition.
 """
 

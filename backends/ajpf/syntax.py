@@ -1,4 +1,4 @@
-"""Gwendolen programs and the terms in them, as data (design: page "AJPF and Gwendolen", section "the subset")."""
+"""Gwendolen programs and the terms in them, as data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How messages become values: rules as data (design: page "RCL", "Mapping from ROS messages").
+"""How messages become values: rules as data.
 
 A rule says from which topic and fields a contract variable gets its value, or that it gets it another way: from the
 scenario's tables, or from an output's value of the step before. `avow.backends.rosmonitoring.options` makes the rules

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -35,3 +36,17 @@ def test_each_folder_is_an_entry_point() -> None:
     folders = {path.parent.name for path in (ROOT / "backends").glob("*/__init__.py")}
     ours = {name for name, point in installed().items() if point.value.startswith("avow.backends.")}
     assert folders == ours
+
+
+def test_every_file_that_the_map_names_is_there() -> None:
+    """The map of rooms and the recipes in docs/architecture.md."""
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`((?:avow|backends|tests)/[\w/.]+)`", page)
+    assert len(named) > 12
+    assert [name for name in named if not (ROOT / name).exists()] == []
+    rows = re.findall(r"^\|[^|]*\| `(\w+)` \|[^|]*\| (.*) \|$", page, re.MULTILINE)
+    rooms = {p.parent.name for p in (ROOT / "avow").glob("*/__init__.py")} - {"backends"}
+    assert rooms <= {room for room, _ in rows}
+    for room, doors in rows:
+        for door in re.findall(r"`([\w/]+\.py)`", doors):
+            assert (ROOT / "avow" / room / door).is_file() or (ROOT / door).is_file(), (room, door)
