@@ -43,7 +43,7 @@ def test_every_file_that_the_map_names_is_there() -> None:
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     named = re.findall(r"`((?:avow|backends|tests)/[\w/.]+)`", page)
     assert len(named) > 12
-    assert [name for name in named if not (ROOT / name).exists()] == []
+    assert [name for name in named if "NAME" not in name and not (ROOT / name).exists()] == []
     rows = re.findall(r"^\|[^|]*\| `(\w+)` \|[^|]*\| (.*) \|$", page, re.MULTILINE)
     rooms = {p.parent.name for p in (ROOT / "avow").glob("*/__init__.py")} - {"backends"}
     assert rooms <= {room for room, _ in rows}
