@@ -16,12 +16,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("systems", nargs=-1)
 @click.option("--fresh", is_flag=True, help="Believe no earlier run: settle every obligation anew.")
-@click.option(
-    "-n",
-    "jobs",
-    type=click.IntRange(0),
-    help="How many tasks at once (default: 2, or the cluster's slots).",
-)
+@click.option("-n", "jobs", type=click.IntRange(0), help="How many tasks at once (default: 2, or the cluster's slots).")
 @click.option("--on", "address", help="Send works to a cluster: dask+tls://HOST:PORT (docs/scale.md).")
 @click.option(
     "--explain", is_flag=True, help="Say what each failing gate lacks, and the cheapest method that would close it."
@@ -48,8 +43,10 @@ def command(
         os.environ[EXPLAIN] = "1"
     wanted = [f"verify:{name}" for name in systems] or ["verify"]
     cluster = _cluster(address) if address else None
+    if jobs is None:
+        jobs = max(2, cluster.slots) if cluster else 2
     try:
-        return execute(place.root, wanted, jobs or (max(2, cluster.slots) if cluster else 2))
+        return execute(place.root, wanted, jobs)
     finally:
         if cluster:
             cluster.close()
