@@ -38,8 +38,8 @@ def run(
     altered: Altered | None = None,
     kept: Mapping[str, Sequence[Any]] | None = None,
 ) -> Report:
-    """Settle the obligations in a process of their own, here or elsewhere; `kept` are cases that refuted them once. Never
-    raises for what that process does."""
+    """Settle the obligations in a process of their own, here or elsewhere; `kept` are cases that refuted them once.
+    Never raises for what that process does."""
     if lacking := _lacking(work):
         return _failed(obligations, work, Verdict.NOT_RUN, f"no worker of the cluster offers {', '.join(lacking)}", {})
     try:
