@@ -144,6 +144,7 @@ class Desk:
     """What an answer says, to be compared."""
     alarms: list[str] = field(default_factory=list)
     _waiting: dict[str, _Waiting] = field(default_factory=dict)
+    _past: dict[str, _Waiting] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _thread: threading.Thread | None = None
 
@@ -152,13 +153,20 @@ class Desk:
         with self._lock:
             waiting = self._waiting.setdefault(asked.key, _Waiting(asked))
             waiting.asked_by += 1
+            first = waiting.asked_by == 1 and waiting.came is None
             if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._listen, daemon=True)
                 self._thread.start()
-        if waiting.asked_by == 1:
+        if first:
             self.executor.submit(asked)
         # the executor bounds the time; what lies beyond that is its own fault, and must not hang a run
-        if not waiting.there.wait(2 * (request.seconds + GRACE) + GRACE):
+        came = waiting.there.wait(2 * (request.seconds + GRACE) + GRACE)
+        with self._lock:
+            waiting.asked_by -= 1
+            if not waiting.asked_by:  # who asks again later wants to know how it is then
+                del self._waiting[asked.key]
+                self._past[asked.key] = waiting
+        if not came:
             self.executor.cancel([asked.key])
             return asked, Came(asked.key, failure="no answer, not even that there is none", timed_out=True)
         assert waiting.came is not None
@@ -167,7 +175,7 @@ class Desk:
     def _listen(self) -> None:
         for came in self.executor.results():
             with self._lock:
-                waiting = self._waiting.get(came.key)
+                waiting = self._waiting.get(came.key) or self._past.get(came.key)
             if waiting is None:
                 self._alarm(f"an answer came to what nobody asked ({came.key[:12]})")
             elif waiting.came is None:
