@@ -22,6 +22,9 @@ from avow.pipeline.requests import Request, request_bytes, request_digest
 GRACE = 90.0
 """Seconds above the tool's own limits that a worker gets to translate and write."""
 
+_LATE = 3600.0
+"""Seconds above all that for works that wait for their turn."""
+
 
 @dataclass(frozen=True, slots=True)
 class Asked:
@@ -160,7 +163,7 @@ class Desk:
         if first:
             self.executor.submit(asked)
         # the executor bounds the time; what lies beyond that is its own fault, and must not hang a run
-        came = waiting.there.wait(2 * (request.seconds + GRACE) + GRACE)
+        came = waiting.there.wait(request.seconds + GRACE + _LATE)
         with self._lock:
             waiting.asked_by -= 1
             if not waiting.asked_by:  # who asks again later wants to know how it is then
