@@ -29,6 +29,13 @@ _NEEDS = {
 }
 
 
+def pytest_configure() -> None:
+    """Plans of the tests may name plug-ins of the tests."""
+    from avow.backend_kit.registry import trust_plugins
+
+    trust_plugins()
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """A test whose tool is missing is skipped, visibly."""
     for item in items:

@@ -82,7 +82,26 @@ def translators(plugins: tuple[str, ...] = ()) -> dict[str, Backend]:
     return found
 
 
+_trusted: list[bool] = []
+"""Not empty: this process may import what a plan names under ``plugins``."""
+
+
+def trust_plugins() -> None:
+    """From now on this process imports a plan's plug-ins: said by what runs a workspace's code anyway."""
+    if not _trusted:
+        _trusted.append(True)
+
+
 def _plugins(modules: Iterable[str]) -> tuple[Backend, ...]:
+    modules = tuple(modules)
+    if modules and not _trusted:
+        raise Rejected(
+            Diagnostic(
+                "BACKEND005",
+                f"the plug-ins of this plan ({', '.join(modules)}) are code, and this command executes none",
+                hint="`avow verify` loads them",
+            )
+        )
     return tuple(_plugin(module) for module in modules)
 
 

@@ -43,6 +43,12 @@ WORKSPACE_CODES = register(
         "This is a defect of the backend: tell its authors.",
     ),
     declare(
+        "BACKEND005",
+        "plug-ins are not loaded here",
+        "The plan names plug-in modules. They are code, and commands that only read execute nothing of a workspace.",
+        "`avow verify` loads them; see `docs/trust-model.md`.",
+    ),
+    declare(
         "POLICY001",
         "no such profile",
         "The plan names a policy profile that does not exist.",

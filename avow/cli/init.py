@@ -13,6 +13,9 @@ _DODO = '''"""The pipeline as doit tasks: `doit verify` does everything for ever
 import sys
 from pathlib import Path
 
+if Path(sys.path[0]).resolve() == Path(__file__).resolve().parent:
+    del sys.path[0]  # put there by doit: no module of this folder is to stand in for one of Avow's
+
 from avow.pipeline.tasks import Pipeline
 
 RUN = Pipeline(Path(__file__).parent, sys.argv[1:])

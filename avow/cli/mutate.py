@@ -17,6 +17,9 @@ def command(system: str, method: str | None, node: str | None, limit: int, jobs:
     Scores go into the ledger and the report, which is rendered again. Evidence that notices no mutant is hollow: it
     supports nothing from then on, and the exit code is 1.
     """
+    from avow.backend_kit.registry import trust_plugins
+
+    trust_plugins()
     from avow.base.diagnostics import Rejected
     from avow.base.workspace import system_folder, workspace
     from avow.pipeline.mutation import hunt

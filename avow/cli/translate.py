@@ -41,6 +41,9 @@ def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], outp
     PATHS are the .rcl files of one contract, or a system's folder (whose plan the notations of backends may need). Code
     1 where guarantees are left out, since the notation cannot say them; 2 where nothing can be translated.
     """
+    from avow.backend_kit.registry import trust_plugins
+
+    trust_plugins()
     if notation not in NOTATIONS:
         return _by_backend(notation, paths, nodes, output)
     from avow.language.load import load_contract

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from doit.exceptions import TaskError
@@ -82,7 +83,13 @@ def _method(system: System, node: str, method: Method) -> Iterable[Diagnostic]:
     if method.id in ENGINES:
         yield Diagnostic("PLAN090", f"'{method.id}' is the name of an engine of Avow's own", method.options.span)
         return
-    tool = method_backend(system, method)
+    try:
+        tool = method_backend(system, method)
+    except Rejected as rejected:
+        if any(d.code != "BACKEND005" for d in rejected.diagnostics):
+            raise
+        yield from (replace(d, severity=Severity.WARNING, span=method.options.span) for d in rejected.diagnostics)
+        return
     wrong = tuple(_schema(tool.options_schema, method.options, f"nodes.{node}: {method.id}"))
     yield from wrong
     if not any(d.is_error for d in wrong):

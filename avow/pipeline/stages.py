@@ -13,11 +13,12 @@ from typing import Any
 
 from doit.exceptions import TaskError
 
-from avow.base.diagnostics import Rejected
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.evidence.heads import index_path, read_index
 from avow.pipeline import check as checking
 from avow.pipeline import export as exporting
 from avow.pipeline.assess import Assessment, gate, report
-from avow.pipeline.discharge import discharge, open_obligations
+from avow.pipeline.discharge import discharge, ledger_of, open_obligations
 from avow.pipeline.state import State
 from avow.pipeline.work import LANGUAGE, Work
 from avow.pipeline.workload import Survey, survey, write_obligations
@@ -42,11 +43,24 @@ def stages(state: State) -> Iterator[Task]:
     for stage, doc in STAGES.items():
         yield {"basename": stage, "name": None, "doc": doc}
     for folder in state.workspace.systems():
-        surveyed = survey(folder)
+        surveyed = _with_ledger(state, survey(folder))
         if isinstance(surveyed, Rejected):
             yield from _rejected(folder.name, surveyed)
         else:
             yield from _system(state, surveyed)
+
+
+def _with_ledger(state: State, surveyed: Survey | Rejected) -> Survey | Rejected:
+    """The system, if its ledger is a file that can be read or is to begin."""
+    if isinstance(surveyed, Rejected):
+        return surveyed
+    path = state.workspace.ledger(surveyed.system.name)
+    try:
+        ledger_of(path).records()
+        read_index(index_path(path.parent))
+    except OSError as error:
+        return Rejected(Diagnostic("LEDGER001", f"{error.filename or path} cannot be read: {error.strerror}"))
+    return surveyed
 
 
 def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
@@ -54,7 +68,7 @@ def _rejected(name: str, rejected: Rejected) -> Iterator[Task]:
     for stage in STAGES:
         action = (
             partial(checking.refuse, rejected)
-            if stage in ("check", "verify")
+            if stage in ("check", "report", "verify")
             else partial(checking.refuse_quietly, name)
         )
         yield {"basename": stage, "name": name, "actions": [action], "uptodate": [False]}

@@ -56,7 +56,11 @@ class Pipeline:
                 action = partial(state.results.note, result, gated=True)
                 yield {"basename": "verify", "name": result.system, "actions": [action], "uptodate": [False]}
             return
+        from avow.backend_kit.registry import trust_plugins
         from avow.pipeline.stages import stages
+
+        if any(name.partition(":")[0] not in ("report", "check") for name in self._wanted) or not self._wanted:
+            trust_plugins()
 
         yield from stages(state)
 

@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from avow.backend_kit.protocol import Report
+from avow.backend_kit.registry import trust_plugins
 from avow.base import process
 from avow.base.diagnostics import Rejected
 from avow.base.files import write
@@ -65,6 +66,7 @@ class Refused(Exception):  # noqa: N818 - it names what happened
 def entry(arguments: Sequence[str]) -> int:
     """The whole work of the process; its exit code."""
     process.adopt_orphans()
+    trust_plugins()
     try:
         asked = Path(arguments[0]).read_bytes()
         write(Path(arguments[1]), answer(asked).decode())

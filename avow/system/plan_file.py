@@ -194,6 +194,9 @@ class _Reader:
         if self.root.at("contract") is not None:
             return tuple(path for piece, path in self.paths("contract") if self.present(piece, path))
         found = tuple(sorted(self.path.resolve().parent.glob("*.rcl")))
+        for path in found:
+            if inside(self.path.parent, path.name) is None:
+                self.fault("PLAN108", f"{path.name} is a link that leads out of the system's folder", self.root.span)
         if not found:
             self.fault("PLAN107", f"no contract: there is no .rcl file in {self.path.parent}", self.root.span)
         return found
