@@ -399,7 +399,7 @@ def _grade(facts: Facts, views: Sequence[ObligationView]) -> tuple[Grade, str]:
     if not facts.run.fresh:
         cached = sum(1 for view in views for v in view.counting if v.entry.evidence.run != facts.run.id)
         if not cached:
-            return Grade.CHECKED, "every answer is of this run, but the ledger was believed (see `avow verify --fresh`)"
+            return Grade.CHECKED, "earlier records would have been believed: `avow verify --fresh` believes none"
         return Grade.CHECKED, f"{cached} answer{'' if cached == 1 else 's'} from earlier runs, with unchanged inputs"
     unanswered = sum(
         1

@@ -92,7 +92,7 @@ def _answer(
         how = "Linked in prose" if standing.status is Status.LINKED else standing.status.value.capitalize()
         hypotheses = len(standing.hypotheses)
         rest = f", on {hypotheses} hypothes{'is' if hypotheses == 1 else 'es'}" if hypotheses else ""
-        return f"{how}{rest}; the weakest link is {short(name)}, {status}."
+        return f"{how}{rest}; the weakest claim under it is {short(name)}, {status}."
     if standing.direct and standing.status is not Status.MISSING:
         own = [name for name in own_obligations if name in standing.below]
         where = ", ".join(short(name) for name in own or standing.below) or "its evidence"

@@ -1,4 +1,4 @@
-"""What each requirement rests on in all, by status: what one word for the weakest link does not tell."""
+"""What each requirement rests on in all, by status: what one word for the weakest claim does not tell."""
 
 from __future__ import annotations
 
