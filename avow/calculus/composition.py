@@ -6,17 +6,21 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from avow.base.verdict import Verdict
+from avow.calculus.certificates import Certificates
 from avow.calculus.derivation import ClauseName, Goal, Settled, SideCondition
 from avow.calculus.discharge import Answers, Bounds, settle
-from avow.calculus.hierarchy import Level, composed_node, level, shown_contract, with_persistence
+from avow.calculus.hierarchy import Level, composed_node, innermost, level, shown_contract, with_persistence
 from avow.calculus.meaning import Meanings
 from avow.calculus.rules import WHOLE, derive
 from avow.calculus.scenario import world
 from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
 from avow.language.contract import Node
+from avow.language.terms import Role
 from avow.system.folding import face, fold, inner_first, leaves, outermost, parents
-from avow.system.plan import ComposeGoal, Subsystem, System
+from avow.system.formulas import ports_of
+from avow.system.plan import ComposeGoal, Endpoint, Subsystem, System
+from avow.system.temporal import parse_state
 
 
 @dataclass(slots=True)
@@ -37,6 +41,7 @@ class Composition:
     _level_meanings: dict[str, Meanings] = field(default_factory=dict)
     _answers: dict[str, Answers] = field(default_factory=dict)
     _machine: Machine | None = None
+    _certificates: Certificates | None = None
 
     def goal(self, name: str) -> Goal:
         return next(goal for goal in self.goals if goal.name == name)
@@ -53,6 +58,13 @@ class Composition:
         if Verdict.REFUTED in verdicts:
             return Verdict.REFUTED
         return Verdict.UNKNOWN if verdicts - {Verdict.PROVED} else Verdict.PROVED
+
+    @property
+    def certificates(self) -> Certificates:
+        """What the kernel has established of these derivations."""
+        if self._certificates is None:
+            self._certificates = Certificates(self)
+        return self._certificates
 
     def frame_of(self, goal: Goal) -> Frame:
         """The frame in which a goal's nodes are nodes."""
@@ -99,26 +111,30 @@ class Composition:
     def whole(self) -> Goal:
         """The derivation over every node: the plan's own, or the one named ``whole``."""
         everything = set(self.outermost)
-        return next((goal for goal in self.goals if set(goal.nodes) == everything), self.goals[-1])
+        complete = (goal for goal in self.goals if set(goal.nodes) == everything and not _left_open(self, goal))
+        return next(complete, self.goals[-1])
 
 
 def compose(system: System) -> Composition:
     """The derivations of a system. Pure. Raises Rejected for a plan whose formulas are wrong."""
     flat = frame(system)
     nodes = outermost(system)
-    faces = {name: face(system, flat.graph, name, inside) for name, inside in leaves(system.plan).items()}
+    inside = leaves(system.plan)
+    faces = {name: face(system, flat.graph, name, held) for name, held in inside.items()}
     composed: dict[str, Node] = {}
     goals: dict[str, Goal] = {}
     levels: dict[str, Level] = {}
 
-    def add(goal: ComposeGoal | None, members: tuple[str, ...], *, carry: bool = False) -> Goal:
+    def add(goal: ComposeGoal | None, members: tuple[str, ...], *, carry: bool = False, name: str = WHOLE) -> Goal:
         parts = [faces[name] for name in members if name in faces]
         built = level(flat, fold(system, flat.graph, parts), composed) if parts else flat
-        found = derive(built, goal, carry=carry)
+        found = derive(built, goal, carry=carry, name=name)
         found = replace(found, within=tuple(goals[part.node.name] for part in parts))
         if isinstance(built, Level):
             levels[found.name] = built
             found = with_persistence(built, found)
+        if _taken_together(flat, frozenset(inner for name in members for inner in inside.get(name, (name,)))):
+            found = replace(found, together=True)
         goals[found.name] = found
         return found
 
@@ -131,9 +147,39 @@ def compose(system: System) -> Composition:
     for wanted in system.plan.compose:
         members = wanted.select or nodes
         add(replace(wanted, select=members), members)
-    if not any(set(goal.nodes) == set(nodes) for goal in goals.values()) and WHOLE not in goals:
-        add(None, nodes)
-    return Composition(flat, tuple(goals.values()), Meanings(flat), levels, nodes, parents(system.plan))
+    found = Composition(flat, tuple(goals.values()), Meanings(flat), levels, nodes, parents(system.plan))
+    if any(set(goal.nodes) == set(nodes) and not _left_open(found, goal) for goal in goals.values()):
+        return found
+    # a rule that the plan names may leave assumed what a node provides: that is shown here
+    name = WHOLE
+    while name in goals:
+        name += "_"
+    add(None, nodes, name=name)
+    return replace(found, goals=tuple(goals.values()), levels=levels)
+
+
+def _taken_together(flat: Frame, nodes: frozenset[str]) -> bool:
+    """Whether claims about these nodes may use values of several of them as of one step: a value of the step before is
+    read, or a requirement of the whole system speaks of several nodes."""
+    if any(e.delayed and {e.source.node, e.target.node} <= nodes for e in flat.graph.edges):
+        return True
+    contract = flat.system.contract
+    if nodes != frozenset(flat.graph.nodes):
+        return False
+    formulas = (r for r in flat.system.plan.requirements if r.formula is not None)
+    spoken = (ports_of(parse_state(r.formula or "", contract, r.formula_span)) for r in formulas)
+    return any(len({v.name.partition(".")[0] for v in ports}) > 1 for ports in spoken)
+
+
+def _left_open(composition: Composition, goal: Goal) -> bool:
+    """Whether a derivation leaves something assumed of values that a node provides."""
+    frame = composition.frame
+    for name in goal.root.assumed:
+        node, clause = innermost(str(name)).split(".")
+        ports = (v.name for v in ports_of(frame.node(node).clause(clause).formula) if v.role is Role.INPUT)
+        if any(Endpoint(node, port) in frame.graph.by_target for port in ports):
+            return True
+    return False
 
 
 def asked(system: System, goal: str) -> ComposeGoal | Subsystem | None:

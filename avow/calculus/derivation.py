@@ -127,7 +127,7 @@ class Goal:
     contract: tuple[str, ...] = ()
     """The derived contract of a subsystem in lines of text."""
     together: bool = False
-    """Whether outputs of several nodes inside one subsystem are used together."""
+    """Whether values of several nodes may be used as of one step, beyond what the rules say."""
 
     @property
     def conditions(self) -> tuple[SideCondition, ...]:
@@ -166,6 +166,8 @@ class Case:
     vacuous: bool = False
     reason: str = ""
     engine: str = ""
+    depth: int = 1
+    """Of how many steps an induction is."""
 
 
 @dataclass(frozen=True, slots=True)

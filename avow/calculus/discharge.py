@@ -210,7 +210,7 @@ class _Solver:
             patience = min(DEEPER_SECONDS, self.bounds.milliseconds / 1000)
             found = deeper(asked, patience, self.bounds.seed, str(condition.about))
         if found.proved is not None:
-            case = Case(Phase.LATER, Verdict.PROVED, found.proved, engine=found.engine)
+            case = Case(Phase.LATER, Verdict.PROVED, found.proved, engine=found.engine, depth=found.steps)
         elif found.run is not None:
             case = replace(later, counterexample=found.run)
         else:

@@ -15,15 +15,18 @@ from avow.base.diagnostics import Span
 from avow.base.files import digest as sha256
 from avow.base.verdict import Outcome
 from avow.calculus import questions
+from avow.calculus.certificates import Certificates, requirement_scope
 from avow.calculus.composition import Composition, argument, asked, compose
 from avow.calculus.derivation import ClauseName, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds
 from avow.calculus.hierarchy import innermost
 from avow.calculus.requirements import requirement_question
+from avow.calculus.resting import Resting
 from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
 from avow.calculus.variables import Frame
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import digest
+from avow.kernel.statements import Kind as Claimed
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
 from avow.system.formulas import ports_of
@@ -74,15 +77,39 @@ def settle_all(composition: Composition, obligations: Sequence[Obligation], limi
     """As `discharge`, of derivations that are made already (they remember what was settled)."""
     bounds = Bounds(int(limits.seconds * 1000), limits.seed)
 
-    tasks = {task.obligation.id: task for task in (*_tasks(composition), *_requirements(composition))}
+    made = tuple(_tasks(composition))
+    resting = Resting(composition, {task.obligation.name: task.obligation for task in made})
+    tasks = {task.obligation.id: task for task in (*made, *_requirements(composition))}
     outcomes: list[Outcome] = []
     for obligation in obligations:
         task = tasks.get(obligation.id)
         if task is None:
             outcomes.append(questions.vanished(obligation.id))
             continue
-        outcomes.append(task.ask(composition, bounds).outcome(obligation.id))
+        answer = task.ask(composition, bounds)
+        goal = getattr(task.ask, "goal", None) if obligation.kind is Kind.COMPOSITION else None
+        outcomes.append(answer.outcome(obligation.id, resting.behind(answer, goal)))
     return tuple(outcomes)
+
+
+def established_key(certificates: Certificates, obligation: str) -> str | None:
+    """The key with which the kernel establishes an obligation (by its id) from the certificates kept; None where it
+    does not. Nothing is searched for."""
+    _, _, kind, name = obligation.split("/", 3)
+    if kind == Kind.REQUIREMENT:
+        found = certificates.kept_for(requirement_scope(name), Claimed.REQUIREMENT, name)
+        return found.key if found is not None else None
+    for goal in certificates.composition.goals:
+        for part in goal.root.walk():
+            if part.rule is Rule.R4 and name == f"{goal.name}.loop.{_joined(part.nodes)}":
+                about = [innermost(str(c.about)) for c in part.side_conditions]
+                each = [certificates.kept_for(goal.name, Claimed.ASSUMPTION, one) for one in about]
+                return questions.loop_key([one for one in each if one is not None]) if all(each) else None
+        for condition in goal.conditions:
+            if name == f"{goal.name}.{condition.about}":
+                found = certificates.kept_for(goal.name, Claimed.ASSUMPTION, innermost(str(condition.about)))
+                return found.key if found is not None else None
+    return None
 
 
 # -- generation --------------------------------------------------------------------------------------------------------

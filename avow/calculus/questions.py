@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from avow.base.verdict import Counterexample, Link, Outcome, Verdict
+from avow.base.files import digest as sha256
+from avow.base.verdict import Counterexample, Hypothesis, Link, Outcome, Verdict
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideCondition
 from avow.calculus.discharge import Bounds, would_hold
 from avow.calculus.entailment import implied
 from avow.calculus.repair import Offer
 from avow.calculus.variables import Frame
-from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.formulas.formula import negation
+from avow.kernel.check import Established
 from avow.language.printer import show_term
 from avow.language.terms import Term
 from avow.sanity.claims import triggers
@@ -33,8 +34,12 @@ class Answer:
     details: dict[str, object] = field(default_factory=dict)
     vacuous: bool = False
     link: Link = Link.GENERATED
+    established: Established | None = None
+    """What the kernel says of it: no answer of the calculus is `proved` without."""
+    everything: bool = False
+    """It rests on every guarantee of every node, and on whatever discharges their assumptions."""
 
-    def outcome(self, obligation: str) -> Outcome:
+    def outcome(self, obligation: str, rests_on: tuple[Hypothesis, ...] = ()) -> Outcome:
         return Outcome(
             obligation,
             self.verdict,
@@ -44,7 +49,8 @@ class Answer:
             self.bound,
             self.details,
             self.link,
-            self.vacuous,
+            self.vacuous or (self.established is not None and self.established.vacuous),
+            rests_on,
         )
 
 
@@ -72,8 +78,24 @@ class SideQuestion:
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         goal = composition.goal(self.goal)
         settled = composition.settled(goal, bounds).settled[self.condition]
-        repairs = would_hold(composition.frame_of(goal), goal, settled) if settled.verdict is not Verdict.PROVED else ()
-        return side_answer(settled, repairs)
+        if settled.verdict is not Verdict.PROVED:
+            return side_answer(settled, would_hold(composition.frame_of(goal), goal, settled))
+        answer = side_answer(settled)
+        found = composition.certificates.condition(goal, str(self.condition.about), bounds)
+        return certified(answer, found)
+
+
+def certified(answer: Answer, found: Established | None) -> Answer:
+    """A proof of the engine, as far as the kernel establishes it."""
+    if found is None:
+        return replace(
+            answer,
+            verdict=Verdict.UNKNOWN,
+            summary=f"the engine finds that it {answer.summary}; the kernel could not establish it",
+            vacuous=False,
+        )
+    details = answer.details | {"certificate": {"key": found.key, "solvers": found.solvers}}
+    return replace(answer, established=found, details=details)
 
 
 def side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ...]]] = ()) -> Answer:
@@ -106,7 +128,6 @@ def side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ..
         return Answer(
             Verdict.PROVED,
             _why(settled),
-            hypotheses=environment_claims(settled.needed),
             details=details,
             vacuous=settled.vacuous,
         )
@@ -128,12 +149,6 @@ def side_answer(settled: Settled, repairs: Sequence[tuple[Phase, tuple[Offer, ..
 def would_hold_if(found: Sequence[Offer], when: str = "") -> str:
     """To be put after a refutation's words; nothing where nothing is offered."""
     return f"; {when}it would hold if {', or if '.join(offer.text for offer in found)}" if found else ""
-
-
-def environment_claims(labels: Sequence[str]) -> tuple[str, ...]:
-    """The obligations of the environment assumptions among some hypotheses."""
-    ports = (label.removeprefix("environment ").split(" ")[0] for label in labels if label.startswith("environment "))
-    return tuple(f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/environment.{port}" for port in dict.fromkeys(ports))
 
 
 def _why(settled: Settled) -> str:
@@ -193,6 +208,11 @@ class RuleQuestion:
         return Answer(Verdict.REFUTED, self.message, Counterexample(explanation=self.message))
 
 
+def loop_key(found: Sequence[Established]) -> str:
+    """What a loop's standing depends on: the side conditions of its members."""
+    return sha256("".join(one.key for one in found))
+
+
 # -- loops and start-up ------------------------------------------------------------------------------------------------
 
 
@@ -210,6 +230,14 @@ class LoopQuestion:
         details: dict[str, object] = {"form": loop.form.value, "cycle": list(loop.cycle)}
         match loop.form:
             case LoopForm.BOOTSTRAP | LoopForm.INITIAL:
+                goal = composition.goal(self.goal)
+                conditions = [
+                    c for part in goal.root.walk() if part.nodes == self.members for c in part.side_conditions
+                ]
+                found = [composition.certificates.condition(goal, str(c.about), bounds) for c in conditions]
+                if not all(found):
+                    return certified(Answer(Verdict.PROVED, f"is in order: {loop.note}", details=details), None)
+                details["certificate"] = {"key": loop_key([one for one in found if one is not None]), "solvers": 1}
                 return Answer(Verdict.PROVED, loop.note, details=details)
             case LoopForm.CIRCULAR:
                 return Answer(Verdict.REFUTED, loop.note, Counterexample(explanation=loop.note), details=details)

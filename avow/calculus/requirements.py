@@ -12,19 +12,18 @@ from dataclasses import dataclass, replace
 
 from avow.base.files import digest as sha256
 from avow.base.verdict import Counterexample, Verdict
+from avow.calculus.certificates import hint_of, labels
 from avow.calculus.composition import Composition
-from avow.calculus.derivation import Phase, Settled
+from avow.calculus.derivation import Case, Phase
 from avow.calculus.discharge import DEEPER_SECONDS, Bounds
 from avow.calculus.entailment import QUICK_MS, implied
-from avow.calculus.hierarchy import innermost
+from avow.calculus.finder import Hint
 from avow.calculus.induction import deeper, steps
 from avow.calculus.model_checking import judge, refuting_run
-from avow.calculus.questions import Answer, contracts, environment_claims, would_hold_if
+from avow.calculus.questions import Answer, certified, contracts, would_hold_if
 from avow.calculus.repair import environment, initial_values, offers, providers
 from avow.calculus.variables import Frame, system_term
-from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.formulas.formula import digest, free_variables
-from avow.language.contract import ClauseKind
 from avow.language.printer import show_term
 from avow.language.terms import Term
 from avow.solving.questions import Entailment
@@ -181,13 +180,15 @@ class FormulaQuestion:
         summary = f"follows {how} from {', '.join(needed) or 'the types alone'}"
         if beyond:
             summary += f" (not named as its support: {', '.join(beyond)})"
-        return Answer(
+        answer = Answer(
             Verdict.PROVED,
             summary,
-            hypotheses=rests_on(composition, needed, bounds),
             details={"needed": list(needed), "phase": phase.value} | ({"k": before} if before > 1 else {}),
             vacuous=any(answer.vacuous for answer in answers),
         )
+        cases = [Case(phase, one.verdict, one.needed) for one in answers]
+        hint = Hint(labels(needed)) if len(cases) == 1 else hint_of(cases[0], replace(cases[1], depth=before))
+        return certified(answer, composition.certificates.requirement(self.name, hint, bounds))
 
     def not_proved(self, answer: Entailment, when: str = "") -> Answer:
         details: dict[str, object] = {"genuine": True}
@@ -217,9 +218,7 @@ class TemporalQuestion:
         if not answer.verdict.supports:
             return answer
         # every node was taken at its word, which it keeps only where its assumptions are met
-        nodes = composition.frame.system.contract.nodes
-        behind = rests_on(composition, tuple(f"{n.name}.{g.name}" for n in nodes for g in n.guarantees), bounds)
-        return replace(answer, hypotheses=tuple(dict.fromkeys((*answer.hypotheses, *behind))))
+        return replace(answer, everything=True)
 
 
 def requirement_question(frame: Frame, requirement: Requirement) -> FormulaQuestion | TemporalQuestion | None:
@@ -234,45 +233,6 @@ def requirement_question(frame: Frame, requirement: Requirement) -> FormulaQuest
         formula = parse_property(requirement.temporal, contract, requirement.formula_span)
         return TemporalQuestion(requirement.id, formula, show_property(formula), sha256(_meaning(formula)))
     return None
-
-
-def rests_on(composition: Composition, labels: tuple[str, ...], bounds: Bounds) -> tuple[str, ...]:
-    """The claims behind the labels of a proof: guarantees, discharged assumptions, environment assumptions.
-
-    A guarantee holds only where its node's assumptions do. What these were proved from are guarantees of other nodes,
-    which hold only where *their* assumptions do, and so on: all of it stands behind the proof.
-    """
-    frame = composition.frame
-    settled: dict[str, dict[str, Settled]] = {}
-    found: dict[str, None] = {}
-    seen: set[str] = set()
-    todo = list(reversed(labels))
-    while todo:
-        name = todo.pop().removesuffix(" one step before")
-        if " " not in name:
-            name = innermost(name)
-        if name in seen:
-            continue
-        seen.add(name)
-        found |= dict.fromkeys(environment_claims((name,)))
-        node, dot, clause = name.partition(".")
-        if not dot or " " in node or node not in frame.graph.nodes:
-            continue
-        if frame.node(node).clause(clause).kind is ClauseKind.GUARANTEE:
-            found[f"{node}/{Kind.GUARANTEE}/{clause}"] = None
-            todo += [f"{node}.{assumption.name}" for assumption in reversed(frame.node(node).assumptions)]
-            continue
-        shown = composition.where(node, clause)
-        if shown is None:
-            found[f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/environment.{name}"] = None
-            continue
-        goal, about = shown
-        found[f"{SYSTEM_LEVEL}/{Kind.COMPOSITION}/{goal.name}.{about}"] = None
-        if goal.name not in settled:
-            answers = composition.settled(goal, bounds).settled
-            settled[goal.name] = {str(condition.about): answer for condition, answer in answers.items()}
-        todo += reversed(settled[goal.name][str(about)].needed)
-    return tuple(found)
 
 
 def _guarantees(frame: Frame, labels: tuple[str, ...]) -> list[str]:

@@ -26,7 +26,7 @@ PERSISTENCE = "the outputs of {} persist once generated, until they are used tog
 ONE_OUTPUT = "{} give at most one output element for each input element"
 
 
-def derive(frame: Frame, goal: ComposeGoal | None = None, *, carry: bool = False) -> Goal:
+def derive(frame: Frame, goal: ComposeGoal | None = None, *, carry: bool = False, name: str = WHOLE) -> Goal:
     """The derivation that a goal of the plan asks for; without one, that of the whole system.
 
     `carry`: an assumption that speaks of anything from outside the selection stays assumed in the conclusion, for a
@@ -34,7 +34,7 @@ def derive(frame: Frame, goal: ComposeGoal | None = None, *, carry: bool = False
     """
     names = goal.select if goal is not None and goal.select else frame.graph.nodes
     builder = _Builder(frame, tuple(names), carry)
-    name = goal.name if goal is not None else WHOLE
+    name = goal.name if goal is not None else name
     root: Derivation | None = None
     findings: list[Diagnostic] = []
     if goal is not None and goal.rule is not None:
@@ -91,7 +91,7 @@ class _Builder:
         self, node: str, providers: Sequence[str]
     ) -> tuple[tuple[SideCondition, ...], tuple[ClauseName, ...]]:
         """The side conditions of a consumer, and those of its assumptions that stay assumed in the conclusion."""
-        given = frozenset(providers)
+        given = frozenset(providers) | self.selected  # whatever the rule's shape: nothing that feeds it is left out
         conditions: list[SideCondition] = []
         kept: list[ClauseName] = []
         for clause in self.frame.node(node).assumptions:

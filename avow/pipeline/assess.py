@@ -29,6 +29,7 @@ from avow.evidence.record import CASE, RETRY
 from avow.pipeline import check as checking
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
+from avow.pipeline.recheck import counting_now
 from avow.pipeline.results import Result, read_result
 from avow.pipeline.run_info import EXPLAIN, Run
 from avow.pipeline.state import State
@@ -138,7 +139,7 @@ def build(assessment: Assessment) -> Case:
     return build_case(
         system,
         assessment.surveyed.catalogue.obligations,
-        as_of_now(ledger, workspace.root),
+        counting_now(ledger, workspace.root, system),
         keys={**assessment.surveyed.keys, **_given_up(assessment, ledger)},
         today=_today(),
         run=RunInfo(
@@ -223,7 +224,7 @@ def _key(assessment: Assessment) -> str:
 
     explain = os.environ.get(EXPLAIN, "")
     root = assessment.workspace.root
-    earlier = zip(ledger.records(), as_of_now(ledger, root), strict=True)
+    earlier = zip(ledger.records(), counting_now(ledger, root, surveyed.system), strict=True)
     damage += [f"{old.number} is of an earlier state" for old, now in earlier if old is not now]
     signed = [digest_file(path) for path in _signatures(assessment)]
     return digest(

@@ -16,7 +16,7 @@ from avow.backend_kit.protocol import Report
 from avow.base.files import digest, digest_file, is_intact, write
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.base.workspace import Workspace
-from avow.evidence.currency import outlived, stands
+from avow.evidence.currency import outlived
 from avow.evidence.ledger import Ledger
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY, Evidence
@@ -24,6 +24,7 @@ from avow.isolation.level import Isolation
 from avow.isolation.observed import ISOLATION, OBSERVED, to_json
 from avow.pipeline import asking
 from avow.pipeline.export import folder
+from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
 
@@ -43,7 +44,7 @@ def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obliga
 def _is_settled(workspace: Workspace, ledger: Ledger, work: Work, obligation: Obligation, run: Run) -> bool:
     refuted = ledger.refutations(obligation.id, obligation.digest, work.engine)
     found = [e for e in ledger.current(obligation.id, work.keys[obligation.id]) if not outlived(e, refuted)]
-    records = [e.evidence for e in found if stands(e.evidence, workspace.root)]
+    records = [e.evidence for e in found if still_counts(e.evidence, workspace.root, work.system)]
     if not records or (run.fresh and records[-1].run != run.id):
         return False
     last = records[-1]

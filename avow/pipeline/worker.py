@@ -27,6 +27,7 @@ from avow.calculus.composition import compose
 from avow.calculus.obligations import settle_all
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
+from avow.pipeline import recheck
 from avow.pipeline.asking import CHANGED
 from avow.pipeline.blobs import Garbled, decode
 from avow.pipeline.engines import discharge_sanity
@@ -116,7 +117,9 @@ def _execute(request: Request, root: Path) -> Report:
             composition = compose(cut.system)
             work = compose_work(composition)
             claims = _claims(request, work.obligations, work.keys)
-            return Report(settle_all(composition, claims, request.limits), "z3", z3_version())
+            outcomes = settle_all(composition, claims, request.limits)
+            kept = {recheck.FILE: recheck.written(composition.certificates)} if composition.certificates.made else {}
+            return Report(outcomes, "z3", z3_version(), logs=kept)
         case MethodSlice(system=system, node=node, method=method):
             return _discharge(request, system, _method_work(system, node, method))
         case _:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from avow.backend_kit.protocol import Limits
-from avow.base.verdict import Outcome
+from avow.base.verdict import Outcome, Verdict
 from avow.calculus.obligations import discharge, requirement_obligations
 from avow.system.load import load_system
 
@@ -38,15 +38,17 @@ def settled(folder: Path, contract: str, plan: str) -> Outcome:
 def test_a_loop(tmp_path: Path, connections: str) -> None:
     """Nobody shows that the assumption holds at first, or at all: the requirement must not read as proved."""
     requirement = "requirements: {R: {text: t, formula: 'a.x >= 0', supported_by: [a.g]}}\n"
-    behind = settled(tmp_path, LOOP, connections + requirement).hypotheses
-    assert set(behind) >= {"a/guarantee/g", "system/composition/whole.a.A"}
+    assert settled(tmp_path, LOOP, connections + requirement).verdict is Verdict.UNKNOWN
 
 
 def test_a_chain_rests_on_all_that_comes_before(tmp_path: Path) -> None:
-    behind = settled(
-        tmp_path, CHAIN, "requirements: {R: {text: t, formula: 'c.z > 0', supported_by: [c.g]}}\n"
-    ).hypotheses
-    assert set(behind) >= {
+    found = settled(tmp_path, CHAIN, "requirements: {R: {text: t, formula: 'c.z > 0', supported_by: [c.g]}}\n")
+    assert found.verdict is Verdict.UNKNOWN, "x >= 0 is not x >= 1: nobody shows what b assumes"
+    good = CHAIN.replace("x >= 0", "x >= 1")
+    found = settled(tmp_path, good, "requirements: {R: {text: t, formula: 'c.z > 0', supported_by: [c.g]}}\n")
+    assert found.verdict is Verdict.PROVED
+    assert {h.name for h in found.rests_on} >= {
         *("c/guarantee/g", "system/composition/whole.c.A"),
         *("b/guarantee/g", "system/composition/whole.b.A"),
+        "a/guarantee/g",
     }

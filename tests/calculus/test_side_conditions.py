@@ -172,7 +172,7 @@ def test_what_the_environment_must_give_stays_in_the_conclusion(tmp_path: Path) 
     plan = 'environment: {in.r: {assume: "in.r > 3", because: it counts}, in.s: {because: hardware}}'
     found = outcomes(make(tmp_path / "planned", text, plan))
     assert found["whole.a.reading"].verdict is Verdict.PROVED
-    assert found["whole.a.reading"].hypotheses == ("system/composition/environment.in.r",)
+    assert [h.name for h in found["whole.a.reading"].rests_on] == ["system/composition/environment.in.r"]
     assert found["environment.in.r"].verdict is Verdict.JUSTIFIED
     assert found["environment.b.other"].verdict is Verdict.JUSTIFIED
 

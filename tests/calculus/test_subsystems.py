@@ -245,7 +245,7 @@ def test_requirements_rest_on_what_is_shown_inside(tmp_path: Path) -> None:
         "grader/guarantee/grade",
         "system/composition/sensor.grader.half",
         "system/composition/front.sensor.reader.sane",
-    } <= set(found["R"].hypotheses)
+    } <= {h.name for h in found["R"].rests_on}
 
 
 def test_environment_assumptions_reach_into_subsystems(tmp_path: Path) -> None:

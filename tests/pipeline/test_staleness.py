@@ -190,7 +190,8 @@ def test_the_generator_does_edit(tmp_path: Path) -> None:
 # -- edits that change a meaning --------------------------------
 
 WHOLE = {("system/well-formed/contract", "language")}
-CHAIN = {("system/composition/chain.pilot.one_berth", "compose")}
+TOGETHER = {(f"system/composition/chain.{part}", "compose") for part in ("persistence", "one-output")}
+CHAIN = {("system/composition/chain.pilot.one_berth", "compose"), *TOGETHER}
 SAFE = {("system/requirement/SAFE", "compose")}
 
 

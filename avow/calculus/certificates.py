@@ -1,0 +1,218 @@
+"""Certificates for a system's derivations and requirements, and what the kernel says of them.
+
+The engine's proofs are hints for `avow.calculus.finder`; certificates kept from an earlier run are tried first. What
+`avow.kernel.check` does not establish from the system as it is now is not proved, whoever says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from avow.base.verdict import Verdict
+from avow.calculus.derivation import Case, Phase, Settled
+from avow.calculus.discharge import Bounds
+from avow.calculus.finder import Finder, Hint
+from avow.calculus.hierarchy import innermost
+from avow.calculus.wiring import wiring
+from avow.kernel.certificate import Certificate, Entry, How, Question, Use
+from avow.kernel.check import Established, Given, Kernel, Refused
+from avow.kernel.solvers import Solvers
+from avow.kernel.statements import Kind, Statement, Statements, statements
+from avow.system.graph import components
+
+if TYPE_CHECKING:
+    from avow.calculus.composition import Composition
+    from avow.calculus.derivation import Goal
+
+
+@dataclass(slots=True)
+class Certificates:
+    """Of one system. `kept`: those of an earlier run, by scope; `made`: those that count now."""
+
+    composition: Composition
+    kept: Mapping[str, Certificate] = field(default_factory=dict)
+    made: dict[str, Certificate] = field(default_factory=dict)
+    solvers: Solvers = field(default_factory=Solvers)
+    _known: Statements | None = None
+    _finders: dict[str, Finder] = field(default_factory=dict)
+    _kernels: dict[str, Kernel] = field(default_factory=dict)
+    _named: dict[tuple[Kind, str], Statement] = field(default_factory=dict)
+
+    @property
+    def known(self) -> Statements:
+        if self._known is None:
+            self._known = statements(wiring(self.composition.frame))
+        return self._known
+
+    def condition(self, goal: Goal, about: str, bounds: Bounds) -> Established | None:
+        """The assumption of a node (``agent.low``, or ``robot.agent.low`` of a node in a subsystem) in a derivation."""
+        claim = self.claim(Kind.ASSUMPTION, innermost(about))
+        if claim is None:
+            return None
+        if goal.name not in self.made:
+            kept = self.kept.get(goal.name)
+            if kept is not None and self.established(kept, claim) is not None:
+                self.made[goal.name] = kept
+        found = self.established(self.made.get(goal.name), claim)
+        if found is None and goal.name not in self._finders:
+            self._finders[goal.name] = self._finder(goal, bounds)
+            self.made[goal.name] = self._finders[goal.name].find()
+            found = self.established(self.made[goal.name], claim)
+        return found
+
+    def requirement(self, name: str, hint: Hint, bounds: Bounds) -> Established | None:
+        """A requirement, of the whole system."""
+        claim = self.claim(Kind.REQUIREMENT, name)
+        if claim is None:
+            return None
+        scope = requirement_scope(name)
+        found = self.established(self.kept.get(scope), claim)
+        if found is not None:
+            self.made[scope] = self.kept[scope]
+            return found
+        whole = self.composition.whole
+        if whole.name not in self._finders:
+            self._finders[whole.name] = self._finder(whole, bounds)
+        finder = replace(self._finders[whole.name], scope=scope, goals=(claim,))
+        finder.hints = {**finder.hints, name: hint}
+        self.made[scope] = pruned(finder.find(), claim)
+        return self.established(self.made[scope], claim)
+
+    def kept_for(self, scope: str, kind: Kind, name: str) -> Established | None:
+        """What the kernel says of a claim from the certificate of an earlier run."""
+        claim = self.claim(kind, name)
+        return self.established(self.kept.get(scope), claim) if claim is not None else None
+
+    def established(self, certificate: Certificate | None, claim: Statement) -> Established | None:
+        """What the kernel says of a claim, from a certificate that has an entry for it."""
+        if certificate is None:
+            return None
+        kernel = self._kernels.get(certificate.scope)
+        if kernel is None or kernel.certificate is not certificate:
+            kernel = self._kernels[certificate.scope] = Kernel(self.known, certificate, self.solvers)
+        for i in kernel.places.get((claim.node, claim.digest), ()):
+            try:
+                if claim.kind is not Kind.REQUIREMENT:
+                    return kernel.side_condition(i)
+                found = kernel.establish(i)
+            except Refused:
+                continue
+            if not any(need.kind is Given.OPEN for need in found.hypotheses):
+                return found
+        return None
+
+    def claim(self, kind: Kind, name: str) -> Statement | None:
+        """The claim of that name as it is now; None where it has no text."""
+        if not self._named:
+            for same in self.known.by_digest.values():
+                self._named |= {(s.kind, f"{s.node}.{s.name}" if s.node else s.name): s for s in same}
+        return self._named.get((kind, name))
+
+    def _finder(self, goal: Goal, bounds: Bounds) -> Finder:
+        composition = self.composition
+        graph = composition.frame.graph
+        nodes = composition.leaves(goal, goal.nodes)
+        selected = frozenset(nodes)
+        edges = [e for e in graph.edges if {e.source.node, e.target.node} <= selected]
+        arcs = [(e.source.node, e.target.node) for e in edges if not e.delayed]
+        into: dict[str, list[str]] = {}
+        for source, target in arcs:
+            into.setdefault(target, []).append(source)
+        order = tuple(name for group in components(nodes, arcs) for name in group)
+        everything = selected == frozenset(graph.nodes)
+        hints: dict[str, Hint] = {}
+        hopeless: set[str] = set()
+        for part in goal.inner_first():
+            for condition, answer in composition.settled(part, bounds).settled.items():
+                name = innermost(str(condition.about))
+                if answer.verdict is not Verdict.PROVED:
+                    hopeless.add(name)
+                elif (hint := _hint(answer)) is not None:
+                    hints[name] = hint
+        return Finder(
+            self.known,
+            goal.name,
+            order,
+            partial(_behind, into),
+            any(e.delayed for e in edges),
+            frozenset() if everything else frozenset(innermost(str(name)) for name in goal.root.assumed),
+            hints,
+            frozenset(hopeless - hints.keys()),
+            solvers=self.solvers,
+        )
+
+
+def requirement_scope(name: str) -> str:
+    """The scope of a requirement's certificate. No derivation can have such a name."""
+    return f"requirement {name}"
+
+
+def pruned(certificate: Certificate, goal: Statement) -> Certificate:
+    """The entries that a claim rests on, and no others."""
+    wanted = (How.SHOWN, goal.node, goal.digest)
+    at = next((i for i, e in enumerate(certificate.entries) if (e.how, e.node, e.digest) == wanted), None)
+    if at is None:
+        return Certificate(certificate.scope, ())
+    kept, stack = {at}, [at]
+    while stack:
+        for i in _named(certificate.entries[stack.pop()]):
+            if i not in kept:
+                kept.add(i)
+                stack.append(i)
+    ranks = {old: new for new, old in enumerate(sorted(kept))}
+
+    def renumbered(question: Question) -> Question:
+        uses = tuple(Use(ranks[use.entry], use.back) for use in question.uses)
+        return Question(uses, question.initials, question.witness)
+
+    def moved(entry: Entry) -> Entry:
+        step = renumbered(entry.step) if entry.step is not None else None
+        conds = tuple(ranks[c] for c in entry.conds)
+        return Entry(entry.how, entry.node, entry.digest, conds, tuple(map(renumbered, entry.base)), step)
+
+    return Certificate(certificate.scope, tuple(moved(certificate.entries[i]) for i in sorted(kept)))
+
+
+def _named(entry: Entry) -> Iterable[int]:
+    questions = (*entry.base, *((entry.step,) if entry.step else ()))
+    return (*entry.conds, *(use.entry for question in questions for use in question.uses))
+
+
+def _hint(settled: Settled) -> Hint | None:
+    cases = {case.phase: case for case in settled.cases}
+    if Phase.SAME_STEP in cases:
+        return Hint(labels(cases[Phase.SAME_STEP].needed))
+    first, later = cases.get(Phase.INITIAL), cases.get(Phase.LATER)
+    return hint_of(first, later) if first is not None and later is not None else None
+
+
+def hint_of(first: Case, later: Case) -> Hint:
+    """The hint of an induction."""
+    initials = tuple(label.removeprefix("initial ") for label in first.needed if label.startswith("initial "))
+    return Hint(labels(later.needed), labels(first.needed), initials, later.depth)
+
+
+def labels(needed: Iterable[str]) -> tuple[tuple[str, int], ...]:
+    """The engine's labels as clauses with how many steps before; initial values apart."""
+    found = []
+    for label in needed:
+        if label.startswith("initial "):
+            continue
+        name = label.removesuffix(" one step before")
+        back = int(name != label)
+        found.append((name if name.startswith("environment ") else innermost(name), back))
+    return tuple(dict.fromkeys(found))
+
+
+def _behind(into: Mapping[str, list[str]], node: str) -> frozenset[str]:
+    found: set[str] = set()
+    stack = [node]
+    while stack:
+        for source in into.get(stack.pop(), ()):
+            if source not in found:
+                found.add(source)
+                stack.append(source)
+    return frozenset(found)

@@ -1,0 +1,355 @@
+"""Finds certificates for what the engine has settled. Nothing here is trusted: `avow.kernel.check` decides.
+
+A certificate of a scope (the nodes of a derivation, or all) shows each assumption of a node by an instance of the
+theorem in `proofs/instances.dfy`:
+
+- R1 to R4 and loops through delays: `Nodes` (assumptions in causal order, each from lower ranks now and from all that
+  held the step before; at the first step from the initial values). The rule's name is presentation only.
+- k-induction: the theorem itself, with k base questions.
+- an assumption that stays assumed, and subsystems: `Derived` (an open entry). A subsystem is flattened: its nodes'
+  clauses are the entries.
+
+The premises that the engine's proof names are tried first, then ever wider ones, from which an unsatisfiable core is
+taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from avow.kernel.certificate import Certificate, Entry, How, Question, Use
+from avow.kernel.check import Kernel, Refused
+from avow.kernel.solvers import Solvers
+from avow.kernel.statements import Kind, Statement, Statements
+from avow.kernel.text import Text, Untranslatable
+from avow.language.terms import And, Quantified, Quantifier
+from avow.solving.z3_module import z3
+
+DEEPEST = 3
+"""The k of k-induction, at most."""
+
+_SEARCH = 1_500_000
+"""Z3's steps for one question of the search."""
+
+_SEARCH_MS = 2_000
+
+
+@dataclass(frozen=True, slots=True)
+class Hint:
+    """What the engine's proof of an assumption names: clauses (``agent.low``) with how many steps before. `first` is of
+    the first step, where it is a case of its own; `depth` of how many steps an induction is."""
+
+    step: tuple[tuple[str, int], ...]
+    first: tuple[tuple[str, int], ...] | None = None
+    initials: tuple[str, ...] = ()
+    depth: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """A claim that a certificate may have as an entry."""
+
+    how: How
+    claim: Statement
+
+    @property
+    def label(self) -> str:
+        """What the engine calls it."""
+        if self.claim.kind is Kind.ENVIRONMENT:
+            return f"environment {self.claim.name}"
+        return f"{self.claim.node}.{self.claim.name}" if self.claim.node else self.claim.name
+
+
+_Uses = tuple[tuple[Item, int], ...]
+_Base = tuple[_Uses, tuple[str, ...]]
+"""Uses, and the digests of initial conditions."""
+
+_Witness = tuple[int, int] | None
+
+_CANDIDATES = 6
+
+
+@dataclass(frozen=True, slots=True)
+class _Proof:
+    base: tuple[_Base, ...]
+    step: _Uses
+    witnesses: tuple[_Witness, ...] = ()
+    """For each first step, and for every later one."""
+
+
+@dataclass(slots=True)
+class Finder:
+    """One scope. `open`: assumptions that stay assumed; without any of these, what speaks only of the environment is
+    the environment's."""
+
+    known: Statements
+    scope: str
+    nodes: Sequence[str]
+    """Providers before consumers, as far as there is such an order."""
+    ancestors: Callable[[str], frozenset[str]]
+    """The nodes from which values flow to a node within one step."""
+    delayed: bool
+    open: frozenset[str]
+    hints: Mapping[str, Hint]
+    hopeless: frozenset[str] = frozenset()
+    """What the engine could not prove."""
+    goals: tuple[Statement, ...] = ()
+    """Requirements, to be shown after everything else."""
+    solvers: Solvers = field(default_factory=Solvers)
+    _proofs: dict[Item, _Proof] = field(default_factory=dict)
+    _now: dict[str, Item] = field(default_factory=dict)
+    """What is established, by label."""
+    _then: dict[str, Item] = field(default_factory=dict)
+    """What may be used of the steps before, by label."""
+    _ever: list[Item] = field(default_factory=list)
+    _initials: tuple[Statement, ...] | None = None
+    _failed: set[tuple[Item, int, int]] = field(default_factory=set)
+    """What could not be shown, when so much was established and usable."""
+
+    def find(self) -> Certificate:
+        """The entries that could be shown, and what they rest on."""
+        ever = self.items()
+        while True:
+            established = self.established(ever)
+            proofs = [self._proofs[item] for item in established if item in self._proofs]
+            used = {item for proof in proofs for uses, _ in (*proof.base, (proof.step, ())) for item, _ in uses}
+            if used <= established.keys():
+                return self.certificate(list(established))
+            ever = [item for item in ever if item in established]
+
+    def items(self) -> list[Item]:
+        """All that may ever be an entry."""
+        found: list[Item] = []
+        own = set(self.nodes)
+        every = [s for same in self.known.by_digest.values() for s in same]
+        found += [Item(How.ENVIRONMENT, s) for s in every if s.kind is Kind.ENVIRONMENT]
+        for s in every:
+            if s.node not in own or s.node not in self.known.assumptions:
+                continue
+            if s.kind is Kind.ASSUMPTION:
+                name = f"{s.node}.{s.name}"
+                if name in self.open or (s.outside_only and s.places and name not in self.hints):
+                    found.append(Item(How.ENVIRONMENT if s.outside_only else How.OPEN, s))
+                else:
+                    found.append(Item(How.SHOWN, s))
+            elif s.kind is Kind.GUARANTEE:
+                found.append(Item(How.GUARANTEE, s))
+        return found
+
+    def established(self, ever: list[Item]) -> dict[Item, None]:
+        """What can be shown, each from what comes before it at the same step and from anything of `ever` before."""
+        self._ever, self._then, self._now = ever, {item.label: item for item in ever}, {}
+        done: dict[Item, None] = {}
+
+        def add(items: Iterable[Item]) -> None:
+            for item in items:
+                done[item] = None
+                self._now[item.label] = item
+
+        add(item for item in ever if item.how in (How.ENVIRONMENT, How.OPEN))
+        of_node: dict[str, list[Item]] = {name: [] for name in self.nodes}
+        for item in ever:
+            if item.claim.node in of_node and item.claim.kind is not Kind.ENVIRONMENT:
+                of_node[item.claim.node].append(item)
+        waiting, progress = list(self.nodes), True
+        while waiting and progress:
+            progress = False
+            for name in list(waiting):
+                mine = of_node[name]
+                assumed = [item for item in mine if item.claim.kind is Kind.ASSUMPTION]
+                found = [item for item in assumed if item not in done and self.shown(item, done)]
+                add(found)
+                progress = progress or bool(found)
+                marks = {item.claim.digest for item in assumed if item in done}
+                if marks >= set(self.known.assumptions[name]):
+                    add(item for item in mine if item.how is How.GUARANTEE)
+                    waiting.remove(name)
+                    progress = True
+        add(item for goal in self.goals if self.shown(item := Item(How.SHOWN, goal), done))
+        return done
+
+    # -- one claim -----------------------------------------------------------------------------------------------------
+
+    def shown(self, item: Item, done: Mapping[Item, None]) -> bool:
+        """Find a proof from what is established at the same step, and from what ever is at the steps before."""
+        if item.label in self.hopeless:
+            return False
+        known = self._proofs.get(item)
+        if known is not None and self.still(known, item):
+            return True
+        attempt = (item, len(done), len(self._ever))
+        proof = None if attempt in self._failed else next((p for p in self.proofs(item, done) if p is not None), None)
+        if proof is None:
+            self._failed.add(attempt)
+            self._proofs.pop(item, None)
+            return False
+        self._proofs[item] = proof
+        return True
+
+    def still(self, proof: _Proof, item: Item) -> bool:
+        uses = [*proof.step, *(use for base, _ in proof.base for use in base)]
+        return all(
+            self._now.get(used.label) == used if back == 0 else used in (item, self._then.get(used.label))
+            for used, back in uses
+        )
+
+    def proofs(self, item: Item, done: Mapping[Item, None]) -> Iterator[_Proof | None]:
+        hint = self.hints.get(item.label)
+        yield self.hinted(item, hint, done) if hint is not None else None
+        near = self.near(item, done)
+        for now in (near, list(done)) if len(near) < len(done) else (near,):
+            yield self.same_step(item, now)
+        if self.delayed:
+            for depth in range(1, DEEPEST + 1):
+                yield self.inductive(item, list(done), depth)
+
+    def near(self, item: Item, done: Mapping[Item, None]) -> list[Item]:
+        behind = self.ancestors(item.claim.node) if item.claim.node else frozenset(self.nodes)
+        return [
+            i for i in done if i.how is How.ENVIRONMENT or i.claim.node in behind or i.claim.node == item.claim.node
+        ]
+
+    def hinted(self, item: Item, hint: Hint, done: Mapping[Item, None]) -> _Proof | None:
+        """The premises that the engine's proof names."""
+
+        def uses(labels: Iterable[tuple[str, int]]) -> _Uses | None:
+            found = [
+                (self._now.get(label) if back == 0 else item if label == item.label else self._then.get(label), back)
+                for label, back in labels
+            ]
+            return tuple((i, back) for i, back in found if i is not None) if all(i for i, _ in found) else None
+
+        step = uses(hint.step)
+        if step is None:
+            return None
+        if hint.first is None:
+            return self.kept(item, (), step)
+        if hint.depth > 1:
+            return self.inductive(item, list(done), hint.depth)
+        first = uses(hint.first)
+        marks = tuple(sorted(s.digest for s in self.initials() if f"{s.node}.{s.name}" in hint.initials))
+        return self.kept(item, ((first, marks),), step) if first is not None else None
+
+    def same_step(self, item: Item, now: Sequence[Item]) -> _Proof | None:
+        premises = tuple((i, 0) for i in now)
+        core = self.core(item, premises)
+        if core is not None:
+            return self.kept(item, (), core[0])
+        goal = item.claim.term  # a witness settles what the search for instances does not find
+        exists = isinstance(goal, Quantified) and goal.quantifier is Quantifier.EXISTS
+        return self.kept(item, (), premises) if exists else None
+
+    def inductive(self, item: Item, now: Sequence[Item], depth: int) -> _Proof | None:
+        earlier = [*self._ever, *([] if item.label in self._then else [item])]
+        bases = []
+        for b in range(depth):
+            before = [(i, back) for back in range(1, b + 1) for i in earlier]
+            core = self.core(item, (*((i, 0) for i in now), *before), initially=b)
+            if core is None:
+                return None
+            bases.append(core)
+        before = [(i, back) for back in range(1, depth + 1) for i in earlier]
+        step = self.core(item, (*((i, 0) for i in now), *before))
+        return self.kept(item, tuple(bases), step[0]) if step is not None else None
+
+    def kept(self, item: Item, base: tuple[_Base, ...], step: _Uses) -> _Proof | None:
+        """The proof, if the kernel finds its questions valid; with a witness where one is needed."""
+        items = list(dict.fromkeys([*(i for uses in (*(b for b, _ in base), step) for i, _ in uses), item]))
+        ranks = {i: k for k, i in enumerate(items)}
+        # ranks and conditions are another matter: here only the questions are asked
+        stand_ins = tuple(Entry(i.how, i.claim.node, i.claim.digest) for i in items)
+        kernel = Kernel(self.known, Certificate(self.scope, stand_ins), self.solvers)
+        found: list[_Witness] = []
+        for b, (uses, initials) in enumerate((*base, (step, ()))):
+            for witness in (*self.witnesses(item, uses, initials), None):
+                question = Question(tuple(Use(ranks[i], back) for i, back in uses), initials, witness)
+                try:
+                    kernel.answered(stand_ins[ranks[item]], question, b)
+                except Refused:
+                    continue
+                found.append(witness)
+                break
+            else:
+                return None
+        return _Proof(base, step, tuple(found))
+
+    def witnesses(self, item: Item, uses: _Uses, initials: tuple[str, ...]) -> list[tuple[int, int]]:
+        """Where a claim says that something exists: the premises that say so of something of the same type."""
+        goal = item.claim.term
+        if not (isinstance(goal, Quantified) and goal.quantifier is Quantifier.EXISTS):
+            return []
+        sorts = [v.sort for v in goal.variables]
+        terms = [used.claim.term for used, _ in uses]
+        terms += [s.term for mark in initials for s in self.initials() if s.digest == mark]
+        found = [
+            (k, at)
+            for k, term in enumerate(terms)
+            for at, part in enumerate(term.items if isinstance(term, And) else (term,))
+            if isinstance(part, Quantified)
+            and part.quantifier is Quantifier.EXISTS
+            and [v.sort for v in part.variables] == sorts
+        ]
+        return found[:_CANDIDATES]
+
+    # -- the certificate -----------------------------------------------------------------------------------------------
+
+    def certificate(self, order: Sequence[Item]) -> Certificate:
+        ranks = {item: k for k, item in enumerate(order)}
+        return Certificate(self.scope, tuple(self.entry(item, self._proofs.get(item), ranks) for item in order))
+
+    def entry(self, item: Item, proof: _Proof | None, ranks: Mapping[Item, int]) -> Entry:
+        claim = item.claim
+        if item.how is How.GUARANTEE:
+            same = (s for mark in self.known.assumptions[claim.node] for s in self.known.by_digest[mark])
+            labels = dict.fromkeys(
+                f"{s.node}.{s.name}" for s in same if s.node == claim.node and s.kind is Kind.ASSUMPTION
+            )
+            conds = (ranks[i] for label in labels if (i := self._now.get(label)) is not None and i in ranks)
+            return Entry(item.how, claim.node, claim.digest, tuple(sorted(conds)))
+        if proof is None:
+            return Entry(item.how, claim.node, claim.digest)
+
+        questions = [
+            Question(tuple(Use(ranks[i], back) for i, back in uses), initials, witness)
+            for (uses, initials), witness in zip((*proof.base, (proof.step, ())), proof.witnesses, strict=True)
+        ]
+        return Entry(item.how, claim.node, claim.digest, (), tuple(questions[:-1]), questions[-1])
+
+    def initials(self) -> tuple[Statement, ...]:
+        if self._initials is None:
+            every = (s for same in self.known.by_digest.values() for s in same)
+            self._initials = tuple(s for s in every if s.kind is Kind.INITIAL and s.unary)
+        return self._initials
+
+    def core(self, item: Item, premises: _Uses, *, initially: int | None = None) -> _Base | None:
+        """Of the premises those that a proof needs; None where none is found. `initially`: about that first step."""
+        text = Text()
+        initials = self.initials() if initially is not None else ()
+        try:
+            written = [text.formula(i.claim.term, i.claim.symbols(back)) for i, back in premises]
+            written += [text.formula(s.term, s.symbols(initially or 0)) for s in initials]
+            goal = text.formula(item.claim.term, item.claim.symbols())
+            facts = text.facts()
+        except Untranslatable:
+            return None
+        lines = [*text.declarations.values(), *(f"(assert {fact})" for fact in facts)]
+        for k, premise in enumerate(written):
+            lines += [f"(declare-const track{k} Bool)", f"(assert (=> track{k} {premise}))"]
+        lines.append(f"(assert (not {goal}))")
+        try:
+            context = z3.Context()
+            solver = z3.Solver(ctx=context)
+            solver.set("rlimit", _SEARCH)
+            solver.set("timeout", _SEARCH_MS)
+            solver.set("smt.arith.nl.grobner", False)
+            solver.from_string("\n".join(lines))
+            said = solver.check(*(z3.Bool(f"track{k}", context) for k in range(len(written))))
+            if said != z3.unsat:
+                return None
+            needed = {str(switch) for switch in solver.unsat_core()}
+        except z3.Z3Exception:
+            return None
+        uses = tuple(use for k, use in enumerate(premises) if f"track{k}" in needed)
+        marks = (s.digest for k, s in enumerate(initials, start=len(premises)) if f"track{k}" in needed)
+        return uses, tuple(sorted(marks))

@@ -1,0 +1,22 @@
+"""The theorem behind the kernel and its instances are what Dafny has checked."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+PROOFS = Path(__file__).parents[2] / "avow/calculus/proofs"
+
+
+@pytest.mark.slow
+@pytest.mark.needs_dafny
+@pytest.mark.parametrize("name", ["kernel.dfy", "instances.dfy"])
+def test_dafny_verifies(name: str) -> None:
+    dafny = shutil.which("dafny") or shutil.which("Dafny")
+    if dafny is None:
+        pytest.skip("dafny is not installed")
+    done = subprocess.run([dafny, "/compile:0", "/timeLimit:100", name], cwd=PROOFS, capture_output=True, text=True)
+    assert ", 0 errors" in done.stdout, done.stdout + done.stderr
