@@ -32,7 +32,7 @@ from .convention import Malformed, outputs, received, sent
 from .export import KEPT
 from .generate import BYTES, Failing, Generator, Impossible, Inputs, Source
 from .judging import Trigger, blamed, guarantee, judged
-from .pools import parse_cell, pools
+from .pools import constants, parse_cell, pools
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
 # and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
@@ -65,8 +65,9 @@ class Bench:
         self.assumptions = tuple(judged(c) for c in data["assumptions"])
         self.guarantees = {c["name"]: guarantee(judged(c)) for c in data["guarantees"]}
         formulas = [j.formula for j in (*self.assumptions, *(g.judged for g in self.guarantees.values()))]
-        self.generator = Generator(self.inputs_sorts, pools(formulas, self._rows()))
         root = _root(data, folder)
+        written = constants(_text(root / data["subject"]["file"]))
+        self.generator = Generator(self.inputs_sorts, pools(formulas, self._rows(), written))
         self.subject = Subject(root / data["subject"]["file"], data["subject"]["function"], PATIENCE, root)
         self._aims = tuple(_aim(t) for g in self.guarantees.values() for t in g.triggers)
         self._kept = _kept(folder / KEPT, self.inputs_sorts)
@@ -376,6 +377,14 @@ def _kept(path: Path, sorts: Mapping[str, Sort]) -> tuple[Inputs, ...]:
             with contextlib.suppress(Malformed, KeyError, ValueError, TypeError, AttributeError):
                 found.append({name: received(case[name], sort, name) for name, sort in sorts.items()})
     return tuple(found)
+
+
+def _text(path: Path) -> str:
+    """The subject's text, which is only looked at for its constants; empty where there is none to be read."""
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
 
 
 def _root(data: Mapping[str, Any], folder: Path) -> Path:

@@ -118,19 +118,22 @@ class Generator:
     def edges(self, failing: Failing) -> Iterator[Inputs]:
         """Each number and string from the pools in its turn for each input that is one, all else as simple as can be,
         and once more all else by chance: that no threshold is left to luck. Of a function it is the value everywhere,
-        of a sequence that of its last element."""
+        of a sequence that of its last element; sequences also of each length."""
         chance = random.Random(0)
-        for name, sort in self.ports.items():
-            for value in self._at_edges(sort):
-                for data in (b"", chance.randbytes(BYTES)):
-                    inputs = {**self.case(Source(data), failing), name: value}
-                    yield inputs
+        for name, value in _in_turn([(name, self._at_edges(sort)) for name, sort in self.ports.items()]):
+            for data in (b"", chance.randbytes(BYTES)):
+                yield {**self.case(Source(data), failing), name: value}
 
     def _at_edges(self, sort: Sort) -> Iterator[Value]:
         match sort:
             case FunctionSort(result=result):
                 yield from (FunctionValue({}, value) for value in self.pools.edges.get(result, ()))
             case SequenceSort(item=item):
+                for length in self.pools.lengths:
+                    plain = self._value(Source(b""), item, {}, 1, False)
+                    chance = random.Random(length)
+                    mixed = (self._value(Source(chance.randbytes(8)), item, {}, 1, True) for _ in range(length))
+                    yield from (Sequence((plain,) * length), Sequence(tuple(mixed)))
                 for value in self.pools.edges.get(item, ()):
                     simple = self._number(Source(b""), item, False) if item != STRING else value
                     yield from (Sequence((value,)), Sequence((simple, value)))
@@ -172,13 +175,20 @@ class Generator:
             case TupleSort(items=items):
                 value = self._row(source, items, near, depth)
             case SequenceSort(item=item):
-                each = range(source.below(_COUNT))
+                each = range(self._length(source, depth))
                 value = Sequence(tuple(self._value(source, item, near, depth + 1, source.coin()) for _ in each))
             case FunctionSort():
                 value = self._function(source, sort, near, depth)
             case SetSort():
                 raise Impossible("a set as an input")
         return value
+
+    def _length(self, source: Source, depth: int) -> int:
+        """Mostly a few; now and then one of those at which something may change."""
+        chosen = source.below(_COUNT + 1)
+        if chosen < _COUNT or depth > 0 or not self.pools.lengths:
+            return chosen % _COUNT
+        return source.of(self.pools.lengths)
 
     def _number(self, source: Source, sort: Sort, alone: bool) -> Value:
         if not alone:
@@ -271,6 +281,18 @@ class Generator:
         default = self._value(source, sort.result, near, depth + 1, True)
         table = {p: self._value(source, sort.result, near, depth + 1, True) for p in points}
         return FunctionValue({p: v for p, v in table.items() if v != default}, default)
+
+
+def _in_turn(streams: Sized[tuple[str, Iterator[Value]]]) -> Iterator[tuple[str, Value]]:
+    """One value of each in its turn, so that none has to wait for the end of another."""
+    waiting = list(streams)
+    while waiting:
+        still = []
+        for name, values in waiting:
+            for value in itertools.islice(values, 1):
+                yield name, value
+                still.append((name, values))
+        waiting = still
 
 
 def table(rows: Sized[tuple[Value, ...]], sort: FunctionSort) -> FunctionValue:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import itertools
 import math
@@ -34,6 +35,18 @@ STEP = Fraction(1, 1000)
 MANY = 6
 """Constants up to which their sums and differences are tried as well."""
 
+LONG = 50
+"""A sequence is also tried with so many elements, whatever is written."""
+LONGEST = 400
+"""Numbers up to which they are taken for lengths."""
+MOST_LENGTHS = 60
+WRITTEN = 300
+"""So many constants of a program are looked at."""
+LARGEST = 10**12
+LONGEST_TEXT = 60
+TINY = Fraction(1, 10**9)
+"""Below it the neighbours of a number are too long to be worth writing."""
+
 SMALL = 4
 """Identifiers and coordinates are drawn from so few that relations meet."""
 
@@ -48,13 +61,19 @@ class Pools:
     rows: Mapping[str, tuple[tuple[Value, ...], ...]] = field(default_factory=dict)
     edges: Mapping[Sort, tuple[Value, ...]] = field(default_factory=dict)
     """Those of the scalars that are to be tried in any case: the thresholds, and what lies around them."""
+    lengths: tuple[int, ...] = ()
+    """Lengths of sequences to be tried in any case: at, beside and beyond every number, and long ones."""
 
 
-def pools(formulas: Iterable[Term], rows: Mapping[str, tuple[tuple[Value, ...], ...]]) -> Pools:
-    """From the constants in the formulas and from the scenario's rows."""
+def pools(
+    formulas: Iterable[Term],
+    rows: Mapping[str, tuple[tuple[Value, ...], ...]],
+    of_subject: tuple[frozenset[Fraction], frozenset[str]] = (frozenset(), frozenset()),
+) -> Pools:
+    """From the constants in the formulas, from the scenario's rows, and from the numbers and texts in the subject."""
     numbers: set[Fraction] = set()
     solved: set[Fraction] = set()
-    strings: set[str] = {""}
+    strings: set[str] = {"", *(t for text in of_subject[1] for t in (text, text + "x"))}
     for formula in formulas:
         for part in subterms(formula):
             if isinstance(part, Literal) and not isinstance(part.value, bool):
@@ -81,7 +100,55 @@ def pools(formulas: Iterable[Term], rows: Mapping[str, tuple[tuple[Value, ...], 
         NATURAL: (*small, *(n for n in inside if n >= 0)),
         STRING: texts,
     }
-    return Pools(_by_sort(combined, texts), near, rows, _by_sort(around, texts))
+    seen = numbers | solved | of_subject[0]
+    edges = _simple((*_around(seen), *(n for number in seen for n in _neighbours(number))))
+    # what only the subject speaks of is tried in any case, and drawn now and then
+    drawn = _simple((*combined, *(n + d for n in sorted(of_subject[0]) for d in (-1, 0, 1))))
+    return Pools(_by_sort(drawn, texts), near, rows, _by_sort(edges, texts), _lengths(seen))
+
+
+def constants(program: str) -> tuple[frozenset[Fraction], frozenset[str]]:
+    """The numbers and texts that a Python program writes down, the first few hundred; none of one that is no Python."""
+    numbers: set[Fraction] = set()
+    texts: set[str] = set()
+    try:
+        tree = ast.parse(program)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return frozenset(), frozenset()
+    documentation = {id(part.value) for part in ast.walk(tree) if isinstance(part, ast.Expr)}
+    for part in ast.walk(tree):
+        if len(numbers) + len(texts) >= WRITTEN or id(part) in documentation or not isinstance(part, ast.Constant):
+            continue
+        match part.value:
+            case bool():
+                continue
+            case int(number) if abs(number) <= LARGEST:
+                numbers |= {Fraction(number), Fraction(-number)}
+            case float(number) if math.isfinite(number) and abs(number) <= LARGEST:
+                # as it is written, and as the machine has it
+                numbers |= {Fraction(repr(number)), Fraction(number), -Fraction(repr(number))}
+            case str(text) if len(text) <= LONGEST_TEXT:
+                texts.add(text)
+    return frozenset(numbers), frozenset(texts)
+
+
+def _neighbours(number: Fraction) -> Iterable[Fraction]:
+    """The floating-point numbers next to a number on either side."""
+    try:
+        near = float(number)
+    except OverflowError:
+        return
+    for end in (-math.inf, math.inf):
+        beside = math.nextafter(near, end)
+        if math.isfinite(beside) and abs(number) >= TINY:
+            yield Fraction(beside)
+
+
+def _lengths(numbers: Iterable[Fraction]) -> tuple[int, ...]:
+    """Lengths at, beside and beyond each number that can be one, and those that any sequence may have."""
+    whole = {math.floor(n) for n in numbers if 0 <= n <= LONGEST}
+    found = {n + d for n in whole for d in (-1, 0, 1, 2)} | {2 * n + 1 for n in whole} | {0, 1, 2, LONG}
+    return tuple(sorted(n for n in found if 0 <= n <= 2 * LONGEST + 1))[:MOST_LENGTHS]
 
 
 def _solved(comparison: Compare) -> set[Fraction]:

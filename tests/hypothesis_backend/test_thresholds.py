@@ -36,6 +36,14 @@ node n {{
         ("y <=> before * 7 / 3 < Limit", "", "before * 7 / 3 < 501"),
         ("y <=> 30 - 4 * before <= before - 100", "", "before >= 26.1"),
         ("y <=> 3 * row >= 1000", "", "row > 334"),
+        ("length(loads) >= 10 <=> y", "", "False"),  # it always says no, and no short sequence shows it
+        ("y <=> length(loads) <= 120", "", "len(loads) <= 121"),
+        ("length(todo) >= 17 -> y", "", "len(todo) != 34"),
+        ("y <=> before >= 0.5", "", "before > 0.5 or before == 0.5 - 2**-54"),  # one unit in the last place
+        ("y", "", "before != 31337"),  # of which only the subject speaks
+        ("y", "", "row != 4711"),
+        ("y", "", "not (len(loads) == 43)"),
+        ("y", "", "len(todo) < 40"),  # a long one
     ],
 )
 def test_is_refuted(tmp_path: Path, formula: str, assume: str, subject: str) -> None:
