@@ -15,7 +15,7 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Verdict
 
 from . import ajpf_tool, spin
-from .ajpf_tool import Said
+from .ajpf_tool import Installation, Said
 from .asking import ask
 from .automaton import TooLarge
 from .beliefs import TooDeep
@@ -25,7 +25,9 @@ from .instances import Instantiation, instances
 from .interpreter import Agent
 from .lazy import open_part
 from .options import Setup, read
+from .replay import Unable, replay
 from .settle import Frame, Settled, outcome
+from .structure import Lasso
 from .words import Wording, explain
 
 ENGINE = "Avow's own Gwendolen checker"
@@ -194,6 +196,27 @@ class _Run:
             found = explain(checker.graph, lasso, refuted, self.wording)
             self.counterexamples[refuted.key] = found
             self.logs[f"{refuted.key}.trace.txt"] = _trace(found)
+            if self.setup.engine in ("auto", "ajpf") and self.ajpf is not None and not self.setup.environment_class:
+                self.replay(self.ajpf, checker, lasso, refuted)
+
+    def replay(self, installation: Installation, checker: Checker, lasso: Lasso, refuted: Property) -> None:
+        """The run that refutes, done again by the real AIL: if that goes another way, our interpreter is not AIL's for
+        this program, and there is no verdict on anything."""
+        name = f"AIL ({installation.version})"
+        result = self.results[refuted.key]
+        try:
+            difference, log = replay(installation, self.setup, checker.graph, lasso)
+        except Unable as error:
+            self.bound["replay"] = f"not replayed by {name}: {error}"
+            return
+        self.logs[f"{refuted.key}.replay.txt"] = log
+        if difference is None:
+            opinions = {**result.opinions, name: "does the same run"}
+            self.results[refuted.key] = replace(result, opinions=opinions)
+            return
+        reason = f"contradictory: {name} does not do the run that refutes {refuted.key}: {difference}"
+        self.results = {key: replace(r, verdict=Verdict.ERROR, reason=reason) for key, r in self.results.items()}
+        self.counterexamples = {}
 
     # Others
 

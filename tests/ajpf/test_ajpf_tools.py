@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from small_agents import case
 
 from avow.backend_kit.protocol import Limits
-from avow.backends.ajpf import BACKEND, ajpf_tool, spin
+from avow.backends.ajpf import BACKEND, ajpf_tool, replay, spin
 from avow.backends.ajpf.ajpf_tool import Said, judge
 from avow.backends.ajpf.asking import ask
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
 from avow.backends.ajpf.interpreter import Agent, Semantics
+from avow.backends.ajpf.java import environment_class
 from avow.backends.ajpf.options import Setup
 from avow.backends.ajpf.parser import parse_program
+from avow.backends.ajpf.printer import program_text
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
 from avow.base.process import Completed
 from avow.base.verdict import Verdict
@@ -180,3 +183,46 @@ def test_ajpf_agrees_on_small_agents(tmp_path, seed):
         expected = Said.HOLDS if Checker(graph, (p,)).check(p).holds else Said.VIOLATED
         assert answers[p.key].said is expected, answers[p.key].log
         assert answers[p.key].framework
+
+
+@pytest.mark.needs_ajpf
+def test_a_run_that_refutes_is_done_again_by_ail(lift, tmp_path, monkeypatch):
+    job = lift({"engine": "auto", "semantics": "mcapl"})
+    monkeypatch.setattr(spin, "version", lambda: None)
+    report = BACKEND.discharge(job, tmp_path, Limits(seconds=120))
+    (answers,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
+    assert answers.verdict is Verdict.REFUTED
+    assert "does the same run" in str(answers.details["properties"])
+
+
+@pytest.mark.needs_ajpf
+def test_a_run_that_ail_does_not_do_is_no_refutation(lift, tmp_path, monkeypatch):
+    """A seeded fault: our interpreter takes initial beliefs for granted that AIL does not have."""
+    monkeypatch.setattr(spin, "version", lambda: None)
+    monkeypatch.setattr(replay, "program_text", lambda program: program_text(replace(program, beliefs=())))
+    report = BACKEND.discharge(lift({"engine": "auto", "semantics": "mcapl"}), tmp_path, Limits(seconds=120))
+    (answers,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
+    assert answers.verdict is Verdict.ERROR
+    assert "contradictory" in answers.summary
+    assert answers.counterexample is None
+
+
+def test_what_a_run_tells(tmp_path):
+    """The moments of a lasso, its loop gone through twice; and the class that repeats its draws compiles from them."""
+    (tmp_path / "e.yaml").write_text("draws: {at_quiescence: repeatedly}\npercepts: {w: [warn, nothing]}\n")
+    draws = read_environment(tmp_path / "e.yaml")
+    program = parse_program(
+        "GWENDOLEN\n:name: ag\n:Initial Beliefs:\nb\n:Initial Goals:\n:Plans:\n+warn : { True } <- shout;\n", "ag.gwen"
+    )
+    wanted = Property("f", instantiate(parse_psl("[] (~D(ag, shout))"), {}))
+    checker = Checker(explore(Agent(program, draws, Semantics.MCAPL)), (wanted,))
+    lasso = checker.lasso(wanted)
+    assert lasso is not None
+    moments, script = replay.expected(checker.graph, lasso)
+    assert moments[0].text() == "start\tb"
+    assert any(moment.text().startswith("shout\tb; warn") for moment in moments)
+    assert len(script) >= len(moments) - 1
+    source = environment_class(draws, script=script, probed=True)
+    assert f"SCRIPT = {{{{{script[0][0]}}}" in source
+    assert "public void begin()" in source
+    assert "SCRIPT" not in environment_class(draws)
