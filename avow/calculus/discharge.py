@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
+from avow.base.graphs import components, cycle_in
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, ClauseName, Derivation, Goal, LoopForm, Phase, Rule, Settled, SideCondition
 from avow.calculus.entailment import implied
@@ -20,7 +21,6 @@ from avow.calculus.repair import Offer, environment, initial_values, offers, pro
 from avow.calculus.variables import Facts, Frame, closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
-from avow.system.graph import components, cycle_in
 
 NARROW_MS = 4_000
 

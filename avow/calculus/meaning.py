@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from avow.base.files import digest as sha256
+from avow.base.graphs import components
 from avow.calculus.variables import Frame
 from avow.formulas.formula import digest, sort_digest
-from avow.system.graph import components
 
 
 @dataclass(slots=True)

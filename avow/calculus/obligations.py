@@ -13,6 +13,7 @@ from typing import Protocol
 
 from avow.base.diagnostics import Span
 from avow.base.files import digest as sha256
+from avow.base.graphs import components
 from avow.base.verdict import Outcome
 from avow.calculus import questions
 from avow.calculus.certificates import Certificates, requirement_scope
@@ -30,7 +31,6 @@ from avow.kernel.statements import Kind as Claimed
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
 from avow.system.formulas import ports_of
-from avow.system.graph import components
 from avow.system.plan import Endpoint, Requirement, System
 
 

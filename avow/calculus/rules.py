@@ -11,12 +11,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from avow.base.diagnostics import Diagnostic
+from avow.base.graphs import components
 from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
 from avow.calculus.variables import Frame
 from avow.language.contract import Clause
 from avow.language.terms import Role
 from avow.system.formulas import ports_of
-from avow.system.graph import Edge, components
+from avow.system.graph import Edge
 from avow.system.plan import ComposeGoal, Endpoint
 
 WHOLE = "whole"

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from itertools import product
 from random import Random
 
+from avow.base.graphs import components, cycles_in
 from avow.calculus.choices import Values, by_variable, search
 from avow.calculus.narrowing import Narrowing, Unknown, forcings
 from avow.calculus.node_outputs import MAX_ANSWERS, Answerer, Doubts, Stuck, judge, possible
@@ -22,7 +23,6 @@ from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
 from avow.language.terms import Role, Term
 from avow.system.formulas import initial_condition, ports_of
-from avow.system.graph import components, cycles_in
 from avow.system.plan import Endpoint
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from avow.base.graphs import strong_components
 from avow.base.verdict import Link
 from avow.evidence.status import Status, weakest_link
 
@@ -51,7 +52,8 @@ def judge(claims: Iterable[Claim]) -> Mapping[str, Standing]:
         for name in claim.rests_on:
             known.setdefault(name, Claim(name, Status.MISSING))
     result: dict[str, Standing] = {}
-    for component in _components(known):
+    for members in strong_components(sorted(known), lambda name: known[name].rests_on):
+        component = tuple(sorted(members))
         circle = _circle(component, known)
         for name in component:
             result[name] = _circular(known[name], circle) if circle else _stand(known[name], result)
@@ -114,41 +116,3 @@ def _circle(component: tuple[str, ...], claims: Mapping[str, Claim]) -> tuple[st
             return (*path[path.index(step[0]) :], step[0])
         path.append(fresh[0])
         seen.add(fresh[0])
-
-
-def _components(claims: Mapping[str, Claim]) -> list[tuple[str, ...]]:
-    """Strongly connected components, those that others rest on first (Tarjan, with an explicit stack)."""
-    index: dict[str, int] = {}
-    low: dict[str, int] = {}
-    open_names: list[str] = []
-    is_open: set[str] = set()
-    found: list[tuple[str, ...]] = []
-    for root in sorted(claims):
-        if root in index:
-            continue
-        work = [(root, iter(claims[root].rests_on))]
-        index[root] = low[root] = len(index)
-        open_names.append(root)
-        is_open.add(root)
-        while work:
-            name, rest = work[-1]
-            child = next(rest, None)
-            if child is None:
-                work.pop()
-                if work:
-                    parent = work[-1][0]
-                    low[parent] = min(low[parent], low[name])
-                if low[name] == index[name]:
-                    members = [open_names.pop()]
-                    while members[-1] != name:
-                        members.append(open_names.pop())
-                    is_open.difference_update(members)
-                    found.append(tuple(sorted(members)))
-            elif child not in index:
-                index[child] = low[child] = len(index)
-                open_names.append(child)
-                is_open.add(child)
-                work.append((child, iter(claims[child].rests_on)))
-            elif child in is_open:
-                low[name] = min(low[name], index[child])
-    return found

@@ -4,9 +4,10 @@ given as a path with a loop (a lasso). Runs are endless: a way to a state withou
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from avow.base.graphs import strong_components
 from avow.formulas.ltl import A, Automaton
 
 Successors = Callable[[int], Sequence[int]]
@@ -36,45 +37,6 @@ class Lasso:
     def cycle(self) -> tuple[int, ...]:
         """What is repeated for ever."""
         return self.path[self.loop :]
-
-
-def components(roots: Iterable[int], successors: Successors) -> Iterator[list[int]]:
-    """Tarjan's strongly connected components, each after those that it can reach; found as they are asked for."""
-    index: dict[int, int] = {}
-    low: dict[int, int] = {}
-    on_stack: set[int] = set()
-    stack: list[int] = []
-    for root in roots:
-        if root in index:
-            continue
-        index[root] = low[root] = len(index)
-        stack.append(root)
-        on_stack.add(root)
-        work = [(root, iter(successors(root)))]
-        while work:
-            node, rest = work[-1]
-            for target in rest:
-                if target not in index:
-                    index[target] = low[target] = len(index)
-                    stack.append(target)
-                    on_stack.add(target)
-                    work.append((target, iter(successors(target))))
-                    break
-                if target in on_stack and index[target] < low[node]:
-                    low[node] = index[target]
-            else:
-                work.pop()
-                if work and low[node] < low[work[-1][0]]:
-                    low[work[-1][0]] = low[node]
-                if low[node] == index[node]:
-                    component = []
-                    while True:
-                        member = stack.pop()
-                        on_stack.discard(member)
-                        component.append(member)
-                        if member == node:
-                            break
-                    yield component
 
 
 def accepted_run(
@@ -133,7 +95,7 @@ def accepted_run(
     def label(product: int) -> int:
         return label_of(product // width)
 
-    for component in components(roots, cached):
+    for component in strong_components(roots, cached):
         core = _fair_core(component, cached, label, fair, automaton, width)
         if core is not None:
             return _lasso(roots, core, cached, label, fair, automaton, width)
@@ -167,7 +129,7 @@ def _fair_core(
         if not unfair:
             return members
         rest = {p for p in part if not any(label(p) & f.asking == f.asking for f in unfair)}
-        work += components(rest, lambda p, rest=rest: [t for t in successors(p) if t in rest])  # type: ignore[misc]
+        work += strong_components(rest, lambda p, rest=rest: [t for t in successors(p) if t in rest])  # type: ignore[misc]
     return None
 
 

@@ -11,10 +11,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from avow.base.diagnostics import Diagnostic, Severity
+from avow.base.graphs import components
 from avow.language.contract import Node, Port
 from avow.language.sorts import Sort
 from avow.language.terms import Role
-from avow.system.graph import Edge, Graph, components, wired
+from avow.system.graph import Edge, Graph, wired
 from avow.system.plan import Endpoint, EnvironmentInput, Plan, System
 
 

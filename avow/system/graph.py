@@ -7,11 +7,11 @@ several providers, delays, or lets a node feed itself; an input named by a conne
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.graphs import components, cycles_in
 from avow.language.contract import Node, Port
 from avow.language.sorts import INTEGER, NATURAL, Sort
 from avow.system.plan import Connection, Endpoint, System
@@ -199,87 +199,3 @@ def _deadlock(cycle: tuple[str, ...], edges: Sequence[Edge], spans: Mapping[str,
         "give the delayed edge an initial value" if delayed else "declare an edge of it delayed, with an initial value"
     )
     return Diagnostic("PLAN123", message, spans.get(cycle[0]), Severity.WARNING, hint)
-
-
-N = TypeVar("N", bound=Hashable)
-
-# -- loops -------------------------------------------------------------------------------------------------------------
-
-
-def components(nodes: Iterable[N], arcs: Iterable[tuple[N, N]]) -> tuple[tuple[N, ...], ...]:
-    """Strongly connected components, providers before consumers; nodes within one in the order given (Tarjan)."""
-    names = tuple(nodes)
-    successors: dict[N, list[N]] = {name: [] for name in names}
-    for source, target in arcs:
-        if source in successors and target in successors:
-            successors[source].append(target)
-    position = {name: k for k, name in enumerate(names)}
-    index: dict[N, int] = {}
-    low: dict[N, int] = {}
-    on_stack: set[N] = set()
-    stack: list[N] = []
-    found: list[tuple[N, ...]] = []
-    for root in names:
-        work = [] if root in index else [root]
-        pending: dict[N, Iterator[N]] = {}
-        while work:
-            name = work[-1]
-            if name not in index:
-                index[name] = low[name] = len(index)
-                stack.append(name)
-                on_stack.add(name)
-                pending[name] = iter(successors[name])
-            following = next((s for s in pending[name] if s not in index), None)
-            if following is not None:
-                work.append(following)
-                continue
-            work.pop()
-            low[name] = min([low[name], *(low[s] for s in successors[name] if s in on_stack)])
-            if low[name] == index[name]:
-                members = [stack.pop()]
-                while members[-1] != name:
-                    members.append(stack.pop())
-                on_stack.difference_update(members)
-                found.append(tuple(sorted(members, key=position.__getitem__)))
-    return tuple(reversed(found))
-
-
-def cycle_in(component: Sequence[str], arcs: Iterable[tuple[str, str]]) -> tuple[str, ...]:
-    """A cycle within a component, or an empty tuple where there is none."""
-    return next(iter(cycles_in(component, arcs)), ())
-
-
-def cycles_in(component: Sequence[str], arcs: Iterable[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
-    """Short cycles within a component, so many that every node that is on one is on one of these; shortest first."""
-    inside = set(component)
-    successors: dict[str, list[str]] = {name: [] for name in component}
-    for source, target in arcs:
-        if source in inside and target in inside and target not in successors[source]:
-            successors[source].append(target)
-    found: list[tuple[str, ...]] = []
-    covered: set[str] = set()
-    for start in component:
-        path = _shortest(start, successors) if start not in covered and len(found) < 50 else ()
-        if path:
-            found.append(path)
-            covered.update(path)
-    return tuple(sorted(found, key=len))
-
-
-def _shortest(start: str, successors: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
-    before: dict[str, str] = {}
-    frontier = [start]
-    while frontier:
-        following: list[str] = []
-        for name in frontier:
-            for successor in successors[name]:
-                if successor == start:
-                    path = [name]
-                    while path[-1] != start:
-                        path.append(before[path[-1]])
-                    return tuple(reversed(path))
-                if successor not in before:
-                    before[successor] = name
-                    following.append(successor)
-        frontier = following
-    return ()

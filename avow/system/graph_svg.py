@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from html import escape
 from itertools import pairwise
 
-from avow.system.graph import Edge, Graph, components
+from avow.base.graphs import components
+from avow.system.graph import Edge, Graph
 
 _WIDTH, _HEIGHT = 150, 46
 _GAP_X, _GAP_Y = 110, 34

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from avow.base.diagnostics import Diagnostic, Span
+from avow.base.graphs import components, cycle_in
 from avow.language.contract import Contract
 from avow.system.folding import leaves, parents
-from avow.system.graph import components, cycle_in
 from avow.system.plan import Connection, Endpoint, Plan, Subsystem
 from avow.system.schema import suggest
 

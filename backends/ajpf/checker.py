@@ -6,13 +6,15 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+from avow.base.graphs import strong_components
+
 from .automaton import Automaton, build, compiled
 from .explore import Graph
 from .intentions import Frame
 from .interpreter import Agent, State
 from .mind import NONE
 from .psl import Atom, Formula, Modality, Not, atoms, conjunction
-from .structure import Fair, Kripke, Lasso, components, find_lasso, reduce
+from .structure import Fair, Kripke, Lasso, find_lasso, reduce
 from .syntax import DeedKind, Sign, Struct, Term, Var, unify
 from .tautology import is_valid
 
@@ -124,7 +126,7 @@ class Checker:
         occasions = {s for s in graph.initial if triggered[s]}
         occasions.update(t for s in range(len(graph)) if not triggered[s] for t in targets(s) if triggered[t])
         good: set[int] = set()
-        for component in components(occasions, waiting):
+        for component in strong_components(occasions, waiting):
             state = component[0]
             still = set(waiting(state))
             if len(component) == 1 and state not in still and still <= good and targets(state):

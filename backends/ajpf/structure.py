@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from avow.base.graphs import strong_components
 from avow.formulas.lasso import Fair as Fair
 from avow.formulas.lasso import Lasso as Lasso
 from avow.formulas.lasso import accepted_run
-from avow.formulas.lasso import components as components
 
 from .automaton import Automaton
 from .psl import Formula
@@ -45,7 +45,7 @@ def reduce(graph: Kripke) -> Kripke:
     seen: dict[tuple[int, bool, tuple[int, ...]], int] = {}
     pending: list[tuple[int, list[int], bool]] = []
     # Components come after those that they reach along equal labels, so "only way leads to its own label" is known.
-    for component in components(range(len(labels)), alike):
+    for component in strong_components(range(len(labels)), alike):
         label = labels[component[0]]
         members = set(component)
         loop = len(component) > 1 or component[0] in successors[component[0]]

@@ -11,10 +11,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import combinations, permutations
 
+from avow.base.graphs import strong_components
+
 from . import psl
 from .automaton import build
 from .psl import Atom, Formula, Modality
-from .structure import components
 from .syntax import Term, Var
 
 MAX_STEPS = 4_000
@@ -48,7 +49,7 @@ def is_valid(formula: Formula) -> bool:
     def successors(node: int) -> list[int]:
         return [t for t in automaton.successors[node] if possible(t)]
 
-    for component in components(filter(possible, automaton.initial), successors):
+    for component in strong_components(filter(possible, automaton.initial), successors):
         round_trip = len(component) > 1 or component[0] in successors(component[0])
         if round_trip and all(not accepting.isdisjoint(component) for accepting in automaton.accepting):
             return False

@@ -8,12 +8,12 @@ from itertools import product
 
 import pytest
 
+from avow.base.graphs import components
 from avow.calculus import replaying
 from avow.calculus.ltl import TooLong, demands_progress, violation
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Variable
 from avow.solving.limits import now
-from avow.system.graph import components
 from avow.system.temporal import Operator, Property, State, Temporal
 
 P, Q = (State(Variable(Role.OUTPUT, name, BOOL), name) for name in "pq")

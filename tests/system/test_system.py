@@ -9,7 +9,8 @@ import pytest
 
 from avow.base.codes_plan import PLAN_CODES
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.system.graph import components, cycles_in, dataflow
+from avow.base.graphs import components, cycles_in
+from avow.system.graph import dataflow
 from avow.system.load import load_bare, load_path, load_system
 from avow.system.plan import Endpoint, System
 from avow.system.rosgraph import account, read_ros_graph
