@@ -155,7 +155,7 @@ def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
         _profile(str(data["profile"]), located.at("profile")) if "profile" in data else (profile("default"), [])
     )
     faults += wrong
-    reader = _Reader(located, faults)
+    reader = _PolicyReader(located, faults)
     policy = replace(base, name=f"{base.name}, with the plan's own rules" if set(data) - {"profile"} else base.name)
     for key in data:
         if key in ("sanity", "composition", "requirements"):
@@ -176,7 +176,7 @@ def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
     return policy, faults
 
 
-def _demands(base: Policy, data: object, reader: _Reader) -> tuple[tuple[str, Demand], ...]:
+def _demands(base: Policy, data: object, reader: _PolicyReader) -> tuple[tuple[str, Demand], ...]:
     demands = dict(base.guarantees)
     if not isinstance(data, Mapping):
         reader.fault("guarantees maps a criticality to what it needs", ("guarantees",))
@@ -188,7 +188,7 @@ def _demands(base: Policy, data: object, reader: _Reader) -> tuple[tuple[str, De
     return tuple(demands.items())
 
 
-class _Reader:
+class _PolicyReader:
     """Reads plain data, collecting located faults."""
 
     def __init__(self, located: Located, faults: list[Diagnostic]) -> None:
@@ -289,7 +289,7 @@ def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
     faults: list[Diagnostic] = []
     policies = {}
     for name, raw in data["profiles"].items():
-        reader = _Reader(Located(raw, Span("profiles.yaml", 1, 1, 1, 1)), faults)
+        reader = _PolicyReader(Located(raw, Span("profiles.yaml", 1, 1, 1, 1)), faults)
         policies[name] = Policy(
             name=name,
             title=raw["title"],

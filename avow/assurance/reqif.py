@@ -62,7 +62,7 @@ class Thing:
 
 
 @dataclass(slots=True)
-class _Reader:
+class _ReqifReader:
     """Builds no tree: what is wanted is put down as it goes by."""
 
     file: str
@@ -197,9 +197,9 @@ def _bare(name: str) -> str:
     return " ".join(name.lower().split())
 
 
-def _parse(data: bytes, file: str) -> _Reader:
+def _parse(data: bytes, file: str) -> _ReqifReader:
     parser = expat.ParserCreate(namespace_separator="}")
-    reader = _Reader(file, parser)
+    reader = _ReqifReader(file, parser)
 
     def refuse(*_: object) -> NoReturn:
         message = f"{file} declares a document type or entities: that is not accepted"

@@ -62,10 +62,10 @@ class FileSyntax:
 
 def read(tokens: Sequence[Token], reports: Reports) -> FileSyntax:
     """The clauses of a file, with every syntax error in them reported."""
-    return _Reader(tokens, reports).file()
+    return _OutlineReader(tokens, reports).file()
 
 
-class _Reader:
+class _OutlineReader:
     def __init__(self, tokens: Sequence[Token], reports: Reports) -> None:
         self.tokens = tokens
         self.reports = reports

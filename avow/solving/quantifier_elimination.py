@@ -110,7 +110,7 @@ def _eliminate(formula: Term, timeout_ms: int) -> Term | None:
     with watchdog(timeout_ms, translator.context.interrupt):  # Z3's own limit is sometimes missed
         result = z3.TryFor(chain, timeout_ms)(goal)
     free = {v.qualified: v for v in free_variables(formula)}
-    reader = _Reader(translator, free)
+    reader = _TermReader(translator, free)
     options = [conjunction(reader.formula(expr) for expr in subgoal) for subgoal in result]
     return push_negations(disjunction(options))
 
@@ -139,7 +139,7 @@ def _simplified(term: Term, hypotheses: Mapping[str, Term], goal: Term, timeout_
     return disjunction(kept)
 
 
-class _Reader:
+class _TermReader:
     """Z3 expressions, back to terms. Raises Unsupported for what has no counterpart."""
 
     def __init__(self, translator: Translator, free: Mapping[str, Variable]) -> None:

@@ -57,7 +57,7 @@ def read_plan(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...]]:
     faults += check_shape(root)
     if faults:
         raise Rejected(*faults)
-    reader = _Reader(path, root)
+    reader = _PlanReader(path, root)
     plan = reader.plan()
     return plan, root, tuple(reader.faults)
 
@@ -87,7 +87,7 @@ def bare_plan(name: str, files: tuple[Path, ...]) -> Plan:
     )
 
 
-class _Reader:
+class _PlanReader:
     """Turns a well-shaped document into a `Plan`, noting what the schema cannot see."""
 
     def __init__(self, path: Path, root: Piece) -> None:

@@ -84,14 +84,14 @@ def read(job: Job) -> Setup:
     ]
     if odd:
         raise Rejected(*odd)
-    reader = _Reader(job)
+    reader = _OptionsReader(job)
     setup = reader.setup()
     if reader.faults or setup is None:
         raise Rejected(*reader.faults)
     return setup
 
 
-class _Reader:
+class _OptionsReader:
     def __init__(self, job: Job) -> None:
         self.job = job
         self.faults: list[Diagnostic] = []

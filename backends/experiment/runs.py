@@ -36,10 +36,10 @@ class Runs:
 
 def read_runs(path: Path, measure: Expression, id_column: str | None) -> Runs:
     """Every run of the file. Raises Rejected, with the place of everything that is not as it should be."""
-    return _Reader(path, measure, id_column).read()
+    return _RunsReader(path, measure, id_column).read()
 
 
-class _Reader:
+class _RunsReader:
     def __init__(self, path: Path, measure: Expression, id_column: str | None) -> None:
         self.path = path
         self.measure = measure

@@ -87,7 +87,7 @@ def read_record(path: Path) -> Record:
 
 def record_in(piece: Piece, problems: Sequence[Diagnostic]) -> Record:
     """The record that a YAML text says. Raises Rejected, with every problem and its place."""
-    return _Reader(piece, list(problems)).read()
+    return _RecordReader(piece, list(problems)).read()
 
 
 def load(path: Path) -> tuple[Piece, tuple[Diagnostic, ...]]:
@@ -100,7 +100,7 @@ def load(path: Path) -> tuple[Piece, tuple[Diagnostic, ...]]:
     return read_yaml(data, str(path))
 
 
-class _Reader:
+class _RecordReader:
     def __init__(self, piece: Piece, problems: list[Diagnostic]) -> None:
         self.piece = piece
         self.problems = problems
