@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from avow.base.graphs import components
 from avow.base.verdict import Verdict
 from avow.calculus.derivation import Case, Phase, Settled
 from avow.calculus.discharge import Bounds
@@ -21,7 +22,6 @@ from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Established, Given, Kernel, Refused
 from avow.kernel.solvers import Solvers
 from avow.kernel.statements import Kind, Statement, Statements, statements
-from avow.system.graph import components
 
 if TYPE_CHECKING:
     from avow.calculus.composition import Composition
