@@ -15,6 +15,7 @@ from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable
 from avow.evaluation.disjunctions import Part, conjunction
 from avow.evaluation.linear import Constraint, Linear, TooMany, satisfy
 from avow.formulas.renaming import bound_names, has_variables
+from avow.formulas.traversal import subterms
 from avow.language.sorts import RealSort
 from avow.language.terms import (
     And,
@@ -78,6 +79,8 @@ def _formula(compiler: Compiler, term: Term, positive: bool, unknown: frozenset[
         case Compare():
             return _comparison(compiler, term, positive, unknown)
         case Conditional(condition=condition, then=then, otherwise=otherwise):
+            if any(isinstance(part, Conditional) for part in subterms(condition)):
+                return None  # the condition is read twice: of conditions within conditions, that would be too often
             cases = (And((condition, then)), And((Not(condition), otherwise)))
             if not positive:
                 cases = (And((condition, Not(then))), And((Not(condition), Not(otherwise))))

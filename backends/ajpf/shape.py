@@ -41,15 +41,33 @@ MAX_ITEMS = 256
 """More disjuncts (or conjuncts) than this under one quantifier are not multiplied out."""
 
 
+MAX_PARTS = 20_000
+"""More parts than this are not written out."""
+
+
 class TooComplex(Exception):  # noqa: N818 - it names what happened
     """The formula is nested too deeply, or multiplies out to too much."""
 
 
 def shape(term: Term) -> Term:
     """The normal form of a formula. Raises TooComplex."""
-    if depth(term) > MAX_DEPTH:
+    if depth(term) > MAX_DEPTH or _written_out(term) > MAX_PARTS:
         raise TooComplex
     return _formula(term, True)
+
+
+def _written_out(term: Term) -> int:
+    """How many parts the formula has once `<=>`, `xor` and conditionals are written out, which doubles theirs."""
+    sizes = [_written_out(child) for child in term.children]
+    match term:
+        case Conditional(sort=sort) if sort == BOOL:
+            return 1 + sum(sizes) + sizes[0]
+        case Iff() | Operation(operator=Builtin.XOR):
+            return 1 + 2 * sum(sizes)
+        case Compare(left=left) if left.sort == BOOL:
+            return 1 + 2 * sum(sizes)
+        case _:  # its parts stand in it once
+            return 1 + sum(sizes)
 
 
 def conjuncts(term: Term) -> tuple[Term, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import random
 from fractions import Fraction
@@ -278,3 +279,20 @@ def test_cvc5_agrees_with_enumeration(seed: int) -> None:
         if held is not None:
             answer = ask_cvc5(export([term, *fixed(values, term)]), timeout_ms=10_000)
             assert answer in ("sat" if held else "unsat", "unknown"), (show_term(term, "rcl"), values)
+
+
+@pytest.mark.parametrize(
+    "shape", ["(if {0} then u + v < {1} else u > a + v)", "xor({0}, u + v < {1})", "({0} <=> x < {1})"]
+)
+def test_operators_within_operators_never_take_for_ever(shape: str) -> None:
+    """What reads a condition twice would double with each level."""
+    text = "u > v"
+    for level in range(40):
+        text = shape.format(text, level)
+    term = parse_formula(f"exists(u, v in REAL | u - v < 100 and {text})", NODE)
+    with contextlib.suppress(NotEvaluable):
+        evaluate(term, named(GRID[0]))
+    with contextlib.suppress(TooManyCases):
+        lifted(term)
+    push_negations(term)
+    assert defined(term)
