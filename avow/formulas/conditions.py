@@ -16,7 +16,23 @@ from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import depth
 from avow.language.sorts import BOOL
-from avow.language.terms import TRUE, And, Compare, Iff, Implies, Not, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import (
+    TRUE,
+    And,
+    Builtin,
+    Compare,
+    Conditional,
+    Iff,
+    Implies,
+    Not,
+    Operation,
+    Or,
+    Quantified,
+    Quantifier,
+    Role,
+    Term,
+    Variable,
+)
 
 MAX_DEPTH = 150
 """Deeper formulas are not taken apart."""
@@ -109,6 +125,11 @@ def _clauses(term: Term, positive: bool, halve: bool = True) -> Iterator[_Clause
             yield from _clauses(right, False, halve)
         case Iff(left=left, right=right) if halve:
             yield from _halves(left, right, positive)
+        case Operation(operator=Builtin.XOR, arguments=(left, right)) if halve:
+            yield from _halves(left, right, not positive)
+        case Conditional(condition=condition, then=then, otherwise=otherwise) if halve:
+            yield from _joined([(condition, False), (then, positive)], False)
+            yield from _joined([(condition, True), (otherwise, positive)], False)
         case Compare(operator="==" | "!=" as operator, left=left, right=right) if halve and left.sort == BOOL:
             yield from _halves(left, right, positive is (operator == "=="))
         case Quantified(quantifier=quantifier, variables=variables, body=body) if quantifier is (
@@ -116,7 +137,7 @@ def _clauses(term: Term, positive: bool, halve: bool = True) -> Iterator[_Clause
         ):
             for clause in _clauses(body, positive, halve):
                 yield _Clause((*variables, *clause.outer), clause.items, clause.halved)
-        case _:
+        case _:  # demanded as a whole
             yield _Clause((), (term if positive else negation(term),))
 
 

@@ -201,7 +201,7 @@ class Text:
                 given = conjunction(self.member(p, n) for p, n in zip(parameters, names, strict=True))
                 body = inside if given is None else f"(=> {given} {inside})"
                 return None if inside is None else f"(forall ({self.binders(names, parameters)}) {body})"
-            case _:
+            case _:  # every value of its SMT-LIB sort is one of it
                 return None
 
     def clamped(self, value: str, sort: Sort) -> str:
@@ -214,7 +214,7 @@ class Text:
                 return (
                     f"({name} {' '.join(self.clamped(f'({part(name, k)} {value})', p) for k, p in enumerate(items))})"
                 )
-            case _:
+            case _:  # as it is
                 return value  # more values than the sort has: what is shown of all of them is shown of its own
 
     def binders(self, names: Iterable[str], sorts: Iterable[Sort]) -> str:
