@@ -74,6 +74,11 @@ def weakest_of(
     )
 
 
+WARNED = "WARNED"
+"""The first word of a verdict that every gate lets pass although something is known to be bad: expected refutations,
+accepted findings."""
+
+
 def answers(
     requirements: Sequence[RequirementView],
     nodes: Sequence[NodeView],
@@ -92,8 +97,12 @@ def answers(
     """Everything that the first screen says, but whether it is signed."""
     number = Counter(r.how for r in requirements)
     headline, verdict, tone = _verdict(requirements, suppositions, gates, strict=strict, passed=passed)
+    bad = sum(bool(view.handled) and not view.standing.supports for view in views)
+    if bad and passed:  # whatever else holds: what is known to be bad is no green
+        verdict, tone = f"{WARNED}: {verdict}; {count(bad, 'finding')} known", Tone.AMBER
     by_how = tuple((how, number[how]) for how in _HOW_ORDER if number[how])
-    good = sum(gate.passed for gate in gates)
+    asked = [gate for gate in gates if not gate.idle]
+    good = sum(gate.passed for gate in asked)
     kinds = len(weakenings)
     ranked = [_basis(node, views, relied) for node in nodes]
     basis = [b for b, _ in (sorted(ranked, key=lambda pair: pair[1]) if len(ranked) > NODES else ranked)]
@@ -105,7 +114,7 @@ def answers(
         by_how=by_how,
         counts=" · ".join(f"{many} {how}" for how, many in by_how) or "no requirement",
         weakened=f"weakened in {count(kinds, 'way')}" if kinds else "not weakened",
-        gates=f"policy: {good} of {count(len(gates), 'gate')} pass" + ("es" if len(gates) == 1 else ""),
+        gates=f"policy: {good} of {count(len(asked), 'gate')} pass" + ("es" if len(asked) == 1 else ""),
         listed=_listed(requirements),
         based_on=tuple(basis[:NODES]),
         bases=tuple(sorted(basis, key=lambda b: b.node)),

@@ -257,6 +257,7 @@ def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, st
         tuple(gates),
         left_out,
         case.answers.verdict,
+        case.answers.tone.value,
         tuple(terminal_lines(case)),
     )
 

@@ -22,6 +22,8 @@ class Result:
     left_out: tuple[tuple[str, str], ...] = ()
     verdict: str = ""
     """The case's verdict in words."""
+    tone: str = ""
+    """The verdict's colour: what is known to be bad is amber, and what nothing is asked of is grey."""
     lines: tuple[str, ...] = ()
     """The five answers, for a terminal."""
 
@@ -35,6 +37,7 @@ class Result:
             "gates": [list(g) for g in self.gates],
             "left_out": [list(pair) for pair in self.left_out],
             "verdict": self.verdict,
+            "tone": self.tone,
             "lines": list(self.lines),
         }
 
@@ -50,6 +53,7 @@ def read_result(data: Mapping[str, Any]) -> Result:
         tuple((title, passed, reason) for title, passed, reason in data["gates"]),
         tuple((name, why) for name, why in data["left_out"]),
         data["verdict"],
+        data["tone"],
         tuple(data["lines"]),
     )
 

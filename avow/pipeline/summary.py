@@ -30,7 +30,9 @@ def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, s
         table.add_column(word, justify="right", style="red" if word in ("refuted", "contradictory", "error") else None)
     table.add_column("verdict")
     for r in sorted(results, key=lambda r: r.system):
-        colour = "green" if r.exit_code == 0 else "red"
+        colour = (
+            "red" if r.exit_code else "yellow" if r.tone == "amber" else "green" if r.tone in ("", "green") else "dim"
+        )
         verdict = f"[{colour}]{escape(r.verdict or _gates(r))}[/]"
         table.add_row(r.system, *(str(r.counts.get(word, "")) or "" for word in shown), verdict)
     for name in broken:
@@ -88,7 +90,8 @@ def job_summary(results: Sequence[Result], broken: Sequence[str]) -> str:
         "|---|" + "--:|" * len(shown) + "---|",
     ]
     for r in sorted(results, key=lambda r: r.system):
-        verdict = f"{'✅' if r.exit_code == 0 else '❌'} {_inline(r.verdict) or _gates(r)}"
+        mark = "❌" if r.exit_code else "✅" if r.tone in ("", "green") else "⚠️"
+        verdict = f"{mark} {_inline(r.verdict) or _gates(r)}"
         lines.append(f"| {r.system} | {' | '.join([*(str(r.counts.get(w, '')) for w in shown), verdict])} |")
     lines += [f"| {name} | {'| ' * len(shown)}❌ not done |" for name in broken]
     failing = [(r.system, title, reason) for r in results for title, passed, reason in r.gates if not passed]

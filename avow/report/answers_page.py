@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from markupsafe import Markup, escape
 
-from avow.assurance.answers import How, NodeBasis, Supposition, Tone
+from avow.assurance.answers import Headline, How, NodeBasis, Supposition, Tone
 from avow.assurance.changes import baseline_of
 from avow.assurance.first_screen import badness, basis_of
 from avow.assurance.model import Case, Grade, ObligationView
@@ -167,7 +167,7 @@ def _refuted(text: str) -> Markup:
 def render_index(cases: Sequence[Case]) -> str:
     """The page over all systems: a row each, the worst first."""
     ranked = sorted(cases, key=lambda case: (case.good, _ORDER.index(case.answers.tone)))
-    relied = [case for case in cases if case.answers.tone is not Tone.GREY]
+    relied = [case for case in cases if case.answers.headline is not Headline.EXAMINED]
     failing = [case for case in relied if case.answers.tone is Tone.RED]
     if failing:
         line, tone = f"{len(failing)} of {wording.count(len(cases), 'system')} not shown", Tone.RED

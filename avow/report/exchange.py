@@ -52,12 +52,12 @@ def render_junit(case: Case) -> str:
 def _gates_suite(case: Case) -> tuple[str, list[int]]:
     rows, failures = [], 0
     for gate in case.gates:
-        inside = ""
+        inside = '<skipped message="the policy asks nothing here"/>' if gate.idle else ""
         if not gate.passed:
             failures += 1
             inside = f'<failure type="gate" message={_attribute(gate.reason)}>{escape(clean(gate.reason))}</failure>'
         rows.append(_testcase(f"{case.system}.gates", gate.title, 0.0, inside))
-    counts = [len(rows), failures, 0, 0]
+    counts = [len(rows), failures, 0, sum(gate.idle and gate.passed for gate in case.gates)]
     return f'<testsuite name="gates" {_numbers(counts)}>\n{"".join(rows)}</testsuite>\n', counts
 
 
@@ -212,8 +212,8 @@ def render_attestation(case: Case) -> str:
 
 def _statement(case: Case, node: str, views: list[ObligationView], result: str) -> dict[str, Any]:
     subjects = dict(case.digests)
-    if node:
-        subjects |= {p: m for view in views for item in view.counting for p, m in item.entry.evidence.inputs.items()}
+    for record in (item.entry.evidence for view in views for item in view.counting):
+        subjects |= record.inputs  # the programs and data that were verified, beside contract and plan
     if not subjects:
         subjects = {f"ledger/{case.system}": case.ledger_head}
     groups: dict[str, list[str]] = {"passedTests": [], "warnedTests": [], "failedTests": []}

@@ -16,6 +16,7 @@ import pytest
 import yaml
 from assurance.sample import case, evidence, guarantee, node_plan, obligation, rover_case, system
 
+from avow.assurance.answers import Tone
 from avow.assurance.codec import case_schema
 from avow.assurance.model import Case
 from avow.assurance.traceability import COLUMNS, trace
@@ -308,6 +309,8 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
     text = render_index([examined, good])
     assert "None is relied upon" in text, "of a system without requirements nothing is claimed either"
     assert text.count("Examined, not relied upon") == 2
+    assert "WARNED: Examined, not relied upon" in text
+    assert examined.answers.tone is Tone.AMBER
     assert "✔" not in text.split("<main")[0]
     relied = case(system({"n": ["g"]}, requirements=[Requirement("R", "t", None, None, ("n.g",))]), [g], [evidence(g)])
     assert "1 system holds; 1 only examined" in render_index([examined, relied])
