@@ -53,11 +53,16 @@ class Composition:
         return self._answers[goal.name]
 
     def stands(self, goal: Goal, bounds: Bounds) -> Verdict:
-        """Whether a derivation stands, up to its hypotheses: it, and those of the subsystems that it is made of."""
+        """Whether a derivation stands, up to its hypotheses: it, and those of the subsystems that it is made of. Proved
+        is what the kernel establishes."""
         verdicts = {self.settled(part, bounds).verdict for part in goal.inner_first()}
         if Verdict.REFUTED in verdicts:
             return Verdict.REFUTED
-        return Verdict.UNKNOWN if verdicts - {Verdict.PROVED} else Verdict.PROVED
+        if verdicts - {Verdict.PROVED}:
+            return Verdict.UNKNOWN
+        conditions = ((part, str(condition.about)) for part in goal.inner_first() for condition in part.conditions)
+        shown = all(self.certificates.condition(part, about, bounds) is not None for part, about in conditions)
+        return Verdict.PROVED if shown else Verdict.UNKNOWN
 
     @property
     def certificates(self) -> Certificates:

@@ -18,7 +18,7 @@ from avow.base.verdict import Outcome
 from avow.calculus import questions
 from avow.calculus.certificates import Certificates, requirement_scope
 from avow.calculus.composition import Composition, argument, asked, compose
-from avow.calculus.derivation import ClauseName, Goal, Rule, SideCondition
+from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds
 from avow.calculus.hierarchy import innermost
 from avow.calculus.requirements import requirement_question
@@ -101,7 +101,7 @@ def established_key(certificates: Certificates, obligation: str) -> str | None:
         return found.key if found is not None else None
     for goal in certificates.composition.goals:
         for part in goal.root.walk():
-            if part.rule is Rule.R4 and name == f"{goal.name}.loop.{_joined(part.nodes)}":
+            if part.rule is Rule.R4 and name == _loop_name(certificates.composition, goal, part):
                 about = [innermost(str(c.about)) for c in part.side_conditions]
                 each = [certificates.kept_for(goal.name, Claimed.ASSUMPTION, one) for one in about]
                 return questions.loop_key([one for one in each if one is not None]) if all(each) else None
@@ -175,7 +175,7 @@ def _goal_tasks(composition: Composition, goal: Goal) -> Iterator[Task]:
             yield Task(
                 _obligation(
                     frame.system,
-                    f"{goal.name}.loop.{_joined(part.nodes)}",
+                    _loop_name(composition, goal, part),
                     f"{goal.name}: the assumptions around the loop of {_listed(part.nodes)} do not hold up one another",
                     "",
                     sha256(f"loop\n{meanings.all(selected)}\n{argument(composition, goal.name, 'entered')}"),
@@ -378,6 +378,12 @@ def _implication(frame: Frame, condition: SideCondition, given: Mapping[str, _Gi
     parts = [text for p in condition.providers if (text := given[p].clauses)]
     parts += [f"environment {port}" for port in condition.environment]
     return f"{' ∧ '.join(parts)} ⇒ {goal}" if parts else goal
+
+
+def _loop_name(composition: Composition, goal: Goal, part: Derivation) -> str:
+    """What an assumption of a node that is called ``loop`` cannot be called: no name of a node has a hyphen."""
+    word = "loop-of" if "loop" in composition.frame_of(goal).graph.nodes else "loop"
+    return f"{goal.name}.{word}.{_joined(part.nodes)}"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -46,6 +46,7 @@ def command(
     from avow.base.verdict import Verdict
     from avow.base.workspace import system_folder
     from avow.calculus.composition import compose
+    from avow.calculus.discharge import Bounds
     from avow.calculus.obligations import composition_obligations, settle_all
     from avow.system.load import load_path
 
@@ -76,6 +77,10 @@ def command(
         from avow.language.translate import to_rcl
 
         goal = chosen[-1] if goals else composition.whole
+        standing = composition.stands(goal, Bounds(int(seconds * 1000), seed))
+        if standing is not Verdict.PROVED:
+            click.echo(f"{goal.name} is {standing}: no contract follows from it (see `avow compose {path}`)", err=True)
+            return 1
         click.echo(to_rcl(derived_contract(composition, goal)), nl=False)
         return 0
     if goals:  # a derivation stands only with those of the subsystems that it is made of

@@ -28,8 +28,8 @@ class Assumed:
 def initial_condition(system: System, edge: Edge) -> Term | None:
     """What holds of the source's ``out.<port>`` before the first step; None where nothing is said.
 
-    The text is a value of the port's type, or a formula about ``out.<port>`` (and the node's environment inputs, as
-    they are at the first step). Raises Rejected, located.
+    The text is a value of the port's type, or a formula about ``out.<port>`` (and inputs from the environment that the
+    plan says are constant: of one that changes, there is no value before the first step). Raises Rejected, located.
     """
     if edge.initial is None:
         return None
@@ -51,16 +51,18 @@ def initial_condition(system: System, edge: Edge) -> Term | None:
         fed = {c.target.port for c in system.plan.connections if c.target.node == node.name} | _fed_by_names(
             system, node
         )
+        held = {entry.port.partition(".")[2] for entry in system.plan.environment if entry.constant}
         foreign = [
             v
             for v in ports_of(term)
-            if (v.role, v.name) != (Role.OUTPUT, port.name) and (v.role is Role.OUTPUT or v.name in fed)
+            if (v.role, v.name) != (Role.OUTPUT, port.name)
+            and (v.role is Role.OUTPUT or v.name in fed or v.name not in held)
         ]
         if not foreign:
             return term
         message = (
-            f"an initial value may speak of out.{port.name} and of inputs from the environment, "
-            f"not of {foreign[0].qualified}"
+            f"an initial value may speak of out.{port.name} and of constant inputs from the environment, "
+            f"not of {foreign[0].qualified}: what is assumed of that is for `environment:` to say"
         )
         failures.append(Rejected(Diagnostic("PLAN112", message, edge.span)))
     what = "; ".join(d.message for d in failures[0].diagnostics)
