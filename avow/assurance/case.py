@@ -52,10 +52,12 @@ from avow.assurance.model import (
     HypothesisView,
     MethodInfo,
     ObligationView,
+    OpenItem,
     RunInfo,
     ToolInfo,
 )
 from avow.assurance.naming import derivation_claim
+from avow.assurance.programs import shown_by_programs
 from avow.assurance.relied import relied_upon
 from avow.assurance.remarks import remarks
 from avow.assurance.requirement_views import held, requirement_view
@@ -134,6 +136,8 @@ def conclude(facts: Facts) -> Case:
     statuses = {
         o.id: roll_up((e.evidence for e in counting[o.id]), outdated=bool(evidence[o.id])) for o in facts.obligations
     }
+    by_program = shown_by_programs(facts.obligations, statuses, counting)
+    statuses |= {name: status for name, (status, _) in by_program.items()}
     findings = (
         *handle("expected", facts.expected or (), facts.obligations, statuses, counting, facts.today),
         *handle("accepted", facts.accepted, facts.obligations, statuses, counting, facts.today),
@@ -167,7 +171,11 @@ def conclude(facts: Facts) -> Case:
     derived = tuple(_derivation(d, standings, rests, names) for d in facts.derivations)
     grade, reason = _grade(facts, views)
     found = gates(facts, views, requirements, derived, findings, grade)
-    listed = (*open_items(facts, views, requirements, derived, findings), *remarks(facts.sources, views))
+    listed = (
+        *open_items(facts, views, requirements, derived, findings),
+        *(OpenItem("program", name, text, advice=True) for name, (_, text) in by_program.items()),
+        *remarks(facts.sources, views),
+    )
     single = _single(views)
     basis = closure.of(names.every_guarantee()).claims if not closed else {n for c in closed.values() for n in c.claims}
     weakened = weakenings(views, requirements, supposed, listed, findings, relied, single, basis, facts.run.id)

@@ -11,6 +11,10 @@ from avow.base.verdict import Counterexample, Hypothesis, Link, Verdict
 RETRY = "retry"
 """Among the details of an answer that the next run must not be content with: what asked for it was cut short."""
 
+OUTPUT_FOR_EVERY_INPUT = "output for every input"
+"""Among the details of a proof: true where the same program is also proved to have an output for every allowed input,
+so that all its proofs together show that such a program exists."""
+
 REMARKS = "remarks"
 """Among the details: what the method's own check remarks of plan and files, a list of ``{code, place, message}``.
 Nothing fails for it, but who reads the answer should know."""

@@ -68,6 +68,9 @@ class Patience:
         return max(1, int(self.full * share) // (1 if serious else 3))
 
 
+WITHIN = "scenario: inputs and quantified variables have the values that the plan's scenario gives them, and no others"
+
+
 def as_outcome(identity: str, node: str, name: str, result: SanityResult | None) -> Outcome:
     """A result as the outcome of an obligation; None says that there is no such claim."""
     if result is None:
@@ -82,6 +85,7 @@ def as_outcome(identity: str, node: str, name: str, result: SanityResult | None)
         result.verdict,
         result.explanation or _SUMMARY[result.verdict],
         result.counterexample,
+        (WITHIN,) if result.bounded else (),
         bound={"scenario": True} if result.bounded else {},
         details=details,
     )

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 from avow.backend_kit.protocol import Limits
 from avow.base.verdict import Verdict
+from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.language.contract import Node
 
 from .answer import Member
@@ -113,6 +114,7 @@ def _verdict(
     if environment != "true":
         added = (f"added assumption of the implementation, Env: {environment}",)
         summary += " and Env"
+    details[OUTPUT_FOR_EVERY_INPUT] = True  # what Env leaves out is a hypothesis
     return Settled(Verdict.PROVED, summary, added, details)
 
 

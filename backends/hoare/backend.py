@@ -14,6 +14,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evidence.obligation import Obligation
+from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.values import show as show_value
 from avow.language.terms import FALSE, TRUE, Not, Role, Variable
@@ -193,7 +194,7 @@ def settle(job: Job, limits: Limits) -> Report:
             worse = {*GIVEN, Verdict.UNKNOWN}
         else:
             worse = set(GIVEN) if running.verdict is not Verdict.PROVED else set()
-        outcomes = tuple(_stopped(o, running, work) if o.verdict in worse else o for o in outcomes)
+        outcomes = tuple(_stopped(o, running, work) if o.verdict in worse else _total(o) for o in outcomes)
     return Report(outcomes, "weakest preconditions", version, logs=logs)
 
 
@@ -293,6 +294,13 @@ def _every_run(work: Work, limits: Limits) -> Settled:
 
 def _holds(condition: Condition, settler: Settler, deadline: float) -> bool:
     return settler.proves(condition.hypotheses, condition.goal, timeout_ms=_left(deadline))
+
+
+def _total(outcome: Outcome) -> Outcome:
+    """A proof that stands also says, of the same program, that it has an output for every input."""
+    if outcome.verdict is not Verdict.PROVED:
+        return outcome
+    return replace(outcome, details={**outcome.details, OUTPUT_FOR_EVERY_INPUT: True})
 
 
 def _stopped(outcome: Outcome, running: Settled, work: Work) -> Outcome:
