@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from datetime import date
@@ -81,10 +83,19 @@ def reviewers(evidence: Evidence) -> tuple[str, ...]:
     return ()
 
 
+def person(name: str) -> str:
+    """One spelling of a name: case, accents, punctuation and the order of its parts make no other person; neither does
+    an initial in place of a first name, so that of several first names only initials count."""
+    plain = "".join(c for c in unicodedata.normalize("NFKD", name.casefold()) if not unicodedata.combining(c))
+    family, comma, given = plain.partition(",")
+    words = re.findall(r"\w+", f"{given} {family}" if comma else plain)
+    return " ".join((words[0][:1], words[-1])) if len(words) > 1 else " ".join(words)
+
+
 def _persons(evidence: Iterable[Evidence], demand: Demand, policy: Policy, today: date) -> set[str]:
     """Whoever reviewed the claim, in one record or in several that each count; a name is one however it is spelled."""
     return {
-        " ".join(name.casefold().replace(".", " ").split())
+        person(name)
         for item in evidence
         if weigh(item).support is Status.REVIEWED and _disregarded(item, demand, policy, today) is None
         for name in reviewers(item)
@@ -107,9 +118,11 @@ def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) ->
     support = weigh(item).support
     if support is None:
         return None
+    age = age_days(item, today)
+    if age is not None and age < -1:  # a clock of another zone may be a day ahead
+        return "dated in the future"
     limit = demand.max_age(support)
     if limit is not None:
-        age = age_days(item, today)
         if age is None or age > limit:
             return f"{'of unknown age' if age is None else f'{age} days old'}, at most {limit} are allowed"
         if age < 0:

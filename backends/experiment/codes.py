@@ -25,6 +25,19 @@ CODES = register(
         "Give it in a unit of the same kind.",
     ),
     declare(
+        "EXP105",
+        "claimed rate too low",
+        "The success rate that is claimed is below the least one of the node's criticality.",
+        "Claim what the criticality asks for: 0.9 at high, 0.8 at medium, 0.5 at low.",
+    ),
+    declare(
+        "EXP106",
+        "numbers in the measure",
+        "A number in the measure scales or shifts what is compared with the contract's tolerance.",
+        "Measure what the guarantee speaks of; convert units by `unit` and by a figure with a unit in `within`.",
+        warning=True,
+    ),
+    declare(
         "EXP111",
         "no table of runs",
         "The file is no CSV in UTF-8 with a line of column names and at least one run.",

@@ -52,6 +52,8 @@ class Expression:
     columns: tuple[str, ...]
     evaluate: Callable[[Mapping[str, Fraction]], Interval]
     """Raises ZeroDivisionError, and ValueError for a root of a negative number."""
+    numbers: tuple[str, ...] = ()
+    """Those that stand in it: a factor or an offset moves the tolerance."""
 
 
 def parse(text: str) -> Expression:
@@ -61,7 +63,7 @@ def parse(text: str) -> Expression:
     parser = _Parser(text)
     value = parser.sum(0)
     parser.end()
-    return Expression(text, tuple(dict.fromkeys(parser.columns)), value)
+    return Expression(text, tuple(dict.fromkeys(parser.columns)), value, tuple(parser.numbers))
 
 
 _Eval = Callable[[Mapping[str, Fraction]], Interval]
@@ -132,6 +134,7 @@ class _Parser:
     def __init__(self, text: str) -> None:
         self.text = text
         self.columns: list[str] = []
+        self.numbers: list[str] = []
         self.tokens: list[tuple[str, str, int]] = []
         position = 0
         while text[position:].strip():
@@ -193,6 +196,7 @@ class _Parser:
         kind, text, position = self.take()
         if kind == "number":
             constant = Interval.of(Fraction(text))
+            self.numbers.append(text)
             return lambda _row: constant
         if kind != "name":
             found = repr(text) if text else "the end"
@@ -205,10 +209,13 @@ class _Parser:
     def call(self, name: str, position: int, depth: int) -> _Eval:
         if name not in FUNCTIONS:
             raise Malformed(f"no function '{name}'; there are {', '.join(sorted(FUNCTIONS))}", position)
+        read, numbers = len(self.columns), len(self.numbers)
         arguments = [self.sum(depth + 1)]
         while self.accept(","):
             arguments.append(self.sum(depth + 1))
         self.expect(")")
+        if name == "min" and len(self.numbers) > numbers and len(self.columns) > read:
+            raise Malformed("a measure is not clamped: 'min' with a number makes any run a success", position)
         function, least, greatest = FUNCTIONS[name]
         if not least <= len(arguments) <= greatest:
             wanted = str(least) if least == greatest else f"{least} to {greatest}"

@@ -61,6 +61,10 @@ class Experiment:
     protocol: str
 
 
+FLOORS = {"high": Fraction(9, 10), "medium": Fraction(4, 5), "low": Fraction(1, 2)}
+"""Criticality of the node → the least success rate that may be claimed."""
+
+
 @dataclass(slots=True)
 class Problems:
     """Collects what is wrong, each with its place in the plan."""
@@ -92,6 +96,13 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
             "at_least",
             "the claimed probability of success must lie between 0 and 1",
             "no finite number of runs shows a certainty; leave 'at_least' out to demand that no run fails",
+        )
+    floor = FLOORS[job.system.plan.node(job.node.name).criticality or "medium"]
+    if at_least is not None and 0 < at_least < floor:
+        problems.add(
+            "at_least",
+            f"a success rate of {float(at_least):g} is too little at this criticality: {float(floor):g} at least",
+            code="EXP105",
         )
     id_column = _text(problems, "run_column") or None
     protocol = _text(problems, "protocol")
@@ -141,7 +152,10 @@ def _measure(problems: Problems, wanted: bool) -> Expression | None:
         problems.add("measure", "'measure' must be text")
         return None
     try:
-        return parse(text)
+        found = parse(text)
+        if not found.columns:
+            problems.add("measure", "the measure reads no column: it is the same for every run", code="EXP103")
+        return found
     except Malformed as error:
         problems.add("measure", f"character {error.position + 1} of the measure: {error.message}", code="EXP103")
         return None

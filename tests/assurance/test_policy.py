@@ -356,3 +356,11 @@ def test_a_method_that_gave_no_answer_is_seen_to_first() -> None:
     given_up = step(Verdict.UNKNOWN, "its condition was never met " * 20)
     assert "; or see why `hypothesis` gave up: its condition was never met" in given_up
     assert given_up.endswith("…")
+
+
+def test_one_person_under_several_spellings_is_one_reviewer() -> None:
+    from avow.assurance.gap import person
+
+    same = ["A. Müller", "Anna Müller", "anna muller", "Müller, Anna", "Anna-Maria Müller", "MÜLLER, A."]
+    assert len({person(name) for name in same}) == 1
+    assert len({person(name) for name in ("A. Müller", "B. Müller", "A. Maier")}) == 3

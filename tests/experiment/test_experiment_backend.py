@@ -54,8 +54,33 @@ def test_the_tolerance_may_be_a_constant_or_have_a_unit(make_job: Callable[..., 
 
 
 def test_the_pipelines_own_options_are_not_ours(make_job: Callable[..., Any], tmp_path: Path) -> None:
-    (tmp_path / "runs.csv").write_text(rows(*["0.1"] * 47))
+    (tmp_path / "runs.csv").write_text(rows(*[f"0.1{n:02}" for n in range(47)]))
     assert BACKEND.check(make_job(**GOOD, id="x", guarantees=["arrives"], seconds=5, megabytes=9, seed=1)) == ()
+
+
+def test_equal_runs_are_told_at_any_width(make_job: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "runs.csv").write_text(rows(*["0.1"] * 47))
+    (told,) = BACKEND.check(make_job(**GOOD))
+    assert told.code == "EXP115"
+    assert "46 runs" in told.message
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        ({"measure": "min(d, 0.2)"}, "EXP103"),
+        ({"measure": "min(0.1 * d, 9)"}, "EXP103"),
+        ({"measure": "0.1"}, "EXP103"),
+        ({"measure": "d / 10"}, "EXP106"),
+        ({"measure": "abs(d - 0.1)"}, "EXP106"),
+        ({"at_least": 0.1}, "EXP105"),
+    ],
+)
+def test_what_would_flatter_is_refused_or_told(
+    make_job: Callable[..., Any], tmp_path: Path, options: dict[str, Any], code: str
+) -> None:
+    (tmp_path / "runs.csv").write_text(rows(*[f"0.1{n:02}" for n in range(47)]))
+    assert code in {d.code for d in BACKEND.check(make_job(**{**GOOD, **options}))}
 
 
 def test_one_failing_run_refutes_and_is_named(make_job: Callable[..., Any], tmp_path: Path) -> None:
