@@ -102,9 +102,18 @@ def system_folder(name: str) -> Path:
     )
 
 
-def require_systems(place: Workspace, names: Iterable[str]) -> None:
-    """Raises Rejected for a name that no system of the workspace has."""
+def require_systems(place: Workspace, names: Iterable[str]) -> tuple[str, ...]:
+    """The systems' names, each given as its name or its folder. Raises Rejected for one that is not there."""
     known = [p.name for p in place.systems()]
-    for name in names:
+    found = tuple(name_of(place, name) for name in names)
+    for name in found:
         if name not in known:
             raise Rejected(Diagnostic("CLI002", f"there is no system '{name}'", hint=f"known: {', '.join(known)}"))
+    return found
+
+
+def name_of(place: Workspace, name: str) -> str:
+    """A system's name, where its folder in ``contracts/`` may be given; anything else as it stands."""
+    path = Path(name)
+    inside = path.is_dir() and path.resolve().parent == place.contracts.resolve()
+    return path.resolve().name if inside else name

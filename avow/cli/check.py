@@ -43,7 +43,7 @@ def command(
     from avow import __version__
     from avow.base.rendering import render, summary, to_json, to_sarif
 
-    paths = tuple(path.parent if path.name == "plan.yaml" else path for path in paths)  # the system that it plans
+    paths = tuple(map(_folder, paths))
     found: list[Diagnostic] = []
     files = 0
     for group, group_off in _groups(paths, separately, found):
@@ -65,6 +65,19 @@ def command(
             _explain(found)
         click.echo(f"{files} file{'' if files == 1 else 's'}: {summary(found)}")
     return 2 if any(d.is_error for d in found) else 0
+
+
+def _folder(path: Path) -> Path:
+    """A plan stands for its system, and a system's name for its folder."""
+    if path.name == "plan.yaml":
+        return path.parent
+    from avow.base.workspace import find_workspace
+
+    if len(path.parts) == 1 and not path.suffix and not path.exists():
+        place = find_workspace(Path.cwd().resolve())
+        if place is not None and (place.contracts / path).is_dir():
+            return place.contracts / path
+    return path
 
 
 def _explain(found: list[Diagnostic]) -> None:

@@ -28,10 +28,22 @@ def task_avow():
 '''
 
 
+_MONITOR = """\
+      - rosmonitoring:                 # a recorded run; `avow monitor --help` tells how to make one of a bag
+          ros_version: {}
+          traces: [traces/morning.jsonl]
+          mapping: {{in.temperature: data, out.mode: data}}
+"""
+
+
 @click.command()
 @click.argument("directory", type=PathArgument(file_okay=False))
-def command(directory: Path) -> int:
-    """Make DIRECTORY a workspace with one system that verifies. Nothing that exists is overwritten."""
+@click.option("--template", type=click.Choice(["ros1", "ros2", "plain"]), default="plain", show_default=True)
+def command(directory: Path, template: str) -> int:
+    """Make DIRECTORY a workspace with one system that verifies. Nothing that exists is overwritten.
+
+    With a template for ROS it is a package, too, whose test runs `avow verify`, and a monitor judges a recorded run.
+    """
     from importlib import resources
 
     from avow.base.diagnostics import Diagnostic, Rejected
@@ -41,11 +53,15 @@ def command(directory: Path) -> int:
         raise Rejected(
             Diagnostic("CLI007", f"{directory} is not empty", hint="give the name of a new folder, or of an empty one")
         )
-    template = Path(str(resources.files("avow.cli") / "template"))
-    for source in sorted(template.rglob("*")):
-        if source.is_file() and "__pycache__" not in source.parts:
-            name = source.relative_to(template)
-            write(directory / (".gitignore" if name.name == "gitignore.txt" else name), source.read_bytes())
+    for part in ("template", *(("template_ros",) if template != "plain" else ())):
+        origin = Path(str(resources.files("avow.cli") / part))
+        for source in sorted(origin.rglob("*")):
+            if source.is_file() and "__pycache__" not in source.parts:
+                name = source.relative_to(origin)
+                write(directory / (".gitignore" if name.name == "gitignore.txt" else name), source.read_bytes())
+    if template != "plain":
+        plan = directory / "contracts/thermostat/plan.yaml"
+        write(plan, plan.read_text("utf-8").replace("\n\npolicy:", f"\n{_MONITOR.format(template)}\npolicy:"))
     write(directory / "dodo.py", _DODO)
     for folder in ("artifacts", "reports"):
         write(directory / folder / "README.md", f"Made by `doit verify`: see Avow's documentation of {folder}/.\n")

@@ -10,7 +10,7 @@ from avow.assurance.codec import read_case
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.workspace import Workspace
+from avow.base.workspace import Workspace, name_of
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.heads import Anchor, Index, index_path, read_index, stated_heads
 from avow.evidence.ledger import Ledger
@@ -24,6 +24,7 @@ def ledger_names(place: Workspace, wanted: Sequence[str], anchors: Sequence[Anch
     Rejected for one that never had any."""
     there = [path.stem for path in place.ledgers.glob("*.jsonl")] if place.ledgers.is_dir() else []
     known = sorted({*there, *_index(place).systems, *(anchor.system for anchor in anchors)})
+    wanted = [name_of(place, name) for name in wanted]
     for name in wanted:
         if name not in known:
             raise Rejected(_unknown(f"there is no ledger of a system '{name}'", name, known))

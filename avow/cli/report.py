@@ -30,7 +30,7 @@ def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
     from avow.pipeline.tasks import execute
 
     place = workspace()
-    require_systems(place, systems)
+    systems = require_systems(place, systems)
     return execute(place.root, [f"report:{name}" for name in systems] or ["report"])
 
 

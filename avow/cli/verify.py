@@ -25,7 +25,7 @@ def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool, san
     from avow.pipeline.tasks import execute
 
     place = workspace()
-    require_systems(place, systems)
+    systems = require_systems(place, systems)
     if fresh:
         os.environ[FRESH] = "1"
     if sandbox:

@@ -1,0 +1,84 @@
+"""The worked examples verify, as a reader of docs/examples would do it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "docs/examples"
+VERDICTS = {
+    "warehouse": "Holds if 2 suppositions hold",
+    "ventilator": "Holds",
+    "geofence": "Holds if 2 suppositions hold",
+}
+
+
+def avow(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "avow.cli", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, check=False)
+
+
+def test_every_example_is_in_the_gallery() -> None:
+    folders = {path.parent.name for path in EXAMPLES.glob("*/plan.yaml")}
+    assert folders == set(VERDICTS)
+    page = (EXAMPLES / "README.md").read_text()
+    assert all(f"[{name}]({name}/system.rcl)" in page for name in folders)
+
+
+def test_the_draft_has_a_conflict_and_the_rest_no_fault() -> None:
+    done = avow("sanity", "docs/examples/ventilator/conflict.rcl", cwd=ROOT)
+    assert done.returncode == 1
+    assert "no output meets relief and off" in " ".join(done.stdout.split())
+    found = avow("check", *(f"docs/examples/{name}/plan.yaml" for name in VERDICTS), cwd=ROOT)
+    assert (found.returncode, "warning" in found.stderr + found.stdout) == (0, False), found.stderr
+
+
+@pytest.mark.slow
+def test_the_examples_verify(tmp_path: Path) -> None:
+    assert avow("init", "robot", cwd=tmp_path).returncode == 0
+    place = tmp_path / "robot"
+    for name in VERDICTS:
+        shutil.copytree(EXAMPLES / name, place / "contracts" / name)
+    done = avow("verify", cwd=place)
+    assert done.returncode == 0, done.stdout + done.stderr
+    for name, verdict in VERDICTS.items():
+        case = json.loads((place / "reports" / name / "report.json").read_text())
+        assert case["answers"]["verdict"] == verdict, name
+
+
+@pytest.mark.parametrize("template", ["ros1", "ros2"])
+def test_a_package_for_ros_has_a_test_and_a_monitor(template: str, tmp_path: Path) -> None:
+    from xml.etree import ElementTree
+
+    assert avow("init", "robot", "--template", template, cwd=tmp_path).returncode == 0
+    place = tmp_path / "robot"
+    assert ElementTree.parse(place / "package.xml").findtext("name") == "robot_contracts"
+    for name in ("package.xml", "CMakeLists.txt"):
+        assert (place / name).read_text() == (ROOT / "docs/adoption/ros" / name).read_text()
+    plan = (place / "contracts/thermostat/plan.yaml").read_text()
+    assert f"ros_version: {template}" in plan
+    found = avow("check", "thermostat", cwd=place)
+    assert found.returncode == 0, found.stderr + found.stdout
+
+
+def test_the_files_for_other_tools_are_well_formed() -> None:
+    import yaml
+
+    kit = ROOT / "docs/adoption"
+    for name in ("github.yaml", "gitlab.yaml"):
+        assert "avow" in str(yaml.safe_load((kit / name).read_text()))
+    hooks = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
+    for hook in hooks:
+        words = hook["entry"].split()
+        assert avow(words[1], "--help", cwd=ROOT).returncode == 0
+    for path in (kit / "vscode").rglob("*.json"):
+        json.loads(path.read_text())
+    page = (ROOT / "docs/adoption.md").read_text()
+    linked = [part.split(")")[0] for part in page.split("](")[1:]]
+    assert all((ROOT / "docs" / link).exists() for link in linked)
