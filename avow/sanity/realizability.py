@@ -113,7 +113,21 @@ def _at_a_point(asked: Question, group: Group) -> Realizability | None:
     answer = search.decide(asked.doubtful)
     if answer.verdict is Verdict.UNKNOWN:
         return None
-    return replace(answer, inputs={v: value for v, value in answer.inputs.items() if v not in there.point})
+    at = {v: value for v, value in answer.inputs.items() if v not in there.point}
+    return _unless_an_output(asked, group, replace(answer, inputs=at))
+
+
+def _unless_an_output(asked: Question, group: Group, answer: Realizability) -> Realizability | None:
+    """A refutation that was found of other formulas is asked about once more as the contract has them, with its inputs
+    as constants; None where an output is found there after all, which takes it back."""
+    if answer.verdict is not Verdict.REFUTED:
+        return answer
+    there = Search((), group, {}, answer.inputs, _AGAIN_MS, asked.seed).decide()
+    return None if there.verdict is Verdict.PROVED else answer
+
+
+_AGAIN_MS = 500
+"""For a question that should only confirm an answer."""
 
 
 def _with_items(asked: Question) -> Realizability | None:
@@ -136,8 +150,9 @@ def _with_items(asked: Question) -> Realizability | None:
     )
     if answer.verdict is not Verdict.REFUTED:
         return answer if answer.verdict is Verdict.PROVED else None
-    labels = tuple(asked.group(answer.group).guarantees)
-    return replace(answer, inputs=apart.values(asked.inputs, answer.inputs), group=labels)
+    group = asked.group(answer.group)
+    at = apart.values(asked.inputs, answer.inputs)
+    return _unless_an_output(asked, group, replace(answer, inputs=at, group=tuple(group.guarantees)))
 
 
 def _with_functions(asked: Question) -> Realizability | None:

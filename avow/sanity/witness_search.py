@@ -26,6 +26,9 @@ _PATIENT_MS = 300
 _TRIES = 6
 """So many inputs for which there is an output after all, one after the other, and something else is tried."""
 
+_BRIEFLY_MS = 300
+"""For a check of what is believed anyway."""
+
 Formulas = Mapping[str, Term]
 Given = Mapping[Variable, Value]
 
@@ -161,9 +164,16 @@ class Search:
             if stronger != whole and (stronger, few) not in tried:
                 tried.append((stronger, few))
                 answer = self._prove(stronger, limit // 3, few)
-                if answer is not None:
+                if answer is not None and not self._weakened(stronger, whole):
                     return answer
         return None
+
+    def _weakened(self, stronger: Sequence[Term], whole: Sequence[Term]) -> bool:
+        """Whether some guarantee that was proved in the place of another is shown not to imply it, by a question of its
+        own: then the proof shows nothing."""
+        pairs = [(one, other) for one, other in zip(stronger, whole, strict=True) if one != other]
+        limit = max(50, min(_BRIEFLY_MS, self.left()))
+        return any(entails([one], other, timeout_ms=limit).verdict is Verdict.REFUTED for one, other in pairs)
 
     def _prove(self, guarantees: Sequence[Term], limit: int, few: int | None = None) -> Realizability | None:
         translator = Translator()
