@@ -41,7 +41,7 @@ def baseline_of(case: Case, name: str = "", who: str = "", signed_on: str = "", 
 
 def content_of(of: Baseline) -> str:
     """SHA-256 of all that a signature speaks of: verdict, requirements, evidence, suppositions, weakenings."""
-    from avow.evidence.encoding import canonical
+    from avow.base.codec import canonical
 
     return digest(
         canonical(

@@ -12,8 +12,8 @@ from avow.assurance.answers import Baseline
 from avow.assurance.changes import baseline_of, content_of
 from avow.assurance.codec import baseline_from_json, baseline_to_json
 from avow.assurance.model import Case
+from avow.base.codec import Unreadable
 from avow.base.files import read_regular, write
-from avow.evidence.encoding import Unreadable
 from avow.evidence.envelope import Opened, seal, unseal
 
 PREDICATE = "https://avow.invalid/signed-case/v1"

@@ -25,9 +25,9 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
+from avow.base.codec import canonical
 from avow.base.files import digest, read_regular
 from avow.evidence.appending import append, locked
-from avow.evidence.encoding import canonical
 
 GENESIS = "0" * 64
 """What the first record of a chain follows."""

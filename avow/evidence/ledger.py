@@ -21,10 +21,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from avow.base.codec import Unreadable, canonical
 from avow.base.files import digest, read_regular, write
 from avow.base.verdict import Verdict
 from avow.evidence.appending import append, locked, open_file
-from avow.evidence.encoding import Unreadable, canonical, decode, encode
+from avow.evidence.encoding import decode, encode
 from avow.evidence.heads import GENESIS as GENESIS
 from avow.evidence.heads import Event, index_path, note
 from avow.evidence.record import CASE, Evidence

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from avow.base.codec import LATER
 from avow.base.verdict import Counterexample, Hypothesis, Link, Verdict
 
 RETRY = "retry"
@@ -59,5 +60,5 @@ class Evidence:
     vacuous: bool = False
     run: str = ""
     """Id of the run that produced it."""
-    rests_on: tuple[Hypothesis, ...] = ()
+    rests_on: tuple[Hypothesis, ...] = field(default=(), metadata=LATER)
     """What the answer rests on: claims of the case, and suppositions that a person has to accept."""

@@ -6,10 +6,10 @@ import json
 import os
 import subprocess
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from pathlib import Path
-from typing import Any
 
 from doit.exceptions import TaskError
 
@@ -17,6 +17,7 @@ from avow import __version__
 from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
 from avow.assurance.signed import KEYS
 from avow.backend_kit.registry import backend, names
+from avow.base import codec
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest, digest_file, is_intact
 from avow.base.notes import read_note, write_note
@@ -30,7 +31,7 @@ from avow.pipeline import check as checking
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
 from avow.pipeline.recheck import counting_now
-from avow.pipeline.results import Result, read_result
+from avow.pipeline.results import Result
 from avow.pipeline.run_info import EXPLAIN, Run
 from avow.pipeline.state import State
 from avow.pipeline.workload import Survey
@@ -94,8 +95,8 @@ def render(assessment: Assessment) -> Result:
     key = _key(assessment)
     known = _read(assessment)
     root = assessment.workspace.root
-    if known is not None and known["key"] == key and all(is_intact(root / p, sha) for p, sha in known["files"].items()):
-        result = read_result(known)
+    if known is not None and known.key == key and all(is_intact(root / p, sha) for p, sha in known.files.items()):
+        result = known.result
     else:
         from avow.report import render_all
 
@@ -103,7 +104,7 @@ def render(assessment: Assessment) -> Result:
         rendered = render_all(case, assessment.workspace.report(assessment.system))
         result = _summarise(assessment, case, rendered.left_out)
         files = {assessment.workspace.relative(p): digest_file(p) for p in rendered.written}
-        write_note(assessment.stamp, {"key": key, "files": files, **result.json()})
+        write_note(assessment.stamp, codec.to_json(Rendering(key, files, result)))
         assessment.state.changed.append(assessment.system)
     confirm(assessment.workspace, ledger)
     return result
@@ -262,10 +263,17 @@ def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, st
     )
 
 
-def _read(assessment: Assessment) -> dict[str, Any] | None:
-    data = read_note(assessment.stamp)
+@dataclass(frozen=True, slots=True)
+class Rendering:
+    """What was rendered last: of what, which files with which digests, and what the terminal shows of it."""
+
+    key: str
+    files: Mapping[str, str]
+    result: Result
+
+
+def _read(assessment: Assessment) -> Rendering | None:
     try:
-        read_result(data or {})
-    except (ValueError, KeyError, TypeError):
+        return codec.from_json(Rendering, read_note(assessment.stamp))
+    except codec.Unreadable:
         return None
-    return data if data and isinstance(data.get("files"), dict) else None

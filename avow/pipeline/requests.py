@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from avow.backend_kit.protocol import Limits, Report
+from avow.base.codec import Unreadable, from_json, to_json
 from avow.pipeline.mutant_systems import Altered
-from avow.pipeline.wire import report_from_json, report_to_json
 
 _TEXTS = ("system", "node", "method", "engine", "home", "root", "folder")
 
@@ -105,7 +105,7 @@ def read_request(data: bytes) -> Request:
 def response_bytes(response: Response) -> bytes:
     body = {
         "request": response.request,
-        "report": report_to_json(response.report) if response.report else None,
+        "report": to_json(response.report) if response.report else None,
         "refused": response.refused,
         "worker": response.worker,
         "cpu": response.cpu,
@@ -124,11 +124,11 @@ def read_response(data: object, asked: bytes) -> Response:
         if hashlib.sha256(text.encode()).hexdigest() != outer["sha256"]:
             raise Unanswered("its digest is not that of what it says")
         said: dict[str, Any] = json.loads(text)
-        report = report_from_json(said["report"]) if said["report"] is not None else None
+        report = from_json(Report, said["report"]) if said["report"] is not None else None
         found = Response(said["request"], report, str(said["refused"]), str(said["worker"]), float(said["cpu"]))
     except Unanswered:
         raise
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
+    except (Unreadable, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         raise Unanswered(f"{type(error).__name__}: {error}"[:300]) from error
     if found.request != request_digest(asked):
         raise Unanswered("it answers another request")

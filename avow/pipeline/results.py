@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,36 +25,6 @@ class Result:
     """The verdict's colour: what is known to be bad is amber, and what nothing is asked of is grey."""
     lines: tuple[str, ...] = ()
     """The five answers, for a terminal."""
-
-    def json(self) -> dict[str, Any]:
-        return {
-            "system": self.system,
-            "exit_code": self.exit_code,
-            "counts": dict(self.counts),
-            "grade": self.grade,
-            "report": self.report,
-            "gates": [list(g) for g in self.gates],
-            "left_out": [list(pair) for pair in self.left_out],
-            "verdict": self.verdict,
-            "tone": self.tone,
-            "lines": list(self.lines),
-        }
-
-
-def read_result(data: Mapping[str, Any]) -> Result:
-    """Raises KeyError, TypeError or ValueError for what `Result.json` did not make."""
-    return Result(
-        data["system"],
-        data["exit_code"],
-        data["counts"],
-        data["grade"],
-        data["report"],
-        tuple((title, passed, reason) for title, passed, reason in data["gates"]),
-        tuple((name, why) for name, why in data["left_out"]),
-        data["verdict"],
-        data["tone"],
-        tuple(data["lines"]),
-    )
 
 
 @dataclass(slots=True)

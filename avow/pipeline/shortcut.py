@@ -18,11 +18,12 @@ from datetime import datetime
 from pathlib import Path
 
 import avow.backends
+from avow.base import codec
 from avow.base.notes import read_note, write_note
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
 from avow.isolation.observed import Observed, Seen, from_json, look, to_json
-from avow.pipeline.results import Result, read_result
+from avow.pipeline.results import Result
 from avow.pipeline.run_info import EXPLAIN, FRESH
 
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX)
@@ -47,11 +48,11 @@ class Shortcut:
             return None
         try:
             kept = read_note(_stamp(self.workspace)) or {}
-            results = tuple(read_result(r) for r in kept["results"])
+            results = tuple(codec.from_json(Result, r) for r in kept["results"])
             observed = from_json(kept["observed"])
             if kept["identity"] != _identity(self.workspace, observed):
                 return None
-        except (OSError, ValueError, KeyError, TypeError):
+        except (codec.Unreadable, OSError, ValueError, KeyError, TypeError):
             return None
         names = {r.system for r in results}
         asked = {name.partition(":")[2] for name in wanted}
@@ -67,7 +68,7 @@ class Shortcut:
             kept = {
                 "identity": _identity(self.workspace, observed),
                 "observed": to_json(observed),
-                "results": [r.json() for r in results],
+                "results": codec.to_json(tuple(results)),
             }
             write_note(_stamp(self.workspace), kept)
         except OSError:

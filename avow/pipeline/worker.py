@@ -20,6 +20,7 @@ from pathlib import Path
 from avow.backend_kit.protocol import Report
 from avow.backend_kit.registry import trust_plugins
 from avow.base import process
+from avow.base.codec import from_json, to_json
 from avow.base.diagnostics import Rejected
 from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
@@ -43,7 +44,6 @@ from avow.pipeline.requests import (
     response_bytes,
 )
 from avow.pipeline.slices import ComposeSlice, MethodSlice, SanitySlice, Slice
-from avow.pipeline.wire import report_from_json, report_to_json
 from avow.pipeline.work import (
     COMPOSE,
     SANITY,
@@ -90,10 +90,10 @@ def answer(asked: bytes) -> bytes:
         if process.ended_by_others():
             report = replace(report, outcomes=tuple(map(_asked_again, report.outcomes)))
         process.end_orphans()  # nothing that a tool or a subject left running outlives its answer
-        told = json.dumps(report_to_json(report), default=str).replace(f"{place}/", "")
+        told = json.dumps(to_json(report), default=str).replace(f"{place}/", "")
         spent = os.times()
         cpu = spent.user + spent.system + spent.children_user + spent.children_system
-    return response_bytes(Response(digest, report_from_json(json.loads(told)), "", platform.node(), round(cpu, 3)))
+    return response_bytes(Response(digest, from_json(Report, json.loads(told)), "", platform.node(), round(cpu, 3)))
 
 
 def _asked_again(outcome: Outcome) -> Outcome:

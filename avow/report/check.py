@@ -16,8 +16,8 @@ from pathlib import Path
 from avow.assurance.case import conclude_again
 from avow.assurance.codec import from_json, to_json
 from avow.assurance.model import Case
+from avow.base.codec import Unreadable
 from avow.base.files import digest, digest_file
-from avow.evidence.encoding import Unreadable
 from avow.evidence.ledger import Ledger
 from avow.report import LeftOut, formats
 

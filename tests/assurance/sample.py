@@ -10,10 +10,11 @@ from typing import Any
 
 from avow.assurance.case import build_case
 from avow.assurance.model import Case, Derivation, MethodInfo, RunInfo, SideCondition, ToolInfo
+from avow.base.codec import canonical
 from avow.base.diagnostics import Span
 from avow.base.files import digest
 from avow.base.verdict import Counterexample, Link, Verdict
-from avow.evidence.encoding import canonical, encode
+from avow.evidence.encoding import encode
 from avow.evidence.ledger import GENESIS, Entry
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.record import Evidence

@@ -26,11 +26,11 @@ from assurance.sample import (
 from avow.assurance.case import conclude_again
 from avow.assurance.codec import case_schema, evidence_schema, from_json, to_json
 from avow.assurance.model import Case, Currency, Derivation, Grade, SideCondition
+from avow.base.codec import Unreadable
 from avow.base.diagnostics import Span
 from avow.base.files import digest
 from avow.base.verdict import Verdict
 from avow.evidence.audit import Discrepancy, Fault
-from avow.evidence.encoding import Unreadable
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
 from avow.system.plan import Finding, Requirement

@@ -19,9 +19,10 @@ import pytest
 from assurance.sample import chain, evidence
 
 from avow.assurance.codec import evidence_schema
+from avow.base.codec import Unreadable
 from avow.base.verdict import Counterexample, Verdict
 from avow.evidence import ledger as module
-from avow.evidence.encoding import Unreadable, decode, encode
+from avow.evidence.encoding import decode, encode
 from avow.evidence.ledger import GENESIS, Ledger
 from avow.evidence.record import Evidence
 

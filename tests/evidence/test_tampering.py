@@ -19,11 +19,11 @@ import pytest
 from assurance.sample import METHODS as METHOD_INFOS
 from assurance.sample import case, evidence, guarantee, key_of, system
 
+from avow.base.codec import canonical
 from avow.base.files import digest
 from avow.base.verdict import Verdict
 from avow.evidence.audit import Discrepancy, audit
 from avow.evidence.continuity import continuity
-from avow.evidence.encoding import canonical
 from avow.evidence.heads import GENESIS, Event, index_path, note, read_index
 from avow.evidence.ledger import Ledger
 from avow.evidence.record import Evidence

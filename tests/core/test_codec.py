@@ -1,0 +1,126 @@
+"""One way from dataclasses to JSON and back: nothing is guessed, and the text for digests does not move."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avow.base.codec import LATER, Unreadable, canonical, from_json, schema, to_json
+
+
+class Colour(StrEnum):
+    RED = "red"
+    BLUE = "blue"
+
+
+@dataclass(frozen=True, slots=True)
+class Inner:
+    """One."""
+
+    name: str
+    at: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Outer:
+    """All kinds of fields."""
+
+    colour: Colour
+    weight: float
+    flag: bool
+    pairs: tuple[tuple[str, int], ...]
+    inner: Inner | None
+    inners: tuple[Inner, ...]
+    words: Mapping[str, str]
+    free: Mapping[str, Any] = field(default_factory=dict)
+    new: tuple[Inner, ...] = field(default=(), metadata=LATER)
+
+
+inner = st.builds(Inner, st.text(), st.none() | st.integers())
+outer = st.builds(
+    Outer,
+    st.sampled_from(Colour),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.booleans(),
+    st.lists(st.tuples(st.text(), st.integers())).map(tuple),
+    st.none() | inner,
+    st.lists(inner).map(tuple),
+    st.dictionaries(st.text(), st.text()),
+    st.dictionaries(st.text(), st.none() | st.integers() | st.lists(st.text())),
+    st.lists(inner).map(tuple),
+)
+ONE = Outer(Colour.RED, 1.5, True, (("a", 1),), Inner("x", 2), (Inner("y"),), {"k": "v"}, {"z": [1]}, (Inner("n"),))
+
+
+@given(outer)
+def test_there_and_back(value: Outer) -> None:
+    text = canonical(to_json(value))
+    assert from_json(Outer, json.loads(text)) == value
+    assert canonical(to_json(from_json(Outer, json.loads(text)))) == text
+    definitions: dict[str, Any] = {}
+    whole = {**schema(Outer, definitions), "$defs": definitions}
+    jsonschema.validate(json.loads(text), whole)
+
+
+def test_what_was_added_later_may_be_missing_and_is_not_written_empty() -> None:
+    data = to_json(replace(ONE, new=()))
+    assert "new" not in data
+    assert from_json(Outer, data) == replace(ONE, new=())
+
+
+def test_what_json_has_no_form_for_becomes_its_text() -> None:
+    data = to_json(replace(ONE, free={"f": Fraction(1, 3), "p": Path("a/b"), "s": {"b", "a"}, "c": Colour.BLUE}))
+    assert data["free"] == {"f": "1/3", "p": "a/b", "s": ["a", "b"], "c": "blue"}
+
+
+def places(data: Any, at: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Every place in plain data but those of type Any."""
+    found = [at]
+    if at[:1] == ("free",):
+        return found
+    for key in data if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ():
+        found += places(data[key], (*at, key))
+    return found
+
+
+@pytest.mark.parametrize("at", places(to_json(ONE)), ids=str)
+@pytest.mark.parametrize("wrong", [None, True, 7, 1.5, "text", [], {}, [[]], {"a": 1}], ids=repr)
+def test_a_value_of_another_type_is_unreadable(at: tuple[Any, ...], wrong: Any) -> None:
+    """At every place: what is read is written again as the same text, or it is refused."""
+    data = json.loads(json.dumps(to_json(ONE)))
+    if at:
+        part = data
+        for key in at[:-1]:
+            part = part[key]
+        part[at[-1]] = wrong
+    else:
+        data = wrong
+    try:
+        written = to_json(from_json(Outer, data))
+    except Unreadable:
+        return
+    assert written == data or (at == ("new",) and wrong == [])
+
+
+@pytest.mark.parametrize("at", [(), ("inner",), ("inners", 0)])
+def test_unknown_and_missing_fields_are_unreadable(at: tuple[Any, ...]) -> None:
+    for change in ("more", "less"):
+        data = part = json.loads(json.dumps(to_json(ONE)))
+        for key in at:
+            part = part[key]
+        if change == "more":
+            part["odd"] = 1
+        else:
+            part.pop("name" if at else "flag")
+        with pytest.raises(Unreadable, match="fields missing"):
+            from_json(Outer, data)
