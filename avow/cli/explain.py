@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import click
+
+from avow.base.diagnostics import Rejected
+
+if TYPE_CHECKING:
+    from avow.assurance.model import Case
 
 
 @click.command()
 @click.argument("name", metavar="ID")
 @click.option("--json", "as_json", is_flag=True, help="For machines.")
 def command(name: str, as_json: bool) -> int:
-    """One obligation: its formula, where it stands, its evidence, its counterexample, how to run it again.
+    """Any name of a report. Of an obligation: its formula, where it stands, its evidence, how to run it again.
 
-    ID is an obligation's id, whole (system/node/kind/name) or in part, or a guarantee as node.name.
+    ID is an obligation's id, whole (system/node/kind/name) or in part, a guarantee as node.name, or the name of a
+    requirement, a supposition (S1, or its key), a node, a gate, a weakening, a derivation, or a word such as argued.
     """
     from avow.assurance.codec import to_json
     from avow.base.workspace import workspace
@@ -21,13 +29,25 @@ def command(name: str, as_json: bool) -> int:
 
     place = workspace()
     cases_here = reported_cases(place)
-    found = find_claim(cases_here, name, unreported(place, cases_here))
+    told = _others(cases_here, name)
+    try:
+        found = find_claim(cases_here, name, unreported(place, cases_here))
+    except Rejected:
+        if not told:
+            raise
+        found = ()
     if as_json:
         wanted = {view.id for _, view in found}
         cases = {case.system: case for case, _ in found}.values()
         listed = [o for case in cases for o in to_json(case)["obligations"] if _id(o["obligation"]) in wanted]
-        click.echo(json.dumps({"obligations": listed}, indent=1))
+        others = [{"system": system, "title": title, "lines": lines} for system, title, lines in told]
+        click.echo(json.dumps({"obligations": listed, "others": others}, indent=1))
         return 0
+    for system, title, lines in told:
+        click.echo(f"{system}: {title}")
+        for line in lines:
+            click.echo(f"  {line}")
+        click.echo()
     from avow.report.terminal import show_obligation
 
     for at, (case, view) in enumerate(found[:20]):
@@ -37,6 +57,18 @@ def command(name: str, as_json: bool) -> int:
     if len(found) > 20:
         click.echo(f"\nand {len(found) - 20} more obligations of that name")
     return 0
+
+
+def _others(cases: Sequence[Case], name: str) -> list[tuple[str, str, list[str]]]:
+    """(system, heading, lines) of what is no obligation; a word is told once."""
+    from avow.report.explained import explained
+
+    found: dict[tuple[str, ...], tuple[str, str, list[str]]] = {}
+    for case in cases:
+        for title, lines in explained(case, name):
+            key = (title,) if title.startswith("the word ") else (case.system, title)
+            found.setdefault(key, (case.system, title, lines))
+    return list(found.values())
 
 
 def _id(obligation: dict[str, str]) -> str:

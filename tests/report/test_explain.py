@@ -66,3 +66,20 @@ def test_a_run_too_wide_for_the_terminal_is_told_by_what_changes() -> None:
     assert "step 1  in.estop: yes" in lines
     assert any(line.startswith("step 2 ↺") and "wait" in line for line in lines)
     assert "what the tool itself shows of each step stands in the report" in told
+
+
+def test_every_name_that_the_first_page_shows_is_known() -> None:
+    from assurance.sample import rover_case
+
+    from avow.report.explained import explained
+
+    found = rover_case()
+    names = [r.id for r in found.requirements] + [s.number for s in found.suppositions]
+    names += [s.key for s in found.suppositions] + [node.title for node in found.nodes]
+    names += [gate.title for gate in found.gates] + [w.words for w in found.weakenings]
+    names += [d.derivation.name for d in found.derivations]
+    names += [r.how.value.split(",")[0] for r in found.requirements]
+    for name in names:
+        told = list(explained(found, name))
+        assert told, name
+        assert all(lines for _, lines in told)
