@@ -101,6 +101,7 @@ def render(assessment: Assessment) -> Result:
         from avow.report import render_all
 
         case = build(assessment)
+        assessment.state.cases[assessment.system] = key, case
         rendered = render_all(case, assessment.workspace.report(assessment.system))
         result = _summarise(assessment, case, rendered.left_out)
         files = {assessment.workspace.relative(p): digest_file(p) for p in rendered.written}
@@ -123,6 +124,12 @@ def gate(assessment: Assessment) -> TaskError | bool:
         return checking.refuse(rejected)
     except OSError as error:
         return TaskError(f"the report cannot be written: {error}")
+
+
+def case_of(assessment: Assessment) -> Case:
+    """The case as it was made for the report, if that is of what stands now; else made anew. Raises Rejected."""
+    made = assessment.state.cases.get(assessment.system)
+    return made[1] if made is not None and made[0] == _key(assessment) else build(assessment)
 
 
 def build(assessment: Assessment) -> Case:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -10,6 +11,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import digest, is_intact, write
 from avow.base.notes import read_note, write_note
 from avow.base.workspace import Workspace
+from avow.pipeline.slices import MethodSlice
 from avow.pipeline.work import Work, method_backend, method_job, planned_method
 
 STAMP = ".export.json"
@@ -28,17 +30,28 @@ def is_current(workspace: Workspace, work: Work, key: str) -> bool:
     return all(is_intact(place / name, sha) for name, sha in stamp["files"].items())
 
 
-def key(work: Work, contract: str) -> str:
-    """An artifact may show more than its obligations' meaning (names, sentences): it depends on the whole texts."""
-    return digest(json.dumps([contract, sorted(work.keys.items())]))
+def key(work: Work) -> str:
+    """An artifact may show more than its obligations' meaning (names, sentences): all that its slice says."""
+    from avow.pipeline.blobs import encode
+
+    assert work.cut is not None
+    cut = encode(work.cut(), work.system.plan.root.absolute())
+    return digest(json.dumps([cut.decode("utf-8", "surrogatepass"), sorted(work.keys.items())]))
+
+
+def generated(work: Work) -> Mapping[str, str]:
+    """The files that the backend makes of the work's slice. Raises Rejected."""
+    assert work.cut is not None
+    cut = work.cut()
+    assert isinstance(cut, MethodSlice)
+    tool = method_backend(work.system, planned_method(work))
+    method = cut.system.plan.node(cut.node).methods[0]
+    return tool.export(method_job(cut.system, cut.system.contract.node(cut.node), method))
 
 
 def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:
     """Write what the backend generates and remove what it generated before and no more; the files' names."""
-    method = planned_method(work)
-    files = method_backend(work.system, method).export(
-        method_job(work.system, work.system.contract.node(work.node), method)
-    )
+    files = generated(work)
     place = folder(workspace, work)
     for name in files:
         _inside(name, work)
@@ -51,6 +64,16 @@ def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:
     digests = {name: digest(text) for name, text in sorted(files.items())}
     write_note(place / STAMP, {"key": key, "files": digests})
     return tuple(sorted(files))
+
+
+def clean(workspace: Workspace, work: Work, dryrun: bool) -> None:
+    """Remove what was generated, and only that."""
+    place = folder(workspace, work)
+    for name in (*(read_stamp(place) or {"files": {}})["files"], STAMP):
+        if (place / name).is_file():
+            print(f"{workspace.relative(place / name)}: removed")
+            if not dryrun:
+                (place / name).unlink()
 
 
 def read_stamp(place: Path) -> dict[str, Any] | None:

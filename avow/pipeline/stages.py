@@ -7,13 +7,17 @@ attempts in flight, and a run with nothing to do does nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from doit.exceptions import TaskError
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.workspace import Workspace
 from avow.evidence.heads import index_path, read_index
 from avow.pipeline import check as checking
 from avow.pipeline import export as exporting
@@ -85,7 +89,11 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
             partial(_act, partial(checking.check, workspace, surveyed)),
             _discharge(state, surveyed.work(LANGUAGE)),
         ],
-        "uptodate": [partial(checking.is_current, workspace, surveyed), _settled(state, surveyed.work(LANGUAGE))],
+        "uptodate": [
+            _Asked("the check is of contract and plan as they are", partial(checking.is_current, workspace, surveyed)),
+            _settled(state, surveyed.work(LANGUAGE)),
+        ],
+        **_said(workspace, _texts(surveyed), (workspace.artifacts / name / "check.json",)),
     }
     for work in surveyed.catalogue.works:
         match work.engine:
@@ -97,13 +105,19 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
                 basename, title = "compose", name
             case _:  # the method of a backend
                 basename, title = "discharge", f"{name}:{work.node}:{work.method}"
-                key = exporting.key(work, surveyed.digest)
+                key = exporting.key(work)
                 yield {
                     "basename": "export",
                     "name": title,
                     "actions": [partial(_act, partial(exporting.export, workspace, work, key))],
                     "task_dep": [check],
-                    "uptodate": [partial(exporting.is_current, workspace, work, key)],
+                    "uptodate": [
+                        _Asked(
+                            "the files are what the slice gives", partial(exporting.is_current, workspace, work, key)
+                        )
+                    ],
+                    "clean": [partial(exporting.clean, workspace, work)],
+                    **_said(workspace, (*_texts(surveyed), *work.files), (exporting.folder(workspace, work),)),
                 }
         yield {
             "basename": basename,
@@ -111,6 +125,8 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
             "actions": [_discharge(state, work)],
             "task_dep": [f"export:{title}"] if basename == "discharge" else [check],
             "uptodate": [_settled(state, work)],
+            "clean": [partial(print, f"{title}: evidence is appended to the ledger and never removed")],
+            **_said(workspace, (*_texts(surveyed), *work.files), (workspace.ledger(name),)),
         }
         done.append(f"{basename}:{title}")
     yield {
@@ -118,8 +134,12 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         "name": name,
         "actions": [partial(_act, partial(write_obligations, workspace, surveyed))],
         "task_dep": [check],
-        "uptodate": [partial(write_obligations, workspace, surveyed, dry=True)],
+        "uptodate": [
+            _Asked("every obligation is listed", partial(write_obligations, workspace, surveyed, dry=True)),
+        ],
+        **_said(workspace, _texts(surveyed), (workspace.artifacts / name / "obligations.json",)),
     }
+    reports = workspace.report(name)
     assessment = Assessment(state, surveyed)
     state.assessments.append(assessment)
     yield {
@@ -129,6 +149,8 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         "task_dep": [check],
         # of the ledger as it stands: `doit report` runs no tool; `verify` renders once all evidence is in
         "uptodate": [False],
+        "clean": [partial(_clean_reports, workspace, name)],
+        **_said(workspace, (*_texts(surveyed), workspace.ledger(name)), (reports,)),
     }
     yield {
         "basename": "verify",
@@ -137,18 +159,53 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         "actions": [partial(gate, assessment)],
         "task_dep": [*done, f"obligations:{name}"],
         "uptodate": [False],
+        "clean": [partial(_clean_reports, workspace, name)],
+        **_said(workspace, (*_texts(surveyed), workspace.ledger(name)), (reports,)),
     }
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """Is it up to date? With words for `doit info`."""
+
+    words: str
+    ask: Callable[[], bool]
+
+    def __call__(self) -> bool:
+        return self.ask()
+
+    def __repr__(self) -> str:
+        return self.words
+
+
+def _texts(surveyed: Survey) -> tuple[Path, ...]:
+    plan = surveyed.system.plan
+    return (plan.path, *plan.contract_files, *plan.included)
+
+
+def _said(workspace: Workspace, inputs: Iterable[Path], targets: Iterable[Path]) -> dict[str, Any]:
+    """For `doit info`. What is up to date is decided by content, not by these."""
+    shown = {"inputs": inputs, "targets": targets}
+    return {"meta": {name: [workspace.relative(path) for path in paths] for name, paths in shown.items()}}
+
+
+def _clean_reports(workspace: Workspace, name: str, dryrun: bool) -> None:
+    place = workspace.report(name)
+    print(
+        f"{workspace.relative(place)}: removed; the ledger and what it refers to stay, `doit report` renders it again"
+    )
+    if not dryrun:
+        shutil.rmtree(place, ignore_errors=True)
 
 
 def _discharge(state: State, work: Work) -> Callable[[], TaskError | bool]:
     return partial(_act, partial(discharge, state.workspace, work, state.run))
 
 
-def _settled(state: State, work: Work) -> Callable[[], bool]:
-    def settled() -> bool:
-        return not open_obligations(state.workspace, work, state.run)
-
-    return settled
+def _settled(state: State, work: Work) -> _Asked:
+    return _Asked(
+        "every obligation has current evidence", lambda: not open_obligations(state.workspace, work, state.run)
+    )
 
 
 def _act(action: Callable[[], object]) -> TaskError | bool:

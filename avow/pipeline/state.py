@@ -11,6 +11,7 @@ from avow.pipeline.run_info import Run, new_run
 from avow.pipeline.shortcut import Shortcut
 
 if TYPE_CHECKING:
+    from avow.assurance.model import Case
     from avow.pipeline.assess import Assessment
 
 
@@ -25,6 +26,8 @@ class State:
     """Every system that could be read; none where nothing had to be."""
     changed: list[str] = field(default_factory=list)
     """The systems whose report was written anew."""
+    cases: dict[str, tuple[str, Case]] = field(default_factory=dict)
+    """System → its case as last made, and the key that it is of."""
     read: bool = False
     """Contracts were read: the run had something to do."""
     shortcut: Shortcut = field(init=False)

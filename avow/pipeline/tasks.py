@@ -12,6 +12,7 @@ from typing import Any
 
 from avow.base.workspace import Workspace
 from avow.pipeline.reporter import reporter_of
+from avow.pipeline.run_info import FRESH
 from avow.pipeline.state import State
 
 Task = dict[str, Any]
@@ -25,6 +26,14 @@ class Pipeline:
     """
 
     def __init__(self, root: Path, asked: Sequence[str]) -> None:
+        if _runs(asked) and not {"-a", "--always-execute"}.isdisjoint(asked):
+            os.environ[FRESH] = "1"  # believe no earlier run: else each stage would find that there is nothing to do
+        if asked[:1] == ["forget"]:
+            print(
+                "doit keeps no memory here that could be forgotten: the ledger says what is settled.", file=sys.stderr
+            )
+            print("`doit -a` (`avow verify --fresh`) settles everything anew.", file=sys.stderr)
+            raise SystemExit(2)
         self._state = State(Workspace(root))
         self._wanted = wanted(asked)
 
@@ -63,6 +72,12 @@ class Pipeline:
             trust_plugins()
 
         yield from stages(state)
+
+
+def _runs(asked: Sequence[str]) -> bool:
+    """Whether doit's command is to run tasks: it is where none is named."""
+    first = next((word for word in asked if not word.startswith("-")), "run")
+    return first not in ("list", "info", "clean", "forget", "help", "ignore", "dumpdb", "strace", "auto", "reset-dep")
 
 
 def execute(root: Path, tasks: Sequence[str], jobs: int = 2) -> int:

@@ -1,0 +1,92 @@
+"""What one edit costs, and what doit's own commands do, through the real command line."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from avow.evidence.ledger import Ledger
+
+from .made import programs
+
+ROOT = Path(__file__).parents[2]
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("edits")
+    programs(root / "contracts" / "made", 3, 3)
+    shutil.copy(ROOT / "dodo.py", root)
+    assert "stages run" in doit(root, "verify")
+    return root
+
+
+def doit(root: Path, *words: str, code: int | None = None) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "doit", *words],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        timeout=200,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert "Traceback" not in done.stdout + done.stderr
+    assert code is None or done.returncode == code, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+def stages(text: str) -> list[str]:
+    return sorted(re.findall(r"^  (export|sanity|discharge|compose)\s", text, re.MULTILINE))
+
+
+def test_one_edited_clause_is_one_export_one_sanity_and_one_method(place: Path) -> None:
+    contract = place / "contracts" / "made" / "system.rcl"
+    before = contract.read_text()
+    contract.write_text(before.replace("in.x1 > 1 ->", "in.x1 > 0 ->"))
+    assert stages(doit(place, "verify")) == ["discharge", "export", "sanity"]
+    contract.write_text("// a comment, which moves every line\n\n" + contract.read_text())
+    assert stages(doit(place, "verify")) == []
+    assert "nothing to do" in doit(place, "verify")
+
+
+def test_always_is_fresh(place: Path) -> None:
+    ledger = Ledger(place / "artifacts" / "ledger" / "made.jsonl")
+    before = len(ledger.records())
+    assert "sanity" in stages(doit(place, "-a", "sanity:made:n0"))
+    assert len(Ledger(ledger.path).records()) > before
+
+
+def test_info_shows_inputs_and_targets(place: Path) -> None:
+    doit(place, "verify")
+    told = doit(place, "info", "discharge:made:n0:hoare", code=0)
+    assert "up-to-date" in told
+    assert "contracts/made/models/n0.imp" in told
+    assert "artifacts/ledger/made.jsonl" in told
+
+
+def test_clean_removes_what_is_made_again_and_no_evidence(place: Path) -> None:
+    doit(place, "verify")
+    ledger = (place / "artifacts" / "ledger" / "made.jsonl").read_bytes()
+    made = place / "artifacts" / "made" / "n0" / "hoare"
+    assert list(made.glob("*.smt2"))
+    told = doit(place, "clean", "-n", "verify:made", "export:made:n0:hoare", code=0)
+    assert list(made.glob("*.smt2"))
+    told = doit(place, "clean", "verify:made", "export:made:n0:hoare", "sanity:made:n0", code=0)
+    assert "never removed" in told
+    assert not list(made.glob("*.smt2"))
+    assert not (place / "reports" / "made").exists()
+    assert (place / "artifacts" / "ledger" / "made.jsonl").read_bytes() == ledger
+    assert stages(doit(place, "verify")) == ["export"]
+    assert (place / "reports" / "made" / "index.html").is_file()
+
+
+def test_forget_says_why_not(place: Path) -> None:
+    assert "avow verify --fresh" in doit(place, "forget", code=2)
