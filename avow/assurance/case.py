@@ -100,8 +100,10 @@ def build_case(
     graph_svg: str = "",
     sources: Mapping[str, str] | None = None,
     baseline: Baseline | None = None,
+    discharging: Mapping[str, tuple[str, ...]] | None = None,
 ) -> Case:
-    """The case. Pure: same arguments, same case. `sources` are the texts behind `digests`, by the same names.
+    """The case. Pure: same arguments, same case. `sources` are the texts behind `digests`, by the same names;
+    `discharging`: of each node the obligations that settle its assumptions.
     Raises Rejected for an unusable policy."""
     return conclude(
         facts_of_system(
@@ -120,6 +122,7 @@ def build_case(
             graph_svg,
             sources or {},
             baseline,
+            discharging or {},
         )
     )
 
@@ -158,9 +161,7 @@ def conclude(facts: Facts) -> Case:
         for o in facts.obligations
     )
     said = Statements(facts.statements, facts.today)
-    relied = {
-        v.id: r for v in views if (r := relied_upon(v, lambda t: names.obligation_named(t) is not None, said.judge))
-    }
+    relied = {v.id: r for v in views if (r := relied_upon(v, names.is_obligation, said.judge))}
     closure = Closure(views, facts.nodes, rests, standings)
     closed = {r.id: closure.of_requirement(r.id) for r in facts.requirements}
     supposed = suppositions(facts, views, relied, closed, said)

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
+from types import MappingProxyType
 
 from avow.assurance.answers import Baseline
 from avow.assurance.model import (
@@ -78,6 +79,7 @@ def facts_of_system(
     graph_svg: str,
     sources: Mapping[str, str],
     baseline: Baseline | None = None,
+    discharging: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
 ) -> Facts:
     """Raises Rejected for an unusable policy."""
     plan = system.plan
@@ -92,6 +94,7 @@ def facts_of_system(
             tuple((clause.name, _say(clause)) for clause in node.guarantees),
             tuple((clause.name, _say(clause)) for clause in node.assumptions),
             plan.node(node.name).title or words_of(node.name),
+            discharging.get(node.name, ()),
         )
         for node in system.contract.nodes
     )

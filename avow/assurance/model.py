@@ -244,6 +244,8 @@ class NodeView:
     assumptions: tuple[tuple[str, str], ...]
     title: str = ""
     """What people call it."""
+    discharged_by: tuple[str, ...] = ()
+    """The obligations (without the system) that settle its assumptions: its guarantees count only with these."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,8 @@ class Names:
             elif o.kind is Kind.SANITY and sanity_property(o) in ("vacuous", "tautology") and not is_advice(o):
                 for clause in o.clauses:
                     self.vacuity.setdefault(clause, []).append(o.id)
+        self.discharged = {node.name: node.discharged_by for node in facts.nodes}
+        self.premises = {derivation.name: derivation.premises for derivation in facts.derivations}
         self.requirements = {r.id for r in facts.requirements}
         for o in facts.obligations:
             if o.kind is Kind.REQUIREMENT:
@@ -57,9 +59,9 @@ class Names:
             return (known.id,)
         return (self.local[name],) if name in self.local else None
 
-    def obligation_named(self, text: str) -> str | None:
-        """The obligation that a hypothesis names, whole or without the system; None where it is just a sentence."""
-        return text if text in self.obligations else self.local.get(text)
+    def is_obligation(self, text: str) -> bool:
+        """Whether a text is the id of an obligation, whole or without the system."""
+        return text in self.obligations or text in self.local
 
     def discharging(self, hypothesis: Hypothesis) -> str | None:
         """The claim that says what a hypothesis says; None where none does. A claim of the same name that says
@@ -72,6 +74,21 @@ class Names:
         ]
         named = [o for o in saying if o.local_id == hypothesis.name]
         return next((o.id for o in (*named, *saying)), None)
+
+    def behind(self, name: str) -> tuple[str, ...]:
+        """What discharges the assumptions of the nodes that a name of the plan stands for: a node keeps its guarantees
+        only where these are met, whoever ties them to a requirement."""
+        owners, seen, found = [name], set[str](), dict[str, None]()
+        while owners:
+            owner = owners.pop()
+            if owner in seen:
+                continue
+            seen.add(owner)
+            owners += self.premises.get(owner, ())
+            node = owner if owner in self.discharged else owner.partition(".")[0]
+            if owner not in self.premises:
+                found |= dict.fromkeys(self.local.get(at, at) for at in self.discharged.get(node, ()))
+        return tuple(found)
 
     def every_guarantee(self) -> tuple[str, ...]:
         return tuple(name for names in self.guarantees.values() for name in names)
@@ -120,14 +137,10 @@ def obligation_claim(
             status = weakest((status, Status.ERROR)) or Status.ERROR
         else:
             rests.append(found)
-    open_hypotheses = []
-    for text in hypotheses:
-        claim = names.obligation_named(text)
-        if claim is None:
-            open_hypotheses.append(text)
-        else:
-            rests.append(claim)
-    return Claim(obligation.id, status, tuple(dict.fromkeys(rests)), tuple(open_hypotheses), link)
+    notes = [text for text in hypotheses if not names.is_obligation(text)]
+    # words that happen to name a claim count against it too; they never count for it
+    rests += [names.local.get(text, text) for text in hypotheses if names.is_obligation(text)]
+    return Claim(obligation.id, status, tuple(dict.fromkeys(rests)), tuple(notes), link)
 
 
 def requirement_support(requirement: Requirement, names: Names) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -140,6 +153,7 @@ def requirement_support(requirement: Requirement, names: Names) -> tuple[tuple[s
             unknown.append(name)
         else:
             rests += found
+            rests += names.behind(name)
     formal = requirement.formula or requirement.temporal
     if (
         formal
@@ -165,7 +179,7 @@ def derivation_claims(facts: Facts, names: Names) -> Iterable[Claim]:
     """A derivation rests on its side conditions, and on the guarantees of the nodes (or derivations) it combines."""
     for derivation in facts.derivations:
         rests: list[str] = [condition.obligation for condition in derivation.side_conditions if condition.obligation]
-        rests += [claim for text in derivation.conditional if (claim := names.obligation_named(text))]
+        rests += [names.local[text] for text in derivation.conditional if text in names.local]
         lost = False
         for premise in derivation.premises:
             found = names.claims(premise)
@@ -179,7 +193,7 @@ def derivation_claims(facts: Facts, names: Names) -> Iterable[Claim]:
 
 def open_conditions(derivation: Derivation, names: Names) -> tuple[str, ...]:
     """What a derivation is conditional on without an obligation that would settle it."""
-    return tuple(text for text in derivation.conditional if names.obligation_named(text) is None)
+    return tuple(text for text in derivation.conditional if text not in names.local)
 
 
 def criticality(obligation: Obligation, facts: Facts) -> str:

@@ -136,7 +136,7 @@ def build(assessment: Assessment) -> Case:
     """The case, from contract, plan and ledger. Raises Rejected for a policy that cannot be used."""
     from avow.assurance.case import build_case
     from avow.assurance.signed import newest_signed
-    from avow.pipeline.derivations import derivation_views, graph_svg
+    from avow.pipeline.derivations import derivation_views, discharging, graph_svg
 
     system, workspace = assessment.surveyed.system, assessment.workspace
     ledger = ledger_of(workspace.ledger(system.name))
@@ -164,6 +164,7 @@ def build(assessment: Assessment) -> Case:
             },
         ),
         derivations=derivation_views(system),
+        discharging=discharging(system),
         methods=_methods(assessment),
         tools=_tools(assessment),
         discrepancies=discrepancies(workspace, ledger, assessment.surveyed),
