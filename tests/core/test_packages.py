@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -32,10 +33,15 @@ def test_a_second_copy_cannot_be_imported(name: str) -> None:
     assert "import the backends as avow.backends" in done.stderr
 
 
-def test_each_folder_is_an_entry_point() -> None:
+def test_each_folder_is_declared_and_documented() -> None:
     folders = {path.parent.name for path in (ROOT / "backends").glob("*/__init__.py")}
     ours = {name for name, point in installed().items() if point.value.startswith("avow.backends.")}
-    assert folders == ours
+    assert folders == ours, "an entry point in pyproject.toml for each folder; then `pip install -e .` again"
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    (apart,) = [set(c["modules"]) for c in contracts if c["type"] == "independence"]
+    assert apart == {f"backends.{name}" for name in folders}, "the import-linter's contract in pyproject.toml"
+    pages = {path.stem for path in (ROOT / "docs" / "backends").glob("*.md")}
+    assert folders <= pages, "a page in docs/backends/ for each"
 
 
 def test_every_file_that_the_map_names_is_there() -> None:
