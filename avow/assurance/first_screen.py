@@ -245,13 +245,15 @@ def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
 
 def with_signature(case: Case) -> Answers:
     """The answers, with what there is to say of a signature: whose it is, and whether the case is still that one."""
-    return replace(case.answers, signed=_signed(case.baseline, baseline_of(case).content))
+    return replace(case.answers, signed=_signed(case.baseline, baseline_of(case).content, case.today))
 
 
-def _signed(baseline: Baseline | None, content: str) -> str:
+def _signed(baseline: Baseline | None, content: str, today: str) -> str:
     if baseline is None:
         return "not signed"
     same = baseline.content == content
+    if same and baseline.until and baseline.until < today:
+        return f"not signed; what {baseline.who} signed on {baseline.signed_on} stood until {baseline.until}"
     until = f" until {baseline.until}" if baseline.until else ""
     if same:
         return f"signed by {baseline.who} on {baseline.signed_on}{until}"

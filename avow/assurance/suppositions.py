@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
@@ -40,15 +41,11 @@ class Statements:
 
     def of_method(self, method: str, hypothesis: str) -> Statement:
         """The statement ``suppositions.<method>.<word>`` whose word the hypothesis has."""
-        told = f" {hypothesis.casefold()}"
+        told = hypothesis.casefold()
         for statement in self.all:
             section, _, rest = statement.place.partition(".")
             owner, _, name = rest.partition(".")
-            if (
-                section == "suppositions"
-                and owner == method
-                and any(f"{c}{w}" in told for c in " '“(" for w in _spelled(name))
-            ):
+            if section == "suppositions" and owner == method and any(_says(told, word) for word in _spelled(name)):
                 return statement
         return Statement("")
 
@@ -66,6 +63,11 @@ class Statements:
 def _spelled(name: str) -> tuple[str, ...]:
     """A key's word as it may stand in a hypothesis."""
     return tuple({name.casefold(), name.replace("_", " ").casefold(), name.replace("-", " ").casefold()})
+
+
+def _says(told: str, word: str) -> bool:
+    """Whether a text has a word, whole: one of three letters at least, so that no key is about everything."""
+    return len(word) > 2 and re.search(rf"(?<!\w){re.escape(word)}(?!\w)", told) is not None
 
 
 @dataclass(frozen=True, slots=True)

@@ -207,6 +207,13 @@ def test_a_side_condition_brings_what_its_proof_used_and_a_guarantee_what_its_no
     assert [s.key for s in nothing.suppositions if s.sort is Sort.WORLD] == ["assumption.b.input"]
 
 
+def test_a_key_is_about_a_whole_word() -> None:
+    listed = [evidence(g, hypotheses=("the map is true", "the runs are drawn")) for g in GUARANTEES]
+    words = [Statement(f"suppositions.hoare.{w}", f"said by {w}", "", *OWNED) for w in ("is", "th", "the_map", "run")]
+    found = build(listed, words, formal=True)
+    assert [s.words for s in found.suppositions] == ["said by the_map", "(no plain words yet)"]
+
+
 def test_bounds_of_a_scenario_are_one_supposition() -> None:
     bounds = ("scenario.domains.N: it is one of 0, 1", "scenario: a.x has one of the values that are tried")
     listed = [evidence(g, Verdict.CHECKED, "ajpf", hypotheses=bounds) for g in GUARANTEES]

@@ -46,6 +46,8 @@ def test_a_signature_by_name_is_the_baseline(tmp_path: Path) -> None:
     assert (found.who, found.until, found.name, refused) == ("A. Person, safety", "2027-11-21", path.name, ())
     same = made(baseline=found)
     assert same.answers.signed == "signed by A. Person, safety on 2026-11-21 until 2027-11-21"
+    late = made(baseline=replace(found, until="2026-11-20"))
+    assert late.answers.signed == "not signed; what A. Person, safety signed on 2026-11-21 stood until 2026-11-20"
     worse = made(Verdict.REFUTED, found)
     assert worse.changes.entries[0].kind == "open"
     assert worse.answers.changed[0][0] == "✘"
