@@ -11,6 +11,7 @@ import hashlib
 from collections.abc import Iterable, Mapping
 from typing import assert_never
 
+from avow.formulas.flattening import flattened
 from avow.formulas.traversal import Steps, run, subterms, transform
 from avow.language.contract import Clause, Node
 from avow.language.sorts import (
@@ -103,20 +104,9 @@ def negation(term: Term) -> Term:
 
 def _join(terms: tuple[Term, ...], kind: type[And] | type[Or]) -> Term:
     unit, zero = (TRUE, FALSE) if kind is And else (FALSE, TRUE)
-    items: list[Term] = []
-    stack = list(reversed(terms))
-    while stack:
-        term = stack.pop()
-        if isinstance(term, kind):
-            stack.extend(reversed(term.items))
-        elif isinstance(term, Literal) and term.value is unit.value:
-            continue
-        elif isinstance(term, Literal) and term.value is zero.value:
-            return zero
-        else:
-            items.append(term)
+    items = flattened(terms, lambda term: term.items if isinstance(term, kind) else None, unit, zero)
     if not items:
-        return unit
+        return zero if items is None else unit
     return items[0] if len(items) == 1 else kind(tuple(items))
 
 

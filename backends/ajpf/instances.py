@@ -10,6 +10,7 @@ from itertools import product
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import depth, subterms
 from avow.language.contract import Clause
 from avow.language.terms import TRUE, And, Quantified, Quantifier, Term, Variable
@@ -23,7 +24,7 @@ from .psl import Always, Eventually, Formula, Implies
 from .psl_parser import instantiate
 from .reading import Left, read_properties
 from .scenario import Decider, domain_of, range_of
-from .shape import MAX_DEPTH, TooComplex, free
+from .shape import MAX_DEPTH, TooComplex
 
 MAX_PROPERTIES = 5_000
 
@@ -146,7 +147,9 @@ def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], key
     mapper.expanded.clear()
     mapper.granted.clear()
     for variables, antecedent, consequent in _implications(clause.formula):
-        used = [v for v in variables if is_index(v.sort) and v.name in free(antecedent) | free(consequent)]
+        used = [
+            v for v in variables if is_index(v.sort) and v.name in bound_names(antecedent) | bound_names(consequent)
+        ]
         others = tuple(v for v in variables if not is_index(v.sort))
         domains = []
         for variable in used:

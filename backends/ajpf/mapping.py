@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from avow.base.diagnostics import Span
 from avow.formulas.formula import substitute
+from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import subterms
 from avow.language.printer import show_term
 from avow.language.sorts import IntegerSort, NaturalSort
@@ -20,7 +21,7 @@ from . import psl
 from .matching import Binding, choose, match
 from .psl import Formula
 from .psl_parser import Malformed, instantiate
-from .shape import conjunction, conjuncts, disjunction, free, shape
+from .shape import conjunction, conjuncts, disjunction, shape
 from .tautology import constant
 
 
@@ -154,7 +155,7 @@ class Mapper:
         return None if truth is None else YES if truth else NO
 
     def _decided(self, term: Term) -> bool | None:
-        return None if free(term) else self.decide(term)
+        return None if bound_names(term) else self.decide(term)
 
     def _quantified(self, term: Quantified) -> Mapped:
         made = self._at_once(term)
@@ -194,14 +195,14 @@ class Mapper:
         """``exists(x | P and Q)``: rows may not tear apart what x joins."""
         names = {v.name for v in term.variables}
         items = conjuncts(term.body)
-        static = [i for i in items if not free(i) - names and not _has_output(i)]
+        static = [i for i in items if not bound_names(i) - names and not _has_output(i)]
         if static:
             possible = Quantified(Quantifier.EXISTS, _used(term, static), conjunction(static), term.span)
             if self._decided(possible) is False:
                 return NO
         made = self._cover(items, True)
         for name in names:
-            joined = [m for m, covered in made if m != YES and any(name in free(c) for c in covered)]
+            joined = [m for m, covered in made if m != YES and any(name in bound_names(c) for c in covered)]
             if len(joined) > 1:
                 raise NotCovered(
                     f"{name} joins parts of {show_term(term)} that different rows would cover; one row must cover both",
@@ -237,7 +238,7 @@ class Mapper:
 
 
 def _used(term: Quantified, items: Sequence[Term]) -> tuple[Variable, ...]:
-    mentioned = {name for item in items for name in free(item)}
+    mentioned = {name for item in items for name in bound_names(item)}
     return tuple(v for v in term.variables if v.name in mentioned) or term.variables
 
 

@@ -13,6 +13,7 @@ import jsonschema
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import subterms
 from avow.language.load import parse_formula
 from avow.language.sorts import IntegerSort, NaturalSort, Sort
@@ -27,7 +28,7 @@ from .psl import AGENT_NAME, KEYWORDS, Formula, Modality, atoms
 from .psl_parser import Malformed, index_names, instantiate, parse_psl
 from .scenario import domain_of
 from .schema import SCHEMA
-from .shape import TooComplex, free, shape
+from .shape import TooComplex, shape
 from .syntax import Program
 
 MAX_INSTANCES = 1_000
@@ -252,7 +253,7 @@ class _OptionsReader:
         except TooComplex:
             self.fault("AJPF123", "the pattern is too complex", *path)
             return None
-        return term, free(term)
+        return term, bound_names(term)
 
     def psl(self, text: str, program: Program | None, *path: str) -> Formula | None:
         try:

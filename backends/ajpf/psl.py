@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
+from avow.formulas.flattening import flattened
+
 from .syntax import Struct, Term, Var
 
 KEYWORDS = frozenset({"A", "E", "U", "R", "B", "G", "F", "I", "D", "P", "T", "ItD"})
@@ -127,18 +129,12 @@ def disjunction(items: list[Formula] | tuple[Formula, ...]) -> Formula:
 def _junction(
     items: list[Formula] | tuple[Formula, ...], kind: type[And] | type[Or], unit: Truth, zero: Truth
 ) -> Formula:
-    flat: dict[Formula, None] = {}
-    for item in items:
-        for piece in item.items if isinstance(item, And | Or) and type(item) is kind else (item,):
-            if piece == zero:
-                return zero
-            if piece != unit:
-                flat[piece] = None
-    if any(negation(piece) in flat for piece in flat):
+    flat = flattened(items, lambda item: item.items if isinstance(item, kind) else None, unit, zero, once=True)
+    if flat is None or not {negation(piece) for piece in flat}.isdisjoint(flat):
         return zero
     if not flat:
         return unit
-    return kind(tuple(flat)) if len(flat) > 1 else next(iter(flat))
+    return kind(tuple(flat)) if len(flat) > 1 else flat[0]
 
 
 def negation(formula: Formula) -> Formula:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from avow.formulas.renaming import bound_names
 from avow.language.printer import show_term
 from avow.language.terms import FALSE, Quantified, Quantifier, Term, Variable
 
@@ -19,7 +20,7 @@ from .mapping import Mapped, Mapper, NotCovered, Unit, clauses, to_formula
 from .matching import match
 from .options import Extra
 from .psl import Always, Eventually, Formula, Implies
-from .shape import free, shape
+from .shape import shape
 
 MAX_ALTERNATIVES = 8
 
@@ -42,10 +43,10 @@ def read_properties(
     if left == FALSE:
         yield _eventually(psl.FALSE, psl.TRUE)
         return
-    shared = sorted({v.name for v in others} & free(right))
+    shared = sorted({v.name for v in others} & bound_names(right))
     if shared:
         raise NotCovered(f"{shared[0]} joins what triggers the guarantee and what it demands", consequent.span)
-    bound = tuple(v for v in others if v.name in free(left))
+    bound = tuple(v for v in others if v.name in bound_names(left))
     trigger = mapper.map(shape(Quantified(Quantifier.EXISTS, bound, left)) if bound else left)
     demands, bans = _parted(mapper.map(right))
     condition = to_formula(trigger)
@@ -86,7 +87,7 @@ def _stand_in(units: Sequence[Unit], least: Formula, extras: Sequence[Extra]) ->
     banned = [u.term for u in units if u.forbids]
     for extra in extras:
         assert extra.forbids is not None
-        pattern, names = extra.forbids, free(extra.forbids)
+        pattern, names = extra.forbids, bound_names(extra.forbids)
         if len(banned) == len(units) and all(any(True for _ in match(pattern, t, names, {})) for t in banned):
             return Left(" and ".join(map(show_term, banned)), extra.name, least)
     return None

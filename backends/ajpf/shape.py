@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from avow.formulas.flattening import flattened
+from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import depth
 from avow.language.sorts import BOOL, INTEGER, NATURAL, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import (
@@ -29,7 +31,6 @@ from avow.language.terms import (
     Or,
     Quantified,
     Quantifier,
-    Role,
     SetTerm,
     Term,
     Variable,
@@ -87,16 +88,10 @@ def disjunction(items: list[Term]) -> Term:
 
 
 def _junction(items: list[Term], kind: type[And] | type[Or], unit: Term, zero: Term) -> Term:
-    flat: dict[Term, None] = {}
-    for item in items:
-        for piece in item.items if isinstance(item, And | Or) and type(item) is kind else (item,):
-            if piece == zero:
-                return zero
-            if piece != unit:
-                flat[piece] = None
+    flat = flattened(items, lambda item: item.items if isinstance(item, kind) else None, unit, zero, once=True)
     if not flat:
-        return unit
-    return kind(tuple(flat)) if len(flat) > 1 else next(iter(flat))
+        return zero if flat is None else unit
+    return kind(tuple(flat)) if len(flat) > 1 else flat[0]
 
 
 def _formula(term: Term, positive: bool) -> Term:
@@ -190,24 +185,6 @@ def _integer(value: int) -> Literal:
     return Literal(value, NATURAL if value >= 0 else INTEGER)
 
 
-def free(term: Term) -> frozenset[str]:
-    """The names of the bound-role variables that are free in it."""
-    found: set[str] = set()
-
-    def walk(part: Term, inner: frozenset[str]) -> None:
-        if isinstance(part, Variable):
-            if part.role is Role.BOUND and part.name not in inner:
-                found.add(part.name)
-            return
-        if isinstance(part, Quantified):
-            inner = inner | {v.name for v in part.variables}
-        for child in part.children:
-            walk(child, inner)
-
-    walk(term, frozenset())
-    return frozenset(found)
-
-
 def _quantified(exists: bool, variables: tuple[Variable, ...], body: Term) -> Term:
     """``exists`` distributes over ``or`` and stands outside only of what it binds (``forall`` the other way round)."""
     outer = disjuncts if exists else conjuncts
@@ -230,7 +207,7 @@ def _multiplied(exists: bool, variables: tuple[Variable, ...], body: Term) -> Te
         return join_outer([_multiplied(exists, variables, part) for part in body.items])
     rows: list[list[Term]] = [[]]
     for item in inner(body):
-        choices = outer(item) if isinstance(item, kind) and names & free(item) else (item,)
+        choices = outer(item) if isinstance(item, kind) and names & bound_names(item) else (item,)
         rows = [[*row, choice] for row in rows for choice in choices]
         if len(rows) > MAX_ITEMS:
             raise TooComplex
@@ -247,7 +224,7 @@ def _scoped(exists: bool, variables: tuple[Variable, ...], block: Term) -> Term:
     groups: list[tuple[set[str], list[Term]]] = []
     outside: list[Term] = []
     for item in inner(block):
-        mentioned = set(free(item)) & names
+        mentioned = set(bound_names(item)) & names
         if not mentioned:
             outside.append(item)
             continue

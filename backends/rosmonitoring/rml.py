@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass, field
 from fractions import Fraction
 
+from avow.formulas.flattening import flattened
+
 KEYWORDS = frozenset(
     "not matches with empty all var let if else abs sin cos tan min max true false null any none".split()  # noqa: SIM905
 )
@@ -89,13 +91,10 @@ def some(items: list[Condition] | tuple[Condition, ...]) -> Condition:
 def _join(
     items: list[Condition] | tuple[Condition, ...], kind: type[Every] | type[Some], absorbing: Condition
 ) -> Condition:
-    flat: dict[Condition, None] = {}
-    for item in items:
-        if item == absorbing:
-            return absorbing
-        for part in item.items if isinstance(item, kind) else (item,):
-            flat[part] = None
-    return next(iter(flat)) if len(flat) == 1 else kind(tuple(flat))
+    flat = flattened(items, lambda item: item.items if isinstance(item, kind) else None, kind(()), absorbing, once=True)
+    if flat is None:
+        return absorbing
+    return flat[0] if len(flat) == 1 else kind(tuple(flat))
 
 
 def opposite(condition: Condition) -> Condition:

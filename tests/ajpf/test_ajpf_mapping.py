@@ -10,8 +10,9 @@ from avow.backends.ajpf import psl
 from avow.backends.ajpf.mapping import Mapper, NotCovered, Row, clauses, to_formula
 from avow.backends.ajpf.matching import match
 from avow.backends.ajpf.psl_parser import parse_psl
-from avow.backends.ajpf.shape import TooComplex, free, shape
+from avow.backends.ajpf.shape import TooComplex, shape
 from avow.evaluation.evaluate import evaluate
+from avow.formulas.renaming import bound_names
 from avow.formulas.values import Element, FunctionValue
 from avow.language.load import check_text, parse_formula
 from avow.language.sorts import BOOL, NATURAL, REAL, EnumSort, FunctionSort
@@ -59,7 +60,7 @@ def row(text, target):
     names = {name: sort for name, sort in SORTS.items() if f"({name} in" not in text and f"{name}, y in" not in text}
     names = {name: sort for name, sort in names.items() if f"{name} in REAL" not in text}
     pattern = shape(formula(text, **names))
-    return Row(text, pattern, free(pattern), parse_psl(target))
+    return Row(text, pattern, bound_names(pattern), parse_psl(target))
 
 
 def mapper(*rows, decide=lambda term: None, values=(1, 2, 3)):
