@@ -181,6 +181,30 @@ WORKSPACE_CODES = register(
     declare("CLI003", "no such node", "The contract has no node of that name.", "Use a name from the hint."),
     declare("CLI005", "no such derivation", "The plan has no derivation of that name.", "Use a name from the hint."),
     declare(
+        "CLUSTER001",
+        "no cluster's address",
+        "A cluster is reached by TLS, or without it on this machine only: who reaches a scheduler runs code there.",
+        "Write `dask+tls://HOST:PORT`, or `dask+tcp://127.0.0.1:PORT`.",
+    ),
+    declare(
+        "CLUSTER002",
+        "no certificate",
+        "A connection by TLS needs the files of the authority's certificate, and of this side's certificate and key.",
+        "Set AVOW_TLS_CA, AVOW_TLS_CERT and AVOW_TLS_KEY.",
+    ),
+    declare(
+        "CLUSTER003",
+        "no cluster",
+        "Dask is not installed here, no scheduler answers at the address, or it does not accept the certificate.",
+        "Install `avow[cluster]`; start a scheduler (`docs/scale.md`).",
+    ),
+    declare(
+        "CLUSTER004",
+        "no workers",
+        "The cluster has no workers: nothing would ever be done.",
+        "Start one with `avow worker --on …`.",
+    ),
+    declare(
         "CLI006",
         "cannot be run",
         "The system cannot be simulated: the message says what is missing, such as an interpretation or a domain.",

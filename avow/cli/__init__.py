@@ -37,6 +37,7 @@ COMMANDS = {
     "simulate": "run the composed contracts over the plan's scenario",
     "translate": "a contract as LaTeX, text, JSON, SMT-LIB, …",
     "verify": "everything for every system: the main job",
+    "worker": "do works for `avow verify --on` of other machines",
 }
 """Name → one line of help. The module of that name in this package holds the click command `command`."""
 

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import os
+from typing import TYPE_CHECKING
 
 import click
+
+from avow.base.diagnostics import Rejected
+
+if TYPE_CHECKING:
+    from avow.pipeline.cluster import Cluster
 
 
 @click.command()
 @click.argument("systems", nargs=-1)
 @click.option("--fresh", is_flag=True, help="Believe no earlier run: settle every obligation anew.")
-@click.option("-n", "jobs", type=click.IntRange(0), default=2, show_default=True, help="How many tasks at once.")
+@click.option("-n", "jobs", type=click.IntRange(0), help="How many tasks at once (default: 2, or the cluster's slots).")
+@click.option("--on", "address", help="Send works to a cluster: dask+tls://HOST:PORT (docs/scale.md).")
 @click.option(
     "--explain", is_flag=True, help="Say what each failing gate lacks, and the cheapest method that would close it."
 )
 @click.option(
     "--sandbox", is_flag=True, help="Run programs under test sealed (bubblewrap): no network, nothing written, or not."
 )
-def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool, sandbox: bool) -> int:
+def command(
+    systems: tuple[str, ...], fresh: bool, jobs: int | None, address: str | None, explain: bool, sandbox: bool
+) -> int:
     """Verify every system under contracts/, or only SYSTEMS (their names)."""
     from avow.base.workspace import require_systems, workspace
     from avow.isolation.level import SANDBOX
@@ -32,4 +41,28 @@ def command(systems: tuple[str, ...], fresh: bool, jobs: int, explain: bool, san
         os.environ[SANDBOX] = "required"
     if explain:
         os.environ[EXPLAIN] = "1"
-    return execute(place.root, [f"verify:{name}" for name in systems] or ["verify"], jobs)
+    wanted = [f"verify:{name}" for name in systems] or ["verify"]
+    cluster = _cluster(address) if address else None
+    if jobs is None:
+        jobs = max(2, cluster.slots) if cluster else 2
+    try:
+        return execute(place.root, wanted, jobs)
+    finally:
+        if cluster:
+            cluster.close()
+
+
+def _cluster(address: str) -> Cluster:
+    """Raises Rejected where there is none, or none that could do anything."""
+    from avow.pipeline.asking import use
+    from avow.pipeline.cluster import Address, Cluster
+    from avow.pipeline.run_info import ON
+
+    found = Cluster(Address.read(address))
+    try:
+        use(found)
+    except Rejected:
+        found.close()
+        raise
+    os.environ[ON] = address
+    return found

@@ -6,7 +6,8 @@ answered whole is handed on.
 
 from __future__ import annotations
 
-import tempfile
+import os
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,20 +15,19 @@ from typing import Any
 
 from avow import __version__
 from avow.backend_kit.protocol import Report
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
 from avow.isolation.observed import Seen
-from avow.pipeline import forks
+from avow.pipeline import work as work_module
+from avow.pipeline.executors import Asked, Came, Desk, Executor, Local
 from avow.pipeline.mutant_systems import Altered
-from avow.pipeline.requests import Request, Unanswered, read_response, request_bytes
-from avow.pipeline.work import Work, method_backend, planned_method, tool_identities
+from avow.pipeline.requests import Request, Unanswered, read_response
+from avow.pipeline.work import Work, is_portable, method_backend, planned_method, tool_identities
 
 CHANGED = "contract, plan or a model changed while it was being verified; run it again"
-
-GRACE = 90.0
-"""Seconds above the tool's own limits that a worker gets to load, translate and write."""
 
 
 def run(
@@ -38,26 +38,67 @@ def run(
     altered: Altered | None = None,
     kept: Mapping[str, Sequence[Any]] | None = None,
 ) -> Report:
-    """Settle the obligations in a process of their own; `kept` are cases that refuted them once. Never raises for what
-    that process does."""
+    """Settle the obligations in a process of their own, here or elsewhere; `kept` are cases that refuted them once.
+    Never raises for what that process does."""
+    if lacking := _lacking(work):
+        return _failed(obligations, work, Verdict.NOT_RUN, f"no worker of the cluster offers {', '.join(lacking)}", {})
     try:
         request = replace(request_of(workspace, work, obligations, folder, altered), kept=kept or {})
     except OSError as error:
         return _failed(obligations, work, Verdict.ERROR, f"{type(error).__name__}: {error}", {})
-    asked = request_bytes(request)
-    limit = request.seconds + GRACE
-    with tempfile.TemporaryDirectory(prefix="avow-work-") as place:
-        question, answer = Path(place, "request"), Path(place, "response")
-        question.write_bytes(asked)
-        done = forks.run([str(question), str(answer)], cwd=workspace.root, seconds=limit)
-        log = {"worker.log": done.stderr} if done.stderr.strip() else {}
-        if done.timed_out:
-            return _failed(obligations, work, Verdict.UNKNOWN, f"no answer within {limit:.0f} s", log)
-        if done.code != 0 or not answer.is_file():
-            last = done.stderr.strip().splitlines()[-1:] or [f"the worker ended with code {done.code}"]
-            return _failed(obligations, work, Verdict.ERROR, f"the engine crashed: {last[0][:300]}", log)
-        said = answer.read_bytes()
-    return judged(work, obligations, asked, said, log)
+    asked, came = _desk(workspace, request).ask(request)
+    log = {"worker.log": came.log} if came.log.strip() else {}
+    if came.data is None:
+        return _failed(obligations, work, Verdict.UNKNOWN if came.timed_out else Verdict.ERROR, came.failure, log)
+    return judged(work, obligations, asked.data, came.data, log)
+
+
+_desks: dict[tuple[int, str], Desk] = {}
+_lock = threading.Lock()
+
+
+def use(executor: Executor) -> None:
+    """Send what can be sent elsewhere to an executor, from now on. Raises Rejected where no worker is there."""
+    offers = executor.offers()
+    if not offers:
+        raise Rejected(Diagnostic("CLUSTER004", "the cluster has no workers", hint="start one: avow worker --on …"))
+    chosen: dict[str, tuple[str, str]] = {}
+    for tools in offers.values():
+        for name, version, program in sorted(tools):
+            chosen[name] = max(chosen.get(name, ("", "")), (version, program))
+    work_module.offered = chosen
+    with _lock:
+        _desks[os.getpid(), ""] = Desk(executor, _said)
+
+
+def _desk(workspace: Workspace, request: Request) -> Desk:
+    """The executor that a request goes to."""
+    elsewhere = _desks.get((os.getpid(), ""))
+    if elsewhere is not None and not request.root:
+        return elsewhere
+    place = os.getpid(), str(workspace.root)
+    with _lock:
+        return _desks.setdefault(place, Desk(Local(workspace.root), _said))
+
+
+def _lacking(work: Work) -> tuple[str, ...]:
+    """The tools of a work, where the machines that there are have none of them."""
+    if work_module.offered is None or work.is_engine:
+        return ()
+    tool = method_backend(work.system, planned_method(work))
+    if not is_portable(tool):
+        return ()
+    wanted = [t.name for t in tool.tools()]
+    return () if any(name in work_module.offered for name in wanted) else tuple(wanted)
+
+
+def _said(asked: Asked, came: Came) -> object:
+    """What an answer says, without what differs from run to run."""
+    try:
+        report = read_response(came.data, asked.data).report
+    except Unanswered:
+        return None
+    return sorted((o.obligation, o.verdict) for o in report.outcomes) if report else None
 
 
 def request_of(
@@ -69,7 +110,7 @@ def request_of(
     assert work.cut is not None
     root = work.system.plan.root.absolute()
     tool = None if work.is_engine else method_backend(work.system, planned_method(work))
-    portable = tool is None or tool.portable
+    portable = tool is None or is_portable(tool)
     files = {path.absolute().relative_to(root).as_posix(): path.read_bytes() for path in work.files if path.is_file()}
     return Request(
         work.system.name,
@@ -83,7 +124,7 @@ def request_of(
         files if portable else {},
         tool_identities(tool) if tool else (),
         "" if portable else str(root),
-        str(folder),
+        workspace.relative(folder),
         altered,
     )
 

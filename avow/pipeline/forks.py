@@ -21,7 +21,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from avow.base import process
@@ -41,6 +41,9 @@ def _python() -> dict[str, str]:
 _START = 60.0
 """Seconds that the server gets for its imports."""
 
+_LOOK = 0.5
+"""Seconds between two looks whether a work is still wanted."""
+
 _STOP = 15.0
 """Seconds that it gets to kill a fork."""
 
@@ -52,10 +55,11 @@ _ending: list[subprocess.Popen[bytes]] = []
 """Those that still had a fork to wait for: kept, so that `kill_all` never finds a number that has become another's."""
 
 
-def run(arguments: Sequence[str], *, cwd: Path, seconds: float) -> Completed:
-    """Run the worker on these arguments, in a process of its own; what it prints on standard output is not kept."""
+def run(arguments: Sequence[str], *, cwd: Path, seconds: float, stopped: Callable[[], bool] | None = None) -> Completed:
+    """Run the worker on these arguments, in a process of its own; what it prints on standard output is not kept. A fork
+    ends soon after `stopped` says so, as if its time were up."""
     server = _server(cwd)
-    done = server.run(arguments, seconds) if server else None
+    done = server.run(arguments, seconds, stopped) if server else None
     if done is not None:
         return done
     return process.run([sys.executable, "-P", "-m", WORKER, *arguments], cwd=cwd, seconds=seconds, env=_python())
@@ -135,7 +139,9 @@ class _Server:
             return False
         return ready
 
-    def run(self, arguments: Sequence[str], seconds: float) -> Completed | None:
+    def run(
+        self, arguments: Sequence[str], seconds: float, stopped: Callable[[], bool] | None = None
+    ) -> Completed | None:
         """None where the server did not take it on."""
         start = time.monotonic()
         mine, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -149,8 +155,7 @@ class _Server:
             code: int | None = None
             ended = False
             try:
-                mine.settimeout(seconds)
-                code = _code(mine)
+                code = _code(mine, start + seconds, stopped)
                 ended = True
             except TimeoutError:
                 pass
@@ -172,12 +177,21 @@ class _Server:
             process.unwatch(self._process.pid)
 
 
-def _code(connection: socket.socket) -> int:
+def _code(connection: socket.socket, end: float, stopped: Callable[[], bool] | None) -> int:
     """The fork's exit code. Raises TimeoutError."""
-    try:
-        said = connection.recv(32)
-    except ConnectionError:
-        said = b""
+    said = b""
+    while True:
+        left = end - time.monotonic()
+        connection.settimeout(max(0.001, left if stopped is None else min(left, _LOOK)))
+        try:
+            said = connection.recv(32)
+        except TimeoutError:
+            if left <= 0 or (stopped is not None and stopped()):
+                raise
+            continue
+        except ConnectionError:
+            pass
+        break
     # without a word: the server, and with it the fork, was killed from outside
     return int(said) if said else -signal.SIGKILL
 

@@ -47,9 +47,9 @@ class Request:
     """Obligation → cases that refuted it once, as its backend wrote them (`record.CASE`): to be tried first."""
 
     @property
-    def needs(self) -> frozenset[str]:
-        """The tools that are wanted on the machine."""
-        return frozenset(name for name, version, *_ in self.tools if version)
+    def wanted(self) -> Tools:
+        """The tools that have to be on the machine."""
+        return tuple(tool for tool in self.tools if tool[1])
 
     @property
     def seconds(self) -> float:

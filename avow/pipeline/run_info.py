@@ -14,6 +14,10 @@ FRESH = "AVOW_FRESH"
 """Environment variable that makes a run settle everything anew (`avow verify --fresh` sets it)."""
 
 
+ON = "AVOW_ON"
+"""Environment variable with the cluster that works are sent to (`avow verify --on` sets it)."""
+
+
 @dataclass(frozen=True, slots=True)
 class Run:
     """The identity of a run, as evidence records name it."""

@@ -19,6 +19,7 @@ from avow.formulas.values import Value
 from avow.language.contract import Contract, Node
 from avow.language.terms import Variable
 from avow.pipeline.evidence_keys import Named, method_options
+from avow.pipeline.work import is_portable
 from avow.system.graph import Edge, dataflow
 from avow.system.plan import Connection, Located, NodePlan, Plan, System
 
@@ -101,7 +102,7 @@ def method_slice(tool: Backend, job: Job) -> MethodSlice:
         ),
         connections=tuple(_connection(edge) for edge in edges),
         scenario=plan.scenario if tool.uses_scenario else None,
-        plugins=plan.plugins,
+        plugins=() if is_portable(tool) else plan.plugins,
     )
     cut_contract = Contract((), named.types(contract), named.constants(contract), nodes)
     return MethodSlice(System(cut, cut_contract), job.node.name, job.method.id)

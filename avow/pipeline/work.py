@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from avow.backend_kit.protocol import Backend, Job, Limits
-from avow.backend_kit.registry import backend
+from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest, digest_file
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
@@ -198,7 +198,18 @@ def planned_method(work: Work) -> Method:
 
 def tool_identities(tool: Backend) -> tuple[tuple[str, str, str], ...]:
     """Name, version and program's digest of each outside tool that a backend can use; empty where it is missing."""
+    if offered is not None and is_portable(tool):
+        return tuple((t.name, *offered.get(t.name, ("", ""))) for t in tool.tools())
     return tuple((t.name, t.version or "", _program(t.path)) for t in tool.tools())
+
+
+offered: Mapping[str, tuple[str, str]] | None = None
+"""Where works go to other machines: tool → version and program's digest there. What they settle is of these tools."""
+
+
+def is_portable(tool: Backend) -> bool:
+    """Whether its works can be sent elsewhere: an installed backend whose answers depend on what is sent alone."""
+    return tool.portable and tool.name in names()
 
 
 def method_backend(system: System, method: Method) -> Backend:

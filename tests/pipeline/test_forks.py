@@ -19,7 +19,7 @@ from avow.backend_kit.protocol import Limits, Report
 from avow.base import process
 from avow.base.verdict import Outcome, Verdict
 from avow.base.workspace import Workspace
-from avow.pipeline import asking, forks
+from avow.pipeline import asking, executors, forks
 from avow.pipeline.workload import Survey, survey
 
 BACKEND = """
@@ -145,7 +145,7 @@ def test_a_work_that_hangs_is_killed_with_all_that_it_started(
     (odd / "pids").unlink(missing_ok=True)
     settle(odd, "answers")  # from here on, a server is there
     for limit in (1.0, 4.0, 16.0, 64.0):  # until the work gets far enough to hang, on a busy machine
-        monkeypatch.setattr(asking, "GRACE", limit - 2 * Limits().seconds)
+        monkeypatch.setattr(executors, "GRACE", limit - 2 * Limits().seconds)
         outcome, _ = settle(odd, "hangs")
         assert outcome.verdict is Verdict.UNKNOWN
         assert "no answer within" in outcome.summary

@@ -1,0 +1,200 @@
+"""Where works are done: on this machine by default (`Local`), or on others (`avow.pipeline.cluster`).
+
+An executor carries bytes to workers and back. What comes back is judged by whoever asked (`avow.pipeline.asking`); only
+the process that asked writes ledger, artifacts and reports.
+"""
+
+from __future__ import annotations
+
+import queue
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from avow.base.process import Completed
+from avow.pipeline import forks
+from avow.pipeline.requests import Request, request_bytes, request_digest
+
+GRACE = 90.0
+"""Seconds above the tool's own limits that a worker gets to translate and write."""
+
+_LATE = 3600.0
+"""Seconds above all that for works that wait for their turn."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A request as it travels. `key` is its digest: to submit it again is to ask the same again."""
+
+    request: Request
+    data: bytes
+    key: str
+
+    @classmethod
+    def of(cls, request: Request) -> Asked:
+        data = request_bytes(request)
+        return cls(request, data, request_digest(data))
+
+
+@dataclass(frozen=True, slots=True)
+class Came:
+    """What came of a request: an answer's bytes, or why there is none."""
+
+    key: str
+    data: object = None
+    failure: str = ""
+    timed_out: bool = False
+    log: str = ""
+
+
+class Executor(Protocol):
+    """Runs works somewhere."""
+
+    def offers(self) -> Mapping[str, frozenset[tuple[str, ...]]]:
+        """Worker → the identities of the tools that it has."""
+        ...
+
+    def submit(self, asked: Asked) -> None:
+        """Have it done; nothing happens where it is under way already."""
+        ...
+
+    def results(self) -> Iterator[Came]:
+        """As they come, until the executor is closed."""
+        ...
+
+    def cancel(self, keys: Collection[str]) -> None:
+        """What is under way for these ends, and its tools with it; no result comes."""
+        ...
+
+    def close(self) -> None:
+        """End everything."""
+        ...
+
+
+class Local:
+    """Forks on this machine, one for each work (`avow.pipeline.forks`)."""
+
+    def __init__(self, cwd: Path) -> None:
+        self._cwd = cwd
+        self._came: queue.SimpleQueue[Came | None] = queue.SimpleQueue()
+        self._stopped: dict[str, threading.Event] = {}
+        self._lock = threading.Lock()
+
+    def offers(self) -> Mapping[str, frozenset[tuple[str, ...]]]:
+        return {}
+
+    def submit(self, asked: Asked) -> None:
+        with self._lock:
+            if asked.key in self._stopped:
+                return
+            stopped = self._stopped[asked.key] = threading.Event()
+        threading.Thread(target=self._run, args=(asked, stopped), daemon=True).start()
+
+    def results(self) -> Iterator[Came]:
+        while (came := self._came.get()) is not None:
+            yield came
+
+    def cancel(self, keys: Collection[str]) -> None:
+        with self._lock:
+            for key in keys:
+                if key in self._stopped:
+                    self._stopped[key].set()
+
+    def close(self) -> None:
+        self.cancel(tuple(self._stopped))
+        self._came.put(None)
+
+    def _run(self, asked: Asked, stopped: threading.Event) -> None:
+        try:
+            came = answered(asked.data, asked.key, asked.request.seconds + GRACE, self._cwd, stopped.is_set)
+        except Exception as error:  # whoever asked waits for an answer
+            came = Came(asked.key, failure=f"{type(error).__name__}: {error}")
+        with self._lock:
+            self._stopped.pop(asked.key)
+        if not stopped.is_set():
+            self._came.put(came)
+
+
+def answered(data: bytes, key: str, seconds: float, cwd: Path, stopped: Callable[[], bool]) -> Came:
+    """Do a work in a process of its own on this machine. Ends it as soon as `stopped` says so."""
+    with tempfile.TemporaryDirectory(prefix="avow-request-") as place:
+        question, answer = Path(place, "request"), Path(place, "response")
+        question.write_bytes(data)
+        done = forks.run([str(question), str(answer)], cwd=cwd, seconds=seconds, stopped=stopped)
+        if done.timed_out:
+            return Came(key, failure=f"no answer within {seconds:.0f} s", timed_out=True, log=done.stderr)
+        if done.code != 0 or not answer.is_file():
+            return Came(key, failure=f"the engine crashed: {_last_line(done)}", log=done.stderr)
+        return Came(key, answer.read_bytes(), log=done.stderr)
+
+
+def _last_line(done: Completed) -> str:
+    last = done.stderr.strip().splitlines()[-1:] or [f"the worker ended with code {done.code}"]
+    return last[0][:300]
+
+
+@dataclass(slots=True)
+class Desk:
+    """Asks an executor on behalf of many threads, each of which waits for its own answer. The first answer to a request
+    counts; another that comes later and says something else is an alarm."""
+
+    executor: Executor
+    said: Callable[[Asked, Came], object] = lambda asked, came: came.data
+    """What an answer says, to be compared."""
+    alarms: list[str] = field(default_factory=list)
+    _waiting: dict[str, _Waiting] = field(default_factory=dict)
+    _past: dict[str, _Waiting] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _thread: threading.Thread | None = None
+
+    def ask(self, request: Request) -> tuple[Asked, Came]:
+        asked = Asked.of(request)
+        with self._lock:
+            waiting = self._waiting.setdefault(asked.key, _Waiting(asked))
+            waiting.asked_by += 1
+            first = waiting.asked_by == 1 and waiting.came is None
+            if self._thread is None or not self._thread.is_alive():
+                self._thread = threading.Thread(target=self._listen, daemon=True)
+                self._thread.start()
+        if first:
+            self.executor.submit(asked)
+        # the executor bounds the time; what lies beyond that is its own fault, and must not hang a run
+        came = waiting.there.wait(request.seconds + GRACE + _LATE)
+        with self._lock:
+            waiting.asked_by -= 1
+            if not waiting.asked_by:  # who asks again later wants to know how it is then
+                del self._waiting[asked.key]
+                self._past[asked.key] = waiting
+        if not came:
+            self.executor.cancel([asked.key])
+            return asked, Came(asked.key, failure="no answer, not even that there is none", timed_out=True)
+        assert waiting.came is not None
+        return asked, waiting.came
+
+    def _listen(self) -> None:
+        for came in self.executor.results():
+            with self._lock:
+                waiting = self._waiting.get(came.key) or self._past.get(came.key)
+            if waiting is None:
+                self._alarm(f"an answer came to what nobody asked ({came.key[:12]})")
+            elif waiting.came is None:
+                waiting.came = came
+                waiting.there.set()
+            elif came.data is not None and self.said(waiting.asked, came) != self.said(waiting.asked, waiting.came):
+                self._alarm(f"{waiting.asked.request.system}: two workers answer one request differently")
+
+    def _alarm(self, text: str) -> None:
+        self.alarms.append(text)
+        print(f"warning: {text}", file=sys.stderr)
+
+
+@dataclass(slots=True)
+class _Waiting:
+    asked: Asked
+    came: Came | None = None
+    there: threading.Event = field(default_factory=threading.Event)
+    asked_by: int = 0

@@ -1,0 +1,327 @@
+"""Whatever carries works about: the same records, and nothing recorded that is no answer."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import pickle
+import queue
+import random
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+
+import pytest
+
+from avow.backend_kit.protocol import Limits
+from avow.backend_kit.registry import backend
+from avow.base.verdict import Verdict
+from avow.base.workspace import Workspace
+from avow.evidence.ledger import Ledger
+from avow.pipeline import asking, forks
+from avow.pipeline import work as work_module
+from avow.pipeline.discharge import discharge, ledger_of
+from avow.pipeline.executors import Asked, Came, Desk, Executor, Local
+from avow.pipeline.requests import Request, Response, Unanswered, read_response, response_bytes
+from avow.pipeline.run_info import Run
+from avow.pipeline.work import Work, catalogue, tool_identities
+from avow.pipeline.worker import answer
+from avow.system.load import load_system
+
+from .made import programs
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Workspace]:
+    programs(tmp_path / "contracts" / "made", 3, 2)
+    (tmp_path / "dodo.py").touch()
+    monkeypatch.delenv("PYTEST_CURRENT_TEST", raising=False)  # with another environment it is another fork server
+    monkeypatch.setattr(asking, "_desks", {})
+    monkeypatch.setattr(work_module, "offered", None)
+    yield Workspace(tmp_path)
+    ledger_of.cache_clear()
+
+
+def works(place: Workspace) -> list[Work]:
+    found = catalogue(load_system(place.contracts / "made")).works
+    return [work for work in found if work.cut is not None]
+
+
+def recorded(place: Workspace) -> list[object]:
+    """The ledger, without what differs from run to run."""
+    records = [dataclasses.asdict(e.evidence) for e in Ledger(place.ledger("made")).records()]
+    for record in records:
+        for name in ("started", "seconds", "run"):
+            del record[name]
+    return sorted(json.loads(json.dumps(records, default=str)), key=lambda r: (r["obligation"], r["method"]))
+
+
+def settle(place: Workspace) -> list[object]:
+    place.ledger("made").unlink(missing_ok=True)
+    ledger_of.cache_clear()
+    for work in works(place):
+        discharge(place, work, Run("a", False))
+    return recorded(place)
+
+
+class Odd:
+    """Here, but answers come late, in another order, and twice."""
+
+    def __init__(self) -> None:
+        self.came: queue.SimpleQueue[Came] = queue.SimpleQueue()
+        self.chance = random.Random(7)
+
+    def offers(self) -> Mapping[str, frozenset[tuple[str, ...]]]:
+        return {"odd": frozenset(tool_identities(backend("hoare")))}
+
+    def submit(self, asked: Asked) -> None:
+        came = Came(asked.key, answer(asked.data))
+        for _ in range(self.chance.choice((1, 2, 3))):
+            self.came.put(came)
+
+    def results(self) -> Iterator[Came]:
+        while True:
+            held = [self.came.get()]
+            while not self.came.empty():
+                held.append(self.came.get())
+            self.chance.shuffle(held)
+            yield from held
+
+    def cancel(self, keys: Collection[str]) -> None: ...
+    def close(self) -> None: ...
+
+
+def test_the_same_is_recorded_however_works_are_carried_about(
+    place: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    forked = settle(place)
+    assert {record["verdict"] for record in forked} >= {"proved"}  # type: ignore[index]
+    monkeypatch.setenv(forks.PLAIN, "1")
+    few = works(place)[:2]
+    place.ledger("made").unlink()
+    ledger_of.cache_clear()
+    for work in few:
+        discharge(place, work, Run("b", False))
+    anew = recorded(place)
+    assert anew == [record for record in forked if record in anew]
+    assert len(anew) == sum(len(work.obligations) for work in few)
+    monkeypatch.delenv(forks.PLAIN)
+    asking.use(Odd())
+    assert settle(place) == forked
+
+
+def one(place: Workspace, engine: str = "hoare") -> tuple[Work, Asked]:
+    work = next(w for w in works(place) if w.engine == engine)
+    return work, Asked.of(asking.request_of(place, work, work.obligations, place.root / "artifacts"))
+
+
+def test_no_answer_but_a_whole_one_to_what_was_asked_is_taken(place: Workspace) -> None:
+    work, asked = one(place)
+    good = answer(asked.data)
+    other = answer(one(place, "sanity")[1].data)
+    outer = json.loads(good)
+    lying = json.dumps({**outer, "body": outer["body"].replace("proved", "tested")}).encode()
+    wrong: list[object] = [
+        pickle.dumps(print),
+        b"",
+        good[:-9],
+        lying,
+        other,
+        "text",
+        None,
+        3,
+        b"{}",
+        b"null",
+        b"[" * 10**5,
+    ]
+    for said in wrong:
+        with pytest.raises(Unanswered):
+            read_response(said, asked.data)
+        report = asking.judged(work, work.obligations, asked.data, said, {})
+        assert {o.verdict for o in report.outcomes} == {Verdict.ERROR}
+    assert {o.verdict for o in asking.judged(work, work.obligations, asked.data, good, {}).outcomes} == {Verdict.PROVED}
+
+
+def test_an_answer_with_too_little_or_too_much_is_none(place: Workspace) -> None:
+    work, asked = one(place)
+    whole = read_response(answer(asked.data), asked.data)
+    assert whole.report is not None
+    first = whole.report.outcomes[0]
+    for outcomes in ((first,), (*whole.report.outcomes, first)):
+        told = dataclasses.replace(whole, report=dataclasses.replace(whole.report, outcomes=outcomes))
+        report = asking.judged(work, work.obligations, asked.data, response_bytes(told), {})
+        assert Verdict.ERROR in {o.verdict for o in report.outcomes}
+    neither = response_bytes(Response(asked.key, None))
+    assert asking.judged(work, work.obligations, asked.data, neither, {}).outcomes[0].verdict is Verdict.ERROR
+
+
+def test_a_worker_with_other_tools_refuses_and_says_which(place: Workspace) -> None:
+    _, asked = one(place)
+    other = Asked.of(dataclasses.replace(asked.request, tools=(("dafny", "9.9", "x"),)))
+    said = read_response(answer(other.data), other.data)
+    assert said.report is None
+    assert "dafny 9.9 wanted" in said.refused
+
+
+def test_an_answer_that_differs_from_the_first_is_an_alarm(
+    place: Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, asked = one(place)
+    good = read_response(answer(asked.data), asked.data)
+    assert good.report is not None
+    worse = tuple(dataclasses.replace(o, verdict=Verdict.REFUTED) for o in good.report.outcomes)
+    bad = dataclasses.replace(good, report=dataclasses.replace(good.report, outcomes=worse))
+
+    class Two(Odd):
+        def submit(self, asked: Asked) -> None:
+            self.came.put(Came(asked.key, response_bytes(good)))
+
+        def results(self) -> Iterator[Came]:
+            yield self.came.get()
+            yield Came(asked.key, response_bytes(good))
+            yield Came(asked.key, response_bytes(bad))
+            yield Came("nobody's", response_bytes(bad))
+
+    desk = Desk(Two(), asking._said)
+    _, came = desk.ask(asked.request)
+    assert came.data == response_bytes(good)
+    until(lambda: len(desk.alarms) == 2)
+    assert "differently" in capsys.readouterr().err
+
+
+def test_a_tool_that_no_worker_offers_is_not_waited_for(tmp_path: Path, place: Workspace) -> None:
+    folder = place.contracts / "made"
+    (folder / "plan.yaml").write_text(
+        (folder / "plan.yaml").read_text().replace("[hoare: {program", "[dafny: {implementation")
+    )
+    asking.use(Odd())
+    work = next(w for w in works(place) if w.engine == "dafny")
+    report = asking.run(place, work, work.obligations, tmp_path)
+    assert {o.verdict for o in report.outcomes} == {Verdict.NOT_RUN}, report.outcomes[0].summary
+    assert "no worker of the cluster offers dafny" in report.outcomes[0].summary
+
+
+def test_what_is_cancelled_ends_at_once(place: Workspace) -> None:
+    _, asked = one(place)
+    local: Executor = Local(place.root)
+    local.submit(asked)
+    local.submit(asked)
+    local.cancel([asked.key])
+    local.close()
+    assert not list(local.results())
+
+
+def until(happens: object, seconds: float = 60) -> None:
+    deadline = time.monotonic() + seconds
+    while not happens():  # type: ignore[operator]
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+# -- Dask --------------------------------------------------------------------------------------------------------------
+
+
+class Machines:
+    """A scheduler and some workers, each a process."""
+
+    def __init__(self, *words: str) -> None:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self.url = f"dask+{'tls' if words else 'tcp'}://127.0.0.1:{self.port}"
+        dask = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard", "--host", "127.0.0.1"]
+        self.processes = [subprocess.Popen([*dask, "--port", str(self.port), *words], stderr=subprocess.DEVNULL)]
+
+    def worker(self) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "avow.cli", "worker", "--on", self.url, "--slots", "1"]
+        self.processes.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
+        return self.processes[-1]
+
+    def close(self) -> None:
+        for process in reversed(self.processes):
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def machines() -> Iterator[Machines]:
+    pytest.importorskip("distributed")
+    found = Machines()
+    yield found
+    found.close()
+
+
+@pytest.mark.slow
+def test_a_cluster_records_the_same_also_where_a_worker_is_killed(place: Workspace, machines: Machines) -> None:
+    from avow.pipeline.cluster import Address, Cluster
+
+    here = settle(place)
+    first, _ = machines.worker(), machines.worker()
+    cluster = Cluster(Address.read(machines.url))
+    try:
+        until(lambda: len(cluster.offers()) == 2)
+        asking.use(cluster)
+        assert settle(place) == here
+        place.ledger("made").unlink()
+        ledger_of.cache_clear()
+        for number, work in enumerate(works(place)):
+            if number == 1:
+                first.send_signal(signal.SIGKILL)
+            discharge(place, work, Run("a", False))
+        assert recorded(place) == here
+    finally:
+        cluster.close()
+
+
+@pytest.mark.slow
+def test_what_a_worker_pickles_is_not_read(machines: Machines, tmp_path: Path) -> None:
+    from avow.pipeline.cluster import Address, Cluster, _fetched
+
+    machines.worker()
+    cluster = Cluster(Address.read(machines.url))
+    try:
+        until(cluster.offers)
+        ran = str(tmp_path / "ran")
+
+        def evil() -> object:
+            class Evil:  # made there, so that it travels by value
+                def __reduce__(self) -> object:
+                    return os.mkdir, (ran,)
+
+            return Evil()
+
+        future = cluster._client.submit(evil, pure=False)
+        until(lambda: future.status in ("finished", "error"))
+        assert future.status == "finished"
+        request = Request("", "", "", "", {}, Limits(), b"", "")
+        assert _fetched(Asked.of(request), future).data is None
+        assert not (tmp_path / "ran").exists()
+    finally:
+        cluster.close()
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "dask", "http://a:1", "dask+tcp://a.example:1", "dask+tcp://10.0.0.1:8786", "dask+tls://:1", "dask+tls://a"],
+)
+def test_addresses_that_are_refused(text: str) -> None:
+    from avow.base.diagnostics import Rejected
+    from avow.pipeline.cluster import Address
+
+    with pytest.raises(Rejected, match="CLUSTER001"):
+        Address.read(text)
+
+
+def test_without_certificates_there_is_no_tls(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    from avow.base.diagnostics import Rejected
+    from avow.pipeline.cluster import Address
+
+    monkeypatch.delenv("AVOW_TLS_CA", raising=False)
+    with pytest.raises(Rejected, match="CLUSTER002"):
+        Address.read("dask+tls://a.example:8786").security()
