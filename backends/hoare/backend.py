@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from functools import cached_property
 from pathlib import Path
 
@@ -116,7 +117,19 @@ def problems(job: Job) -> tuple[Diagnostic, ...]:
     except Rejected as rejected:
         return rejected.diagnostics
     clauses = (*job.node.assumptions, *(job.clause(o) for o in job.obligations))
-    return tuple(other_numbers(work.checked.program, clauses))
+    return (*_undated(job), *other_numbers(work.checked.program, clauses))
+
+
+def _undated(job: Job) -> tuple[Diagnostic, ...]:
+    accepted = Accepted.of(job)
+    try:
+        if accepted is not None:
+            date.fromisoformat(accepted.until)
+    except ValueError:
+        place = job.method.options.at("termination", "until")
+        message = f"termination.until is no day: {accepted.until!r}" if accepted else ""
+        return (Diagnostic("HOARE400", message, place, hint="write it as 2027-06-30"),)
+    return ()
 
 
 # -- export ------------------------------------------------------------------------------------------------------------

@@ -90,6 +90,21 @@ def test_partial_correctness_supports_nothing_until_a_person_answers_for_the_end
     assert settle(tmp_path / "c", hangs, termination=word).verdict is Verdict.REFUTED  # whoever says what
 
 
+def test_a_word_without_a_day_is_a_fault_of_the_plan(tmp_path: Path) -> None:
+    word = {"because": "n rises to a", "who": "A. Person", "until": "soon"}
+    job = make_job(
+        tmp_path,
+        CONTRACT.format(formula="y == 0", assume=""),
+        "n",
+        {"program": "n.imp", "termination": word},
+        {"n.imp": "y := 0\nn := 0\nWHILE n < a INVARIANT TRUE DO\n  n := n + 1\n"},
+        "hoare",
+    )
+    (fault,) = BACKEND.check(job)
+    assert (fault.code, fault.is_error) == ("HOARE400", True)
+    assert "soon" in fault.message
+
+
 @pytest.mark.parametrize(
     ("program", "formula", "assume"),
     [
