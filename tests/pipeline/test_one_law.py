@@ -1,0 +1,153 @@
+"""One law over all of it: whatever happened before, `avow verify` says what `avow verify --fresh` says."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+AVOW = str(Path(sys.executable).with_name("avow"))
+RCL = """node n {{ inputs( x : REAL ) outputs( y : REAL ) topics()
+  assume some ( in.x >= {least} )
+  guarantee small ( out.y <= {most} )
+}}
+"""
+PLAN = """system: s
+requirements:
+  R: {{text: "The output is small.", supported_by: [n.small]}}
+nodes: {{n: {{criticality: low, methods: [{{hypothesis: {{subject: '{file}:step', cases: {cases}, seed: {seed}}}}}]}}}}
+"""
+SUBJECTS = {
+    "right": "from lib import limit\ndef step(x):\n    return min(x, limit.TOP)\n",
+    "wrong": "def step(x):\n    return x\n",
+    "reads": "top = float(open('top.txt').read())\ndef step(x):\n    return min(x, top)\n",
+    "raises": "def step(x):\n    raise ValueError\n",
+}
+
+
+class World:
+    """A workspace, and what may happen to it."""
+
+    def __init__(self, root: Path, rng: random.Random) -> None:
+        self.root, self.rng = root, rng
+        self.folder = root / "contracts" / "s"
+        (self.folder / "lib").mkdir(parents=True)
+        (root / "dodo.py").write_text("")
+        (self.folder / "lib" / "limit.py").write_text("TOP = 5\n")
+        (self.folder / "top.txt").write_text("5")
+        self.told = {"least": 0, "most": 10, "cases": 20, "seed": 0, "file": "m.py"}
+        self.subject = "right"
+        self.kept: list[Path] = []
+        self.write()
+
+    def write(self) -> None:
+        (self.folder / "s.rcl").write_text(RCL.format(**self.told))
+        (self.folder / "plan.yaml").write_text(PLAN.format(**self.told))
+        for old in self.folder.glob("m*.py"):
+            old.unlink()
+        (self.folder / str(self.told["file"])).write_text(SUBJECTS[self.subject])
+
+    def option(self) -> None:
+        name = self.rng.choice(["least", "most", "cases", "seed"])
+        self.told[name] = self.rng.choice({"cases": [5, 20], "seed": [0, 1, 2]}.get(name, [-1, 0, 4, 10]))
+        self.write()
+
+    def rename(self) -> None:
+        self.told["file"] = self.rng.choice(["m.py", "m2.py", "m3.py"])
+        self.write()
+
+    def swap(self) -> None:
+        self.subject = self.rng.choice([*SUBJECTS])
+        self.write()
+
+    def data(self) -> None:
+        path = self.rng.choice([self.folder / "top.txt", self.folder / "lib" / "limit.py"])
+        number = self.rng.choice([3, 5, 50])
+        path.write_text(str(number) if path.suffix == ".txt" else f"TOP = {number}\n")
+
+    def missing(self) -> None:
+        path = self.folder / "top.txt"
+        if path.exists():
+            path.unlink()
+        else:
+            path.write_text("5")
+
+    def comment(self) -> None:
+        path = self.folder / "s.rcl"
+        path.write_text(path.read_text() + f"// {self.rng.random()}\n")
+
+    def edit_notes(self) -> None:
+        files = [f for place in ("artifacts", "reports") for f in (self.root / place).rglob("*") if f.is_file()]
+        files = [f for f in files if f.parent.name != "ledger"]
+        for path in self.rng.sample(files, min(3, len(files))):
+            match self.rng.randrange(3):
+                case 0:
+                    path.unlink()
+                case 1:
+                    path.write_bytes(path.read_bytes().replace(b"1", b"0").replace(b"refuted", b"proved"))
+                case _:
+                    path.write_bytes(b"")
+
+    def keep(self) -> None:
+        place = self.root.with_name(f"{self.root.name}-kept{len(self.kept)}")
+        if (self.root / "artifacts").is_dir():
+            shutil.copytree(self.root / "artifacts" / "s", place, dirs_exist_ok=True)
+            self.kept.append(place)
+
+    def restore(self) -> None:
+        if self.kept:
+            shutil.copytree(self.rng.choice(self.kept), self.root / "artifacts" / "s", dirs_exist_ok=True)
+
+    def killed(self) -> None:
+        run = subprocess.Popen([AVOW, "verify"], cwd=self.root, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(self.rng.random() * 2)
+        run.send_signal(signal.SIGKILL)
+        run.wait()
+
+    def happenings(self) -> list[Callable[[], None]]:
+        return [
+            *(self.option, self.rename, self.swap, self.data, self.missing, self.comment),
+            *(self.edit_notes, self.keep, self.restore, self.killed),
+        ]
+
+    def verify(self, *options: str) -> tuple[int, dict[str, str]]:
+        done = subprocess.run(
+            [AVOW, "verify", *options], cwd=self.root, capture_output=True, text=True, timeout=120, check=False
+        )
+        assert "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
+        case = json.loads((self.root / "reports" / "s" / "report.json").read_text())
+        return done.returncode, {
+            f"{o['obligation']['node']}/{o['obligation']['name']}": o["standing"] for o in case["obligations"]
+        }
+
+
+def hold(root: Path, seed: int, steps: int) -> None:
+    rng = random.Random(seed)
+    world = World(root, rng)
+    done = []
+    for _ in range(steps):
+        for happens in rng.choices(world.happenings(), k=rng.randrange(1, 4)):
+            done.append(happens.__name__)
+            happens()
+        said = world.verify()
+        assert said == world.verify("--fresh"), (seed, done)
+        assert said == world.verify(), (seed, done)
+
+
+def test_the_law_on_a_short_walk(tmp_path: Path) -> None:
+    hold(tmp_path / "w", 1, 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(int(os.environ.get("AVOW_WALKS", "4"))))
+def test_the_law_on_random_walks(tmp_path: Path, seed: int) -> None:
+    hold(tmp_path / "w", 100 + seed, 8)
