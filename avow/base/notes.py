@@ -47,8 +47,10 @@ def cache_folder() -> Path:
 
 
 def _mark(path: Path, body: Mapping[str, Any]) -> str:
-    """Of one place: a note that is copied to another says nothing there."""
-    text = json.dumps([str(path.absolute()), body], sort_keys=True)
+    """Of one place among the artifacts: a note that is copied to another says nothing there."""
+    parts = path.absolute().parts
+    within = max((at for at, part in enumerate(parts) if part == "artifacts"), default=0)
+    text = json.dumps([parts[within:], body], sort_keys=True)
     return hmac.new(_key(str(cache_folder())), text.encode("utf-8", "surrogatepass"), hashlib.sha256).hexdigest()
 
 
