@@ -19,7 +19,7 @@ from avow.calculus.finder import Finder, Hint
 from avow.calculus.hierarchy import innermost
 from avow.calculus.wiring import wiring
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
-from avow.kernel.check import Established, Given, Kernel, Refused
+from avow.kernel.check import Established, Kernel, Refused
 from avow.kernel.solvers import Solvers
 from avow.kernel.statements import Kind, Statement, Statements, statements
 
@@ -95,13 +95,9 @@ class Certificates:
             kernel = self._kernels[certificate.scope] = Kernel(self.known, certificate, self.solvers)
         for i in kernel.places.get((claim.node, claim.digest), ()):
             try:
-                if claim.kind is not Kind.REQUIREMENT:
-                    return kernel.side_condition(i)
-                found = kernel.establish(i)
+                return kernel.establish(i) if claim.kind is Kind.REQUIREMENT else kernel.side_condition(i)
             except Refused:
                 continue
-            if not any(need.kind is Given.OPEN for need in found.hypotheses):
-                return found
         return None
 
     def claim(self, kind: Kind, name: str) -> Statement | None:

@@ -92,7 +92,11 @@ class Kernel:
             raise Refused("the entries that it rests on are not closed")
         for i in sorted(part):
             self._valid(i)
-        return self._established(goal, part, part)
+        found = self._established(goal, part, part)
+        is_open = any(need.kind is Given.OPEN for need in found.hypotheses)
+        if is_open and self._claim(self.certificate.entries[goal]).kind is Kind.REQUIREMENT:
+            raise Refused("a requirement rests on what only a derived contract may assume")
+        return found
 
     def side_condition(self, goal: int) -> Established:
         """The claim of an entry as an implication: established with all that it rests on, and told with only what its

@@ -1,0 +1,208 @@
+"""The kernel: what it establishes, that mutated certificates pass for nothing else, and that its text says what
+`avow.solving` says."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from calculus.make import make, node
+
+from avow.calculus.certificates import Certificates
+from avow.calculus.composition import compose
+from avow.calculus.discharge import Bounds
+from avow.calculus.finder import Hint
+from avow.kernel.certificate import Certificate, Entry, How, Malformed, Question, Use, canonical, from_json, to_json
+from avow.kernel.check import Established, Given, Kernel, Refused
+from avow.kernel.solvers import Said, Solvers, ask_z3
+from avow.kernel.statements import Kind
+from avow.kernel.text import Text
+from avow.language.load import check_text
+from avow.solving.questions import entails
+from avow.solving.smtlib import export
+
+LOOP = (
+    node(
+        "a", "z : INTEGER, e : INTEGER", "x : INTEGER", "A low: in.z > 0", "A env: in.e >= 0", "G: out.x >= in.z + in.e"
+    )
+    + node("b", "x : INTEGER", "y : INTEGER", "A: in.x > 0", "G: out.y == in.x", "G other: out.y < 99")
+    + node("c", "y : INTEGER", "z : INTEGER", "A: in.y > 0", "G: out.z == in.y + 1")
+)
+PLAN = "connections: [{from: c.z, to: a.z, delayed: true, initial: '1'}]\n"
+PLAN += "environment: {in.e: {assume: 'in.e >= 0', because: it counts}}\n"
+PLAN += "requirements: {R: {text: t, formula: 'c.z > 1', supported_by: [c]}}\n"
+
+
+def made(folder: Path, text: str = LOOP, plan: str = PLAN) -> tuple[Certificates, Certificate]:
+    certificates = compose(make(folder, text, plan)).certificates
+    found = certificates.requirement("R", Hint(()), Bounds())
+    assert found is not None
+    return certificates, certificates.made["requirement R"]
+
+
+def established(certificates: Certificates, certificate: Certificate) -> Established:
+    """The requirement, from a certificate. Raises Refused."""
+    claim = certificates.claim(Kind.REQUIREMENT, "R")
+    assert claim is not None
+    kernel = Kernel(certificates.known, certificate, certificates.solvers)
+    places = kernel.places.get(("", claim.digest), ())
+    if not places:
+        raise Refused("no entry")
+    return kernel.establish(places[0])
+
+
+def test_hypotheses_are_computed(tmp_path: Path) -> None:
+    certificates, certificate = made(tmp_path)
+    found = established(certificates, certificate)
+    names = {(n.kind, n.node) for n in found.hypotheses}
+    assert {(Given.GUARANTEE, "a"), (Given.GUARANTEE, "b"), (Given.GUARANTEE, "c"), (Given.TOGETHER, "")} <= names
+    assert any(kind is Given.ENVIRONMENT for kind, _ in names)
+    assert not found.vacuous
+    again = from_json(json.loads(canonical(certificate)))
+    assert established(certificates, again) == found
+
+
+def mutants(certificate: Certificate) -> Iterator[Certificate]:
+    """Certificates that are wrong in one place."""
+    entries = certificate.entries
+    for i, entry in enumerate(entries):
+
+        def put(changed: Entry, i: int = i) -> Certificate:
+            return replace(certificate, entries=(*entries[:i], changed, *entries[i + 1 :]))
+
+        for at in range(len(entry.conds)):
+            yield put(replace(entry, conds=entry.conds[:at] + entry.conds[at + 1 :]))
+        questions: tuple[Question, ...] = (*entry.base, *((entry.step,) if entry.step else ()))
+        for q, question in enumerate(questions):
+
+            def asked(other: Question, q: int = q, entry: Entry = entry) -> Entry:
+                if q < len(entry.base):
+                    return replace(entry, base=(*entry.base[:q], other, *entry.base[q + 1 :]))
+                return replace(entry, step=other)
+
+            for at, use in enumerate(question.uses):
+                yield put(asked(replace(question, uses=question.uses[:at] + question.uses[at + 1 :])))
+                for other in (
+                    Use(use.entry, use.back + 1),
+                    Use(i, use.back),
+                    Use((use.entry + 1) % len(entries), use.back),
+                ):
+                    yield put(asked(replace(question, uses=(*question.uses[:at], other, *question.uses[at + 1 :]))))
+            if question.initials:
+                yield put(asked(replace(question, initials=())))
+                yield put(asked(replace(question, initials=("0" * 64,))))
+            else:
+                yield put(asked(replace(question, initials=("0" * 64,))))
+        for how in How:
+            if how is not entry.how:
+                yield put(replace(entry, how=how))
+        yield put(replace(entry, node="a" if entry.node != "a" else "b"))
+    for i in range(len(entries) - 1):
+        yield replace(certificate, entries=(*entries[:i], entries[i + 1], entries[i], *entries[i + 2 :]))
+
+
+def test_mutants_pass_for_nothing_else(tmp_path: Path) -> None:
+    certificates, certificate = made(tmp_path)
+    good = established(certificates, certificate)
+    refused = passed = 0
+    for mutant in mutants(certificate):
+        try:
+            found = established(certificates, mutant)
+        except Refused:
+            refused += 1
+            continue
+        passed += 1
+        # what still stands is another proof of the same claim: its key says so, and its hypotheses are true ones
+        assert found.goal == good.goal
+        assert found.key != good.key or found.hypotheses == good.hypotheses
+        assert all(need.kind is not Given.OPEN for need in found.hypotheses)
+    assert refused > 5 * passed > 0
+
+
+def test_an_edit_makes_stale_what_used_it_and_nothing_else(tmp_path: Path) -> None:
+    _, certificate = made(tmp_path / "before")
+    unused = compose(make(tmp_path / "unused", LOOP.replace("out.y < 99", "out.y < 98"), PLAN)).certificates
+    established(unused, certificate)
+    used = compose(make(tmp_path / "used", LOOP.replace("out.z == in.y + 1", "out.z == in.y + 2"), PLAN)).certificates
+    with pytest.raises(Refused, match="stale"):
+        established(used, certificate)
+    rewired = PLAN.replace("'1'", "'2'")
+    with pytest.raises(Refused, match="stale"):
+        established(compose(make(tmp_path / "initial", LOOP, rewired)).certificates, certificate)
+
+
+def test_the_environment_is_what_no_node_provides(tmp_path: Path) -> None:
+    certificates, _ = made(tmp_path)
+    claim = certificates.claim(Kind.ASSUMPTION, "a.low")
+    assert claim is not None
+    forged = Certificate("forged", (Entry(How.ENVIRONMENT, "a", claim.digest),))
+    with pytest.raises(Refused, match="a node provides"):
+        Kernel(certificates.known, forged, Solvers()).establish(0)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {},
+        {"format": "avow/certificate/2", "scope": "", "entries": []},
+        {"format": "avow/certificate/1", "scope": "", "entries": [{"how": "shown"}]},
+        {"format": "avow/certificate/1", "scope": "", "entries": [{"how": "open", "node": "a", "digest": "x", "y": 1}]},
+    ],
+)
+def test_what_is_no_certificate_is_refused(data: object) -> None:
+    with pytest.raises(Malformed):
+        from_json(data)
+
+
+def test_json_there_and_back(tmp_path: Path) -> None:
+    _, certificate = made(tmp_path)
+    assert from_json(to_json(certificate)) == certificate
+
+
+FORMULAS = (
+    "exists_unique(i in NATURAL | TRUE)",
+    "exists_unique(i in NATURAL | i < 1)",
+    "forall(i in NATURAL | 0 <= i)",
+    "exists(x in REAL | x * 2 == 1)",
+    "forall(i in NATURAL | in.f(i) >= 0)",
+    "in.n + in.k >= in.k",
+    "in.k - in.n <= in.k",
+    "abs(in.k) >= 0 and min(in.k, 3) <= 3 and max(in.k, 3) >= in.k",
+    "mod(in.k, 3) < 3 and div(in.k, 3) * 3 <= in.k",
+    "(if in.k > 0 then in.k else 0) >= 0",
+    "in.c in {red, green}",
+    "in.c == red or in.c == green or in.c == blue",
+    "in.t == move(in.k, in.n) -> exists(a in INTEGER, b in NATURAL | in.t == move(a, b))",
+    "forall(a in INTEGER, b in NATURAL | in.t == move(a, b) -> b >= 0)",
+    "length(in.s) >= 0",
+    "2 in in.s -> length(in.s) > 0",
+    "in.k in <1 upto 3> -> in.k < 4",
+    "not xor(in.k > 1, in.k > 1)",
+    "in.k > 0 -> in.n > 0",
+    "in.k / 2 > 1 -> in.k > 2",
+)
+CONTEXT = """context {
+  Colour : {red, green, blue};
+  Task : {move(INTEGER, NATURAL), rest};
+  F : NATURAL --> NATURAL;
+}
+"""
+
+
+@pytest.mark.parametrize("formula", FORMULAS)
+def test_its_text_says_what_the_other_translation_says(formula: str) -> None:
+    """Both have the same truth: each is equivalent to the other as Z3 reads them."""
+    ports = "k : INTEGER, n : NATURAL, f : F, c : Colour, t : Task, s : <INTEGER>"
+    text = f"{CONTEXT}node a {{ inputs( {ports} ) outputs( o : BOOL ) topics()\n guarantee g ( {formula} ) }}\n"
+    contract, found = check_text(text, "a.rcl")
+    assert contract is not None, [str(d) for d in found]
+    term = contract.nodes[0].clause("g").formula
+    written = Text()
+    body = written.formula(term, lambda v: (f"|{v.name}~0|", v.sort))
+    facts = [f"(assert {fact})" for fact in written.facts()]
+    script = "\n".join([*written.declarations.values(), *facts, f"(assert (not {body}))", ""])
+    mine, theirs = ask_z3(script), entails({}, term, timeout_ms=5_000).verdict
+    assert {"proved": Said.UNSAT, "refuted": Said.SAT}.get(theirs, mine) is mine, export([term])
