@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from math import fmod
+from math import fmod, isfinite, isnan
 
 from .syntax import Bindings, Struct, Term, Var, plain
 
@@ -18,6 +18,10 @@ def _divide(x: float, y: float) -> float:
     return float("nan") if x == 0 else float("inf") if x > 0 else float("-inf")
 
 
+def _modulo(x: float, y: float) -> float:
+    return fmod(x, y) if y != 0 and isfinite(x) and not isnan(y) else float("nan")
+
+
 _ARITHMETIC: Mapping[str, Callable[[float, float], float]] = {
     "sum": lambda x, y: x + y,
     "minus": lambda x, y: x - y,
@@ -29,7 +33,7 @@ _OPERATORS: Mapping[str, Callable[[float, float], float]] = {
     "-": _ARITHMETIC["minus"],
     "*": _ARITHMETIC["times"],
     "/": _divide,
-    "%": fmod,
+    "%": _modulo,
 }
 COMPUTING = frozenset((*_ARITHMETIC, "append", "toString"))
 
@@ -77,7 +81,7 @@ def value_of(term: Term) -> float | None:
     """The value of an arithmetic expression; None where it has a free variable, or no value."""
     if isinstance(term, Struct) and term.functor in _OPERATORS and len(term.args) == 2:
         left, right = map(value_of, term.args)
-        if left is None or right is None or (term.functor == "%" and right == 0):
+        if left is None or right is None:
             return None
         return _OPERATORS[term.functor](left, right)
     return number(term)

@@ -6,11 +6,11 @@ agent sleeps), and draws through AJPF's choices, so that AJPF explores every dra
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from .builtin import number
 from .environment import Choice, Environment
-from .syntax import Term, Var
+from .syntax import CONS, NIL, Struct, Term, Var
 
 CLASS = "AvowEnvironment"
 MARK = "avow: "
@@ -115,6 +115,14 @@ public class {name} extends DefaultEnvironment {{
 
     private static Term number(double value) {{
         return new NumberTermImpl(value);
+    }}
+
+    private static Term listed(Term... items) {{
+        ListTermImpl made = new ListTermImpl();
+        for (Term item : items) {{
+            made.add(item);
+        }}
+        return made;
     }}
 
     private static Predicate make(String name, Term... args) {{
@@ -248,9 +256,17 @@ def _term(term: Term) -> str:
     value = number(term)
     if value is not None:
         return f"number({value!r})"
+    if term.functor in (CONS, NIL):
+        return f"listed({', '.join(map(_term, _items(term)))})"
     if term.functor[:1] in ("'", '"'):
         return f"new StringTermImpl({_text(term.functor[1:-1])})"
     return f"make({', '.join((_text(term.functor), *map(_term, term.args)))})"
+
+
+def _items(term: Term) -> Iterator[Term]:
+    while isinstance(term, Struct) and term.functor == CONS:
+        yield term.args[0]
+        term = term.args[1]
 
 
 def _text(text: str) -> str:

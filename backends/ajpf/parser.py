@@ -231,7 +231,7 @@ class _Builder(Transformer):  # type: ignore[misc]
 
     @_build
     def arithmetic(self, meta: Any, parts: list[Any]) -> Struct:
-        return Struct(str(parts[1]), (parts[0], parts[2]))
+        return self.measured(Struct(str(parts[1]), (parts[0], parts[2])))
 
     def equation(self, parts: list[Any]) -> tuple[str, Struct]:
         test = "==" if str(parts[1]) == "is" else str(parts[1])
