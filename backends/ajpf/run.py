@@ -223,11 +223,14 @@ class _Run:
     def ask_spin(self, checkers: Sequence[Checker]) -> None:
         name = f"Spin {spin.version()}"
         answers: dict[str, bool] = {}
+        seen: dict[str, None] = {}
         with tempfile.TemporaryDirectory() as temporary:
             try:
                 for checker in checkers:
                     seconds = self.left() * SPIN_SHARE if self.setup.engine == "auto" else self.left()
-                    answers |= spin.opinions(checker, checker.properties, Path(temporary), seconds)
+                    told = spin.opinions(checker, checker.properties, Path(temporary), seconds)
+                    answers |= told.holds
+                    seen[told.seen] = None
             except spin.NoOpinion as error:
                 self.bound["spin"] = f"no second opinion: {error.reason}"
                 if self.setup.engine == "spin":
@@ -239,6 +242,7 @@ class _Run:
         for key, holds in answers.items():
             self.second(key, name, Said.HOLDS if holds else Said.VIOLATED)
         self.engine += f" and {name}"
+        self.bound["spin"] = f"asked of {'; '.join(seen)}"
 
     def second(self, key: str, name: str, said: Said) -> None:
         """Note another engine's answer; a contradiction is an error, never a vote."""

@@ -11,14 +11,16 @@ import re
 import shutil
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base.files import write
 from avow.base.process import ToolMissing, run
 from avow.base.tools import Tool
 
-from . import psl
+from . import promela, psl
 from .checker import Checker, Property
+from .interpreter import Semantics
 
 _ERRORS = re.compile(r"errors: (\d+)")
 
@@ -47,14 +49,39 @@ def tool() -> Tool:
     return Tool("spin", version(), shutil.which("spin"), "apt-get install spin gcc")
 
 
-def opinions(checker: Checker, properties: Sequence[Property], folder: Path, seconds: float) -> dict[str, bool]:
-    """Key → whether the property holds, says Spin. Raises NoOpinion."""
+@dataclass(frozen=True, slots=True)
+class Opinions:
+    """Key → whether the property holds, says Spin; `seen` is what it was asked of."""
+
+    holds: Mapping[str, bool]
+    seen: str
+
+
+def opinions(checker: Checker, properties: Sequence[Property], folder: Path, seconds: float) -> Opinions:
+    """Of the program, translated for Spin apart from our interpreter; where there is no translation, of the state graph
+    that we explored. Raises NoOpinion."""
     if version() is None:
         raise NoOpinion("spin or gcc is not installed")
     deadline = time.monotonic() + seconds
-    write(folder / "graph.h", _tables(checker))
-    write(folder / "agent.pml", _model(checker, properties))
-    for command in (["spin", "-a", "agent.pml"], ["gcc", "-O0", "-w", "-DNOREDUCE", "-o", "pan", "pan.c"]):
+    try:
+        files = _translated(checker, properties)
+        said = _asked(files, checker, properties, folder, time.monotonic() + seconds / 2)
+        return Opinions(said, "the program, by a translation of its own")
+    except promela.NotTranslated as error:
+        reason = f"no translation of {error}"
+    except NoOpinion as error:
+        reason = error.reason
+    files = {"graph.h": _tables(checker), "agent.pml": _model(checker, properties)}
+    said = _asked(files, checker, properties, folder, deadline)
+    return Opinions(said, f"our state graph ({reason})")
+
+
+def _asked(
+    files: Mapping[str, str], checker: Checker, properties: Sequence[Property], folder: Path, deadline: float
+) -> dict[str, bool]:
+    for name, text in files.items():
+        write(folder / name, text)
+    for command in (["spin", "-a", "agent.pml"], ["gcc", "-O1", "-w", "-DNOREDUCE", "-o", "pan", "pan.c"]):
         try:
             done = run(command, cwd=folder, seconds=_left(deadline))
         except ToolMissing as error:
@@ -63,6 +90,24 @@ def opinions(checker: Checker, properties: Sequence[Property], folder: Path, sec
             raise NoOpinion(f"{command[0]} failed: {(done.stdout + done.stderr).strip()[:300]}")
     depth = 20 * len(checker.graph) + 10_000
     return {p.key: _verdict(folder, f"c{number}", depth, _left(deadline)) for number, p in enumerate(properties)}
+
+
+def _translated(checker: Checker, properties: Sequence[Property]) -> dict[str, str]:
+    agent = checker.graph.agent
+    if agent.semantics is not Semantics.MCAPL:
+        raise promela.NotTranslated(f"'{agent.semantics}' percepts")
+    if agent.environment.fair:
+        raise promela.NotTranslated("fairness assumptions")
+    tables = promela.header(agent.program, agent.environment, checker.atoms, probed=agent.probed)
+    lines = ['c_decl {\n\\#include "agent.h"\n\\#include "agent.c"\n}', 'c_state "S s" "Global"', ""]
+    lines += [f"#define a{at} (c_expr {{ SAYS_{at} }})" for at in range(len(checker.atoms))]
+    lines += ["", "active proctype agent() {", "end: do"]
+    for way in range(promela.most_ways(agent.environment)):
+        lines.append(f"  :: atomic {{ c_expr {{ MORE_{way} }} -> c_code {{ go(HERE, {way}); }} }}")
+    lines += ["  od", "}", ""]
+    lines += [f"ltl c{number} {{ {_ltl(p.formula, checker.places)} }}" for number, p in enumerate(properties)]
+    runner = promela.RUNNER.read_text(encoding="utf-8")
+    return {"agent.h": tables, "agent.c": runner, "agent.pml": "\n".join(lines) + "\n"}
 
 
 def _left(deadline: float) -> float:
