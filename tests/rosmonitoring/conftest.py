@@ -47,7 +47,8 @@ def write_case(folder: Path, traces: dict[str, list[str]] | None = None) -> Path
         plan["nodes"][name]["methods"] = [{"rosmonitoring": options}]
     plan.pop("expected", None)
     plan.pop("accepted", None)
-    (target / "plan.yaml").write_text(json.dumps(plan), encoding="utf-8")
+    plan.pop("suppositions", None)
+    (target / "plan.yaml").write_text(json.dumps(plan, default=str), encoding="utf-8")
     return target
 
 
