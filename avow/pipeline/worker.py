@@ -174,7 +174,8 @@ def _discharge(request: Request, system: System, work: Work) -> Report:
         node = system.contract.node(node.name)
         for name, text in tool.export(method_job(system, node, method)).items():
             write(folder / name, text)
-    job = replace(method_job(system, node, method), obligations=claims, kept=request.kept)
+    job, wanted = method_job(system, node, method), {o.id for o in claims}
+    job = replace(job, obligations=tuple(o for o in job.obligations if o.id in wanted), kept=request.kept)
     report = tool.discharge(job, folder, request.limits)
     if request.root and not request.altered:  # tools read the plan's files by themselves, at any time until now
         again = _method_work(system, work.node, work.method)

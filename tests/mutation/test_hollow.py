@@ -57,6 +57,7 @@ def place(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     plan = f"plugins: [any_backend_of_test_hollow]\nnodes:\n  n:\n    methods:{methods}\n"
     (folder / "plan.yaml").write_text(plan)
     monkeypatch.syspath_prepend(str(workspace))
+    monkeypatch.setenv("PYTHONPATH", str(workspace))  # where a worker stands is not where it looks for modules
     monkeypatch.delenv("PYTEST_CURRENT_TEST", raising=False)
     return Workspace(workspace)
 
