@@ -321,15 +321,19 @@ static int gw_deed(S *s, int way) { /* the ways that there are; does it if way >
       if (!known) gw_put(s, gw_single(t, 0, 0, 0, OPEN));
       return 1; }
     case DROPBEL: {
-      int gone = 0; short b[MAXVARS], first[MAXVARS];
+      int gone = 0, lost[MAXBEL]; short b[MAXVARS], first[MAXVARS];
       for (i = 0; i < s->nb;) {
         memcpy(b, f->b, sizeof b);
-        if (t >= 0 ? s->bel[i] == t : gw_match(d->pat, s->bel[i], b)) { if (!gone++) memcpy(first, b, sizeof b); gw_rid(s, i); } else i++;
+        if (t >= 0 ? s->bel[i] == t : gw_match(d->pat, s->bel[i], b)) { if (!gone) memcpy(first, b, sizeof b); lost[gone++] = s->bel[i]; gw_rid(s, i); } else i++;
       }
-      if (t < 0 && gone) gw_give_up("a dropped belief with a free variable");
+      if (t < 0 && gone) { /* the event keeps the variable: it may be another only if no plan asks for it */
+        for (i = 0; i < NPLANS; i++)
+          if (plans[i].drop && !plans[i].isgoal && pats[plans[i].trigger].functor == pats[d->pat].functor) gw_give_up("a plan for a dropped belief with a free variable");
+        memcpy(f->b, first, sizeof first);
+      }
       gw_tail(s, &x); s->cur = gw_intention(&x);
       if (t >= 0) gw_wake(s, -1, t); else for (i = 0; i < s->nq; i++) if (gw_its[s->q[i]].waiting) gw_give_up("waiting for a belief with a free variable");
-      while (gone--) gw_put(s, gw_single(t, 1, 0, 0, OPEN));
+      for (i = 0; i < gone; i++) gw_put(s, gw_single(lost[i], 1, 0, 0, OPEN));
       return 1; }
     case LOCKS: case UNLOCKS: x.locked = kind == LOCKS; gw_tail(s, &x); s->cur = gw_intention(&x); return 1;
     case WAITS: case WAITSNOT: {

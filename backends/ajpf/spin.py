@@ -1,7 +1,5 @@
-"""A second opinion from Spin: the explored state graph as a Promela model, the properties in Spin's own LTL.
-
-Spin sees the graph before our reductions, and translates and checks the properties by itself. What it shares with the
-first opinion is the exploration of the agent.
+"""A second opinion from Spin, in its own LTL: of the agent's program, run by a runner in C that shares nothing with our
+interpreter (`promela`); where that cannot run it, of the state graph that we explored, before our reductions.
 """
 
 from __future__ import annotations
