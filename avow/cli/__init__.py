@@ -28,6 +28,7 @@ COMMANDS = {
     "lsp": "the language server",
     "monitor": "judge a recorded trace against assumptions and guarantees",
     "mutate": "would the evidence notice if the contract said something else?",
+    "recheck": "the kernel alone, over the certificates that runs left",
     "refines": "weaker assumptions, stronger guarantees?",
     "report": "render the reports, or check one against the ledger",
     "requirements": "requirements from CSV or ReqIF, as a plan's section",

@@ -1,0 +1,59 @@
+"""``avow recheck``: the kernel alone, over the certificates that the last runs left."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from avow.cli.paths import PathArgument
+
+
+@click.command()
+@click.argument("path", type=PathArgument())
+@click.argument("certificates", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+def command(path: Path, certificates: Path) -> int:
+    """Establish again what certificates say of a system, with nothing but the kernel, Z3, and cvc5 where it is here.
+
+    PATH is a system's folder or its name; CERTIFICATES a file certificates.json of its artifacts. Code 1 where a claim
+    is not established from contract and plan as they are.
+    """
+    from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.workspace import system_folder
+    from avow.calculus.variables import frame
+    from avow.calculus.wiring import wiring
+    from avow.kernel.certificate import How, Malformed, from_json
+    from avow.kernel.check import Kernel, Refused
+    from avow.kernel.solvers import Second, Solvers, versions
+    from avow.kernel.statements import statements
+    from avow.system.load import load_path
+
+    system = load_path(path if path.is_dir() else system_folder(str(path)))
+    known = statements(wiring(frame(system)))
+    names = {(s.node, s.digest): s.name for same in known.by_digest.values() for s in same}
+    try:
+        found = {scope: from_json(data) for scope, data in json.loads(certificates.read_text()).items()}
+    except (ValueError, AttributeError, Malformed) as error:
+        raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: {error}")) from error
+    solvers = Solvers(second=Second() if "cvc5" in versions() else None)
+    refused = 0
+    try:
+        for scope, certificate in found.items():
+            kernel = Kernel(known, certificate, solvers)
+            for i, entry in enumerate(certificate.entries):
+                if entry.how is not How.SHOWN:
+                    continue
+                called = ".".join(part for part in (entry.node, names.get((entry.node, entry.digest), "?")) if part)
+                try:
+                    claim = kernel.establish(i)
+                except Refused as why:
+                    refused += 1
+                    click.echo(f"refused      {scope}: {called}: {why}")
+                    continue
+                rests = f"on {len(claim.hypotheses)} hypotheses" + (", vacuous" if claim.vacuous else "")
+                click.echo(f"certified-{claim.solvers}  {scope}: {called}, {rests}, key {claim.key[:12]}")
+    finally:
+        solvers.close()
+    click.echo(", ".join(f"{name} {version}" for name, version in versions().items()))
+    return 1 if refused else 0
