@@ -153,7 +153,7 @@ def _conditional(found: object, name: str) -> bool:
 
 
 def test_nothing_proved_is_false(tmp_path: Path) -> None:
-    assert sum(judged(tmp_path, seed) for seed in range(14)) > 0
+    assert sum(judged(tmp_path, seed) for seed in range(5)) > 0
 
 
 @pytest.mark.slow

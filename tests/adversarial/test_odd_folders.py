@@ -55,7 +55,9 @@ def test_no_module_of_the_folder_stands_in_for_another(place: Path) -> None:
     assert not list(place.glob("**/executed"))
 
 
-@pytest.mark.parametrize("name", ["artifacts/ledger/s.jsonl", "artifacts/ledger/index"])
+@pytest.mark.parametrize(
+    "name", ["artifacts/ledger/s.jsonl", pytest.param("artifacts/ledger/index", marks=pytest.mark.slow)]
+)
 def test_a_pipe_where_the_ledger_should_be(place: Path, name: str) -> None:
     (place / "artifacts" / "ledger").mkdir(parents=True)
     os.mkfifo(place / name)

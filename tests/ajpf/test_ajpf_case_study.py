@@ -22,7 +22,7 @@ def settle(job, tmp_path: Path) -> dict[str, Outcome]:
     return {outcome.obligation.rpartition("/")[2]: outcome for outcome in report.outcomes}
 
 
-@pytest.mark.parametrize("semantics", ["mcapl", "edge"])
+@pytest.mark.parametrize("semantics", [pytest.param("mcapl", marks=pytest.mark.slow), "edge"])
 def test_the_repaired_agent_meets_every_guarantee_and_not_for_nothing(rover, tmp_path, semantics):
     job = rover(*REPAIRED, {"semantics": semantics})
     assert BACKEND.check(job) == ()

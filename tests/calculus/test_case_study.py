@@ -82,6 +82,7 @@ def test_an_initial_value_that_breaks_the_assumption_is_found(tmp_path: Path) ->
     assert answers.verdict is not Verdict.PROVED
 
 
+@pytest.mark.slow
 def test_waypoints_too_close_are_found_at_the_hair(tmp_path: Path) -> None:
     """With the tolerance of ±0.25 m, 0.5 m apart is too close and anything above is not."""
     just_enough = case_study(tmp_path, "remote_inspection", REPAIRED)

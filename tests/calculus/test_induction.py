@@ -50,7 +50,10 @@ def test_a_state_that_is_not_shown_to_be_reached_refutes_nothing(tmp_path: Path)
     assert "if such a step is reached" in found.counterexample.explanation
 
 
-@pytest.mark.parametrize(("lag", "verdict"), [(2, Verdict.PROVED), (3, Verdict.PROVED), (5, Verdict.UNKNOWN)])
+@pytest.mark.parametrize(
+    ("lag", "verdict"),
+    [(2, Verdict.PROVED), (3, Verdict.PROVED), pytest.param(5, Verdict.UNKNOWN, marks=pytest.mark.slow)],
+)
 def test_induction_over_several_steps(tmp_path: Path, lag: int, verdict: Verdict) -> None:
     """n keeps what the first of a row of delays holds: how many steps induction needs is the row's length."""
     inputs = ", ".join(f"b{k} : INTEGER" for k in range(lag))
@@ -90,6 +93,7 @@ def test_a_side_condition_is_refuted_by_a_run(tmp_path: Path) -> None:
     assert "at step 4 of a run" in found.summary
 
 
+@pytest.mark.slow
 def test_a_side_condition_that_is_not_inductive_is_unknown(tmp_path: Path) -> None:
     text = counter("INTEGER", "G: in.last < 5 -> out.n == 0")
     plan = "connections: [{from: count.n, to: count.last, delayed: true, initial: 0}]\n"
