@@ -33,9 +33,11 @@ from .words import Wording, explain
 ENGINE = "Avow's own Gwendolen checker"
 GRACE = 0.5
 """Of the time limit, what may be used beyond it to look for violations in what could be explored."""
-LAZY = 20_000
+LAZY = 200_000
 """States after which the properties are asked for one by one, each on the part of the state space that it needs."""
-LAZY_SHARE = 0.1
+PART = 20_000
+"""States of such a part."""
+LAZY_SHARE = 0.02
 """Of the time that is left, what one property may use for that."""
 SPIN_SHARE = 0.5
 """Of the time that is left, what Spin may use for its second opinion."""
@@ -143,7 +145,7 @@ class _Run:
     def settled_early(self, agent: Agent, p: Property) -> bool:
         """Whether the property was decided on the part of the state space that it needs (`lazy.open_part`)."""
         try:
-            part = open_part(agent, p, min(LAZY, self.setup.states), self.left() * LAZY_SHARE)
+            part = open_part(agent, p, min(PART, self.setup.states), self.left() * LAZY_SHARE)
         except (TooDeep, TooLarge, RecursionError):
             return False
         if part is None:
