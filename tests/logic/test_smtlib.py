@@ -40,6 +40,7 @@ def test_both_solvers_read_it_and_agree(hypothesis: str, goal: str) -> None:
         assert answer == "unsat"
 
 
+@pytest.mark.slow
 @pytest.mark.needs_cvc5
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 @given(formulas())
