@@ -177,7 +177,7 @@ class _Builder:
 
     def obligation(self, view: ObligationView) -> str:
         o = view.obligation
-        title = short(o.id) if o.kind is Kind.GUARANTEE else o.name
+        title = short(o.id)
         goal = self.add(Shape.GOAL, title, o.claim, view.standing, o.id)
         self.by_claim[view.id] = goal
         solutions = tuple(self.solution(view, item) for item in _one_a_method(view.counting))

@@ -22,8 +22,27 @@ def derivation_claim(name: str) -> str:
     return f"derivation:{name}"
 
 
+_SANITY = {
+    "assumptions-satisfiable": "its assumptions can hold together",
+    "consistent": "its guarantees can hold together",
+    "realizable": "its guarantees can always be met",
+    "tautology": "rules something out",
+    "vacuous": "can be triggered",
+    "redundant": "does not follow from the others",
+    "unconstrained": "is constrained",
+    "undetermined": "is determined by the inputs",
+    "unmeetable": "can be met by what its inputs come from",
+    "unneeded": "is needed",
+}
+"""The good property that a sanity claim states: its id names the fault that is looked for."""
+
+
 def short(claim: str) -> str:
-    """``agent.low`` for a guarantee, ``REQ1``, ``D1``, else the id without the system (a supposition has none)."""
+    """``agent.low`` for a guarantee, ``REQ1``, ``D1``, else the id without the system (a supposition has none).
+
+    Where the id of a claim misleads people, words: a sanity claim is ``agent.low (can be triggered)`` and not
+    ``agent/sanity/vacuous-low``, what the plan says of the environment ``what is supposed of in.away``.
+    """
     kind, colon, name = claim.partition(":")
     if colon and kind in ("requirement", "derivation"):
         return name
@@ -33,7 +52,20 @@ def short(claim: str) -> str:
     if len(parts) != 4:
         return claim
     _, node, kind, name = parts
-    return f"{node}.{name}" if kind == Kind.GUARANTEE else f"{node}/{kind}/{name}"
+    if kind == Kind.GUARANTEE:
+        return f"{node}.{name}"
+    if kind == Kind.SANITY:
+        about, dash, subject = next(
+            ((key, name[len(key) : len(key) + 1], name[len(key) + 1 :]) for key in _SANITY if name.startswith(key)),
+            ("", "", ""),
+        )
+        if about and dash == "-" and subject:
+            return f"{node}.{subject} ({_SANITY[about]})"
+        if about and not dash:
+            return f"{node} ({_SANITY[about]})"
+    if kind == Kind.COMPOSITION and name.startswith("environment."):
+        return f"what is supposed of {name.removeprefix('environment.')}"
+    return f"{node}/{kind}/{name}"
 
 
 def sanity_property(obligation: Obligation) -> str:

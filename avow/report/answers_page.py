@@ -23,8 +23,6 @@ from avow.report.page import asset, environment
 TONE_MARKS = {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}
 _BOXES = 12
 """So many guarantees of a node have a box each; more are grouped by where they stand."""
-_REASON = 300
-"""Characters of a gate's reason; all of it stands in claims.html."""
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
 WORDS = (
     ("proved", "for all inputs, by a sound method"),
@@ -59,7 +57,7 @@ def render_answers(case: Case, json_digest: str = "") -> str:
             style=Markup(asset("answers.css")),
             script=Markup(asset("answers.js")),
             TONE_MARKS=TONE_MARKS,
-            brief=_brief,
+            brief=wording.gate_line,
             by_how=[(how, [r.id for r in case.requirements if r.how is how]) for how, _ in case.answers.by_how],
             content=baseline_of(case).content,
             freshness=freshness(case),
@@ -149,10 +147,6 @@ def _boxes(cells: Sequence[dict[str, Any]], basis: NodeBasis) -> list[tuple[Tone
 def _word(record: Evidence) -> str:
     status = weigh(record).status
     return word(status) if status.supports else status.value
-
-
-def _brief(text: str) -> str:
-    return text if len(text) <= _REASON else text[: _REASON - 1] + "…"
 
 
 def _refuted(text: str) -> Markup:

@@ -13,7 +13,7 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status
 from avow.report.short import markdown_head
 from avow.report.source import plain_lines
-from avow.report.wording import bound_text, clean, mutation, open_line, where, worth
+from avow.report.wording import bound_text, clean, gate_line, mutation, open_line, where, worth
 
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
 _LONG = 200
@@ -37,7 +37,11 @@ def render_markdown(case: Case) -> str:
         _table(
             ("gate", "", "why"),
             (
-                (_md(g.title), "not asked" if g.idle else "passes" if g.passed else "**fails**", _md(g.reason))
+                (
+                    _md(g.title),
+                    "not asked" if g.idle else "passes" if g.passed else "**fails**",
+                    _md(gate_line(g.reason)),
+                )
                 for g in case.gates
             ),
         ),

@@ -61,6 +61,7 @@ def environment() -> Environment:
         "ticks": _ticks,
         "banner_tone": wording.banner_tone,
         "bound_text": wording.bound_text,
+        "gate_line": wording.gate_line,
         "derivation": _derivation,
         "draw_map": draw_map,
         "example_run": example.run,

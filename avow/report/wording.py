@@ -93,13 +93,33 @@ def rerun(view: ObligationView, evidence: Evidence) -> str:
 
 
 def tool_command(evidence: Evidence) -> str:
-    """The exact command that was run, quoted for a shell; empty where the method runs within Avow."""
-    return shlex.join(evidence.command)
+    """The command that was run, quoted for a shell; empty where the method runs within Avow.
+
+    A tool runs where the method's exported files lie, a copy of their folder: what tools say of a guarantee begins
+    with the way to that folder from the workspace's, so that it can be run as it is printed.
+    """
+    command = shlex.join(evidence.command)
+    match evidence.obligation.split("/", 3):
+        case [system, node, Kind.GUARANTEE, _] if command:
+            return f"(cd {shlex.quote(f'artifacts/{system}/{node}/{evidence.method}')} && {command})"
+        case _:
+            return command
 
 
 def worth(evidence: Evidence) -> Status:
     """What a record counts as: a pass whose trigger was never met is vacuous, whatever verdict the tool gave."""
     return weigh(evidence).status
+
+
+def gate_line(reason: str, most: int = 200) -> str:
+    """A gate's reason in a line: whole parts of it while they fit, and how many are left out; JSON has all of it."""
+    if len(reason) <= most:
+        return reason
+    first, *parts = reason.split("; ")
+    shown = first if len(first) <= most else first[: most - 1].rstrip() + "…"
+    while parts and len(shown) + len(parts[0]) + 2 <= most:
+        shown += f"; {parts.pop(0)}"
+    return f"{shown}; and {len(parts)} more" if parts else shown
 
 
 def within(view: ObligationView, status: Status, most: int = 160) -> str:
@@ -222,10 +242,23 @@ def _cuts(text: str, wanted: int) -> tuple[list[int], str]:
 
 
 def bound_text(bound: Mapping[str, Any]) -> str:
-    """``cases 2000, seed 0``."""
-    return ", ".join(
-        f"{name.replace('_', ' ')} {_plain(value)}" for name, value in bound.items() if value not in ([], (), {}, "")
-    )
+    """``cases 2000, seed 0``; ``every state explored, for each i in 0…12, 25 properties`` of a state space."""
+    return ", ".join(_one_bound(name, value) for name, value in bound.items() if value not in ([], (), {}, ""))
+
+
+def _one_bound(name: str, value: Any) -> str:
+    match name, value:
+        case "exhaustive", bool():
+            return "every state explored" if value else "not every state explored"
+        case "indices", [_, *_] as names:
+            return f"for each {' and '.join(map(str, names))}"
+        case "properties" | "states" | "transitions", int() if not isinstance(value, bool):
+            return f"{_plain(value)} {name if value != 1 else _SINGULAR[name]}"
+        case _:
+            return f"{name.replace('_', ' ')} {_plain(value)}"
+
+
+_SINGULAR = {"properties": "property", "states": "state", "transitions": "transition"}
 
 
 def mutation(evidence: Evidence) -> str:

@@ -121,7 +121,10 @@ class Bench:
     # -- for Avow ------------------------------------------------------------------------------------------------------
 
     def main(self) -> int:
-        """``python test_….py CHANNEL SECONDS SEED``: all guarantees, and the counts, for whoever holds the channel."""
+        """``python test_….py CHANNEL SECONDS SEED``: all guarantees, and the counts, for whoever holds the channel.
+        Without these, for people: each guarantee in a line, and code 1 where one is broken."""
+        if len(sys.argv) == 1:
+            return self._told()
         channel, seconds, self.seed = int(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3])
         os.set_inheritable(channel, False)
         adopt_orphans()
@@ -136,6 +139,30 @@ class Bench:
             fault = self.subject.close()
         judge.say(channel, {**self._report(stopped, smaller), "fault": fault})
         return 0
+
+    def _told(self) -> int:
+        """What the generated tests find, guarantee by guarantee; the same cases as pytest would try."""
+        try:
+            found = {name: self._broken(name) for name in self.guarantees}
+        finally:
+            fault = self.subject.close()
+        for name, broken in found.items():
+            print(broken or f"{name}: no case breaks it")
+        if fault:
+            print(fault)
+        return 1 if fault or any(found.values()) else 0
+
+    def _broken(self, name: str) -> str:
+        @self.configured
+        @given(self.inputs)
+        def every(inputs: Inputs) -> None:
+            self.check(name, inputs)
+
+        try:
+            every()
+        except (AssertionError, SubjectFailed, Unsatisfiable, FailedHealthCheck) as fault:
+            return f"{name}: {fault}"
+        return ""
 
     def _sweep(self) -> str:
         """One pass for all guarantees; why it stopped early, if it did."""

@@ -280,7 +280,7 @@ def test_a_risk_that_is_taken_excuses_what_rests_on_it_until_its_day() -> None:
     assert gate(environment(risk(), policy=strict, formal=True), "requirements")[0]
     passed, reason = gate(environment(risk(expires="2026-11-20"), policy=strict, formal=True), "requirements")
     assert not passed
-    assert "R is justified, but proved is asked: it rests on system/composition/environment.n.r" in reason
+    assert "R is justified, but proved is asked: it rests on what is supposed of n.r" in reason
     assert environment(risk(expires="2026-11-21")).exit_code == environment(risk()).exit_code  # its last day counts
 
 

@@ -415,3 +415,26 @@ def test_deep_contracts_do_not_crash(tmp_path: Path, depth: int) -> None:
     except Rejected:
         return  # the language has its own limit
     assert found.verdict in {Verdict.TESTED, Verdict.UNKNOWN, Verdict.ERROR}
+
+
+@pytest.mark.parametrize(("old", "code"), [("", 0), ("r < 250", 1)])
+def test_what_was_exported_runs_as_its_command_is_printed(tmp_path: Path, old: str, code: int) -> None:
+    wanted = job(tmp_path, STEP.replace(old, "r <= 250") if old else STEP)
+    folder = tmp_path / "exported"
+    folder.mkdir()
+    for name, text in BACKEND.export(wanted).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    command = run(wanted).command
+    assert command[1:] == ("-P", "test_sensor.py")
+    done = subprocess.run(
+        [sys.executable, *command[1:]],
+        cwd=folder,
+        env={**os.environ, "AVOW_SYSTEM_ROOT": str(wanted.root)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == code, done.stderr
+    assert done.stderr == ""
+    assert ("high is broken" in done.stdout) == bool(code)
+    assert "low: no case breaks it" in done.stdout

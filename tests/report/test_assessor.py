@@ -91,7 +91,7 @@ def test_causes_stand_worst_first_and_the_contracts_fault_before_the_programs() 
     found = case(SUBJECT, [G1, G2, contract], records)
     (told,) = found.requirements
     assert told.below == (contract.id, G2.id, G1.id)
-    assert told.answer.startswith("Not shown: agent/sanity/realizable is refuted, agent.g2 is refuted")
+    assert told.answer.startswith("Not shown: agent (its guarantees can always be met) is refuted, agent.g2 is refuted")
 
 
 def test_known_bad_material_is_never_attested_as_passed() -> None:

@@ -16,6 +16,7 @@ from click.testing import CliRunner
 
 from avow.assurance.compare import ORDER, Change, Snapshot, compare, of_case
 from avow.assurance.model import Case
+from avow.assurance.naming import short
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.cli.diff import command as diff
@@ -165,7 +166,7 @@ def test_the_page_says_what_the_terminal_says(tmp_path: Path, monkeypatch: pytes
     text = " ".join(Page((tmp_path / "d.html").read_text(encoding="utf-8")).text)
     assert len(said["changes"]) > 3
     for change in said["changes"]:
-        assert change["subject"].rsplit("/", 1)[-1].split(":")[-1] in text
+        assert short(change["subject"]) in text
         assert all(line in text for line in change["why"][:8])
     result = run.invoke(diff, ["old", "new", "--html", "no/such/../\0/x.html"], standalone_mode=False)
     assert isinstance(result.exception, Rejected | SystemExit | ValueError)

@@ -287,5 +287,5 @@ def test_a_bound_that_is_empty_is_not_named() -> None:
     from avow.report.wording import bound_text
 
     assert bound_text({"tables": [], "steps": 2, "indices": (), "seed": 0, "exhaustive": False}) == (
-        "steps 2, seed 0, exhaustive no"
+        "steps 2, seed 0, not every state explored"
     )
