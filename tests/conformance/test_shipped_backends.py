@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+import yaml
 
 from avow.backend_kit.registry import installed
 from avow.backends.ajpf import BACKEND as AJPF
@@ -210,19 +211,7 @@ class TestReview(Conformance):
 
 
 LIFT = Path(__file__).parents[1] / "ajpf" / "fixtures" / "lift"
-LIFT_OPTIONS = {
-    "program": "cabin.gwen",
-    "environment": "cabin.yaml",
-    "engine": "builtin",
-    "instances": {"f": [1, 2]},
-    "predicates": {
-        "in.call(f)": "B(cabin, call(f))",
-        "in.door == shut": "B(cabin, shut)",
-        "in.door == open": "B(cabin, open)",
-        "out.motion == go(f)": "D(cabin, go(f))",
-        "exists(n in NATURAL | out.motion == halt(n))": "D(cabin, halt(_))",
-    },
-}
+LIFT_OPTIONS = yaml.safe_load((LIFT / "plan.yaml").read_text())["nodes"]["cabin"]["methods"][0]["ajpf"]
 
 
 @pytest.mark.slow
