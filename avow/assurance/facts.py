@@ -165,6 +165,7 @@ def facts_of_case(case: Case) -> Facts:
                 f.date or None,
                 f.expires or None,
                 f.method or None,
+                matched=f.matched,
             ),
         )
         for f in case.findings
@@ -179,7 +180,9 @@ def facts_of_case(case: Case) -> Facts:
         ledger_head=case.ledger_head,
         digests=case.digests,
         requirements=tuple(
-            Requirement(r.id, r.text, r.formula or None, r.temporal or None, r.supported_by, r.span)
+            Requirement(
+                r.id, r.text, r.formula or None, r.temporal or None, r.supported_by, r.span, confirmed=r.confirmed
+            )
             for r in case.requirements
         ),
         nodes=case.nodes,

@@ -1,8 +1,10 @@
 """Expected and accepted findings: what the plan says of results that are not good.
 
 *Expected* (reproducing known-bad material) is strict both ways: a finding that is not listed fails, and so does a
-listed one that is not there. *Accepted* is a risk that a named person takes, for a reason, until a date; without one
-it lasts a year. An accepted finding that has expired excuses nothing.
+listed one that is not there, or whose last day (where it names one) has gone by. *Accepted* is a risk that a named
+person takes, for a reason, until a date; without one it lasts a year. A finding that has expired excuses nothing.
+Wildcards stand for what they matched when they were written, as the plan records it; what they match besides is an
+open item.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from avow.assurance.model import Handled
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.evidence.status import Status, roll_up
-from avow.system.plan import Finding
+from avow.system.plan import Finding, is_wild
 
 LASTS_DAYS = 365
 """How long an accepted finding without an expiry is accepted, from its date."""
@@ -54,13 +56,13 @@ def _match(
     counting: Mapping[str, tuple[Entry, ...]],
     today: date,
 ) -> Handled:
-    matched = tuple(
-        obligation.id
+    alike = [
+        obligation
         for obligation in obligations
-        if matches(finding.obligation, obligation.local_id)
+        if _matches(finding.obligation, obligation.local_id)
         and _status(finding, obligation.id, statuses, counting) == finding.verdict
-    )
-    last_day = expiry(finding)
+    ]
+    taken = tuple(o.id for o in alike if takes(finding.obligation, finding.matched, o.local_id))
     return Handled(
         how=how,
         pattern=finding.obligation,
@@ -70,13 +72,28 @@ def _match(
         who=finding.who or "",
         date=finding.date or "",
         expires=finding.expires or "",
-        expired=how == "accepted" and (last_day is None or last_day < today),
-        obligations=matched,
+        expired=_is_out(finding, today) if how == "accepted" or finding.expires else False,
+        obligations=taken,
+        matched=finding.matched,
+        unlisted=tuple(o.local_id for o in alike if o.id not in taken),
     )
 
 
-def matches(pattern: str, name: str) -> bool:
-    """Whether a finding's pattern is about the obligation of that id (without the system)."""
+def _is_out(finding: Finding, today: date) -> bool:
+    """Whether its days have gone by, have not come, or cannot be read."""
+    last_day = expiry(finding)
+    return (
+        last_day is None or last_day < today or (finding.date is not None and date.fromisoformat(finding.date) > today)
+    )
+
+
+def takes(pattern: str, matched: Sequence[str], name: str) -> bool:
+    """Whether a finding is about the obligation of that id (without the system): one with wildcards is about what it
+    matched when it was written, as the plan records it, and about nothing else."""
+    return _matches(pattern, name) and (not is_wild(pattern) or name in matched)
+
+
+def _matches(pattern: str, name: str) -> bool:
     # only * and ? are wild: an id may hold a bracket, which fnmatch would read as a set
     return fnmatch.fnmatchcase(name, pattern.replace("[", "[[]"))
 

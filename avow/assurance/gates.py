@@ -69,10 +69,20 @@ def _integrity(facts: Facts) -> Gate:
 def _findings(facts: Facts, findings: Sequence[Handled], obligations: Sequence[ObligationView]) -> Iterable[Gate]:
     if facts.expected is not None:
         absent = [f for f in findings if f.how == "expected" and not f.obligations]
-        listed = {name for f in findings for name in f.obligations}
+        listed = {name for f in findings if not f.expired for name in f.obligations}
         extra = [v.id for v in obligations if v.status in FINDINGS and v.id not in listed and not v.advice]
         reasons = [
             f"expected but not there: {f.pattern} {f.verdict}{f' by {f.method}' if f.method else ''}" for f in absent
+        ]
+        reasons += [
+            f"expected but not there: {name} {f.verdict}"
+            for f in findings
+            if f.how == "expected" and f.obligations
+            for name in f.matched
+            if f"{facts.system}/{name}" not in f.obligations
+        ]
+        reasons += [
+            f"{f.pattern} was expected until {f.expires}" for f in findings if f.how == "expected" and f.expired
         ]
         reasons += [f"there but not expected: {short(name)}" for name in extra]
         good = f"exactly the {_count(sum(f.how == 'expected' for f in findings), 'expected finding')}"

@@ -20,7 +20,7 @@ from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.evidence.status import Status
-from avow.system.plan import Statement
+from avow.system.plan import Confirmation, Statement
 
 # -- handed in by the pipeline --------------------------------------------------------------------------------------
 
@@ -136,7 +136,11 @@ class Handled:
     expires: str
     expired: bool
     obligations: tuple[str, ...]
-    """What it matched; empty: it matched nothing."""
+    """What it stands for; empty: for nothing."""
+    matched: tuple[str, ...] = ()
+    """As the plan records it, where the pattern has wildcards."""
+    unlisted: tuple[str, ...] = ()
+    """What the wildcards match besides: it is not handled."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,6 +222,7 @@ class RequirementView:
     supposes: tuple[str, ...] = ()
     """Keys of suppositions."""
     span: Span | None = None
+    confirmed: Confirmation | None = None
 
 
 @dataclass(frozen=True, slots=True)

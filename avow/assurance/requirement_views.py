@@ -42,6 +42,7 @@ def requirement_view(
         obligations=tuple(names.own.get(requirement.id, ())),
         answer=_answer(requirement, standing, unknown, statuses, names.own.get(requirement.id, ())),
         span=requirement.span,
+        confirmed=requirement.confirmed,
     )
 
 
@@ -85,6 +86,11 @@ def _answer(
 ) -> str:
     if unknown:
         return f"Not shown: {', '.join(unknown)} under supported_by stands for nothing."
+    if requirement.suspect and requirement.confirmed:
+        said = f"{requirement.confirmed.who} confirmed it on {requirement.confirmed.on}"
+        return (
+            f"Suspect: the sentence, or what is linked to it, was changed since {said}; nobody has confirmed it anew."
+        )
     if standing.circle:
         return f"Refused: it would support itself ({' → '.join(short(name) for name in standing.circle)})."
     if standing.status.supports:

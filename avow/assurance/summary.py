@@ -52,9 +52,16 @@ def open_items(
         if not r.status.supports and not r.below:
             items.append(OpenItem(r.status.value, requirement_claim(r.id), r.answer))
     for f in findings:
+        if f.unlisted:
+            listed = ", ".join(dict.fromkeys((*f.matched, *f.unlisted)))
+            text = (
+                f"{f.how} as {f.verdict}, it matches what it did not when it was written: {_list(list(f.unlisted))}; "
+                f"if these are meant too, write  matched: [{listed}]"
+            )
+            items.append(OpenItem("unlisted", f.pattern, text))
         if f.expired:
             until = f.expires or f"a year after {f.date or 'no date'}"
-            items.append(OpenItem("expired", f.pattern, f"accepted by {f.who} until {until}: {f.reason}"))
+            items.append(OpenItem("expired", f.pattern, f"{f.how} by {f.who or 'nobody'} until {until}: {f.reason}"))
         elif f.how == "accepted" and not f.obligations:
             items.append(
                 OpenItem("unused", f.pattern, f"accepted as {f.verdict}, but nothing is so: remove it", advice=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from avow.assurance.facts import Facts
-from avow.assurance.findings import matches
+from avow.assurance.findings import takes
 from avow.assurance.model import Derivation, Handled
 from avow.assurance.naming import derivation_claim, is_advice, is_foundation, requirement_claim, sanity_property
 from avow.base.verdict import Hypothesis, HypothesisKind, Link
@@ -107,10 +107,10 @@ def supposition_claim(hypothesis: Hypothesis) -> str:
 def supposition_claims(hypotheses: Iterable[Hypothesis], accepted: Iterable[Handled]) -> Iterable[Claim]:
     """What a person has to accept: justified where somebody has (``accepted: {obligation: agent/supposition/…, verdict:
     missing, …}``) and still does, else missing."""
-    taken = [f.pattern for f in accepted if f.how == "accepted" and f.verdict == Status.MISSING and not f.expired]
+    taken = [f for f in accepted if f.how == "accepted" and f.verdict == Status.MISSING and not f.expired]
     found = {h: None for h in hypotheses if h.kind is HypothesisKind.SUPPOSITION}
     for hypothesis in found:
-        given = any(matches(pattern, hypothesis.name) for pattern in taken)
+        given = any(takes(f.pattern, f.matched, hypothesis.name) for f in taken)
         status = Status.JUSTIFIED if given else Status.MISSING
         yield Claim(supposition_claim(hypothesis), status, link=Link.GUIDED if given else None)
 
@@ -170,7 +170,7 @@ def requirement_claim_of(requirement: Requirement, names: Names, statuses: Mappi
     rests, unknown = requirement_support(requirement, names)
     formal = bool(requirement.formula or requirement.temporal)
     own = weakest(statuses[name] for name in names.own.get(requirement.id, ()))
-    if (formal and own is None) or unknown or not rests:
+    if (formal and own is None) or unknown or not rests or requirement.suspect:
         own = weakest((Status.MISSING, *([own] if own else ())))
     return Claim(requirement_claim(requirement.id), own, rests, prose=not formal)
 

@@ -10,7 +10,7 @@ from datetime import date
 from avow.assurance.answers import Sort, Supposition
 from avow.assurance.closure import Closed
 from avow.assurance.facts import Facts
-from avow.assurance.findings import matches
+from avow.assurance.findings import takes
 from avow.assurance.model import ObligationView
 from avow.assurance.relied import Judged, Relied
 from avow.assurance.support import supposition_claim
@@ -194,7 +194,7 @@ def _accepted(facts: Facts, views: Sequence[ObligationView], closed: Mapping[str
     }
     for claim in dict.fromkeys(name for found in closed.values() for name in found.accepted):
         hypothesis = supposed[claim]
-        given = next((f for f in facts.accepted if matches(f.obligation, hypothesis.name)), None)
+        given = next((f for f in facts.accepted if takes(f.obligation, f.matched, hypothesis.name)), None)
         holders = {name for name, found in closed.items() if claim in found.accepted}
         said = Statement(hypothesis.name)
         if given is not None:

@@ -13,6 +13,7 @@ from avow.evidence.status import Status, weigh
 
 _WORDS = {
     "argued": ("argued, not derived", "A person must agree that the guarantees amount to the sentence."),
+    "unconfirmed": ("sentences that nobody has confirmed", "A changed sentence would not be noticed: see `confirmed`."),
     "bounded": ("derived within bounds only", "Nothing is said outside the finite scenario."),
     "unowned": ("suppositions without owner or date", "Nobody is named to keep them true, or they never expire."),
     "sampled": ("guarantees sampled, not proved", "Other inputs and other runs may behave otherwise."),
@@ -43,6 +44,7 @@ def weakenings(
     guarantees = [v for v in views if v.id in within and v.obligation.kind is Kind.GUARANTEE]
     found: dict[str, Iterable[str]] = {
         "argued": [r.id for r in requirements if r.how is How.ARGUED],
+        "unconfirmed": [r.id for r in requirements if r.how is How.ARGUED and r.confirmed is None],
         "bounded": [r.id for r in requirements if r.how is How.BOUNDED],
         "unowned": [s.key for s in suppositions if not s.owned],
         "sampled": [v.id for v in guarantees if _status(v, relied) in (Status.TESTED, Status.MONITORED)],

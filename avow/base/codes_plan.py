@@ -103,6 +103,13 @@ PLAN_CODES: dict[str, Code] = {
             remedy="Add `says: …` (at most 14 words), and `who` and `until`.",
         ),
         Code(
+            "PLAN129",
+            "suspect",
+            "A requirement's sentence, or what is linked to it, is another than the named person confirmed.",
+            severity=Severity.WARNING,
+            remedy="Read both; if they still go together, write your name, the day and the digest under `confirmed`.",
+        ),
+        Code(
             "PLAN121",
             "types clash",
             "An output and the input that it would feed have different types.",

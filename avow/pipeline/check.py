@@ -48,9 +48,15 @@ def of_plan(system: System) -> tuple[Diagnostic, ...]:
     """What is to be said of a plan that can be read: its account of the ROS graph, its requirements' sentences, and
     what each backend says of its options; without the warnings that the plan switches off."""
     from avow.system.sentences import requirement_sentences
-    from avow.system.statements import without_words
+    from avow.system.statements import unconfirmed, without_words
 
-    found = [*_model(system), *_policy(system), *requirement_sentences(system), *without_words(system)]
+    found = [
+        *_model(system),
+        *_policy(system),
+        *requirement_sentences(system),
+        *without_words(system),
+        *unconfirmed(system),
+    ]
     for plan in system.plan.nodes:
         for method in plan.methods:
             found += _method(system, plan.node, method)

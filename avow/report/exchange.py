@@ -35,6 +35,12 @@ def headline(view: ObligationView) -> str:
     return MEANINGS[view.status]
 
 
+def _result_of(case: Case) -> str:
+    """``PASSED``, ``WARNED`` or ``FAILED``. Known-bad material that is as bad as expected passes its gates and supports
+    nothing: whoever asks for ``PASSED`` must not get it for that."""
+    return "FAILED" if not case.good else "WARNED" if banner_tone(case) == "open" else "PASSED"
+
+
 # -- JUnit XML ------------------------------------------------------------------------------------------------------
 
 
@@ -57,8 +63,9 @@ def _gates_suite(case: Case) -> tuple[str, list[int]]:
             failures += 1
             inside = f'<failure type="gate" message={_attribute(gate.reason)}>{escape(clean(gate.reason))}</failure>'
         rows.append(_testcase(f"{case.system}.gates", gate.title, 0.0, inside))
+    result = f'<properties><property name="result" value="{_result_of(case)}"/></properties>\n'
     counts = [len(rows), failures, 0, sum(gate.idle and gate.passed for gate in case.gates)]
-    return f'<testsuite name="gates" {_numbers(counts)}>\n{"".join(rows)}</testsuite>\n', counts
+    return f'<testsuite name="gates" {_numbers(counts)}>\n{result}{"".join(rows)}</testsuite>\n', counts
 
 
 def _suite(case: Case, node: str, views: Iterable[ObligationView]) -> tuple[str, list[int]]:
@@ -123,7 +130,12 @@ def render_sarif(case: Case, *, findings_only: bool = False) -> str:
         "columnKind": "unicodeCodePoints",
         "invocations": [{"executionSuccessful": case.exit_code != 3, "exitCode": case.exit_code}],
         "results": [_result(view, case, names) for view in views],
-        "properties": {"system": case.system, "grade": case.grade.value, "ledgerHead": case.ledger_head},
+        "properties": {
+            "system": case.system,
+            "result": _result_of(case),
+            "grade": case.grade.value,
+            "ledgerHead": case.ledger_head,
+        },
     }
     schema = "https://json.schemastore.org/sarif-2.1.0.json"
     return json_text({"$schema": schema, "version": "2.1.0", "runs": [run]}, depth=4)
@@ -197,10 +209,7 @@ def _sarif_level(view: ObligationView) -> tuple[str, str]:
 
 def render_attestation(case: Case) -> str:
     """in-toto statements (v1) with test-result predicates (v0.1): one for the system, then one for each node."""
-    # known-bad material that is as bad as expected passes its gates, and supports nothing: whoever asks for PASSED
-    # must not get it for that
-    whole = "FAILED" if not case.good else "WARNED" if banner_tone(case) == "open" else "PASSED"
-    every = [_statement(case, "", list(case.obligations), whole)]
+    every = [_statement(case, "", list(case.obligations), _result_of(case))]
     nodes = dict.fromkeys(view.obligation.node for view in case.obligations)
     for node in nodes:
         views = [view for view in case.obligations if view.obligation.node == node and not view.advice]

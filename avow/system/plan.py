@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Span
+from avow.base.files import digest
 from avow.language.contract import Contract
 
 
@@ -159,6 +160,17 @@ class NodePlan:
 
 
 @dataclass(frozen=True, slots=True)
+class Confirmation:
+    """A named person's word that what stands under a requirement is what its sentence asks for."""
+
+    who: str
+    on: str
+    """The day (ISO 8601) on which it was confirmed."""
+    sentence: str
+    """`Requirement.digest` as it was on that day."""
+
+
+@dataclass(frozen=True, slots=True)
 class Requirement:
     """A system requirement in a person's words; a formula or a temporal property where there is one.
 
@@ -173,6 +185,19 @@ class Requirement:
     span: Span | None = field(default=None, compare=False, repr=False)
     formula_span: Span | None = field(default=None, compare=False, repr=False)
     """Where the formula or the temporal property stands."""
+    confirmed: Confirmation | None = None
+
+    @property
+    def digest(self) -> str:
+        """Of the sentence, without regard to white space, and of what is linked to it."""
+        linked = sorted(self.supported_by)
+        parts = (" ".join(self.text.split()), self.formula or "", self.temporal or "", *linked)
+        return digest(repr(parts))[:16]
+
+    @property
+    def suspect(self) -> bool:
+        """Whether the sentence, or what is linked to it, is another than a person confirmed."""
+        return self.confirmed is not None and self.confirmed.sentence != self.digest
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +239,13 @@ class Finding:
     expires: str | None = None
     method: str | None = None
     span: Span | None = field(default=None, compare=False, repr=False)
+    matched: tuple[str, ...] = ()
+    """Where `obligation` has wildcards: what it stood for when it was written, and stands for now."""
+
+
+def is_wild(pattern: str) -> bool:
+    """Whether a finding's `obligation` may stand for several."""
+    return "*" in pattern or "?" in pattern
 
 
 @dataclass(frozen=True, slots=True)

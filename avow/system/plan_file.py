@@ -18,6 +18,7 @@ from avow.base.files import digest
 from avow.system.paths import inside
 from avow.system.plan import (
     ComposeGoal,
+    Confirmation,
     Connection,
     Endpoint,
     EnvironmentInput,
@@ -32,6 +33,7 @@ from avow.system.plan import (
     Statement,
     Subsystem,
     Table,
+    is_wild,
 )
 from avow.system.schema import check_shape
 from avow.system.statements import read_statements
@@ -301,7 +303,17 @@ class _PlanReader:
                 tuple(_texts(piece.at("supported_by"))),
                 piece.span,
                 (formula or temporal or piece).span,
+                self.confirmation(name, piece.at("confirmed")),
             )
+
+    def confirmation(self, name: str, piece: Piece | None) -> Confirmation | None:
+        if piece is None:
+            return None
+        texts = {key: " ".join(part.text.split()) for key, part in (piece.entries or {}).items()}
+        if not _is_date(texts["on"]):
+            place = f"requirements.{name}.confirmed"
+            self.fault("PLAN105", f"{place}: {texts['on']!r} is no date of the calendar", piece.entries["on"].span)  # type: ignore[index]
+        return Confirmation(**texts)
 
     def goals(self) -> Iterator[ComposeGoal]:
         for name, piece in self.entries("compose"):
@@ -396,6 +408,12 @@ class _PlanReader:
                 part = piece.at(field)
                 if part is not None and not _is_date(part.text):
                     self.fault("PLAN105", f"{key}: {part.text!r} is no date of the calendar", part.span)
+            matched = piece.at("matched")
+            if matched is not None and not is_wild(texts["obligation"]):
+                message = (
+                    f"{key}: {texts['obligation']!r} has no * or ? in it: it matches what it names, and nothing else"
+                )
+                self.fault("PLAN110", message, matched.span, hint="leave  matched  out")
             yield Finding(
                 texts["obligation"],
                 texts["verdict"],
@@ -405,6 +423,7 @@ class _PlanReader:
                 texts.get("expires"),
                 texts.get("method"),
                 piece.span,
+                tuple(_texts(matched)),
             )
 
 

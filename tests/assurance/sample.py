@@ -330,7 +330,13 @@ def rover_system(policy: Any = None) -> System:
                 "2027-10-01",
             ),
             Finding(
-                "localisation/guarantee/*", "missing", "bought component", "R. Assessor", "2025-01-01", "2026-01-01"
+                "localisation/guarantee/*",
+                "missing",
+                "bought component",
+                "R. Assessor",
+                "2025-01-01",
+                "2026-01-01",
+                matched=("localisation/guarantee/one_position",),
             ),
         ],
     )

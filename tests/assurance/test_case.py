@@ -23,6 +23,7 @@ from assurance.sample import (
     rover_parts,
     system,
 )
+from avow.assurance.answers import How
 from avow.assurance.case import conclude_again
 from avow.assurance.codec import case_schema, evidence_schema, from_json, to_json
 from avow.assurance.model import Case, Currency, Derivation, Grade, SideCondition
@@ -33,7 +34,7 @@ from avow.base.verdict import Verdict
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
-from avow.system.plan import Finding, Requirement
+from avow.system.plan import Confirmation, Finding, Requirement, is_wild
 
 G = guarantee("n", "g")
 PLANS = [node_plan("n", "low", "hoare", "hypothesis")]
@@ -206,6 +207,60 @@ def test_a_derivation_rests_on_side_conditions_and_premises() -> None:
     assert lost.derivations[0].status is Status.MISSING
 
 
+@pytest.mark.parametrize("changed", [{"text": "Another sentence."}, {"supported_by": ("n.g", "n")}])
+def test_what_is_linked_to_a_changed_sentence_is_suspect(changed: dict[str, Any]) -> None:
+    asked = Requirement("R", "It does.", None, None, ("n.g",))
+    confirmed = replace(asked, confirmed=Confirmation("A. Person", "2026-01-01", asked.digest))
+
+    def stated(requirement: Requirement) -> Case:
+        return case(system({"n": ["g"]}, requirements=[requirement], plans=PLANS), [G], [evidence(G)])
+
+    assert replace(confirmed, text="It  does.\n").digest == asked.digest  # white space says nothing
+    good = stated(confirmed)
+    assert good.requirements[0].status is Status.LINKED
+    assert "unconfirmed" not in {w.key for w in good.weakenings}
+    assert "unconfirmed" in {w.key for w in stated(asked).weakenings}
+    bad = stated(replace(confirmed, **changed))
+    assert bad.requirements[0].how is How.OPEN
+    assert bad.requirements[0].status is Status.MISSING
+    assert "Suspect" in bad.requirements[0].answer
+    assert bad.exit_code == 1
+    assert conclude_again(bad) == bad
+
+
+def test_wildcards_stand_for_what_they_matched_when_they_were_written() -> None:
+    other = guarantee("n", "h")
+    plans = [node_plan("n", "high", "hoare")]
+
+    def taken(how: str, *matched: str) -> Case:
+        terms = {"reason": "seen", "who": "A. Person", "date": "2026-01-01", "expires": "2026-12-31"}
+        found = [Finding("n/guarantee/*", "refuted", matched=matched, **terms)]
+        subject = system({"n": ["g", "h"]}, plans=plans, policy="reproduction", **{how: found})
+        return case(subject, [G, other], [evidence(G, Verdict.REFUTED), evidence(other, Verdict.REFUTED)])
+
+    for how in ("expected", "accepted"):
+        assert taken(how, "n/guarantee/g", "n/guarantee/h").exit_code == 0
+        new = taken(how, "n/guarantee/g")
+        assert new.exit_code == 1
+        assert new.obligation(G.id).handled == how
+        assert new.obligation(other.id).handled == ""
+        item = next(i for i in new.open_items if i.kind == "unlisted")
+        assert not item.advice
+        assert "matched: [n/guarantee/g, n/guarantee/h]" in item.text
+        assert taken(how).exit_code == 1
+        assert conclude_again(new) == new
+    gone = taken("expected", "n/guarantee/g", "n/guarantee/h", "n/guarantee/i")
+    assert "expected but not there: n/guarantee/i" in next(g.reason for g in gone.gates if g.id == "expected")
+
+
+@pytest.mark.parametrize("terms", [{"date": "2026-01-01", "expires": "2026-11-01"}, {"date": "2099-01-01"}])
+def test_a_finding_out_of_its_days_excuses_nothing(terms: dict[str, str]) -> None:
+    found = [Finding("n/guarantee/g", "refuted", "seen", "A. Person", **terms)]
+    assert finding_case(None, found, REFUTED).exit_code == 1
+    if "expires" in terms:
+        assert finding_case(found, [], REFUTED).exit_code == 1
+
+
 # -- findings -------------------------------------------------------------------------------------------------------
 
 
@@ -219,7 +274,7 @@ REFUTED = evidence(G, Verdict.REFUTED)
 
 @pytest.mark.parametrize("pattern", ["n/guarantee/g", "n/*/g", "*/guarantee/?"])
 def test_expected_findings_are_strict_both_ways(pattern: str) -> None:
-    expected = [Finding(pattern, "refuted")]
+    expected = [Finding(pattern, "refuted", matched=("n/guarantee/g",) if is_wild(pattern) else ())]
     assert finding_case(expected, [], REFUTED).exit_code == 0
     absent = finding_case(expected, [], evidence(G))
     assert absent.exit_code == 1

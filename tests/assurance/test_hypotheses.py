@@ -57,4 +57,6 @@ def test_a_supposition_wants_a_person() -> None:
     taken = Finding("agent/supposition/*", Verdict.REFUTED, "seen", "A. Person", facts.today.isoformat())
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
     taken = replace(taken, verdict="missing")
+    assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
+    taken = replace(taken, matched=(ends.name,))
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.JUSTIFIED

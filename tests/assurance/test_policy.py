@@ -255,7 +255,8 @@ def environment(*accepted: Finding, policy: Any = "sil3", formal: bool = False) 
 
 def risk(**more: str) -> Finding:
     terms = {"reason": "data sheet", "who": "R. A.", "date": "2026-10-01", "expires": "2026-12-01", **more}
-    return Finding("system/composition/environment.*", "justified", **terms)
+    matched = ("system/composition/environment.n.r",)
+    return Finding("system/composition/environment.*", "justified", matched=matched, **terms)
 
 
 def test_what_is_weaker_than_asked_is_told_with_what_is_asked() -> None:

@@ -175,6 +175,18 @@ def test_csv_has_every_path_and_no_formula(rendered: tuple[Case, dict[str, Any]]
     assert all(cell[:1] not in tuple("=+-@") for row in rows for cell in row)
 
 
+def test_known_bad_material_is_warned_of_in_every_format_for_machines() -> None:
+    from avow.system.plan import Finding
+
+    target = guarantee("n", "g")
+    expected = [Finding("n/guarantee/g", "refuted", "as published")]
+    subject = system({"n": ["g"]}, plans=[node_plan("n", "low", "hoare")], expected=expected, policy="reproduction")
+    texts: dict[str, Any] = dict(formats(case(subject, [target], [evidence(target, Verdict.REFUTED)])))
+    assert '<property name="result" value="WARNED"/>' in texts["junit.xml"]
+    assert json.loads(texts["report.sarif"])["runs"][0]["properties"]["result"] == "WARNED"
+    assert json.loads(texts["attestation.jsonl"].splitlines()[0])["predicate"]["result"] == "WARNED"
+
+
 def test_latex_only_prints(rendered: tuple[Case, dict[str, Any]]) -> None:
     _, texts = rendered
     text = texts["report.tex"]

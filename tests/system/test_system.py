@@ -366,6 +366,23 @@ def test_every_ros_node_is_accounted_for(tmp_path: Path) -> None:
     assert "ROS sends /chatter from a to b; the contracts link nothing there" in [f.message for f in told.findings]
 
 
+def test_a_sentence_that_was_changed_is_a_warning_with_what_to_write(tmp_path: Path) -> None:
+    from avow.system.statements import unconfirmed
+
+    confirmed = "confirmed: {{who: A. P., on: 2026-01-01, sentence: '{1}'}}"
+    plan = "requirements: {{R: {{text: {0}, supported_by: [a], " + confirmed + "}}}}"
+    first = list(unconfirmed(make(tmp_path / "a", A, plan.format("It does", "?"))))
+    assert [d.code for d in first] == ["PLAN129"]
+    assert first[0].span is not None
+    digest = str(first[0].hint).partition('sentence: "')[2].partition('"')[0]
+    assert list(unconfirmed(make(tmp_path / "b", A, plan.format("It does", digest)))) == []
+    assert [d.code for d in unconfirmed(make(tmp_path / "c", A, plan.format("It does not", digest)))] == ["PLAN129"]
+    wrong = faults(tmp_path / "d", A, plan.format("It does", digest).replace("2026-01-01", "2026-02-30"))
+    assert [d.code for d in wrong] == ["PLAN105"]
+    listed = "expected: [{obligation: a/guarantee/g, verdict: refuted, matched: [a/guarantee/g]}]"
+    assert [d.code for d in faults(tmp_path / "e", A, listed)] == ["PLAN110"]
+
+
 def test_what_is_supposed_without_plain_words_is_a_warning(tmp_path: Path) -> None:
     from avow.system.statements import without_words
 
