@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 from urllib.parse import quote
 
+from avow.assurance.first_screen import WARNED
 from avow.assurance.model import Case, EvidenceView, ObligationView
 from avow.evidence.obligation import Kind
 from avow.evidence.record import RETRY, Evidence
@@ -175,10 +176,11 @@ def open_line(case: Case) -> str:
 
 
 def banner_tone(case: Case) -> str:
-    """Green is for a case that supports what is asked; known-bad material that is as bad as expected is none."""
+    """Green is for a case that supports what is asked: known-bad material, expected or accepted, is none."""
     if not case.good:
         return "bad"
-    return "open" if case.strict and not all(r.status.supports for r in case.requirements) else "good"
+    examined = case.strict and not all(r.status.supports for r in case.requirements)
+    return "open" if examined or case.answers.verdict.startswith(WARNED) else "good"
 
 
 _CONNECTIVES = ("→↔⇒⇔", "∨", "∧")
