@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from avow.assurance.answers import How
@@ -84,6 +84,35 @@ def render_gsn(case: Case) -> str:
 
 
 def render_cae(case: Case) -> str:
+    """`cae` as YAML."""
+    return yaml_text(_quoted(cae(case)))
+
+
+def cae_rows(case: Case) -> Iterator[tuple[int, str, str, str, str]]:
+    """The elements of `cae` as they are read: depth, name, kind, text, and what else is said of it. What is under a
+    claim follows it where the claim stands first; where it stands again its kind is ``see``."""
+    elements = cae(case)
+    seen: set[str] = set()
+    todo = [(0, "claim-system")]
+    while todo:
+        depth, name = todo.pop()
+        body = elements[name]
+        kind = name.partition("-")[0]
+        text = str(body.get("text") or body.get("kind", ""))
+        if name in seen:
+            yield depth, name, "see", text, ""
+            continue
+        seen.add(name)
+        notes = [str(body["verdict"])] if "verdict" in body else []
+        notes += [f"side-warrant: {body['side_warrant']}"] if "side_warrant" in body else []
+        notes += [f"supposes {', '.join(body['supposes'])}"] if "supposes" in body else []
+        notes += ["open"] if "open" in body else []
+        yield depth, name, kind, text, "; ".join(notes)
+        below = body.get("argued_by", ()) if kind == "claim" else body.get("from", ())
+        todo += [(depth + 1, one) for one in reversed(below)]
+
+
+def cae(case: Case) -> _Elements:
     """Claims, arguments, evidence. What a tool derived is a decomposition, what a person says a substitution, a record
     is incorporated as evidence; conditions of the composition are the side-warrant."""
     found: _Elements = {
@@ -124,8 +153,13 @@ def render_cae(case: Case) -> str:
         for view, claim in zip(node.guarantees, clauses, strict=True):
             records = [f"evidence-{name}.{view.obligation.name}-{item.entry.evidence.method}" for item in view.counting]
             records = list(dict.fromkeys(records))
-            found[claim] = {"text": view.obligation.claim, "verdict": view.standing.value}
-            found[f"argument-{name}.{view.obligation.name}"] = {
+            argument = f"argument-{name}.{view.obligation.name}"
+            found[claim] = {
+                "text": view.obligation.claim,
+                "verdict": view.standing.value,
+                "argued_by": [argument],
+            }
+            found[argument] = {
                 "kind": "evidence incorporation",
                 "supports": [claim],
                 "from": records,
@@ -138,7 +172,7 @@ def render_cae(case: Case) -> str:
                 }
     for s in case.suppositions:
         found[f"supposition-{s.number}"] = {"text": s.words, "sort": s.sort.value}
-    return yaml_text(_quoted(found))
+    return found
 
 
 def _quoted(elements: _Elements) -> Mapping[str, Mapping[str, Any]]:

@@ -22,6 +22,7 @@ from avow.assurance.traceability import Row
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.report import example, source, wording
+from avow.report.gsn import cae_rows
 from avow.report.maps import draw_map
 from avow.report.support_counts import resting
 from avow.report.wording import history
@@ -132,6 +133,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
             full=_in_full(views),
             brief=lambda view: _brief(view, places),
             json_digest=json_digest,
+            cae=list(cae_rows(case)),
             kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in views)],
             open_at_once=_OPEN_AT_ONCE,
         )

@@ -25,17 +25,21 @@ function clipped(doc, width) {
   const out = [];
   for (const [n, e] of texts(doc)) {
     const range = doc.createRange(); range.selectNodeContents(n);
-    for (const r of range.getClientRects()) {
+    for (const rect of range.getClientRects()) {
+      let r = rect, bad = "";
       if (r.width < 1 || r.height < 1) continue;
-      if (r.left < -1 || r.right > width + 1) { out.push(n.data.trim().slice(0, 40) + " outside the window"); break; }
-      let bad = "";
       for (let up = e; up && up !== doc.body; up = up.parentElement) {
-        const shown = getComputedStyle(up).display;
-        if (shown === "inline" || shown === "contents") continue;
+        const style = getComputedStyle(up);
+        if (style.display === "inline" || style.display === "contents") continue;
         const b = up.getBoundingClientRect();
+        // what a reader can scroll to is not cut off: the box that scrolls is what has to lie within the others
+        const wide = /auto|scroll/.test(style.overflowX) && up.scrollWidth > up.clientWidth;
+        const tall = /auto|scroll/.test(style.overflowY) && up.scrollHeight > up.clientHeight;
+        if (wide || tall) { r = b; continue; }
         if (r.left < b.left - 1 || r.right > b.right + 1 || r.top < b.top - 2.5 || r.bottom > b.bottom + 2.5) {
           bad = `${n.data.trim().slice(0, 40)} outside ${up.tagName}.${up.className}`; break; }
       }
+      if (!bad && (r.left < -1 || r.right > width + 1)) bad = n.data.trim().slice(0, 40) + " outside the window";
       if (bad) { out.push(bad); break; }
     }
   }
@@ -89,7 +93,7 @@ function report(names) {
 """
 
 
-def _browser() -> str:
+def browser() -> str:
     return next(found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name)))
 
 
@@ -113,8 +117,9 @@ def frames_of(page: str, widths: tuple[int, ...] = (320, 420, 1400)) -> dict[str
 
 def measure(frames: dict[str, tuple[str, int]], folder: Path) -> dict[str, Any]:
     """For each page at its width, folds closed and open: what is clipped, contrast, words. One start of the browser."""
+    whole = "<style>*{content-visibility:visible!important}</style></head>"  # no guessed heights of what is far below
     bare = {
-        name: (re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", page), width)
+        name: (re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", page).replace("</head>", whole), width)
         for name, (page, width) in frames.items()
     }
     body = "".join(
@@ -124,7 +129,7 @@ def measure(frames: dict[str, tuple[str, int]], folder: Path) -> dict[str, Any]:
     script = f"{_MEASURE}\nonload = () => setTimeout(() => report({json.dumps(list(frames))}), 200);"
     path = folder / "measured.html"
     path.write_text(f"<!doctype html><meta charset=utf-8><body>{body}<script>{script}</script>", "utf-8", "replace")
-    command = [_browser(), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}"]
+    command = [browser(), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}"]
     command += ["--window-size=1500,1000", "--virtual-time-budget=2000", "--dump-dom", path.as_uri()]
     done = subprocess.run(command, capture_output=True, text=True, timeout=180, check=True)
     shown = re.search(r'<pre id="result">(.*?)</pre>', done.stdout, re.DOTALL)

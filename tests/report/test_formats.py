@@ -24,8 +24,10 @@ from avow.assurance.trend import trend
 from avow.base.verdict import Verdict
 from avow.evidence.status import Status
 from avow.report import LeftOut, formats, render_all, wording, write_index
+from avow.report.gsn import cae_rows
 from avow.report.latex import latex
 from report.hostile import hostile_case
+from report.test_page import Page
 
 CASES = {"rover": rover_case, "hostile": hostile_case, "empty": lambda: case(system({}), [], [])}
 _RENDERED: dict[str, dict[str, Any]] = {}
@@ -141,6 +143,16 @@ def test_cae_is_the_same_tree(rendered: tuple[Case, dict[str, Any]]) -> None:
     for r in found.requirements:
         argued = not (r.formula or r.temporal)
         assert every[wording.clean(f"argument-{r.id}")]["kind"] == ("substitution" if argued else "decomposition")
+    read = list(cae_rows(found))
+    told = [name for _, name, kind, _, _ in read if kind != "see"]
+    assert len(set(told)) == len(told)
+    assert {f"claim-{r.id}" for r in found.requirements} <= set(told)
+    assert all(name in told[:at] for at, (_, name, kind, _, _) in enumerate(read) if kind == "see")
+    assert {name for name in every if name.startswith("evidence-")} >= {
+        wording.clean(name) for name in told if name.startswith("evidence-")
+    }
+    ids = Page(texts["claims.html"]).ids
+    assert sum(name.startswith(wording.anchor("cae:")) for name in ids) == sum(n.startswith("claim-") for n in told)
     records = sum(name.startswith("evidence-") for name in every)
     assert records <= sum(len(v.counting) for v in found.obligations)
 
