@@ -35,6 +35,7 @@ from dataclasses import replace
 from datetime import date
 
 from avow.assurance.answers import Baseline
+from avow.assurance.certification import KernelRun, ProofView, proof_views, standing, trusted_base
 from avow.assurance.changes import changes
 from avow.assurance.closure import Closure
 from avow.assurance.facts import Facts, facts_of_case, facts_of_system
@@ -101,9 +102,11 @@ def build_case(
     sources: Mapping[str, str] | None = None,
     baseline: Baseline | None = None,
     discharging: Mapping[str, tuple[str, ...]] | None = None,
+    kernel: KernelRun | None = None,
 ) -> Case:
     """The case. Pure: same arguments, same case. `sources` are the texts behind `digests`, by the same names;
-    `discharging`: of each node the obligations that settle its assumptions.
+    `discharging`: of each node the obligations that settle its assumptions; `kernel`: what the
+    kernel established in this run.
     Raises Rejected for an unusable policy."""
     return conclude(
         facts_of_system(
@@ -123,6 +126,7 @@ def build_case(
             sources or {},
             baseline,
             discharging or {},
+            kernel,
         )
     )
 
@@ -170,8 +174,10 @@ def conclude(facts: Facts) -> Case:
         for r in facts.requirements
     )
     derived = tuple(_derivation(d, standings, rests, names) for d in facts.derivations)
-    grade, reason = _grade(facts, views)
-    found = gates(facts, views, requirements, derived, findings, grade)
+    fresh, freshness = _fresh(facts, views)
+    proofs = proof_views(views, facts.kernel, facts.run.id)
+    grade, reason = _grade(facts, proofs)
+    found = gates(facts, views, requirements, derived, findings, proofs, fresh)
     listed = (
         *open_items(facts, views, requirements, derived, findings),
         *(OpenItem("program", name, text, advice=True) for name, (_, text) in by_program.items()),
@@ -208,6 +214,11 @@ def conclude(facts: Facts) -> Case:
         run=facts.run,
         grade=grade,
         grade_reason=reason,
+        fresh=fresh,
+        freshness=freshness,
+        kernel=facts.kernel,
+        proofs=proofs,
+        trusted=trusted_base(proofs, facts.kernel),
         policy=facts.policy,
         exit_code=code,
         ledger_head=facts.ledger_head,
@@ -398,18 +409,28 @@ def _single(views: Sequence[ObligationView]) -> tuple[str, ...]:
     )
 
 
-def _grade(facts: Facts, views: Sequence[ObligationView]) -> tuple[Grade, str]:
-    """CERTIFIED only if nothing was believed that this run did not compute, and every digest was verified."""
+def _grade(facts: Facts, proofs: Sequence[ProofView]) -> tuple[Grade, str]:
+    """CERTIFIED: no proof of the calculus or of a requirement is merely claimed, and every digest was verified."""
     if facts.discrepancies is None:
         return Grade.CHECKED, "digests were not verified in this run"
+    if any(d.serious for d in facts.discrepancies):
+        return Grade.CHECKED, "the audit found that the ledger or what it refers to was changed"
+    good, reason = standing(proofs, facts.kernel, facts.run.id)
+    return (Grade.CERTIFIED if good else Grade.CHECKED), reason
+
+
+def _fresh(facts: Facts, views: Sequence[ObligationView]) -> tuple[bool, str]:
+    """Whether nothing was believed that this run did not compute, and every digest was verified."""
+    if facts.discrepancies is None:
+        return False, "digests were not verified in this run"
     serious = sum(d.serious for d in facts.discrepancies)
     if serious:
-        return Grade.CHECKED, f"the audit found {serious} discrepanc{'y' if serious == 1 else 'ies'}"
+        return False, f"the audit found {serious} discrepanc{'y' if serious == 1 else 'ies'}"
     if not facts.run.fresh:
         cached = sum(1 for view in views for v in view.counting if v.entry.evidence.run != facts.run.id)
         if not cached:
-            return Grade.CHECKED, "earlier records would have been believed: `avow verify --fresh` believes none"
-        return Grade.CHECKED, f"{cached} answer{'' if cached == 1 else 's'} from earlier runs, with unchanged inputs"
+            return False, "earlier records would have been believed: `avow verify --fresh` believes none"
+        return False, f"{cached} answer{'' if cached == 1 else 's'} from earlier runs, with unchanged inputs"
     unanswered = sum(
         1
         for view in views
@@ -420,5 +441,5 @@ def _grade(facts: Facts, views: Sequence[ObligationView]) -> tuple[Grade, str]:
         )
     )
     if unanswered:
-        return Grade.CHECKED, f"{unanswered} planned attempt{'' if unanswered == 1 else 's'} not made in this run"
-    return Grade.CERTIFIED, "every answer was computed in this run, and every digest verified"
+        return False, f"{unanswered} planned attempt{'' if unanswered == 1 else 's'} not made in this run"
+    return True, "every answer was computed in this run, and every digest verified"

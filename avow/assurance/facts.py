@@ -6,12 +6,13 @@ That it can be taken from a finished case as well is what lets ``avow report --c
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date
 from pathlib import Path
 from types import MappingProxyType
 
 from avow.assurance.answers import Baseline
+from avow.assurance.certification import KernelRun
 from avow.assurance.model import (
     Case,
     Derivation,
@@ -61,6 +62,7 @@ class Facts:
     sources: tuple[SourceView, ...] = ()
     statements: tuple[Statement, ...] = ()
     baseline: Baseline | None = None
+    kernel: KernelRun = field(default_factory=KernelRun)
 
 
 def facts_of_system(
@@ -80,6 +82,7 @@ def facts_of_system(
     sources: Mapping[str, str],
     baseline: Baseline | None = None,
     discharging: Mapping[str, tuple[str, ...]] = MappingProxyType({}),
+    kernel: KernelRun | None = None,
 ) -> Facts:
     """Raises Rejected for an unusable policy."""
     plan = system.plan
@@ -136,6 +139,7 @@ def facts_of_system(
         ),
         statements=tuple(replace(s, span=_relative(s.span, plan)) for s in plan.statements),
         baseline=baseline,
+        kernel=kernel or KernelRun(),
     )
 
 
@@ -201,6 +205,7 @@ def facts_of_case(case: Case) -> Facts:
         sources=case.sources,
         statements=case.statements,
         baseline=case.baseline,
+        kernel=case.kernel,
     )
 
 

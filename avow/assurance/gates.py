@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date
 
 from avow.assurance.answers import How
+from avow.assurance.certification import ProofView, certifiable, claimed
 from avow.assurance.facts import Facts
 from avow.assurance.findings import FINDINGS
 from avow.assurance.gap import shortfall, suggest
-from avow.assurance.model import DerivationView, Gate, Grade, Handled, ObligationView, RequirementView, Suggestion
+from avow.assurance.model import DerivationView, Gate, Handled, ObligationView, RequirementView, Suggestion
 from avow.assurance.naming import derivation_claim, requirement_claim, short
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
@@ -23,7 +24,8 @@ def gates(
     requirements: Sequence[RequirementView],
     derivations: Sequence[DerivationView],
     findings: Sequence[Handled],
-    grade: Grade,
+    proofs: Sequence[ProofView],
+    fresh: bool,
 ) -> tuple[Gate, ...]:
     """Every gate, in the order in which a reader should look at them."""
     views = {view.id: view for view in obligations}
@@ -38,7 +40,7 @@ def gates(
         *_guarantees(facts, obligations, excused),
         _derivations(facts, derivations, views, excused),
         _requirements(facts, requirements, derivations, views, excused),
-        *_certified(facts, grade),
+        *_certified(facts, proofs, fresh),
     )
 
 
@@ -265,9 +267,19 @@ def _weak(
     return tuple(found)
 
 
-def _certified(facts: Facts, grade: Grade) -> Iterable[Gate]:
+def _certified(facts: Facts, proofs: Sequence[ProofView], fresh: bool) -> Iterable[Gate]:
+    if facts.policy.proved:
+        wanted = certifiable(proofs)
+        lacking = claimed(wanted)
+        names = ", ".join(short(name) for name in lacking[:5]) + (
+            f" and {len(lacking) - 5} more" if lacking[5:] else ""
+        )
+        reason = f"by the calculus' word alone: {names}" if lacking else f"{_count(len(wanted), 'proof')}, none by it"
+        yield Gate(
+            "proved", "What is proved of composition and requirements is certified", not lacking, reason, lacking
+        )
     if facts.policy.certified:
-        done = grade is Grade.CERTIFIED
+        done = fresh
         reason = "every answer is of this run, every digest verified" if done else "run `avow verify --fresh`"
         yield Gate("certified", "Every answer is fresh and every digest verified", done, reason)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from avow.assurance.answers import Answers, Baseline, Changes, How, Supposition, Tone, Weakening, WeakestEvidence
+from avow.assurance.certification import KernelRun, ProofView, Trusted
 from avow.assurance.naming import is_advice
 from avow.assurance.policy import Policy
 from avow.base.diagnostics import Span
@@ -332,12 +333,12 @@ class Gate:
 
 
 class Grade(StrEnum):
-    """How fresh the case is."""
+    """Whether what is proved of composition and requirements has to be believed."""
 
     CHECKED = "CHECKED"
-    """Some answers are from the ledger of an earlier run, or some digest was not verified."""
+    """Some such proof has no certificate, or there is none, or the ledger's digests were not verified."""
     CERTIFIED = "CERTIFIED"
-    """Every answer was computed in this run, and every digest verified."""
+    """The kernel established every such proof of the calculus again in this run, and every digest was verified."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -350,6 +351,14 @@ class Case:
     run: RunInfo
     grade: Grade
     grade_reason: str
+    fresh: bool
+    """Whether every answer was computed in this run, and every digest verified."""
+    freshness: str
+    """Why it is so, or is not."""
+    kernel: KernelRun
+    proofs: tuple[ProofView, ...]
+    trusted: tuple[Trusted, ...]
+    """The trusted base."""
     policy: Policy
     exit_code: int
     ledger_head: str

@@ -7,6 +7,7 @@
       sanity: [proved]        composition: […]        requirements: […]
       reviewers: [A. Person]  who may review; without it, anybody
       certified: true         every answer must be of this run, every digest verified
+      proved: certified       a proof of the calculus or of a requirement needs a certificate that the kernel checked
 
 Profiles are data (`profiles.yaml`, beside this module). Errors are located diagnostics with codes POLICY001 to 005.
 """
@@ -85,6 +86,8 @@ class Policy:
     requirements: tuple[Status, ...]
     reviewers: tuple[str, ...] = ()
     certified: bool = False
+    proved: bool = False
+    """Whether a proof of the calculus or of a requirement needs a certificate (``proved: certified``)."""
 
     def demand(self, criticality: str) -> Demand:
         """The demand for a criticality; an unknown one is treated as the highest."""
@@ -144,7 +147,7 @@ def _profile(name: str, span: Span) -> tuple[Policy, list[Diagnostic]]:
     return profile("default"), [fault]
 
 
-_KEYS = ("profile", "guarantees", "sanity", "composition", "requirements", "reviewers", "certified")
+_KEYS = ("profile", "guarantees", "sanity", "composition", "requirements", "reviewers", "certified", "proved")
 _DEMAND_KEYS = ("one_of", "methods", "independent", "max_age_days", "reviewers", "links", "unconditional", "isolation")
 
 
@@ -171,6 +174,11 @@ def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
         policy = replace(policy, reviewers=reader.texts(data["reviewers"], ("reviewers",)))
     if "certified" in data:
         policy = replace(policy, certified=reader.flag(data["certified"], ("certified",)))
+    if "proved" in data:
+        word = data["proved"]
+        if word != "certified":
+            reader.fault(f"'{word}' is not what may be asked: certified", ("proved",))
+        policy = replace(policy, proved=True)
     if "guarantees" in data:
         policy = replace(policy, guarantees=_demands(policy, data["guarantees"], reader))
     return policy, faults

@@ -27,6 +27,7 @@ from avow.calculus.rules import ONE_OUTPUT, PERSISTENCE
 from avow.calculus.variables import Frame
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import digest
+from avow.kernel.check import Established
 from avow.kernel.statements import Kind as Claimed
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
@@ -92,24 +93,43 @@ def settle_all(composition: Composition, obligations: Sequence[Obligation], limi
     return tuple(outcomes)
 
 
-def established_key(certificates: Certificates, obligation: str) -> str | None:
-    """The key with which the kernel establishes an obligation (by its id) from the certificates kept; None where it
-    does not. Nothing is searched for."""
+@dataclass(frozen=True, slots=True)
+class Reestablished:
+    """That the kernel establishes an obligation from a certificate kept."""
+
+    key: str
+    solvers: int
+    """How many answered each of its questions."""
+    scope: str
+    """The certificate's."""
+
+
+def reestablished(certificates: Certificates, obligation: str) -> Reestablished | None:
+    """What the kernel says of an obligation (by its id) from the certificates kept; None where it does not establish
+    it. Nothing is searched for."""
     _, _, kind, name = obligation.split("/", 3)
     if kind == Kind.REQUIREMENT:
-        found = certificates.kept_for(requirement_scope(name), Claimed.REQUIREMENT, name)
-        return found.key if found is not None else None
+        scope = requirement_scope(name)
+        return _told(certificates.kept_for(scope, Claimed.REQUIREMENT, name), scope)
     for goal in certificates.composition.goals:
         for part in goal.root.walk():
             if part.rule is Rule.R4 and name == _loop_name(certificates.composition, goal, part):
                 about = [innermost(str(c.about)) for c in part.side_conditions]
                 each = [certificates.kept_for(goal.name, Claimed.ASSUMPTION, one) for one in about]
-                return questions.loop_key([one for one in each if one is not None]) if all(each) else None
+                there = [one for one in each if one is not None]
+                if len(there) < len(each):
+                    return None
+                solvers = min((one.solvers for one in there), default=1)
+                return Reestablished(questions.loop_key(there), solvers, goal.name)
         for condition in goal.conditions:
             if name == f"{goal.name}.{condition.about}":
                 found = certificates.kept_for(goal.name, Claimed.ASSUMPTION, innermost(str(condition.about)))
-                return found.key if found is not None else None
+                return _told(found, goal.name)
     return None
+
+
+def _told(found: Established | None, scope: str) -> Reestablished | None:
+    return Reestablished(found.key, found.solvers, scope) if found is not None else None
 
 
 # -- generation --------------------------------------------------------------------------------------------------------

@@ -7,9 +7,11 @@ net for where it does not count. Each question has a context of its own, so that
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 import threading
+import time
 from dataclasses import dataclass, field
 from enum import StrEnum
 from importlib import metadata, util
@@ -77,28 +79,34 @@ def versions() -> dict[str, str]:
 
 
 class Second:
-    """cvc5 in a process of its own, ended where it does not keep its time."""
+    """cvc5 in a process of its own, ended where it does not keep its time. `seconds`: for all questions together, if
+    not without end; what is asked later is `unknown`."""
 
-    def __init__(self) -> None:
+    def __init__(self, seconds: float = math.inf) -> None:
+        self._left = seconds
         self._process: subprocess.Popen[str] | None = None
         self._known: dict[str, Said] = {}
 
     def ask(self, script: str) -> Said:
         if script not in self._known:
-            self._known[script] = self._ask(script)
+            if self._left <= 0:
+                return Said.UNKNOWN
+            start = time.monotonic()
+            self._known[script] = self._ask(script, int(min(SECOND_MS, 1 + self._left * 1000)))
+            self._left -= time.monotonic() - start
         return self._known[script]
 
-    def _ask(self, script: str) -> Said:
+    def _ask(self, script: str, milliseconds: int) -> Said:
         if self._process is None or self._process.poll() is not None:
             command = [sys.executable, "-P", "-m", "avow.kernel.second"]
             self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         process = self._process
         assert process.stdin is not None
         assert process.stdout is not None
-        net = threading.Timer(SECOND_MS / 1000 + 5, process.kill)
+        net = threading.Timer(milliseconds / 1000 + 5, process.kill)
         net.start()
         try:
-            process.stdin.write(json.dumps([SECOND_MS, script]) + "\n")
+            process.stdin.write(json.dumps([milliseconds, script]) + "\n")
             process.stdin.flush()
             return Said(process.stdout.readline().strip() or "unknown")
         except (OSError, ValueError):

@@ -30,7 +30,7 @@ from avow.evidence.record import CASE, RETRY
 from avow.pipeline import check as checking
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
-from avow.pipeline.recheck import counting_now
+from avow.pipeline.recheck import counting_now, kernel_run
 from avow.pipeline.results import Result
 from avow.pipeline.run_info import EXPLAIN, Run
 from avow.pipeline.state import State
@@ -143,11 +143,12 @@ def build(assessment: Assessment) -> Case:
     plan = system.plan
     # read once, so that the texts that the report shows are those whose digests it names
     files = (*plan.contract_files, plan.path, *plan.included)
+    entries = counting_now(ledger, workspace.root, system)
     texts = {workspace.relative(path): path.read_bytes() for path in files}
     return build_case(
         system,
         assessment.surveyed.catalogue.obligations,
-        counting_now(ledger, workspace.root, system),
+        entries,
         keys={**assessment.surveyed.keys, **_given_up(assessment, ledger)},
         today=_today(),
         run=RunInfo(
@@ -173,6 +174,7 @@ def build(assessment: Assessment) -> Case:
         graph_svg=graph_svg(system),
         sources={path: data.decode("utf-8", "replace") for path, data in texts.items()},
         baseline=newest_signed(workspace.signed, system.name)[0],
+        kernel=kernel_run(entries, workspace.root, system, assessment.run.id),
     )
 
 
@@ -233,11 +235,16 @@ def _key(assessment: Assessment) -> str:
 
     explain = os.environ.get(EXPLAIN, "")
     root = assessment.workspace.root
-    earlier = zip(ledger.records(), counting_now(ledger, root, surveyed.system), strict=True)
+    entries = counting_now(ledger, root, surveyed.system)
+    earlier = zip(ledger.records(), entries, strict=True)
     damage += [f"{old.number} is of an earlier state" for old, now in earlier if old is not now]
     signed = [digest_file(path) for path in _signatures(assessment)]
+    kernel = kernel_run(entries, root, surveyed.system, assessment.run.id)
+    graded = [kernel.parts, dict(kernel.solvers), [(one.obligation, one.solvers) for one in kernel.established]]
     return digest(
-        json.dumps([SCHEMA, signed, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain])
+        json.dumps(
+            [SCHEMA, signed, graded, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]
+        )
     )
 
 

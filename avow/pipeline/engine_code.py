@@ -9,6 +9,7 @@ from pathlib import Path
 
 import avow
 from avow.backend_kit.protocol import Backend
+from avow.base.files import digest_file
 
 _ROOMS = (
     "base",
@@ -37,6 +38,29 @@ def engine_digest() -> str:
 def backend_digest(tool: Backend) -> str:
     """Of the code behind a backend's answers: the core's, and its own package or module."""
     return _digest((*(_PACKAGE / room for room in _ROOMS_OF_BACKENDS), *_own(tool)))
+
+
+TRUSTED = {
+    "parser and type checker (avow/language)": ("language",),
+    "dataflow graph and plan (avow/system)": ("system",),
+    "wiring of a system as the kernel is told it (avow/calculus)": ("calculus/wiring.py", "calculus/variables.py"),
+    "kernel (avow/kernel)": ("kernel",),
+    "theorem (kernel.dfy)": ("calculus/proofs/kernel.dfy",),
+    "its instances (instances.dfy)": ("calculus/proofs/instances.dfy",),
+    "accounting (avow/assurance)": ("assurance",),
+}
+"""What of Avow has to be trusted for a certified claim, and where it stands."""
+
+
+@functools.cache
+def trusted_parts() -> tuple[tuple[str, str], ...]:
+    """Those parts, each with the SHA-256 of its files; of a single file, the file's own."""
+    found = []
+    for what, rooms in TRUSTED.items():
+        places = tuple(_PACKAGE / room for room in rooms)
+        single = len(places) == 1 and places[0].is_file()
+        found.append((what, digest_file(places[0]) if single else _digest(places)))
+    return tuple(found)
 
 
 def _own(tool: Backend) -> tuple[Path, ...]:

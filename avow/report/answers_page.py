@@ -11,7 +11,7 @@ from markupsafe import Markup, escape
 from avow.assurance.answers import Headline, How, NodeBasis, Supposition, Tone
 from avow.assurance.changes import baseline_of
 from avow.assurance.first_screen import badness, basis_of
-from avow.assurance.model import Case, Grade, ObligationView
+from avow.assurance.model import Case, ObligationView
 from avow.assurance.modules import NodeModule, RequirementModule, node_modules, requirement_modules
 from avow.assurance.relied import word
 from avow.assurance.trend import trend
@@ -81,9 +81,9 @@ def render_answers(case: Case, json_digest: str = "") -> str:
 
 def freshness(case: Case) -> str:
     """How fresh the answers are, in words (the grade's own name says nothing to a reader)."""
-    if case.grade is Grade.CERTIFIED:
-        return case.grade_reason
-    return f"partly from earlier records ({case.grade_reason})"
+    if case.fresh:
+        return case.freshness
+    return f"partly from earlier records ({case.freshness})"
 
 
 def full_reason(supposition: Supposition) -> str:

@@ -66,6 +66,13 @@ def render_markdown(case: Case) -> str:
         )
         if case.environment
         else "The plan assumes nothing of the environment's inputs.",
+        "## Trusted base",
+        f"{case.grade}: {_md(case.grade_reason)}.",
+        _table(
+            ("proof", "grade", "by"),
+            ((_md(short(p.obligation)), p.grade, _md(", ".join(p.tools))) for p in case.proofs),
+        ),
+        _table(("what", "which"), ((_md(t.what), _md(t.which)) for t in case.trusted)),
         "## What is not shown",
         "\n".join(f"- {_md(line)}" for line in case.not_shown),
         *_contracts(case),

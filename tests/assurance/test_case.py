@@ -26,7 +26,7 @@ from assurance.sample import (
 from avow.assurance.answers import How
 from avow.assurance.case import conclude_again
 from avow.assurance.codec import case_schema, evidence_schema, from_json, to_json
-from avow.assurance.model import Case, Currency, Derivation, Grade, SideCondition
+from avow.assurance.model import Case, Currency, Derivation, SideCondition
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Span
 from avow.base.files import digest
@@ -339,20 +339,20 @@ def test_tampering_fails_whatever_the_evidence_says() -> None:
     assert case(SYSTEM, [G], [evidence(G)], discrepancies=[replace(serious, serious=False)]).exit_code == 0
 
 
-def test_certified_means_all_fresh_and_all_verified() -> None:
+def test_fresh_means_all_fresh_and_all_verified() -> None:
     fresh = replace(RUN, fresh=True)
-    assert case(SYSTEM, [G], [evidence(G)], run=fresh).grade is Grade.CERTIFIED
-    assert case(SYSTEM, [G], [evidence(G)]).grade is Grade.CHECKED
-    assert case(SYSTEM, [G], [evidence(G)], run=fresh, discrepancies=None).grade is Grade.CHECKED
+    assert case(SYSTEM, [G], [evidence(G)], run=fresh).fresh
+    assert not case(SYSTEM, [G], [evidence(G)]).fresh
+    assert not case(SYSTEM, [G], [evidence(G)], run=fresh, discrepancies=None).fresh
     old = evidence(G, run="an earlier run")
     found = case(SYSTEM, [G], [old], run=fresh)
-    assert found.grade is Grade.CHECKED
+    assert not found.fresh
     assert status_of(found) is Status.STALE  # a fresh run believes no support that it did not see
     refuted = case(SYSTEM, [G], [evidence(G, Verdict.REFUTED, run="an earlier run"), evidence(G)], run=fresh)
     assert status_of(refuted) is Status.CONTRADICTORY  # but it forgets no refutation
 
 
-def test_sil4_asks_for_a_certified_case() -> None:
+def test_sil4_asks_for_a_fresh_case() -> None:
     subject = system({"n": ["g"]}, plans=PLANS, policy={"profile": "default", "certified": True})
     assert case(subject, [G], [evidence(G)]).exit_code == 1
     assert case(subject, [G], [evidence(G)], run=replace(RUN, fresh=True)).exit_code == 0

@@ -1,0 +1,149 @@
+"""Whose word each `proved` is: the kernel's, of this very run, or another's. And all that has to be trusted for it.
+
+No record of the ledger gives a grade: the pipeline hands in what the kernel established again (`KernelRun`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from avow.evidence.obligation import Kind
+from avow.evidence.status import Status, weigh
+
+if TYPE_CHECKING:
+    from avow.assurance.model import ObligationView
+
+CALCULUS = "compose"
+"""The engine whose proofs come with certificates."""
+
+_CERTIFIABLE = (Kind.COMPOSITION, Kind.REQUIREMENT)
+
+
+class ProofGrade(StrEnum):
+    CERTIFIED_2 = "certified-2"
+    """Established by the kernel in this run; two solvers, of different makers, answered each of its questions."""
+    CERTIFIED_1 = "certified-1"
+    """Established by the kernel in this run, with Z3."""
+    CLAIMED = "claimed"
+    """The calculus says so, and the kernel did not establish it in this run."""
+    TOOL_TRUSTED = "tool-trusted"
+    """The word of another engine: its tools have to be trusted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reestablished:
+    """An obligation that the kernel established from its certificate. `solvers`: how many answered each question."""
+
+    obligation: str
+    solvers: int
+    key: str
+    scope: str
+    """Under which its certificate stands in `KernelRun.certificates`."""
+
+
+@dataclass(frozen=True, slots=True)
+class KernelRun:
+    """What the kernel did in a run."""
+
+    run: str = ""
+    """The run's id; empty: the kernel was not asked."""
+    established: tuple[Reestablished, ...] = ()
+    solvers: Mapping[str, str] = field(default_factory=dict)
+    """Name → version."""
+    certificates: Mapping[str, Any] = field(default_factory=dict)
+    """Scope → certificate (``avow/certificate/1``)."""
+    parts: tuple[tuple[str, str], ...] = ()
+    """What of Avow has to be trusted: name, and SHA-256 or version."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProofView:
+    """A `proved` with its grade."""
+
+    obligation: str
+    grade: ProofGrade
+    tools: tuple[str, ...] = ()
+    """Whose word it is, with versions, where it is no certificate."""
+    key: str = ""
+    """The kernel's, of what it was established from."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trusted:
+    """A part of the trusted base: what it is, and which one (a version or a SHA-256)."""
+
+    what: str
+    which: str
+
+
+def proof_views(views: Iterable[ObligationView], kernel: KernelRun, run: str) -> tuple[ProofView, ...]:
+    """Every `proved` of the case with its grade, but for that of parser and type checker (they are trusted). What the
+    kernel said in another run than this one gives none."""
+    known = {one.obligation: one for one in kernel.established if kernel.run == run}
+    return tuple(
+        _graded(view, known.get(view.id))
+        for view in views
+        if view.status is Status.PROVED and view.obligation.kind is not Kind.WELL_FORMED
+    )
+
+
+def _graded(view: ObligationView, known: Reestablished | None) -> ProofView:
+    proofs = [v.entry.evidence for v in view.counting if weigh(v.entry.evidence).support is Status.PROVED]
+    own = [e for e in proofs if e.backend == CALCULUS]
+    certifiable = view.obligation.kind in _CERTIFIABLE
+    if known is not None and own and certifiable:
+        grade = ProofGrade.CERTIFIED_2 if known.solvers > 1 else ProofGrade.CERTIFIED_1
+        return ProofView(view.id, grade, (), known.key)
+    others = [e for e in proofs if e.backend != CALCULUS]
+    if own and not others:
+        return ProofView(view.id, ProofGrade.CLAIMED, tuple(sorted({f"{e.tool} {e.tool_version}" for e in own})))
+    tools = {f"{e.backend}: {e.tool} {e.tool_version}".strip() for e in others}
+    tools |= set() if tools else {f"{v.entry.evidence.backend}: another claim's proof" for v in view.counting}
+    return ProofView(view.id, ProofGrade.TOOL_TRUSTED, tuple(sorted(tools)))
+
+
+def certifiable(proofs: Iterable[ProofView]) -> tuple[ProofView, ...]:
+    """The proofs that a certificate is wanted for: those of the calculus and of requirements."""
+    return tuple(p for p in proofs if p.obligation.split("/")[2] in _CERTIFIABLE)
+
+
+def claimed(proofs: Iterable[ProofView]) -> tuple[str, ...]:
+    """What is proved by the calculus' word alone."""
+    return tuple(p.obligation for p in proofs if p.grade is ProofGrade.CLAIMED)
+
+
+def standing(proofs: Sequence[ProofView], kernel: KernelRun, run: str) -> tuple[bool, str]:
+    """Whether every proof of the calculus and of a requirement was established again in the run, and why not."""
+    wanted = certifiable(proofs)
+    if not wanted:
+        return False, "nothing of the composition or of the requirements is proved: there is nothing to certify"
+    if kernel.run != run:
+        return False, "the kernel was not asked in this run"
+    if lacking := claimed(wanted):
+        names = ", ".join(name.split("/", 1)[1] for name in lacking[:3])
+        more = f" and {len(lacking) - 3} more" if len(lacking) > 3 else ""
+        return False, f"{len(lacking)} of {len(wanted)} proofs have no certificate: {names}{more}"
+    certified = [p for p in wanted if p.grade is not ProofGrade.TOOL_TRUSTED]
+    if not certified:
+        return False, "no proof of the composition or of the requirements has a certificate"
+    twice = sum(p.grade is ProofGrade.CERTIFIED_2 for p in certified)
+    told = f"the kernel established {len(certified)} of {len(wanted)} proofs again in this run, {twice} by two solvers"
+    trusted = len(wanted) - len(certified)
+    return True, f"{told}; {trusted} by the word of a tool" if trusted else told
+
+
+def trusted_base(proofs: Iterable[ProofView], kernel: KernelRun) -> tuple[Trusted, ...]:
+    """All that has to be trusted for what is proved, beside the reasons that persons give."""
+    own = [Trusted(what, which) for what, which in kernel.parts]
+    solvers = [Trusted(f"solver {name}", version) for name, version in sorted(kernel.solvers.items())]
+    tools: dict[str, int] = {}
+    for proof in proofs:
+        for tool in proof.tools:
+            tools[tool] = tools.get(tool, 0) + 1
+    words = [
+        Trusted(f"{tool} (not certified)", f"{n} proof{'' if n == 1 else 's'}") for tool, n in sorted(tools.items())
+    ]
+    return (*own, *solvers, *words)
