@@ -61,6 +61,20 @@ class Flat(Generic[Label]):
         """The variables that stand for these."""
         return tuple(part for v in originals for part in self.parts.get(v, (v,)))
 
+    def restored(self, term: Term) -> Term:
+        """A formula with the sequences again: their lengths and elements in the place of what stands for them."""
+        lengths: dict[Term, Term] = {length: Length(v, NATURAL) for v, (length, _) in self.parts.items()}
+        elements: dict[Term, Variable] = {element: v for v, (_, element) in self.parts.items()}
+
+        def put(part: Term) -> Term:
+            match part:
+                case Apply(function=function, arguments=(at,)) if function in elements:
+                    return Index(elements[function], put(at), part.sort)
+                case _:  # an element is only asked for by its position
+                    return lengths[part] if part in lengths else map_children(part, put)
+
+        return put(term)
+
     def values(self, found: Mapping[Variable, Value]) -> dict[Variable, Value] | None:
         """The values of the original variables; None where one is too long to be of use."""
         parts = {part for pair in self.parts.values() for part in pair}

@@ -16,12 +16,13 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from avow.base.verdict import Verdict
-from avow.formulas.formula import conjunction, free_variables
+from avow.formulas.formula import conjunction, free_variables, substitute
 from avow.formulas.pointwise import pointwise
 from avow.formulas.sequences import defined, flatten
 from avow.formulas.tuples import untupled
 from avow.language.sorts import SequenceSort
-from avow.language.terms import Term, Variable
+from avow.language.terms import Apply, Quantified, Quantifier, Role, Term, Variable
+from avow.sanity.proofs import confirmed, implied, refutes
 from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
 from avow.solving.limits import budget, now
 
@@ -90,7 +91,7 @@ def _grouped(asked: Question) -> Realizability:
     engines: list[str] = []
     open_question: Realizability | None = None
     for group in groups(asked.guarantees, asked.outputs):
-        answer = _at_a_point(asked, group) or asked.search(group, asked.timeout_ms).decide(asked.doubtful)
+        answer = _at_a_point(asked, group) or _searched(asked, group, asked.timeout_ms)
         if answer.verdict is Verdict.REFUTED:
             return answer
         if answer.verdict is not Verdict.PROVED:
@@ -103,27 +104,62 @@ def _grouped(asked: Question) -> Realizability:
     return Realizability(Verdict.PROVED, needed=ordered, engine=", ".join(dict.fromkeys(engines)) or "z3")
 
 
+def _searched(asked: Question, group: Group, timeout_ms: int) -> Realizability:
+    """What the search says of a group, if a question of its own confirms it."""
+    answer = asked.search(group, timeout_ms).decide(asked.doubtful)
+    limit = max(_AGAIN_MS, timeout_ms)
+    match answer.verdict:
+        case Verdict.PROVED:
+            good = confirmed(
+                answer.proofs, asked.assumptions, group.guarantees, asked.given, timeout_ms=limit, seed=asked.seed
+            )
+        case Verdict.REFUTED:
+            good = _refutes(asked, group, answer.inputs, limit)
+        case _:  # nothing is claimed
+            return answer
+    return answer if good else Realizability(Verdict.UNKNOWN, reason=_UNCONFIRMED, engine=answer.engine)
+
+
+def _refutes(asked: Question, group: Group, inputs: Given, limit: int) -> bool:
+    at = {**inputs, **asked.given}
+    return refutes(at, asked.assumptions, group.guarantees, group.outputs, timeout_ms=limit, seed=asked.seed)
+
+
+def _same(asked: Question, assumptions: Formulas, guarantees: Formulas) -> bool:
+    """Whether what was shown with these formulas was shown of the question."""
+    limit = max(_AGAIN_MS, asked.timeout_ms)
+    return implied(guarantees, asked.guarantees, timeout_ms=limit, seed=asked.seed) and implied(
+        asked.assumptions, assumptions, timeout_ms=limit, seed=asked.seed
+    )
+
+
+_UNCONFIRMED = "an answer was found, but a separate question does not confirm it"
+
+
 def _at_a_point(asked: Question, group: Group) -> Realizability | None:
     """Decide one group with values in the place of functions; None if that is not possible, or not decided."""
     there = pointwise(group.guarantees, group.outputs)
     if there is None:
         return None
     inputs = (*asked.inputs, *there.point)
-    search = replace(asked, inputs=inputs).search(Group(there.guarantees, there.outputs), asked.timeout_ms // 2)
-    answer = search.decide(asked.doubtful)
-    if answer.verdict is Verdict.UNKNOWN:
-        return None
-    at = {v: value for v, value in answer.inputs.items() if v not in there.point}
-    return _unless_an_output(asked, group, replace(answer, inputs=at))
-
-
-def _unless_an_output(asked: Question, group: Group, answer: Realizability) -> Realizability | None:
-    """A refutation that was found of other formulas is asked about once more as the contract has them, with its inputs
-    as constants; None where an output is found there after all, which takes it back."""
-    if answer.verdict is not Verdict.REFUTED:
-        return answer
-    there = Search((), group, {}, answer.inputs, _AGAIN_MS, asked.seed).decide()
-    return None if there.verdict is Verdict.PROVED else answer
+    answer = _searched(replace(asked, inputs=inputs), Group(there.guarantees, there.outputs), asked.timeout_ms // 2)
+    limit = max(_AGAIN_MS, asked.timeout_ms // 2)
+    match answer.verdict:
+        case Verdict.PROVED:
+            point = tuple(replace(v, role=Role.BOUND) for v in there.point)
+            put: dict[Variable, Term] = dict(zip(there.point, point, strict=True))
+            put |= {value: Apply(f, point, value.sort) for f, value in there.values.items()}
+            everywhere = {
+                label: Quantified(Quantifier.FORALL, point, substitute(formula, put))
+                for label, formula in there.guarantees.items()
+            }
+            good = implied(everywhere, group.guarantees, timeout_ms=limit, seed=asked.seed)
+        case Verdict.REFUTED:
+            answer = replace(answer, inputs={v: x for v, x in answer.inputs.items() if v not in there.point})
+            good = _refutes(asked, group, answer.inputs, limit)
+        case _:  # some other way may tell more
+            good = False
+    return answer if good else None
 
 
 _AGAIN_MS = 500
@@ -148,11 +184,21 @@ def _with_items(asked: Question) -> Realizability | None:
         seed=asked.seed,
         doubtful=asked.doubtful,
     )
-    if answer.verdict is not Verdict.REFUTED:
-        return answer if answer.verdict is Verdict.PROVED else None
-    group = asked.group(answer.group)
-    at = apart.values(asked.inputs, answer.inputs)
-    return _unless_an_output(asked, group, replace(answer, inputs=at, group=tuple(group.guarantees)))
+    match answer.verdict:
+        case Verdict.PROVED:
+            whole = replace(
+                asked,
+                assumptions={k: substitute(f, apart.parts) for k, f in asked.assumptions.items()},
+                guarantees={k: substitute(f, apart.parts) for k, f in asked.guarantees.items()},
+            )
+            return answer if _same(whole, assumed, wanted) else None
+        case Verdict.REFUTED:
+            group = asked.group(answer.group)
+            at = apart.values(asked.inputs, answer.inputs)
+            good = _refutes(asked, group, at, max(_AGAIN_MS, asked.timeout_ms // 2))
+            return replace(answer, inputs=at, group=tuple(group.guarantees)) if good else None
+        case _:  # some other way may tell more
+            return None
 
 
 def _with_functions(asked: Question) -> Realizability | None:
@@ -186,7 +232,10 @@ def _with_functions(asked: Question) -> Realizability | None:
         at = None if values is None else {v: values[v] for v in inputs if v in values}
         limit = asked.timeout_ms // 4
         return asked.search(asked.group(answer.group), limit).judge(at, limit) if at is not None else None
-    return answer if answer.verdict is Verdict.PROVED else None
+    if answer.verdict is not Verdict.PROVED:
+        return None
+    shown, supposed = ({k: flat.restored(f) for k, f in formulas.items()} for formulas in (wanted, assumed))
+    return answer if _same(asked, supposed, shown) else None
 
 
 def _halves(formulas: Mapping[tuple[bool, str], Term]) -> tuple[dict[str, Term], dict[str, Term]]:

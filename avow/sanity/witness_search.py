@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.values import Value
-from avow.language.sorts import REAL, FunctionSort
+from avow.language.sorts import FunctionSort
 from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
+from avow.sanity.proofs import Proof
 from avow.sanity.witness_candidates import Definition, candidates
-from avow.sanity.witnesses import Cases, Fixed, Witness, instantiate, witnesses
+from avow.sanity.witnesses import Cases, Fixed, Witness, instantiate, meanings_of, witnesses
 from avow.solving.limits import now
 from avow.solving.questions import Translator, Unsupported, check, entails, replay, search_tables, solve
 from avow.solving.translation import Expr, Meaning
@@ -25,9 +26,6 @@ _PATIENT_MS = 300
 
 _TRIES = 6
 """So many inputs for which there is an output after all, one after the other, and something else is tried."""
-
-_BRIEFLY_MS = 300
-"""For a check of what is believed anyway."""
 
 Formulas = Mapping[str, Term]
 Given = Mapping[Variable, Value]
@@ -44,6 +42,8 @@ class Realizability:
     needed: tuple[str, ...] = ()
     reason: str = ""
     engine: str = "z3"
+    proofs: tuple[Proof, ...] = ()
+    """If proved: what was found for each group, to be checked by questions of their own (`avow.sanity.proofs`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,9 +124,16 @@ class Search:
         answer = entails(
             self.assumptions, goal, timeout_ms=self.left(), seed=self.seed, given=self.given, variables=self.inputs
         )
-        return Realizability(
-            answer.verdict, answer.values, tuple(self.group.guarantees), answer.needed, answer.reason, answer.engine
+        labels = tuple(self.group.guarantees)
+        proofs = (self._shown(),) if answer.verdict is Verdict.PROVED else ()
+        return Realizability(answer.verdict, answer.values, labels, answer.needed, answer.reason, answer.engine, proofs)
+
+    def _shown(self, guarantees: Sequence[Term] | None = None, asked: Sequence[Witness] = ()) -> Proof:
+        formulas = (
+            self.group.guarantees if guarantees is None else dict(zip(self.group.guarantees, guarantees, strict=True))
         )
+        axioms = self._axioms(asked, formulas.values()) if asked else ()
+        return Proof(self.inputs, self.group.outputs, formulas, tuple(asked), tuple(axioms), self.found)
 
     def _direct(self, limit: int) -> Realizability | None:
         if any(isinstance(output.sort, FunctionSort) for output in self.group.outputs):
@@ -145,7 +152,8 @@ class Search:
             variables=self.inputs,
         )
         if answer.status == "unsat":
-            return Realizability(Verdict.PROVED, needed=tuple(c for c in answer.core if c != label), engine="z3")
+            needed = tuple(c for c in answer.core if c != label)
+            return Realizability(Verdict.PROVED, needed=needed, proofs=(self._shown(),))
         if answer.status == "sat":
             return self.judge({**answer.values, **self.given}, limit)
         self.reason = answer.reason
@@ -164,16 +172,9 @@ class Search:
             if stronger != whole and (stronger, few) not in tried:
                 tried.append((stronger, few))
                 answer = self._prove(stronger, limit // 3, few)
-                if answer is not None and not self._weakened(stronger, whole):
+                if answer is not None:
                     return answer
         return None
-
-    def _weakened(self, stronger: Sequence[Term], whole: Sequence[Term]) -> bool:
-        """Whether some guarantee that was proved in the place of another is shown not to imply it, by a question of its
-        own: then the proof shows nothing."""
-        pairs = [(one, other) for one, other in zip(stronger, whole, strict=True) if one != other]
-        limit = max(50, min(_BRIEFLY_MS, self.left()))
-        return any(entails([one], other, timeout_ms=limit).verdict is Verdict.REFUTED for one, other in pairs)
 
     def _prove(self, guarantees: Sequence[Term], limit: int, few: int | None = None) -> Realizability | None:
         translator = Translator()
@@ -185,7 +186,8 @@ class Search:
         tracked = [(label, translator.term(formula, fixed)) for label, formula in self.assumptions.items()]
         answer = check(translator, facts, tracked=tracked, timeout_ms=limit, seed=self.seed)
         if answer.status == "unsat":
-            return Realizability(Verdict.PROVED, needed=answer.core, engine="z3, by witnesses")
+            proof = self._shown(guarantees, self._asked(few))
+            return Realizability(Verdict.PROVED, needed=answer.core, engine="z3, by witnesses", proofs=(proof,))
         self.reason = answer.reason or self.reason
         return None
 
@@ -201,7 +203,7 @@ class Search:
         the first `few` are asked, and no more than can be written down in `limit` ms)."""
         end = now() + limit / 1000
         guarantees = list(guarantees)
-        asked = [*self.witnesses[: self.read][:few], *self.witnesses[self.read :]]
+        asked = self._asked(few)
         facts = [translator.term(axiom, meanings) for axiom in self._axioms(asked, guarantees)]
         for witness in asked:
             if now() > end:
@@ -213,6 +215,9 @@ class Search:
             met = [*translator.background(witness, whole), *(translator.term(g, whole) for g in guarantees)]
             facts.append(z3.Not(z3.And(met)))
         return [*facts, *translator.opaque_facts()]
+
+    def _asked(self, few: int | None) -> list[Witness]:
+        return [*self.witnesses[: self.read][:few], *self.witnesses[self.read :]]
 
     def _axioms(self, asked: Iterable[Witness], guarantees: Iterable[Term]) -> list[Term]:
         """What is known of the constants that these mention, and of those that this mentions in its turn."""
@@ -294,41 +299,6 @@ class Search:
             if witness not in self.witnesses:
                 self.witnesses.append(witness)
         return None
-
-
-def meanings_of(
-    translator: Translator, witness: Witness, inputs: Mapping[Variable, Meaning]
-) -> dict[Variable, Meaning]:
-    """The outputs' meanings under a witness."""
-    meanings: dict[Variable, Meaning] = {}
-    for output, value in witness.items():
-        match value:
-            case Fixed():
-                meanings[output] = translator.value(value.value, output.sort)
-            case Definition():
-                continue
-            case _:  # a term
-                term = translator.term(value, inputs)
-                meanings[output] = z3.ToReal(term) if output.sort == REAL and z3.is_int(term) else term
-    for output, value in witness.items():
-        if isinstance(value, Definition):
-            meanings[output] = _function(translator, value, {**inputs, **meanings})
-    return meanings
-
-
-def _function(
-    translator: Translator, definition: Definition, meanings: Mapping[Variable, Meaning]
-) -> Callable[..., Expr]:
-    def function(*arguments: Expr) -> Expr:
-        bound = dict(zip(definition.parameters, arguments, strict=True))
-        if not isinstance(definition, Cases):
-            return translator.term(definition.body, meanings, bound)
-        result = translator.term(definition.default, meanings, bound)
-        for condition, value in reversed(definition.cases):
-            result = z3.If(translator.term(condition, meanings, bound), translator.term(value, meanings, bound), result)
-        return result
-
-    return function
 
 
 def _mentioned(witness: Witness) -> frozenset[Variable]:

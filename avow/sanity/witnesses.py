@@ -10,7 +10,7 @@ node is realizable; which of them does may depend on the input (an if-then-else 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import islice, pairwise, product
@@ -56,6 +56,8 @@ from avow.language.terms import (
     Widen,
 )
 from avow.sanity.witness_candidates import MAX_DEPTH, Candidates, Definition
+from avow.solving.translation import Expr, Meaning, Translator
+from avow.solving.z3_module import z3
 
 MAX_PER_OUTPUT = 24
 MAX_WITNESSES = 96
@@ -298,3 +300,41 @@ def _places(found: Candidates, variables: Sequence[Variable], wide: bool) -> lis
     pools = [list(enumerate(_ground(found, sort)))[:ARGUMENTS] for sort in sorts]
     combinations = sorted(product(*pools), key=_spread)[:24]
     return [tuple(term for _, term in combination) for combination in combinations]
+
+
+# -- meanings ----------------------------------------------------------------------------------------------------------
+
+
+def meanings_of(
+    translator: Translator, witness: Witness, inputs: Mapping[Variable, Meaning]
+) -> dict[Variable, Meaning]:
+    """The outputs' meanings under a witness."""
+    meanings: dict[Variable, Meaning] = {}
+    for output, value in witness.items():
+        match value:
+            case Fixed():
+                meanings[output] = translator.value(value.value, output.sort)
+            case Definition():
+                continue
+            case _:  # a term
+                term = translator.term(value, inputs)
+                meanings[output] = z3.ToReal(term) if output.sort == REAL and z3.is_int(term) else term
+    for output, value in witness.items():
+        if isinstance(value, Definition):
+            meanings[output] = _function(translator, value, {**inputs, **meanings})
+    return meanings
+
+
+def _function(
+    translator: Translator, definition: Definition, meanings: Mapping[Variable, Meaning]
+) -> Callable[..., Expr]:
+    def function(*arguments: Expr) -> Expr:
+        bound = dict(zip(definition.parameters, arguments, strict=True))
+        if not isinstance(definition, Cases):
+            return translator.term(definition.body, meanings, bound)
+        result = translator.term(definition.default, meanings, bound)
+        for condition, value in reversed(definition.cases):
+            result = z3.If(translator.term(condition, meanings, bound), translator.term(value, meanings, bound), result)
+        return result
+
+    return function

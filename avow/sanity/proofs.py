@@ -1,0 +1,248 @@
+"""That a contract is realizable, and that it is not, is said only after a separate question.
+
+A search hands over what it found: alternatives for the outputs (`Proof`), or values of the inputs. Nothing that the
+search concluded is taken from it. Of a proof it is checked
+
+- that the constants in the alternatives exist whatever the inputs: each axiom only names what there is (Hilbert's
+  epsilon, the least natural number, the integer part), of a constant that nothing before it mentions;
+- that the contract's own assumptions exclude that every alternative fails what was shown: a fresh question to the
+  solver. An alternative's terms are put into the formulas first; a function, or a value that was found, has its meaning
+  in the question. `unsat` says so for every result that operations may have outside their domains;
+- that what was shown implies the contract's own guarantees, where it is said in other words: with instances for
+  `exists`, with items for tuples, lengths and functions for sequences, or of one point of a function in the place of
+  all; and that the contract's assumptions imply the changed ones.
+
+Without alternatives, what was shown is that no assumption lets every output fail: that question is asked again. Of a
+refutation the assumptions are evaluated at the inputs, and no output may meet the guarantees with these as constants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from avow.base.verdict import Verdict
+from avow.formulas.formula import conjunction, free_variables, negation, substitute
+from avow.formulas.negation_normal_form import push_negations
+from avow.formulas.traversal import depth
+from avow.formulas.values import Value
+from avow.language.sorts import INTEGER, NATURAL, REAL
+from avow.language.terms import (
+    And,
+    Arithmetic,
+    Compare,
+    Implies,
+    Literal,
+    Or,
+    Quantified,
+    Quantifier,
+    Role,
+    Term,
+    Variable,
+    Widen,
+)
+from avow.sanity.witness_candidates import MAX_DEPTH, Candidates, Definition
+from avow.sanity.witnesses import Fixed, Witness, meanings_of
+from avow.solving.questions import Translator, Unsupported, check, entails, replay, solve
+from avow.solving.translation import Expr, Meaning
+from avow.solving.z3_module import z3
+
+Formulas = Mapping[str, Term]
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """For all `inputs`, one of the `alternatives` (over inputs and constants) meets the guarantees as `shown`; without
+    alternatives, some values of the `outputs` do. `axioms` are those of `constants` that it needs."""
+
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    shown: Formulas
+    alternatives: tuple[Witness, ...]
+    axioms: tuple[Term, ...]
+    constants: Candidates
+
+
+def confirmed(
+    proofs: Sequence[Proof],
+    assumptions: Formulas,
+    guarantees: Formulas,
+    given: Mapping[Variable, Value],
+    *,
+    timeout_ms: int,
+    seed: int = 0,
+) -> bool:
+    """Whether the proofs together, each about outputs of its own, show that some output meets all guarantees."""
+    labels = [label for proof in proofs for label in proof.shown]
+    outputs = [output for proof in proofs for output in proof.outputs]
+    if set(labels) != set(guarantees) or len(set(labels)) < len(labels) or len(set(outputs)) < len(outputs):
+        return False
+    try:
+        return all(
+            _conservative(proof, given)
+            and _met(proof, assumptions, given, timeout_ms, seed)
+            and implied(proof.shown, guarantees, timeout_ms=timeout_ms, seed=seed)
+            for proof in proofs
+        )
+    except (Unsupported, z3.Z3Exception):
+        return False
+
+
+def refutes(
+    inputs: Mapping[Variable, Value],
+    assumptions: Formulas,
+    guarantees: Formulas,
+    outputs: Iterable[Variable],
+    *,
+    timeout_ms: int,
+    seed: int = 0,
+) -> bool:
+    """Whether the inputs are allowed, and no output meets the guarantees there."""
+    outputs = tuple(outputs)
+    spoken = {v for formula in (*assumptions.values(), *guarantees.values()) for v in free_variables(formula)}
+    if not spoken - set(outputs) <= inputs.keys() or not replay(assumptions.values(), inputs, timeout_ms=timeout_ms):
+        return False
+    found = solve(guarantees, timeout_ms=timeout_ms, seed=seed, given=inputs, variables=outputs)
+    return found.status == "unsat"
+
+
+def implied(stronger: Formulas, weaker: Formulas, *, timeout_ms: int, seed: int = 0) -> bool:
+    """Whether it is proved that each formula implies the one with the same label: what was shown, or assumed, in other
+    words was that."""
+    pairs = [(stronger[label], formula) for label, formula in weaker.items() if label in stronger]
+    return all(one == other or _implies(one, other, timeout_ms, seed) for one, other in pairs)
+
+
+def _implies(one: Term, other: Term, timeout_ms: int, seed: int) -> bool:
+    def proved(left: Term, right: Term) -> bool:
+        return entails([left], right, timeout_ms=timeout_ms, seed=seed).verdict is Verdict.PROVED
+
+    pushed = push_negations(other) if depth(other) <= MAX_DEPTH else other
+    return proved(pushed, other) if _is_instance(one, pushed) else proved(one, other)
+
+
+def _is_instance(one: Term, other: Term) -> bool:
+    """Whether a formula is another with some values in the place of what there `exists`: then it implies it."""
+    match one, other:
+        case (And(items=ones), And(items=others)) | (Or(items=ones), Or(items=others)) if len(ones) == len(others):
+            return all(map(_is_instance, ones, others))
+        case (
+            Quantified(quantifier=Quantifier.FORALL, variables=variables, body=body),
+            Quantified(quantifier=Quantifier.FORALL, variables=same, body=weaker),
+        ) if variables == same:
+            return _is_instance(body, weaker)
+        case _, Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=body) if one != other:
+            return any(
+                all(_is_one_of(part, variables, body) for part in parts)
+                for parts in ((one,), one.items if isinstance(one, Or) else ())
+                if parts
+            )
+        case _:  # nothing is put in any place
+            return one == other
+
+
+def _is_one_of(one: Term, variables: tuple[Variable, ...], body: Term) -> bool:
+    values: dict[Variable, Term] = {}
+    _align(one, body, set(variables), values)
+    sorted_right = all(v.sort == value.sort for v, value in values.items())
+    return sorted_right and len(values) == len(variables) and _is_instance(one, substitute(body, values))
+
+
+def _align(one: Term, body: Term, variables: set[Variable], values: dict[Variable, Term]) -> None:
+    """What stands in a term where another has these variables; a guess, to be tried."""
+    if isinstance(body, Variable) and body in variables:
+        values.setdefault(body, one)
+    elif type(one) is type(body) and len(one.children) == len(body.children):
+        for part, other in zip(one.children, body.children, strict=True):
+            _align(part, other, variables, values)
+
+
+def _met(proof: Proof, assumptions: Formulas, given: Mapping[Variable, Value], timeout_ms: int, seed: int) -> bool:
+    """No allowed input, and constants as the axioms have them, at which every alternative fails."""
+    goal = conjunction(proof.shown.values())
+    translator = Translator()
+    fixed: dict[Variable, Meaning] = {v: translator.value(value, v.sort) for v, value in given.items()}
+    free = {v for formula in (*assumptions.values(), goal) for v in free_variables(formula)}
+    facts = [translator.term(formula, fixed) for formula in proof.axioms]
+    if not proof.alternatives:
+        bound = {v: Variable(Role.BOUND, f"some {v.name}", v.sort) for v in proof.outputs}
+        never = negation(substitute(goal, bound))
+        if bound:
+            never = Quantified(Quantifier.FORALL, tuple(bound.values()), never)
+        facts.append(translator.term(never, fixed))
+        free -= set(proof.outputs)
+    else:
+        facts += [
+            z3.Not(_meets(translator, proof.shown.values(), alternative, fixed)) for alternative in proof.alternatives
+        ]
+        # an output that an alternative leaves out may be anything
+        free -= {v for v in proof.outputs if all(v in alternative for alternative in proof.alternatives)}
+    facts += translator.opaque_facts()
+    named = dict.fromkeys((*proof.inputs, *proof.constants.constants))
+    free.difference_update(fixed, named)
+    facts += translator.background([*named, *sorted(free, key=lambda v: v.qualified)])
+    tracked = [(label, translator.term(formula, fixed)) for label, formula in assumptions.items()]
+    return check(translator, facts, tracked=tracked, timeout_ms=timeout_ms, seed=seed).status == "unsat"
+
+
+def _meets(
+    translator: Translator, shown: Iterable[Term], alternative: Witness, fixed: Mapping[Variable, Meaning]
+) -> Expr:
+    terms = {
+        output: _widened(value, output)
+        for output, value in alternative.items()
+        if not isinstance(value, Fixed | Definition)
+    }
+    others = {output: value for output, value in alternative.items() if output not in terms}
+    meanings = {**fixed, **meanings_of(translator, alternative, fixed)}
+    members = translator.background(alternative, meanings)
+    left = {**fixed, **{v: meanings[v] for v in others}}
+    return z3.And([*members, *(translator.term(substitute(formula, terms), left) for formula in shown)])
+
+
+def _widened(value: object, output: Variable) -> Term:
+    assert isinstance(value, Term)
+    return Widen(value, REAL) if output.sort == REAL and value.sort in (INTEGER, NATURAL) else value
+
+
+def _conservative(proof: Proof, given: Mapping[Variable, Value]) -> bool:
+    """Whether suitable constants exist, whatever the inputs: each axiom speaks of constants that are new with it."""
+    found = proof.constants
+    taken = {*proof.inputs, *proof.outputs, *given}
+    if any(constant.role is not Role.BOUND or constant in taken for constant in found.constants):
+        return False
+    blocks = iter(found.blocks)
+    seen = set[Variable]()
+    least = list[Term]()
+    for axiom in found.axioms:
+        match axiom:
+            case Implies(left=Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=guard), right=chosen):
+                block = tuple(v for v in next(blocks, ()) if isinstance(v, Variable))
+                sorts = [v.sort for v in block]
+                new = {*block}
+                if (
+                    sorts != [v.sort for v in variables]
+                    or len(new) < len(block)
+                    or new & (seen | free_variables(guard))
+                ):
+                    return False
+                if chosen != substitute(guard, dict(zip(variables, block, strict=True))):
+                    return False
+                if sorts == [NATURAL]:
+                    smallest = Implies(guard, Compare("<=", block[0], variables[0]))
+                    least.append(Quantified(Quantifier.FORALL, variables, smallest))
+            case And(
+                items=(Compare(operator="<=", left=Widen(term=Variable() as whole) as least_one, right=ground), _)
+            ):
+                above = Arithmetic("+", least_one, Literal(Fraction(1), REAL), REAL)
+                between = And((Compare("<=", least_one, ground), Compare("<", ground, above)))
+                if axiom != between or whole.sort != INTEGER or whole in seen | free_variables(ground):
+                    return False
+                new = {whole}
+            case _:  # it says something that need not be so
+                return False
+        if not new <= set(found.constants) or free_variables(axiom) & set(proof.outputs):
+            return False
+        seen |= free_variables(axiom)
+    return set(found.least) <= set(least) and set(proof.axioms) <= {*found.axioms, *found.least}
