@@ -160,25 +160,22 @@ def _align(one: Term, body: Term, variables: set[Variable], values: dict[Variabl
 
 def _met(proof: Proof, assumptions: Formulas, given: Mapping[Variable, Value], timeout_ms: int, seed: int) -> bool:
     """No allowed input, and constants as the axioms have them, at which every alternative fails."""
-    goal = conjunction(proof.shown.values())
-    translator = Translator()
-    fixed: dict[Variable, Meaning] = {v: translator.value(value, v.sort) for v, value in given.items()}
-    free = {v for formula in (*assumptions.values(), goal) for v in free_variables(formula)}
-    facts = [translator.term(formula, fixed) for formula in proof.axioms]
+    shown = tuple(proof.shown.values())
     if not proof.alternatives:
         bound = {v: Variable(Role.BOUND, f"some {v.name}", v.sort) for v in proof.outputs}
-        never = negation(substitute(goal, bound))
+        never = negation(substitute(conjunction(shown), bound))
         if bound:
             never = Quantified(Quantifier.FORALL, tuple(bound.values()), never)
-        facts.append(translator.term(never, fixed))
-        free -= set(proof.outputs)
-    else:
-        facts += [
-            z3.Not(_meets(translator, proof.shown.values(), alternative, fixed)) for alternative in proof.alternatives
-        ]
-        # an output that an alternative leaves out may be anything
-        free -= {v for v in proof.outputs if all(v in alternative for alternative in proof.alternatives)}
-    facts += translator.opaque_facts()
+        formulas = (*assumptions.values(), never)
+        return solve(formulas, timeout_ms=timeout_ms, seed=seed, given=given, variables=proof.inputs).status == "unsat"
+    translator = Translator()
+    fixed: dict[Variable, Meaning] = {v: translator.value(value, v.sort) for v, value in given.items()}
+    # what is given says which elements an unspecified sort has; a value that the search has met does not
+    facts = [*translator.opaque_facts(), *(translator.term(formula, fixed) for formula in proof.axioms)]
+    facts += [z3.Not(_meets(translator, shown, alternative, fixed)) for alternative in proof.alternatives]
+    # an output that an alternative leaves out may be anything
+    free = {v for formula in (*assumptions.values(), *shown) for v in free_variables(formula)}
+    free -= {v for v in proof.outputs if all(v in alternative for alternative in proof.alternatives)}
     named = dict.fromkeys((*proof.inputs, *proof.constants.constants))
     free.difference_update(fixed, named)
     facts += translator.background([*named, *sorted(free, key=lambda v: v.qualified)])

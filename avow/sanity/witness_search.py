@@ -128,12 +128,15 @@ class Search:
         proofs = (self._shown(),) if answer.verdict is Verdict.PROVED else ()
         return Realizability(answer.verdict, answer.values, labels, answer.needed, answer.reason, answer.engine, proofs)
 
-    def _shown(self, guarantees: Sequence[Term] | None = None, asked: Sequence[Witness] = ()) -> Proof:
+    def _shown(
+        self, guarantees: Sequence[Term] | None = None, asked: Sequence[Witness] = (), least: bool = False
+    ) -> Proof:
         formulas = (
             self.group.guarantees if guarantees is None else dict(zip(self.group.guarantees, guarantees, strict=True))
         )
         axioms = self._axioms(asked, formulas.values()) if asked else ()
-        return Proof(self.inputs, self.group.outputs, formulas, tuple(asked), tuple(axioms), self.found)
+        known = (*axioms, *(self.found.least if least else ()))
+        return Proof(self.inputs, self.group.outputs, formulas, tuple(asked), known, self.found)
 
     def _direct(self, limit: int) -> Realizability | None:
         if any(isinstance(output.sort, FunctionSort) for output in self.group.outputs):
@@ -186,7 +189,7 @@ class Search:
         tracked = [(label, translator.term(formula, fixed)) for label, formula in self.assumptions.items()]
         answer = check(translator, facts, tracked=tracked, timeout_ms=limit, seed=self.seed)
         if answer.status == "unsat":
-            proof = self._shown(guarantees, self._asked(few))
+            proof = self._shown(guarantees, self._asked(few), limit >= _PATIENT_MS)
             return Realizability(Verdict.PROVED, needed=answer.core, engine="z3, by witnesses", proofs=(proof,))
         self.reason = answer.reason or self.reason
         return None
