@@ -16,10 +16,11 @@ from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
-from avow.formulas.formula import conjunction, free_variables
+from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.values import show as show_value
 from avow.language.terms import FALSE, TRUE, Not, Role, Variable
 from avow.solving.questions import Entailment, entails, z3_version
+from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
 from avow.solving.smtlib import export as smtlib
 from avow.solving.translation import Unsupported
@@ -302,7 +303,15 @@ def _every_run(work: Work, limits: Limits) -> Settled:
     if failed:
         why = "not shown that the program has an output for every input that the assumptions allow"
         return Settled(triple, Verdict.UNKNOWN, f"{why}: {failed[0].what}")
-    return Settled(triple, Verdict.PROVED, "proved", conditions=len(wanted))
+    return _proved(Settled(triple, Verdict.PROVED, "proved", conditions=len(wanted)), wanted, deadline)
+
+
+def _proved(settled: Settled, wanted: Sequence[Condition], deadline: float) -> Settled:
+    """What Z3 has proved; an error where a second solver finds values for which a condition fails."""
+    broken = [conjunction((*c.hypotheses, negation(c.goal))) for c in wanted]
+    if contradicted([negation(settled.triple.fidelity), *broken], timeout_ms=_left(deadline)):
+        return Settled(settled.triple, Verdict.ERROR, CONTRADICTED)
+    return settled
 
 
 def _holds(condition: Condition, settler: Settler, deadline: float) -> bool:
@@ -394,7 +403,7 @@ def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Sett
         if not vacuous and _endless(triple, work, deadline):
             why = "its loops never end where it applies, and a node that never answers guarantees nothing"
             return Settled(triple, Verdict.UNKNOWN, why)
-        return Settled(triple, Verdict.PROVED, "proved", None, vacuous, len(wanted))
+        return _proved(Settled(triple, Verdict.PROVED, "proved", None, vacuous, len(wanted)), wanted, deadline)
     shown = breach(triple, program, [c for c, _ in failed], max(1000, _left(deadline)))
     if shown is not None:
         return Settled(triple, Verdict.REFUTED, shown.why, shown)

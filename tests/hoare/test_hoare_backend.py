@@ -12,6 +12,7 @@ from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backends.hoare import BACKEND
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Link, Outcome, Verdict
+from avow.solving import second
 from hoare.systems import make_job, sensor
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -110,6 +111,15 @@ def test_seeded_faults_are_refuted(tmp_path: Path, old: str, new: str, broken: s
     assert {name for name, o in found.items() if o.verdict is Verdict.REFUTED} == broken
     assert all(o.verdict is Verdict.PROVED for name, o in found.items() if name not in broken)
     assert all(found[name].counterexample is not None for name in broken)
+
+
+def test_what_two_solvers_do_not_agree_on_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(second.importlib.util, "find_spec", lambda _: object())
+    for answer, expected in (("sat", Verdict.ERROR), ("unknown", Verdict.PROVED), (None, Verdict.PROVED)):
+        monkeypatch.setattr(second.smtlib, "ask_cvc5", lambda *_, answer=answer, **__: answer)
+        found = settle(job(tmp_path, sensor(), PROGRAM, TABLE))
+        assert {found[name].verdict for name in ("marks", "low", "medium", "high")} == {expected}
+        assert all("contradict" in o.summary for o in found.values() if o.verdict is Verdict.ERROR)
 
 
 def test_a_moved_threshold_is_refuted_by_a_simple_reading(tmp_path: Path) -> None:

@@ -1,0 +1,32 @@
+"""A second solver on what the first has settled: where cvc5 is installed and says otherwise, one of the two is wrong.
+
+Such an answer is neither of the two: whoever asked gives `error`, and says so. What cvc5 does not know, or does not
+read, says nothing.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterable
+
+from avow.formulas.formula import disjunction
+from avow.language.terms import FALSE, Term
+from avow.solving import smtlib
+from avow.solving.translation import Unsupported
+
+PATIENCE_MS = 1_000
+"""How long cvc5 may look for values that Z3 says there are not."""
+
+CONTRADICTED = "two solvers contradict each other: Z3 says that there are no such values, and cvc5 that there are"
+
+
+def contradicted(impossible: Iterable[Term], *, timeout_ms: int = PATIENCE_MS) -> bool:
+    """Whether cvc5 says that one of these formulas, of which Z3 said that none can hold, can."""
+    questions = [formula for formula in impossible if formula != FALSE]
+    if not questions or importlib.util.find_spec("cvc5") is None:
+        return False
+    try:
+        script = smtlib.export([disjunction(questions)])
+    except Unsupported:
+        return False
+    return smtlib.ask_cvc5(script, timeout_ms=max(1, min(timeout_ms, PATIENCE_MS))) == "sat"
