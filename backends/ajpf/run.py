@@ -41,6 +41,8 @@ LAZY_SHARE = 0.02
 """Of the time that is left, what one property may use for that."""
 SPIN_SHARE = 0.5
 """Of the time that is left, what Spin may use for its second opinion."""
+SPIN_SECONDS = 20.0
+"""The most that a second opinion may take that the plan did not ask for."""
 
 _SAID = {
     Said.HOLDS: Verdict.CHECKED,
@@ -226,10 +228,12 @@ class _Run:
         name = f"Spin {spin.version()}"
         answers: dict[str, bool] = {}
         seen: dict[str, None] = {}
+        seconds = min(self.left() * SPIN_SHARE, SPIN_SECONDS) if self.setup.engine == "auto" else self.left()
+        deadline = time.monotonic() + seconds
         with tempfile.TemporaryDirectory() as temporary:
             try:
                 for checker in checkers:
-                    seconds = self.left() * SPIN_SHARE if self.setup.engine == "auto" else self.left()
+                    seconds = max(0.0, deadline - time.monotonic())
                     told = spin.opinions(checker, checker.properties, Path(temporary), seconds)
                     answers |= told.holds
                     seen[told.seen] = None

@@ -63,7 +63,7 @@ def opinions(checker: Checker, properties: Sequence[Property], folder: Path, sec
     deadline = time.monotonic() + seconds
     try:
         files = _translated(checker, properties)
-        said = _asked(files, checker, properties, folder, time.monotonic() + seconds / 2)
+        said = _asked(files, checker, properties, folder, deadline)
         return Opinions(said, "the program, by a translation of its own")
     except promela.NotTranslated as error:
         reason = f"no translation of {error}"
