@@ -17,7 +17,9 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     """Sign a report: an in-toto statement of its verdict, suppositions and weakenings, in signed/SYSTEM/.
 
     The report has to say what the ledger says (as `avow report --check` does). Later reports tell what changed since.
-    Without --key it is a name only. Public keys in signed/keys/*.pub make only signatures by these keys count.
+    Without --key it is a name only. With one, the report's attestations stand beside the signature, each in a DSSE
+    envelope on a line of its own (*.attestation.jsonl). Public keys in signed/keys/*.pub make only signatures by these
+    keys count.
     """
     import json
     from datetime import date, datetime
@@ -26,9 +28,12 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     from avow.assurance.codec import read_case
     from avow.assurance.signed import sign_case
     from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.files import write
     from avow.base.workspace import find_workspace, workspace
+    from avow.evidence.envelope import seal
     from avow.evidence.ledger import Ledger
     from avow.report.check import check
+    from avow.report.exchange import render_attestation
 
     folder = Path(name)
     place = find_workspace(folder.resolve()) if (folder / "report.json").is_file() else None
@@ -61,6 +66,10 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
             today=today,
             private=private,
         )
+        if private is not None:
+            attested = map(json.loads, render_attestation(case).splitlines())
+            sealed = "".join(seal(statement, private, indent=None) for statement in attested)
+            write(path.with_suffix(".attestation.jsonl"), sealed)
     except OSError as error:
         raise Rejected(Diagnostic("SIGN001", f"the signature cannot be written: {error.strerror}")) from None
     if as_json:

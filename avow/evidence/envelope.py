@@ -27,8 +27,8 @@ class Opened:
     checked: str
 
 
-def seal(statement: dict[str, Any], private: Path | None) -> str:
-    """The envelope as JSON. Raises Rejected for a key that cannot be used."""
+def seal(statement: dict[str, Any], private: Path | None, *, indent: int | None = 1) -> str:
+    """The envelope as JSON; on one line with `indent` None. Raises Rejected for a key that cannot be used."""
     payload = json.dumps(statement, ensure_ascii=True, sort_keys=True).encode()
     signatures = []
     if private is not None:
@@ -41,7 +41,7 @@ def seal(statement: dict[str, Any], private: Path | None) -> str:
         "payloadType": PAYLOAD,
         "signatures": signatures,
     }
-    return json.dumps(body, indent=1, sort_keys=True) + "\n"
+    return json.dumps(body, indent=indent, sort_keys=True) + "\n"
 
 
 def unseal(text: str, trusted: Sequence[Path] = ()) -> Opened | str:

@@ -72,22 +72,6 @@ def is_settled(state: State) -> bool:
     )
 
 
-def index_is_due(state: State) -> bool:
-    """Whether the page over all systems no longer shows what its systems' reports show."""
-    return bool(state.changed) or bool(
-        state.assessments and state.results.all and not _overview_stands(state.workspace)
-    )
-
-
-def _overview_stands(workspace: Workspace) -> bool:
-    known = read_note(workspace.artifacts / OVERVIEW) or {}
-    return is_intact(workspace.reports / "index.html", str(known.get("sha256")))
-
-
-OVERVIEW = ".overview.json"
-"""Beside the artifacts: the digest of the page over all systems, as it was written."""
-
-
 def render(assessment: Assessment) -> Result:
     """Build the case and write every format, unless what stands in reports/ already says the same."""
     ledger = ledger_of(assessment.workspace.ledger(assessment.system))

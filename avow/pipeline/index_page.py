@@ -1,21 +1,58 @@
-"""The page over all systems."""
+"""The page over all systems, and reports that are of an earlier state."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from avow.base.files import digest_file, is_intact, write
+from avow.base.notes import read_note, write_note
+from avow.pipeline.assess import case_of
+from avow.pipeline.state import State
 
-from avow.base.files import digest_file
-from avow.base.notes import write_note
-from avow.pipeline.assess import OVERVIEW, Assessment, case_of
+OVERVIEW = ".overview.json"
+"""Beside the artifacts: the digest of the page over all systems, as it was written, and whose reports are old."""
+
+_MARK = (
+    '<p role="alert" data-earlier="yes" style="margin:0;padding:.8em 1em;background:#fff3c4;color:#4a3500;'
+    'border-bottom:3px solid #b07d00"><b>As of an earlier state.</b> The system cannot be read as it stands now, '
+    "or is gone: this report is of what it was.</p>"
+)
 
 
-def write_overview(assessments: Sequence[Assessment]) -> None:
-    """Write reports/index.html over every system that has evidence."""
+def earlier(state: State) -> tuple[str, ...]:
+    """The systems that have a report and could not be read in this run: what their reports say is of an earlier state.
+    Of a run that read nothing, none is known."""
+    if not state.read:
+        return ()
+    reports, read = state.workspace.reports, {a.system for a in state.assessments}
+    return tuple(sorted(p.parent.name for p in reports.glob("*/report.json") if p.parent.name not in read))
+
+
+def index_is_due(state: State) -> bool:
+    """Whether the page over all systems no longer shows what its systems' reports show."""
+    known = read_note(state.workspace.artifacts / OVERVIEW) or {}
+    if state.changed or list(earlier(state)) != known.get("earlier", []):
+        return True
+    page = state.workspace.reports / "index.html"
+    return bool(state.assessments and state.results.all and not is_intact(page, str(known.get("sha256"))))
+
+
+def write_overview(state: State) -> None:
+    """Write reports/index.html over every system that has evidence. Raises OSError."""
     from avow.report import write_index
 
-    cases = [case_of(a) for a in assessments if a.workspace.ledger(a.system).is_file()]
-    if cases:
-        workspace = assessments[0].workspace
-        write_index(cases, workspace.reports)
+    workspace, old = state.workspace, earlier(state)
+    cases = [case_of(a) for a in state.assessments if workspace.ledger(a.system).is_file()]
+    if cases or old:
+        write_index(cases, workspace.reports, old)
         page = digest_file(workspace.reports / "index.html")
-        write_note(workspace.artifacts / OVERVIEW, {"sha256": page})
+        write_note(workspace.artifacts / OVERVIEW, {"sha256": page, "earlier": list(old)})
+
+
+def mark_earlier(state: State) -> None:
+    """Say on the pages of reports of an earlier state that they are. Once the system can be read again they are not as
+    they were written, and therefore written anew. Raises OSError."""
+    for name in earlier(state):
+        for page in sorted((state.workspace.reports / name).glob("*.html")):
+            text = page.read_text(encoding="utf-8", errors="replace")
+            before, body, after = text.partition("<body>")
+            if body and not after.startswith(_MARK):
+                write(page, before + body + _MARK + after)

@@ -102,7 +102,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             {f["task"].name.split(":")[1] for f in self.failures if ":" in f["task"].name}
             - set(self._state.results.finished)
         )
-        print_summary(results.all, broken, self._done, time.monotonic() - self._start, self.outstream)
+        print_summary(results.all, broken, self._earlier(), self._done, time.monotonic() - self._start, self.outstream)
         append_job_summary(results.all, broken)
         if sys.exc_info()[0] is None and not self._seen.issuperset(self._selected):
             self.runtime_errors.append("not all of it was run: is the number after -n below 0?")
@@ -119,14 +119,21 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
 
     def _write_index(self) -> None:
         if self._state.read:  # else nothing can have changed
-            from avow.pipeline.assess import index_is_due
-            from avow.pipeline.index_page import write_overview
+            from avow.pipeline.index_page import index_is_due, mark_earlier, write_overview
 
             try:
+                mark_earlier(self._state)
                 if index_is_due(self._state):
-                    write_overview(self._state.assessments)
+                    write_overview(self._state)
             except OSError as error:
                 self.runtime_errors.append(f"the page over all systems cannot be written: {error}")
+
+    def _earlier(self) -> tuple[str, ...]:
+        if not self._state.read:
+            return ()
+        from avow.pipeline.index_page import earlier
+
+        return earlier(self._state)
 
     def _keep(self) -> None:
         """Note that all is settled, for the next run, or that it is not."""
@@ -137,8 +144,8 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
 
         complete = {a.system for a in state.assessments} == set(state.results.finished)
         plugins = any(a.surveyed.system.plan.plugins for a in state.assessments)  # their code may be anywhere
-        undisturbed = complete and not plugins and not self.failures and not self.runtime_errors
-        if "verify" in self._selected and undisturbed and is_settled(state):
+        undisturbed = not (plugins or self.failures or self.runtime_errors or self._earlier())
+        if "verify" in self._selected and complete and undisturbed and is_settled(state):
             state.shortcut.keep(state.results.all)
 
     def _line(self, text: str) -> None:

@@ -14,8 +14,11 @@ GOOD = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
 BAD = ("refuted", "contradictory", "error", "missing", "stale", "vacuous", "unknown", "not-run", "unsupported")
 
 
-def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, seconds: float, out: IO[str]) -> None:
-    """A row a system: what was proved, checked, tested, reviewed, refuted, not run; then failing gates."""
+def print_summary(
+    results: Sequence[Result], broken: Sequence[str], earlier: Sequence[str], done: int, seconds: float, out: IO[str]
+) -> None:
+    """A row a system: what was proved, checked, tested, reviewed, refuted, not run; then failing gates. `earlier`: the
+    systems whose reports are of an earlier state."""
     if not results and not broken:
         return
     from rich.console import Console
@@ -37,8 +40,10 @@ def print_summary(results: Sequence[Result], broken: Sequence[str], done: int, s
         table.add_row(r.system, *(str(r.counts.get(word, "")) or "" for word in shown), verdict)
     for name in broken:
         table.add_row(name, *("" for _ in shown), "[red]not done: see above[/]")
+    for name in earlier:
+        table.add_row(name, *("" for _ in shown), "[yellow]its report is as of an earlier state[/]")
     console.print()
-    if len(results) == 1 and not broken and results[0].lines:
+    if len(results) == 1 and not broken and not earlier and results[0].lines:
         console.print("\n".join(results[0].lines), markup=False)
     else:
         console.print(table)

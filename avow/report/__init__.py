@@ -88,10 +88,11 @@ def _pdf(case: Case) -> bytes | LeftOut:
         return LeftOut(f"typst failed: {str(error).splitlines()[0] if str(error) else type(error).__name__}")
 
 
-def write_index(cases: Sequence[Case], folder: Path) -> Rendered:
-    """Write the page over all systems, `folder`/index.html; a system's own page is `folder`/<system>/index.html."""
+def write_index(cases: Sequence[Case], folder: Path, earlier: Sequence[str] = ()) -> Rendered:
+    """Write the page over all systems, `folder`/index.html; a system's own page is `folder`/<system>/index.html.
+    `earlier`: systems that have a report and cannot be read now."""
     from avow.report.answers_page import render_index
 
     path = folder / "index.html"
-    write(path, render_index(cases))
+    write(path, render_index(cases, earlier))
     return Rendered((path,))

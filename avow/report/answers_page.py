@@ -158,8 +158,8 @@ def _refuted(text: str) -> Markup:
     return Markup('<b>{}</b> <span class="said">“{}”</span>{}').format(before.strip(), quote, after)
 
 
-def render_index(cases: Sequence[Case]) -> str:
-    """The page over all systems: a row each, the worst first."""
+def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
+    """The page over all systems: a row each, the worst first; then those whose reports are as of an earlier state."""
     ranked = sorted(cases, key=lambda case: (case.good, _ORDER.index(case.answers.tone)))
     relied = [case for case in cases if case.answers.headline is not Headline.EXAMINED]
     failing = [case for case in relied if case.answers.tone is Tone.RED]
@@ -171,11 +171,15 @@ def render_index(cases: Sequence[Case]) -> str:
         rest = f"; {len(cases) - len(relied)} only examined" if len(relied) < len(cases) else ""
         tone = min((case.answers.tone for case in relied), key=lambda t: t.rank)
         line = f"{wording.count(len(relied), 'system')} {'holds' if len(relied) == 1 else 'hold'}{rest}"
+    if earlier:
+        line += f"; {wording.count(len(earlier), 'report')} as of an earlier state"
+        tone = Tone.AMBER if tone is Tone.GREEN else tone
     return (
         environment()
         .get_template("systems.html.j2")
         .render(
             rows=[(case, trend(case)) for case in ranked],
+            earlier=earlier,
             line=line,
             tone=tone,
             TONE_MARKS=TONE_MARKS,

@@ -1,0 +1,91 @@
+"""Reports whose system can no longer be read say that they are of an earlier state; attestations as envelopes."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from avow.evidence.envelope import Opened, unseal
+from avow.evidence.signing import new_key_pair
+
+AVOW = str(Path(sys.executable).with_name("avow"))
+MARK = "As of an earlier state"
+
+
+def avow(root: Path, *words: str) -> tuple[int, str]:
+    done = subprocess.run([AVOW, *words], cwd=root, capture_output=True, text=True, timeout=120, check=False)
+    assert "Traceback" not in done.stdout + done.stderr
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    for name in ("s", "t"):
+        folder = tmp_path / "contracts" / name
+        folder.mkdir(parents=True)
+        (folder / "n.rcl").write_text(
+            "node n { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee g ( out.y <= 1 ) }\n"
+        )
+        (folder / "plan.yaml").write_text(f"system: {name}\npolicy: reproduction\n")
+    (tmp_path / "dodo.py").write_text("")
+    avow(tmp_path, "verify")
+    return tmp_path
+
+
+def marked(root: Path) -> dict[str, set[str]]:
+    pages = {name: list((root / "reports" / name).glob("*.html")) for name in ("s", "t")}
+    return {name: {p.name for p in found if MARK in p.read_text()} for name, found in pages.items()}
+
+
+@pytest.mark.parametrize("breaks", ["plan", "contract", "gone"])
+def test_a_report_of_what_cannot_be_read_is_marked_until_it_can(workspace: Path, breaks: str) -> None:
+    folder, page = workspace / "contracts" / "s", workspace / "reports" / "s" / "index.html"
+    whole, index = page.read_text(), workspace / "reports" / "index.html"
+    assert MARK not in index.read_text()
+    match breaks:
+        case "plan":
+            (folder / "plan.yaml").write_text("system: [\n")
+        case "contract":
+            (folder / "n.rcl").write_text("node n {")
+        case _:
+            folder.rename(workspace / "away")
+    for _ in range(2):
+        code, said = avow(workspace, "verify")
+        assert code == (0 if breaks == "gone" else 2)
+        assert "its report is as of an earlier state" in " ".join(said.split())
+        assert marked(workspace) == {"s": {"index.html", "claims.html", "traceability.html"}, "t": set()}
+        assert page.read_text().count(MARK) == 1
+        assert MARK in index.read_text()
+    match breaks:
+        case "plan":
+            (folder / "plan.yaml").write_text("system: s\npolicy: reproduction\n")
+        case "contract":
+            (folder / "n.rcl").write_text((workspace / "contracts" / "t" / "n.rcl").read_text())
+        case _:
+            (workspace / "away").rename(folder)
+    code, said = avow(workspace, "verify")
+    assert "earlier state" not in said
+    assert MARK not in index.read_text()
+    assert marked(workspace) == {"s": set(), "t": set()}
+    assert len(page.read_text()) == pytest.approx(len(whole), abs=200)  # run and time differ
+
+
+def test_attestations_are_envelopes_where_a_key_signs(workspace: Path) -> None:
+    pytest.importorskip("cryptography")
+    public = new_key_pair(workspace / "key")
+    signing = ("sign", "--report", "s", "--as", "A. Person", "--until", "2099-01-01")
+    assert avow(workspace, *signing)[0] == 0
+    assert not list((workspace / "signed").rglob("*.attestation.jsonl"))
+    assert avow(workspace, *signing, "--key", "key")[0] == 0
+    (sealed,) = (workspace / "signed").rglob("*.attestation.jsonl")
+    lines = sealed.read_text().splitlines()
+    plain = (workspace / "reports" / "s" / "attestation.jsonl").read_text().splitlines()
+    opened = [unseal(line, [public]) for line in lines]
+    assert [o.statement for o in opened if isinstance(o, Opened)] == [json.loads(line) for line in plain]
+    changed = lines[0].replace('"payload": "e', '"payload": "f')
+    assert isinstance(unseal(changed, [public]), str)
+    assert avow(workspace, "verify")[0] == 0  # it is no signature of a case, and none is looked for in it
