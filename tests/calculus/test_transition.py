@@ -266,11 +266,12 @@ def test_a_search_that_would_take_for_ever_ends(tmp_path: Path) -> None:
     assert "more than 4000 answers" in found.summary
 
 
-def test_initial_values_are_those_of_what_the_environment_gives_at_first(tmp_path: Path) -> None:
-    """`out.x <=> in.e` before the first step is about the first step's `in.e`, which may change later."""
+def test_initial_values_may_be_those_of_what_the_environment_gives_for_good(tmp_path: Path) -> None:
+    """`out.x <=> in.e` before the first step: `in.e` is constant, or the start would speak of a later value."""
     text = node("a", "m : BOOL, e : BOOL", "x : BOOL, y : BOOL", "G: out.y <=> in.m", "G: out.x")
     plan = """
 connections: [{from: a.x, to: a.m, delayed: true, initial: "out.x <=> in.e"}]
+environment: {in.e: {because: it does not move, constant: true}}
 requirements:
   SAME: {text: t, temporal: "a.y <=> a.e"}
   ALWAYS: {text: t, temporal: "always (a.y <=> a.e)"}

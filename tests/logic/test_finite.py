@@ -6,6 +6,7 @@ from pathlib import Path
 
 from avow.base.verdict import Verdict
 from avow.calculus.interpretation import interpretation, ranges
+from avow.calculus.variables import frame
 from avow.formulas.finite import Ranges
 from avow.formulas.traversal import subterms
 from avow.language.sorts import NATURAL
@@ -27,7 +28,7 @@ def realizable(folder: Path, domain: str) -> SanityResult:
     (folder / "plan.yaml").write_text(f"scenario:\n  domains: {{in.n: {domain}}}\n")
     system = load_system(folder)
     of = system.contract.nodes[0]
-    given, few = interpretation(of, system.plan.scenario), ranges(system, of)
+    given, few = interpretation(of, system.plan.scenario), ranges(frame(system), of)
     (found,) = analyse(of, scenario=given, ranges=few, bounds=Bounds(200), wanted=["realizable"])
     return found
 
