@@ -165,7 +165,7 @@ def conclude(facts: Facts) -> Case:
         for o in facts.obligations
     )
     said = Statements(facts.statements, facts.today)
-    relied = {v.id: r for v in views if (r := relied_upon(v, names.is_obligation, said.judge))}
+    relied = {v.id: r for v in views if (r := relied_upon(v, said.judge))}
     closure = Closure(views, facts.nodes, rests, standings)
     closed = {r.id: closure.of_requirement(r.id) for r in facts.requirements}
     supposed = suppositions(facts, views, relied, closed, said)
@@ -388,11 +388,8 @@ def _derivation(
 def _assumed(views: Sequence[ObligationView], derived: Sequence[DerivationView]) -> tuple[HypothesisView, ...]:
     found: dict[str, list[str]] = {}
     for view in views:
-        # a claim of this case that a record names is no hypothesis: the claim rests on it, and falls with it
-        claims = {f"{view.obligation.system}/": view.rests_on, "": view.rests_on}
         for text in dict.fromkeys(h for v in view.counting for h in v.entry.evidence.hypotheses):
-            if not any(f"{prefix}{text}" in rests for prefix, rests in claims.items()):
-                found.setdefault(text, []).append(view.id)
+            found.setdefault(text, []).append(view.id)
     for d in derived:
         for text in d.conditional:
             found.setdefault(text, []).append(derivation_claim(d.derivation.name))

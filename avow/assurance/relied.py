@@ -52,7 +52,7 @@ Opinion = Callable[[str, str], Judged]
 """(method, hypothesis) → what is thought of it."""
 
 
-def relied_upon(view: ObligationView, is_claim: Callable[[str], bool], opinion: Opinion) -> Relied | None:
+def relied_upon(view: ObligationView, opinion: Opinion) -> Relied | None:
     """None where nothing supports the claim."""
     if not view.status.supports:
         return None
@@ -62,7 +62,7 @@ def relied_upon(view: ObligationView, is_claim: Callable[[str], bool], opinion: 
         status = weigh(record).support
         if status is None:
             continue
-        open_ones = tuple(dict.fromkeys(h for h in record.hypotheses if not is_claim(h)))
+        open_ones = tuple(dict.fromkeys(record.hypotheses))
         thought = [opinion(record.method, text) for text in open_ones]
         badness = (
             any(t.expired for t in thought),

@@ -59,10 +59,6 @@ class Names:
             return (known.id,)
         return (self.local[name],) if name in self.local else None
 
-    def is_obligation(self, text: str) -> bool:
-        """Whether a text is the id of an obligation, whole or without the system."""
-        return text in self.obligations or text in self.local
-
     def discharging(self, hypothesis: Hypothesis) -> str | None:
         """The claim that says what a hypothesis says; None where none does. A claim of the same name that says
         something else is not it; of several that say it, the one of that name is meant."""
@@ -124,7 +120,8 @@ def obligation_claim(
     names: Names,
 ) -> Claim:
     """An obligation stands on its evidence; a guarantee also on its node's contract being worth verifying; and either
-    on what its evidence rests on. A hypothesis that no claim of the case discharges is an error."""
+    on what its evidence rests on. A hypothesis that no claim of the case discharges is an error; a remark in words is
+    one, also where its words are a claim's id."""
     rests: list[str] = []
     if obligation.kind is Kind.GUARANTEE:
         rests += names.foundation.get(obligation.node, [])
@@ -137,10 +134,7 @@ def obligation_claim(
             status = weakest((status, Status.ERROR)) or Status.ERROR
         else:
             rests.append(found)
-    notes = [text for text in hypotheses if not names.is_obligation(text)]
-    # words that happen to name a claim count against it too; they never count for it
-    rests += [names.local.get(text, text) for text in hypotheses if names.is_obligation(text)]
-    return Claim(obligation.id, status, tuple(dict.fromkeys(rests)), tuple(notes), link)
+    return Claim(obligation.id, status, tuple(dict.fromkeys(rests)), tuple(hypotheses), link)
 
 
 def requirement_support(requirement: Requirement, names: Names) -> tuple[tuple[str, ...], tuple[str, ...]]:

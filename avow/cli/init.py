@@ -23,7 +23,7 @@ DOIT_CONFIG = RUN.config()
 
 
 def task_avow():
-    """check, sanity, compose, obligations, export, discharge, report and verify, for each system, node and method"""
+    """all stages from check to verify, for each system, node and method"""
     yield from RUN.tasks()
 '''
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from doit.exceptions import TaskError
 
 from avow import __version__
+from avow.assurance.certification import KernelRun
 from avow.assurance.model import Case, MethodInfo, RunInfo, ToolInfo
 from avow.assurance.signed import KEYS
 from avow.backend_kit.registry import backend, names
@@ -93,6 +94,18 @@ def render(assessment: Assessment) -> Result:
         assessment.state.changed.append(assessment.system)
     confirm(assessment.workspace, ledger)
     return result
+
+
+def certify(assessment: Assessment) -> KernelRun:
+    """Let the kernel establish again, in this run, what the calculus told that it proved: the report's grades."""
+    workspace, system = assessment.workspace, assessment.surveyed.system
+    ledger = ledger_of(workspace.ledger(system.name))
+    entries = counting_now(ledger, workspace.root, system)
+    found = kernel_run(entries, workspace.root, system, assessment.run.id)
+    twice = sum(one.solvers > 1 for one in found.established)
+    told = f"{len(found.established)} proofs established again, {twice} of them by two solvers"
+    assessment.state.certified[system.name] = told
+    return found
 
 
 def report(assessment: Assessment) -> bool:

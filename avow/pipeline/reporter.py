@@ -17,8 +17,9 @@ from avow.base.files import PART
 from avow.base.workspace import Workspace
 from avow.pipeline.state import State
 
-_SILENT = ("verify",)
-"""Stages whose result is the final table, not a line of its own."""
+_SILENT = ("certify", "verify")
+"""Stages whose result is the report and the final table, not a line of their own; they are done in every run that
+does any work."""
 
 
 class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
@@ -59,6 +60,8 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
             if start is None:
                 return
             stage, _, subject = task.name.partition(":")
+            if stage == "certify" and subject in self._state.certified:
+                self._line(f"  {stage:<11} {subject:<40} {self._state.certified[subject]}")
             if stage not in _SILENT:
                 self._done += 1
                 seconds = time.monotonic() - start

@@ -21,7 +21,7 @@ from avow.base.workspace import Workspace
 from avow.evidence.heads import index_path, read_index
 from avow.pipeline import check as checking
 from avow.pipeline import export as exporting
-from avow.pipeline.assess import Assessment, gate, report
+from avow.pipeline.assess import Assessment, certify, gate, report
 from avow.pipeline.discharge import discharge, ledger_of, open_obligations
 from avow.pipeline.state import State
 from avow.pipeline.work import LANGUAGE, Work
@@ -36,6 +36,7 @@ STAGES = {
     "obligations": "write every proof obligation",
     "export": "generate each method's input from the contract",
     "discharge": "run each method's tool and record the evidence",
+    "certify": "the kernel establishes again what the calculus proved",
     "report": "render the assurance reports from the ledger",
     "verify": "everything, and the policy's gates",
 }
@@ -153,11 +154,20 @@ def _system(state: State, surveyed: Survey) -> Iterator[Task]:
         **_said(workspace, (*_texts(surveyed), workspace.ledger(name)), (reports,)),
     }
     yield {
+        "basename": "certify",
+        "name": name,
+        "actions": [partial(_act, partial(certify, assessment))],
+        "task_dep": [*done, f"obligations:{name}"],
+        # whoever asks is told what was established in this run, not in an earlier one
+        "uptodate": [False],
+        **_said(workspace, (*_texts(surveyed), workspace.ledger(name)), ()),
+    }
+    yield {
         "basename": "verify",
         "name": name,
         "doc": surveyed.system.plan.title,
         "actions": [partial(gate, assessment)],
-        "task_dep": [*done, f"obligations:{name}"],
+        "task_dep": [f"certify:{name}"],
         "uptodate": [False],
         "clean": [partial(_clean_reports, workspace, name)],
         **_said(workspace, (*_texts(surveyed), workspace.ledger(name)), (reports,)),

@@ -28,6 +28,8 @@ class State:
     """The systems whose report was written anew."""
     cases: dict[str, tuple[str, Case]] = field(default_factory=dict)
     """System → its case as last made, and the key that it is of."""
+    certified: dict[str, str] = field(default_factory=dict)
+    """System → what the kernel established again in this run, in words."""
     read: bool = False
     """Contracts were read: the run had something to do."""
     shortcut: Shortcut = field(init=False)

@@ -17,7 +17,7 @@ from avow.assurance.changes import KINDS, baseline_of
 from avow.assurance.first_screen import WARNED
 from avow.assurance.model import Case
 from avow.base.plain import identifiers, words_of
-from avow.base.verdict import Link, Verdict
+from avow.base.verdict import Hypothesis, HypothesisKind, Link, Verdict
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.system.plan import EnvironmentInput, Requirement, Statement, System
@@ -174,8 +174,8 @@ def test_a_supposition_stands_once_whoever_needs_it() -> None:
     ]
     claims = [obligation(SYSTEM_LEVEL, Kind.COMPOSITION, f"environment.in.{p}") for p in "ab"]
     reasons = [evidence(c, Verdict.JUSTIFIED, "compose", link=Link.GUIDED, summary="surveyed") for c in claims]
-    needs = tuple(c.local_id for c in claims)
-    proofs = [evidence(g, hypotheses=needs) for g in GUARANTEES]
+    needs = tuple(Hypothesis(HypothesisKind.CLAIM, c.local_id, c.digest) for c in claims)
+    proofs = [evidence(g, rests_on=needs) for g in GUARANTEES]
     made = subject(PROSE, said, environment=[EnvironmentInput(f"in.{p}", "TRUE", "surveyed") for p in "ab"])
     found = case(made, [*GUARANTEES, *claims], [*proofs, *reasons])
     (world,) = [s for s in found.suppositions if s.sort is Sort.WORLD]
