@@ -3,7 +3,8 @@
 The programs are our own. AJPF (MCAPL of December 2025, Java 11) ran each with an environment that offers what NAME.yaml
 lists. Those in `golden/verdicts` were written for one question each or told readings of the semantics apart; those in
 `golden/random` were drawn by `small_agents`. A remark says where AJPF errs: its answer is not what follows from
-the model that it writes down itself, and ours is.
+the model that it writes down itself, and ours is; or, where the model was not written down, the program's first state
+alone breaks a property that AJPF says holds, and the remark says by what.
 """
 
 from __future__ import annotations
