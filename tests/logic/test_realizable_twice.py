@@ -143,7 +143,7 @@ def test_a_change_of_words_that_changes_the_meaning_proves_nothing(monkeypatch: 
 def test_the_elements_that_a_search_has_met_are_not_all_that_there_are() -> None:
     """Of a sort with one element it would be so, and the search met no other."""
     text = (
-        "context { T : {}; } node n { inputs( a : T ) outputs( c : T ) topics() "
+        "context { T : {}; } node n { inputs( a : T, b : T ) outputs( c : T ) topics() "
         "guarantee( c == a ) guarantee( forall(x in T | x == c) ) }"
     )
     assert realizable(text) is not Verdict.PROVED
