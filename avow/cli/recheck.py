@@ -16,7 +16,7 @@ from avow.cli.paths import PathArgument
 def command(path: Path, certificates: Path) -> int:
     """Establish again what certificates say of a system, with nothing but the kernel, Z3, and cvc5 where it is here.
 
-    PATH is a system's folder or its name; CERTIFICATES a file certificates.json of its artifacts. Code 1 where a claim
+    PATH is a system's folder or its name; CERTIFICATES a file certificates.json of its artifacts, or report.json. Code 1 where a claim
     is not established from contract and plan as they are.
     """
     from avow.base.diagnostics import Diagnostic, Rejected
@@ -33,8 +33,11 @@ def command(path: Path, certificates: Path) -> int:
     known = statements(wiring(frame(system)))
     names = {(s.node, s.digest): s.name for same in known.by_digest.values() for s in same}
     try:
-        found = {scope: from_json(data) for scope, data in json.loads(certificates.read_text()).items()}
-    except (ValueError, AttributeError, Malformed) as error:
+        kept = json.loads(certificates.read_text())
+        if "kernel" in kept:
+            kept = kept["kernel"]["certificates"]
+        found = {scope: from_json(data) for scope, data in kept.items()}
+    except (ValueError, AttributeError, KeyError, TypeError, Malformed) as error:
         raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: {error}")) from error
     solvers = Solvers(second=Second() if "cvc5" in versions() else None)
     refused = 0

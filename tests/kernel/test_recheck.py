@@ -20,6 +20,9 @@ def test_recheck(tmp_path: Path) -> None:
     code, told = invoke(command, str(tmp_path / "system"), str(kept))
     assert code == 0
     assert "requirement R: R, on" in told
+    report = tmp_path / "report.json"
+    report.write_text(json.dumps({"kernel": {"certificates": {"requirement R": to_json(certificate)}}}))
+    assert invoke(command, str(tmp_path / "system"), str(report)) == (code, told)
     make(tmp_path / "system", LOOP.replace("out.z == in.y + 1", "out.z == in.y + 2"), PLAN)
     code, told = invoke(command, str(tmp_path / "system"), str(kept))
     assert code == 1
