@@ -274,7 +274,11 @@ def _certified(facts: Facts, proofs: Sequence[ProofView], fresh: bool) -> Iterab
         names = ", ".join(short(name) for name in lacking[:5]) + (
             f" and {len(lacking) - 5} more" if lacking[5:] else ""
         )
-        reason = f"by the calculus' word alone: {names}" if lacking else f"{_count(len(wanted), 'proof')}, none by it"
+        reason = (
+            f"by the calculus' word alone: {names}"
+            if lacking
+            else f"{_count(len(wanted), 'proof')}, none by its word alone"
+        )
         yield Gate(
             "proved", "What is proved of composition and requirements is certified", not lacking, reason, lacking
         )

@@ -16,8 +16,8 @@ from avow.cli.paths import PathArgument
 def command(path: Path, certificates: Path) -> int:
     """Establish again what certificates say of a system, with nothing but the kernel, Z3, and cvc5 where it is here.
 
-    PATH is a system's folder or its name; CERTIFICATES a file certificates.json of its artifacts, or report.json. Code 1 where a claim
-    is not established from contract and plan as they are.
+    PATH is a system's folder or its name; CERTIFICATES a file certificates.json of its artifacts, or report.json.
+    Code 1 where a claim is not established from contract and plan as they are.
     """
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.workspace import system_folder
