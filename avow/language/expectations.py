@@ -65,13 +65,15 @@ def _expected(start: str, expected: frozenset[str]) -> str:
 def _hint(start: str, tokens: Sequence[Token], at: int, found: Token, expected: frozenset[str]) -> str | None:
     before = tokens[at - 1] if at else None
     after = tokens[at + 1] if at + 1 < len(tokens) else None
+    if expected == {"NAME"} and after is not None and after.type == "IN":  # forall(if in REAL | …)
+        return about_keyword(found)
     if start == "formula":
         said = _in_formula(tokens[:at], before, found, after, expected)
     elif start == "topics":
         said = in_topics(tokens, at, found, expected)
     else:
         said = in_types(start, tokens, at, found, expected)
-    return said or _about_keyword(found)
+    return said or about_keyword(found)
 
 
 def _in_formula(
@@ -207,7 +209,8 @@ def _in_general(
     return None
 
 
-def _about_keyword(found: Token) -> str | None:
+def about_keyword(found: Token) -> str | None:
+    """What to say where a name is wanted and a keyword stands."""
     return f"`{found.text}` is a keyword and cannot be a name" if found.text in KEYWORDS else None
 
 

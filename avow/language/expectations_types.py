@@ -111,7 +111,7 @@ def _in_ports(
         if found.type == "BUILTIN":
             name = tokens[at + 1].text if tokens[at + 1 : at + 2] and tokens[at + 1].type == "NAME" else "name"
             return f"the name stands first: `{name} : {found.text}`; a function is `a : REAL x REAL --> BOOL`"
-        if found.type in ("IN", "OUT"):
+        if found.type in ("IN", "OUT") and tokens[at + 1 : at + 2] and tokens[at + 1].type == "DOT":
             return f"here the name stands alone, without `{found.text}.`"
         if found.type == "$END" and before is not None and before.type == "COMMA":
             return "no comma after the last one"

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from avow.language.contract import ClauseKind
+from avow.language.expectations import about_keyword
 from avow.language.lexer import Token
 from avow.language.parser import parse
 from avow.language.source import Reports
@@ -251,6 +252,11 @@ class _OutlineReader:
             message = f"`;` is missing after the declaration of `{part[0].text}`"
             self.reports.error("RCL113", message, end - 1, end, hint="end every declaration with `;`")
 
+    def no_name(self, hint: str) -> str:
+        """The hint, after what is to be said of a keyword that stands where a name may stand."""
+        said = about_keyword(self.tokens[self.at]) if self.at < len(self.tokens) else None
+        return f"{said}; {hint}" if said else hint
+
     # --- node --------------------------------------------------------------------------------------------------------
 
     def node(self) -> None:
@@ -263,6 +269,7 @@ class _OutlineReader:
             hint = "write `node NAME {`, with a name of letters, digits and `_`"
             if self.kind() == "STRING":
                 hint = "a name stands without quotation marks"
+            hint = self.no_name(hint)
             self.complain("RCL113", "expected the node's name and not %", self.at, hint)
             node = NodeSyntax(Token("NAME", "", start, start), start)
             ahead = next((i for i in range(4) if self.kind(i) in ("LBRACE", "$END") or self.kind(i) in _SECTIONS), 0)
@@ -410,6 +417,7 @@ class _OutlineReader:
             hint = f"write `{keyword.text}( … )`"
             if section in ("ASSUME", "GUARANTEE") and self.kind() not in ("LBRACE", "RBRACE", "$END"):
                 hint = f'write `{keyword.text} NAME "sentence" ( … )`; the name and the sentence may be left out'
+                hint = self.no_name(hint)
             self.complain("RCL113", f"expected `(` after `{(name or keyword).text}` and not %", self.at, hint)
             if self.kind() == "LBRACE":
                 self.balanced()

@@ -139,7 +139,7 @@ def _settle(job: Job, record: Record, obligation: Obligation) -> Outcome:
     hypotheses = elsewhere
     example = None
     if stale:
-        verdict, summary = Verdict.UNKNOWN, f"stale: {'; '.join(stale)}"
+        verdict, summary = Verdict.UNKNOWN, f"stale: {'; '.join(stale)}; read it again and date the record anew"
         if conclusion == "rejected":
             summary += " (it had been rejected)"
         details["stale"] = stale

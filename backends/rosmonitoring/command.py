@@ -111,6 +111,11 @@ def _print_summary(running: Session) -> None:
         if tally.reason:
             words.append(tally.reason)
         click.echo(f"  {monitor.setup.node.name}.{name} ({kind}): {', '.join(words)}")
+    if running.unheard:
+        told = ", ".join(f"{topic} ({count})" for topic, count in list(running.unheard.items())[:10])
+        more = f" and {len(running.unheard) - 10} more" if len(running.unheard) > 10 else ""
+        click.echo(f"topics of the trace that no clause speaks of, and their events: {told}{more}")
+        click.echo(f"topics listened to: {', '.join(running.topics) or 'none'}")
     faults = ", ".join(f"{count} × {fault}" for fault, count in running.counts.items())
     fine = (
         "nothing broken"

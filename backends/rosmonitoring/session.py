@@ -12,7 +12,7 @@ from avow.system.plan import System
 from avow.system.schema import suggest
 
 from .engine import Fault, Monitor, Tally, Violation
-from .options import NAME, setup
+from .options import NAME, same_topic, setup
 
 
 @dataclass(slots=True)
@@ -23,13 +23,23 @@ class Session:
     monitors: tuple[Monitor, ...]
     events: int = 0
     counts: dict[Fault, int] = field(default_factory=dict)
+    unheard: dict[str, int] = field(default_factory=dict)
+    """Topics of the trace that no monitor listens to, and their events."""
 
     def step(self, event: Mapping[str, Any]) -> Iterator[Violation]:
         self.events += 1
+        topic = event.get("topic")
+        if isinstance(topic, str) and same_topic(topic) not in map(same_topic, self.topics):
+            self.unheard[topic] = self.unheard.get(topic, 0) + 1
         for monitor in self.monitors:
             for violation in monitor.step(event):
                 self.counts[violation.fault] = self.counts.get(violation.fault, 0) + 1
                 yield violation
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """What the monitors listen to."""
+        return tuple(dict.fromkeys(topic for monitor in self.monitors for topic in monitor.setup.topics))
 
     @property
     def clean(self) -> bool:

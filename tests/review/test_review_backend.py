@@ -48,7 +48,9 @@ def test_a_changed_file_makes_it_stale(make_job: MakeJob, stamped: Path) -> None
     (stamped.parent / "models/more.py").write_text("other")
     for outcome in settle(make_job()):
         assert outcome.verdict is Verdict.UNKNOWN
-        assert outcome.summary == "stale: models/more.py changed since the review of 2026-11-20"
+        assert outcome.summary == (
+            "stale: models/more.py changed since the review of 2026-11-20; read it again and date the record anew"
+        )
 
 
 def test_a_lost_file_makes_it_stale(make_job: MakeJob, stamped: Path) -> None:

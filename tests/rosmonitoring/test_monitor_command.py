@@ -14,6 +14,7 @@ import pytest
 from avow.backends.rosmonitoring.serve import answer, serve
 from avow.backends.rosmonitoring.session import session
 from avow.system.plan import System
+from rosmonitoring.conftest import CASE
 
 
 def avow(*arguments: str, stdin: str | None = None) -> subprocess.CompletedProcess[str]:
@@ -40,6 +41,15 @@ def test_nominal(case_folder: Path, traces: dict[str, Path]) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     assert "nothing broken" in done.stdout
     assert "agent.next_waypoint (guarantee): judged 16 times" in done.stdout
+
+
+def test_topics_that_nobody_listens_to_are_told_with_those_that_are() -> None:
+    line = '{"topic": "/raditaion", "time": %d, "radiation": 1}'
+    done = avow(str(CASE), "-", "--node", "radiationSensor", stdin="\n".join(line % n for n in range(3)))
+    assert done.returncode == 1
+    assert "topics of the trace that no clause speaks of, and their events: /raditaion (3)" in done.stdout
+    told = next(row for row in done.stdout.splitlines() if row.startswith("topics listened to: "))
+    assert "radiationStatus" in told
 
 
 def test_faulty_as_json_and_from_standard_input(case_folder: Path, traces: dict[str, Path]) -> None:
