@@ -47,6 +47,7 @@ class World:
         self.told = {"least": 0, "most": 10, "cases": 20, "seed": 0, "file": "m.py"}
         self.subject = "right"
         self.kept: list[Path] = []
+        self.rolled_back = False
         self.write()
 
     def write(self) -> None:
@@ -107,6 +108,14 @@ class World:
         if self.kept:
             shutil.copytree(self.rng.choice(self.kept), self.root / "artifacts" / "s", dirs_exist_ok=True)
 
+    def roll_back(self) -> None:
+        """The ledger as it was some records ago."""
+        path = self.root / "artifacts" / "ledger" / "s.jsonl"
+        lines = path.read_bytes().splitlines(keepends=True) if path.is_file() else []
+        if len(lines) > 1:
+            path.write_bytes(b"".join(lines[: self.rng.randrange(1, len(lines))]))
+            self.rolled_back = True
+
     def killed(self) -> None:
         run = subprocess.Popen([AVOW, "verify"], cwd=self.root, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(self.rng.random() * 2)
@@ -116,7 +125,7 @@ class World:
     def happenings(self) -> list[Callable[[], None]]:
         return [
             *(self.option, self.rename, self.swap, self.data, self.missing, self.comment),
-            *(self.edit_notes, self.keep, self.restore, self.killed),
+            *(self.edit_notes, self.keep, self.restore, self.roll_back, self.killed),
         ]
 
     def verify(self, *options: str) -> tuple[int, dict[str, str]]:
@@ -125,29 +134,49 @@ class World:
         )
         assert "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
         case = json.loads((self.root / "reports" / "s" / "report.json").read_text())
-        return done.returncode, {
-            f"{o['obligation']['node']}/{o['obligation']['name']}": o["standing"] for o in case["obligations"]
-        }
+        standings = {f"{o['obligation']['node']}/{o['obligation']['name']}": o["standing"] for o in case["obligations"]}
+        gates = {f"gate {gate['id']}": "passes" if gate["passed"] else "fails" for gate in case["gates"]}
+        return done.returncode, standings | gates
 
 
-def hold(root: Path, seed: int, steps: int) -> None:
+def hold(root: Path, seed: int, steps: int, seconds: float) -> None:
+    """A walk of so many steps; none is begun after so many seconds."""
+    end = time.monotonic() + seconds
     rng = random.Random(seed)
     world = World(root, rng)
     done = []
-    for _ in range(steps):
+    for step in range(steps):
+        if step and time.monotonic() > end:
+            break
         for happens in rng.choices(world.happenings(), k=rng.randrange(1, 4)):
             done.append(happens.__name__)
             happens()
         said = world.verify()
+        # who lost records has to say so: no run forgets it, fresh or not
+        assert said[1]["gate integrity"] == ("fails" if world.rolled_back else "passes"), (seed, done)
         assert said == world.verify("--fresh"), (seed, done)
         assert said == world.verify(), (seed, done)
 
 
 def test_the_law_on_a_short_walk(tmp_path: Path) -> None:
-    hold(tmp_path / "w", 1, 1)
+    hold(tmp_path / "w", 1, 1, 60)
+
+
+@pytest.mark.slow
+def test_the_law_after_a_ledger_was_rolled_back(tmp_path: Path) -> None:
+    world = World(tmp_path / "w", random.Random(3))
+    assert world.verify()[1]["gate integrity"] == "passes"
+    world.subject = "wrong"
+    world.write()
+    world.verify()
+    world.roll_back()
+    said = world.verify()
+    assert said[0] == 1
+    assert said[1]["gate integrity"] == "fails"
+    assert said == world.verify("--fresh") == world.verify()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(int(os.environ.get("AVOW_WALKS", "4"))))
 def test_the_law_on_random_walks(tmp_path: Path, seed: int) -> None:
-    hold(tmp_path / "w", 100 + seed, 8)
+    hold(tmp_path / "w", 100 + seed, 8, float(os.environ.get("AVOW_WALK_SECONDS", "90")))
