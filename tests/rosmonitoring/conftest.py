@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -39,7 +40,8 @@ def write_case(folder: Path, traces: dict[str, list[str]] | None = None) -> Path
     """A copy of the case study whose plan has the monitors' method blocks, and no other."""
     target = folder / "remote_inspection"
     shutil.copytree(CASE, target)
-    plan = yaml.safe_load((target / "plan.yaml").read_text(encoding="utf-8"))
+    text = (target / "plan.yaml").read_text(encoding="utf-8")
+    plan = yaml.safe_load(re.sub(r"\bon:", '"on":', text))  # a key, and not the truth value of YAML 1.1
     for name, mapping in MAPPINGS.items():
         options: dict[str, Any] = {"mapping": mapping}
         if traces is not None:
