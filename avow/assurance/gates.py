@@ -211,13 +211,17 @@ def _requirements(
     good = facts.policy.requirements
     failing = [r for r in requirements if good and (r.status not in good or r.how is How.OPEN)]
     causes = {r.id: r.below or r.failing or _weak(r, derivations, views, good) for r in failing}
-    bad = [r for r in failing if not _all_excused(causes[r.id], excused)]
+    # what is wrong with the requirement itself, no finding beneath it excuses
+    own = {r.id for r in failing if r.suspect or r.unknown_names}
+    bad = [r for r in failing if r.id in own or not _all_excused(causes[r.id], excused)]
     let_off = tuple(requirement_claim(r.id) for r in failing if r not in bad)
     reason = "; ".join(
         f"{r.id} is {_standing(r, good)}{f': {_because(causes[r.id])}' if causes[r.id] else ''}" for r in bad[:5]
     )
     found = [s for r in bad for name in causes[r.id] if name in views for s in _suggestion(views[name])]
-    if any(not (r.formula or r.temporal or r.below or causes[r.id]) for r in bad):
+    if any(r.suspect for r in bad):
+        found.append(Suggestion("read the sentence again and confirm it: `avow check` prints what to write", cost=5))
+    if any(not (r.formula or r.temporal or r.below or causes[r.id] or r.suspect) for r in bad):
         found.append(
             Suggestion("state the requirement as a `formula` or a `temporal` one: prose is linked by a person", cost=20)
         )
@@ -238,6 +242,8 @@ def _requirements(
 
 def _standing(requirement: RequirementView, good: Sequence[Status]) -> str:
     """Why it does not count; one that would hold by its own evidence may still rest on what has failed or expired."""
+    if requirement.suspect:
+        return "suspect: its sentence, or what is linked to it, was changed since it was confirmed"
     if requirement.status not in good:
         return _short_of(requirement.status, good)
     return "open" if requirement.failing else "open: a supposition has expired"

@@ -224,6 +224,8 @@ class RequirementView:
     """Keys of suppositions."""
     span: Span | None = None
     confirmed: Confirmation | None = None
+    suspect: bool = False
+    """Whether its sentence, or what is linked to it, is another than was confirmed."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,6 +43,7 @@ def requirement_view(
         answer=_answer(requirement, standing, unknown, statuses, names.own.get(requirement.id, ())),
         span=requirement.span,
         confirmed=requirement.confirmed,
+        suspect=requirement.suspect,
     )
 
 

@@ -228,6 +228,12 @@ def test_what_is_linked_to_a_changed_sentence_is_suspect(changed: dict[str, Any]
     assert "Suspect" in bad.requirements[0].answer
     assert bad.exit_code == 1
     assert conclude_again(bad) == bad
+    # that what stands under it is accepted excuses no changed sentence
+    risk = Finding("n/guarantee/g", "refuted", "seen", "A. Person", "2026-01-01", "2026-12-31")
+    for requirement, passes in ((confirmed, True), (replace(confirmed, **changed), False)):
+        subject = system({"n": ["g"]}, requirements=[requirement], plans=PLANS, accepted=[risk])
+        gates = {g.id: g.passed for g in case(subject, [G], [evidence(G, Verdict.REFUTED)]).gates}
+        assert gates["requirements"] is passes
 
 
 def test_wildcards_stand_for_what_they_matched_when_they_were_written() -> None:
