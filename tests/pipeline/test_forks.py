@@ -186,10 +186,12 @@ def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
     (odd / "pids").unlink(missing_ok=True)
     script = f"""
         from pathlib import Path
+        from avow.backend_kit.registry import trust_plugins
         from avow.pipeline import asking
         from avow.pipeline.workload import survey
         from avow.base.workspace import Workspace
         root = Path({str(odd)!r})
+        trust_plugins()
         work = survey(root / "contracts" / "hangs").work("odd")
         asking.run(Workspace(root), work, work.obligations, root)
     """
