@@ -255,6 +255,10 @@ class Finder:
 
     def kept(self, item: Item, base: tuple[_Base, ...], step: _Uses) -> _Proof | None:
         """The proof, if the kernel finds its questions valid; with a witness where one is needed."""
+        begun = [self.begun(b, at) for at, b in enumerate(base)]
+        base = tuple(b for b in begun if b is not None)
+        if len(base) < len(begun):
+            return None
         items = list(dict.fromkeys([*(i for uses in (*(b for b, _ in base), step) for i, _ in uses), item]))
         ranks = {i: k for k, i in enumerate(items)}
         # ranks and conditions are another matter: here only the questions are asked
@@ -273,6 +277,24 @@ class Finder:
             else:
                 return None
         return _Proof(base, step, tuple(found))
+
+    def begun(self, base: _Base, at: int) -> _Base | None:
+        """A first step whose initial conditions the kernel takes: where it must, with what is assumed of all that is
+        constant in the environment. None where it does not even so."""
+        uses, initials = base
+        constant = (
+            (i, 0) for i in self._ever if i.how is How.ENVIRONMENT and all(p.rigid for p in i.claim.places.values())
+        )
+        for wider in (uses, tuple(dict.fromkeys((*uses, *constant)))):
+            stand_ins = tuple(Entry(i.how, i.claim.node, i.claim.digest) for i, _ in wider)
+            kernel = Kernel(self.known, Certificate(self.scope, stand_ins), self.solvers)
+            question = Question(tuple(Use(k, back) for k, (_, back) in enumerate(wider)), initials)
+            try:
+                tuple(kernel.begins(question, at))
+            except Refused:
+                continue
+            return wider, initials
+        return None
 
     def witnesses(self, item: Item, uses: _Uses, initials: tuple[str, ...]) -> list[tuple[int, int]]:
         """Where a claim says that something exists: the premises that say so of something of the same type."""

@@ -17,16 +17,18 @@ def command(path: Path, certificates: Path) -> int:
     """Establish again what certificates say of a system, with nothing but the kernel, Z3, and cvc5 where it is here.
 
     PATH is a system's folder or its name; CERTIFICATES a file certificates.json of its artifacts, or report.json.
-    Code 1 where a claim is not established from contract and plan as they are.
+    Code 1 where a claim is not established from contract and plan as they are, and where a label is not that of
+    the claims under it; code 2 where there is nothing to establish.
     """
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.workspace import system_folder
+    from avow.calculus.certificates import requirement_scope
     from avow.calculus.variables import frame
     from avow.calculus.wiring import wiring
     from avow.kernel.certificate import How, Malformed, from_json
     from avow.kernel.check import Kernel, Refused
     from avow.kernel.solvers import Second, Solvers, versions
-    from avow.kernel.statements import statements
+    from avow.kernel.statements import Kind, statements
     from avow.system.load import load_path
 
     system = load_path(path if path.is_dir() else system_folder(str(path)))
@@ -39,10 +41,22 @@ def command(path: Path, certificates: Path) -> int:
         found = {scope: from_json(data) for scope, data in kept.items()}
     except (ValueError, AttributeError, KeyError, TypeError, Malformed) as error:
         raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: {error}")) from error
+    if not any(entry.how is How.SHOWN for certificate in found.values() for entry in certificate.entries):
+        raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: no claim is shown in it"))
+    scopes = {
+        mark: {requirement_scope(s.name) for s in same if s.kind is Kind.REQUIREMENT}
+        for mark, same in known.by_digest.items()
+    }
     solvers = Solvers(second=Second() if "cvc5" in versions() else None)
     refused = 0
     try:
         for scope, certificate in found.items():
+            shown = [entry for entry in certificate.entries if entry.how is How.SHOWN and not entry.node]
+            about = {label for entry in shown for label in scopes.get(entry.digest, ())}
+            unlike = certificate.scope != scope or (shown and scope not in about)
+            if unlike or (certificate.entries and not shown and scope.startswith(requirement_scope(""))):
+                refused += 1
+                click.echo(f"refused      {scope}: its label is not that of the claims in it")
             kernel = Kernel(known, certificate, solvers)
             for i, entry in enumerate(certificate.entries):
                 if entry.how is not How.SHOWN:

@@ -17,8 +17,8 @@ from functools import cached_property
 from avow.base.files import digest as sha256
 from avow.kernel.certificate import FORMAT, Certificate, Entry, How, Question
 from avow.kernel.solvers import LOOK, Said, Solvers
-from avow.kernel.statements import Kind, Statement, Statements
-from avow.kernel.text import Text, Untranslatable, symbol
+from avow.kernel.statements import Kind, Place, Statement, Statements
+from avow.kernel.text import Text, Untranslatable, conjunction, symbol
 from avow.language.terms import And, Quantified, Quantifier, Term
 
 
@@ -203,6 +203,7 @@ class Kernel:
                 for b, question in enumerate(entry.base):
                     self._formed(i, question, b)
                     yield self.answered(entry, question, b)
+                    yield from self.begins(question, b)
                 if entry.step.initials:
                     raise Refused("initial values in a question about every step")
                 self._formed(i, entry.step, len(entry.base))
@@ -264,6 +265,61 @@ class Kernel:
         second = self.solvers.second is not None and self.solvers.second.ask(script) is Said.UNSAT
         vacuous = self.solvers.first(premises, LOOK) is Said.UNSAT
         return Answered(sha256(script), self._together(entry, question), vacuous, 2 if second else 1)
+
+    def begins(self, question: Question, step: int) -> Iterator[Answered]:
+        """That initial conditions that are used say nothing of the environment: whatever its constant values are, as
+        far as the question's environment entries allow, there is a first value of each output. Those of one output are
+        taken together; those of different outputs share nothing but what is constant. Raises Refused."""
+        for mark in dict.fromkeys(question.initials):
+            initial = self.known.find(mark, Kind.INITIAL)
+            assert initial is not None
+            together = self._with_same_outputs(initial)
+            if all(place.node is not None for each in together for place in each.places.values()):
+                continue  # where no value satisfies it, the claim is vacuous, and said to be so
+            script = self._beginning(question, step, together)
+            if self.solvers.first(script) is not Said.UNSAT:
+                raise Refused(
+                    f"the initial condition of {initial.node}.{initial.name} is not shown to have a value "
+                    "for every constant input that the environment allows"
+                )
+            second = self.solvers.second is not None and self.solvers.second.ask(script) is Said.UNSAT
+            yield Answered(sha256(script), (), False, 2 if second else 1)
+
+    def _with_same_outputs(self, initial: Statement) -> list[Statement]:
+        """An initial condition with all others of the system that speak, directly or through others, of its outputs."""
+        found, spoken = [initial], _first_values(initial)
+        others = [s for same in self.known.by_digest.values() for s in same if s.kind is Kind.INITIAL]
+        while more := [s for s in others if s not in found and _first_values(s).keys() & spoken.keys()]:
+            found += more
+            spoken = {name: place for s in found for name, place in _first_values(s).items()}
+        return found
+
+    def _beginning(self, question: Question, step: int, together: list[Statement]) -> str:
+        """The text of: constant values, as the environment entries of a question allow, without first values."""
+        text = Text()
+        used = [(self.certificate.entries[use.entry], use.back) for use in question.uses]
+        first = {name: place for each in together for name, place in _first_values(each).items()}
+        names = {name: f"first{k}" for k, name in enumerate(sorted(first))}
+        try:
+            allowed = [
+                text.formula(claim.term, claim.symbols(back))
+                for entry, back in used
+                if entry.how is How.ENVIRONMENT and (claim := self._claim(entry)).outside_only
+            ]
+            conditions = [text.member(first[name].sort, called) for name, called in names.items()]
+            for each in together:
+                if not each.unary:
+                    raise Refused("an initial condition speaks of more than the state before the first step")
+                bound = {v: names[p.symbol()] for v, p in each.places.items() if p.node is not None}
+                conditions.append(text.formula(each.term, each.symbols(step), bound))
+            binders = text.binders(names.values(), [first[name].sort for name in names])
+            body = conjunction(conditions)
+            begins = f"(exists ({binders}) {body})" if names else body
+            facts = text.facts()
+        except Untranslatable as problem:
+            raise Refused(f"no text: {problem}") from None
+        lines = [f"(assert {premise})" for premise in (*facts, *allowed)]
+        return "\n".join(["(set-logic ALL)", *text.declarations.values(), *lines, f"(assert (not {begins}))", ""])
 
     def script(self, entry: Entry, question: Question, step: int) -> tuple[str, str]:
         """The text of a question, and of its premises alone. Raises Refused."""
@@ -346,6 +402,11 @@ class Answered:
     together: tuple[str, ...]
     vacuous: bool
     solvers: int
+
+
+def _first_values(initial: Statement) -> dict[str, Place]:
+    """The values before the first step that it speaks of, by their symbol."""
+    return {place.symbol(): place for place in initial.places.values() if place.node is not None}
 
 
 def _named(entry: Entry) -> Iterator[int]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from calculus.make import make
 from calculus.test_commands import invoke
 
+from avow.base.diagnostics import Rejected
 from avow.cli.recheck import command
 from avow.kernel.certificate import to_json
 from kernel.test_kernel import LOOP, PLAN, made
@@ -27,3 +28,28 @@ def test_recheck(tmp_path: Path) -> None:
     code, told = invoke(command, str(tmp_path / "system"), str(kept))
     assert code == 1
     assert "stale" in told
+
+
+def test_nothing_to_establish_and_wrong_labels_are_no_success(tmp_path: Path) -> None:
+    _, certificate = made(tmp_path / "system")
+    good, kept = to_json(certificate), tmp_path / "certificates.json"
+
+    def recheck(data: object) -> tuple[int, str]:
+        kept.write_text(json.dumps(data))
+        try:
+            return invoke(command, str(tmp_path / "system"), str(kept))
+        except Rejected as rejected:
+            return 2, str(rejected)
+
+    for empty in ({}, {"requirement R": good | {"entries": []}}, {"kernel": {"certificates": {}}}):
+        assert recheck(empty)[0] == 2
+    for label, data in (
+        ("requirement Q", good),
+        ("requirement R", good | {"scope": "requirement Q"}),
+        ("requirement Q", good | {"scope": "requirement Q"}),
+        ("whole", good | {"scope": "whole"}),
+        ("requirement R", good | {"entries": good["entries"][:-1]}),
+    ):
+        code, told = recheck({label: data})
+        assert code == 1, label
+        assert "label" in told
