@@ -54,16 +54,26 @@ class Refinement:
 
     @property
     def verdict(self) -> Verdict:
+        """`proved` only where it is known as well that something can keep `concrete`, or that nothing can."""
+        found = self._demanded
+        undecided = found is Verdict.PROVED and bool(self.doubt) and not self._hollow
+        return Verdict.UNKNOWN if undecided else found
+
+    @property
+    def _demanded(self) -> Verdict:
         verdicts = {demand.verdict for demand in self.demands}
         if self.faults or Verdict.REFUTED in verdicts:
             return Verdict.REFUTED
         return Verdict.UNKNOWN if verdicts - {Verdict.PROVED} else Verdict.PROVED
 
     @property
+    def _hollow(self) -> bool:
+        return self.unrealizable is not None or any(demand.vacuous for demand in self.demands)
+
+    @property
     def vacuous(self) -> bool:
         """It is true, but only of a contract that nothing can keep (or of assumptions that nothing meets)."""
-        hollow = self.unrealizable is not None or any(demand.vacuous for demand in self.demands)
-        return self.verdict is Verdict.PROVED and hollow
+        return self.verdict is Verdict.PROVED and self._hollow
 
     @property
     def holds(self) -> bool:

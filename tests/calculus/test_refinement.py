@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.export import derived_contract
-from avow.calculus.refinement import refines
+from avow.calculus.refinement import Demand, Refinement, refines
 from avow.cli.refines import command as refines_command
 from avow.language.contract import Node
 from avow.language.load import check_text
@@ -73,6 +74,38 @@ def test_of_a_contract_that_nothing_can_keep_it_says_so(guarantees: tuple[str, .
     assert code == (1 if at else 0)
     assert (": vacuous" in out) == at
     assert ("not realizable: in.r = " in out) == at
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        "forall(i in NATURAL | in.f(i) < out.y)",
+        "out.y > in.f(3)",
+        "exists(m in REAL | forall(i in NATURAL | in.f(i) < m))",
+    ],
+)
+def test_where_it_is_not_decided_whether_anything_can_keep_it_nothing_is_proved(wanted: str, tmp_path: Path) -> None:
+    """No number lies above all values of an unbounded function: `unknown` or `vacuous`, and never `proved`."""
+    context = "context { F : NATURAL --> REAL; }\n"
+    texts = [
+        context + f"node n {{ inputs( f : F ) outputs( y : REAL ) topics() guarantee g ( {formula} ) }}"
+        for formula in ("forall(i in NATURAL | y > f(i))", wanted.replace("in.f", "f").replace("out.y", "y"))
+    ]
+    for option in ("", "--json"):
+        code, out = command(tmp_path, *texts, *([option] if option else []))
+        assert code == 1
+        assert not out.splitlines()[0].endswith(": proved")
+        if option:
+            told = json.loads(out)
+            assert told["nodes"][0]["verdict"] in ("unknown", "vacuous")
+            assert not told["refines"]
+
+
+@pytest.mark.parametrize("vacuous", [False, True])
+def test_a_doubt_is_the_answer_where_all_demands_are_proved(vacuous: bool) -> None:
+    proved = Demand("n", only(BASE).guarantees[0], Verdict.PROVED, (), None, "", vacuous)
+    doubted = Refinement("n", "n", (), (proved,), doubt="no answer in time")
+    assert (doubted.verdict is Verdict.UNKNOWN, doubted.vacuous, doubted.holds) == (not vacuous, vacuous, False)
 
 
 def test_a_natural_where_the_other_has_an_integer() -> None:
