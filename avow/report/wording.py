@@ -103,7 +103,7 @@ def tool_command(evidence: Evidence) -> str:
     match evidence.obligation.split("/", 3):
         case [system, node, Kind.GUARANTEE, _] if command:
             return f"(cd {shlex.quote(f'artifacts/{system}/{node}/{evidence.method}')} && {command})"
-        case _:
+        case _:  # not a method's tool: it runs where the run was started
             return command
 
 
@@ -256,7 +256,7 @@ def _one_bound(name: str, value: Any) -> str:
             return f"for each {' and '.join(map(str, names))}"
         case "properties" | "states" | "transitions", int() if not isinstance(value, bool):
             return f"{_plain(value)} {name if value != 1 else _SINGULAR[name]}"
-        case _:
+        case _:  # bounds of any method, by the name that it gives them
             return f"{name.replace('_', ' ')} {_plain(value)}"
 
 

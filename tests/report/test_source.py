@@ -76,7 +76,7 @@ def test_what_cannot_be_seen_is_told() -> None:
     """A control of writing direction could make code look like a comment to whoever signs."""
     lines = shown(with_text("// \u202e } ;evil \u2066 // x\na\u200bb\r\nc\rd\n"))
     assert lines == ["// U+202E } ;evil U+2066 // x", "aU+200Bb", "cU+000Dd"]
-    assert "\u202e" not in render_markdown(hostile_case()).split("as written")[1]
+    assert "\u202e" not in render_markdown(hostile_case()).rsplit("as written", 1)[1]
 
 
 def test_hostile_comments_stay_text_on_the_page() -> None:
