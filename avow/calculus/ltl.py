@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import count
 from typing import assert_never
 
 from avow.formulas import ltl
 from avow.formulas.lasso import Lasso as Lasso
-from avow.formulas.lasso import accepted_run
+from avow.formulas.lasso import accepted_run, monitor, rejected_prefix
 from avow.formulas.ltl import TooLarge
 from avow.solving.limits import now
 from avow.system.temporal import Operator, Property, State
@@ -80,3 +80,40 @@ def violation(
             raise TooLong
 
     return accepted_run(initial, successors, label, automaton, tick=tick)
+
+
+def refuted_prefix(
+    formula: Property,
+    initial: Iterable[int],
+    successors: Callable[[int], Sequence[int]],
+    holds: Callable[[int, State], bool],
+    deadline: float | None = None,
+) -> tuple[int, ...] | None:
+    """The steps of a shortest beginning of a run that breaks the property however the run goes on, or None.
+
+    `deadline` is in seconds of `avow.solving.limits.now`; raises TooLong after it.
+    """
+    try:
+        automaton = ltl.build(normal(formula))
+    except TooLarge:
+        raise TooLong from None
+    seen = count()
+
+    def label(step: int) -> int:
+        return sum(1 << at for at, state in enumerate(automaton.leaves) if holds(step, state))
+
+    def tick() -> None:
+        if deadline is not None and next(seen) % 500 == 0 and now() > deadline:
+            raise TooLong
+
+    return rejected_prefix(initial, successors, cache(label), monitor(automaton), tick)
+
+
+def refuted_at(formula: Property, run: Sequence[Mapping[State, bool]]) -> int | None:
+    """The step of a beginning of a run up to which it breaks the property however it goes on; None if it need not.
+
+    Raises TooLong.
+    """
+    following = [*((k + 1,) for k in range(len(run) - 1)), ()]
+    found = refuted_prefix(formula, range(min(1, len(run))), following.__getitem__, lambda k, state: run[k][state])
+    return None if found is None else len(found) - 1

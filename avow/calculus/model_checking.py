@@ -1,8 +1,9 @@
 """Temporal requirements, settled on the composed contracts over the plan's scenario, before anything is implemented.
 
-`checked` only if every step that the scenario allows was looked at; a search cut short is `tested` at best. A run that
-breaks the property is shown as it goes, with the step to which it returns. A system that cannot take another step
-stays as it is for ever, and the report says which node has no answer.
+`checked` only if every step that the scenario allows was looked at, and its domains leave out no output that the
+contracts allow; a search cut short is `tested` at best. A run that breaks the property is shown as it goes, with the
+step to which it returns, or up to the step after which no continuation can have the property. A system that cannot take
+another step stays as it is for ever, and the report says which node has no answer.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from random import Random
 
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.discharge import Bounds
-from avow.calculus.ltl import Lasso, TooLong, demands_progress, violation
+from avow.calculus.ltl import Lasso, TooLong, demands_progress, refuted_at, refuted_prefix, violation
 from avow.calculus.node_outputs import Doubts, Stuck
 from avow.calculus.node_outputs import judge as judge_formula
 from avow.calculus.open_values import Holds
@@ -115,12 +116,18 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
     except CannotRun as reason:
         return _cannot_run(frame, name, formula, str(reason))
     if isinstance(done, Lasso):
-        return _broken(explored, name, formula, done)
+        answer = _broken(explored, name, formula, done)
+        bad = _prefix(explored, formula, bounds) if answer.verdict is not Verdict.REFUTED else None
+        return answer if bad is None else _broken_prefix(explored, name, formula, bad)
+    if isinstance(done, tuple):
+        return _broken_prefix(explored, name, formula, done)
     if explored.cannot_start is not None and stopped:
         told = f"the system cannot take a first step: {explored.cannot_start.text()}"
         verdict = Verdict.REFUTED if explored.cannot_start.genuine else Verdict.UNKNOWN
         return Answer(verdict, told, Counterexample(explanation=told), bound=_bound(explored))
     within = restrictions(explored.machine.world)
+    if done and not machine.short:
+        machine.look_for_cuts(now() + bounds.milliseconds / 1000)
     if done and not machine.short:
         return Answer(
             Verdict.CHECKED,
@@ -130,6 +137,8 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
             details={"exhaustive": True},
         )
     why = "; ".join(machine.short) or "time or steps ran out"
+    if demands_progress(formula):
+        why += "; that what it demands never comes can only be shown by a run that repeats or stops, and none was found"
     return Answer(
         Verdict.TESTED,
         f"no run of the first {explored.depth} steps was found to break it; not exhaustive: {why}",
@@ -190,19 +199,22 @@ def _tried(machine: Machine, frame: Frame, name: str, formula: Property, bounds:
     random = Random(bounds.seed)
     deadline = now() + bounds.milliseconds / 4000
     judges = _judges(machine, frame, formula)
-    best: tuple[Walk, int] | None = None  # a run that gets stuck tells more than one that goes round
+    best: tuple[Walk, int | None] | None = None  # a run that gets stuck tells more than one that goes round
     for _ in range(RUNS):
         walk = machine.walk(random, RUN_LENGTH, until_repeat=True, judges=tuple(judges.values()))
         if walk.steps and (walk.back is not None or (walk.stuck is not None and walk.stuck.genuine)):
             back = len(walk.steps) - 1 if walk.back is None else walk.back
             if (best is None or walk.stuck is not None) and _breaks(walk.steps, back, formula, judges):
                 best = (walk, back)
+        elif best is None and _refuted_at(walk.steps, formula, judges) is not None:
+            best = (walk, None)
         if now() > deadline or (best is not None and best[0].stuck is not None):
             break
     if best is None:
         return None
-    walk, back = best
-    return _shown_run(machine, frame, name, formula, list(walk.steps), back, walk.stuck, {"runs": RUNS})
+    walk, closes = best
+    stuck = None if closes is None else walk.stuck
+    return _shown_run(machine, frame, name, formula, list(walk.steps), closes, stuck, {"runs": RUNS})
 
 
 def _breaks(steps: Sequence[Step], back: int, formula: Property, judges: dict[State, Holds]) -> bool:
@@ -210,6 +222,14 @@ def _breaks(steps: Sequence[Step], back: int, formula: Property, judges: dict[St
     truth = [{state: judge(step.values) for state, judge in judges.items()} for step in steps]
     following = [(k + 1,) for k in range(len(steps) - 1)] + [(back,)]
     return violation(formula, [0], following.__getitem__, lambda k, state: truth[k][state]) is not None
+
+
+def _refuted_at(steps: Sequence[Step], formula: Property, judges: dict[State, Holds]) -> int | None:
+    """The first step up to which a run breaks the property however it goes on."""
+    try:
+        return refuted_at(formula, [{state: judge(step.values) for state, judge in judges.items()} for step in steps])
+    except TooLong:
+        return None
 
 
 def _judges(machine: Machine, frame: Frame, formula: Property) -> dict[State, Holds]:
@@ -232,7 +252,7 @@ def _begin(machine: Machine, frame: Frame, formula: Property) -> Explored:
     return explored
 
 
-def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | bool:
+def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | tuple[int, ...] | bool:
     """Breadth first; looks for a violation now and then. True: nothing is left to look at."""
     deadline = now() + bounds.milliseconds / 1000
     scenario = explored.machine.world.scenario
@@ -262,15 +282,32 @@ def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | b
             if found is not None:
                 return found
     try:
-        return _violation(explored, formula, max(deadline, now()) + bounds.milliseconds / 4000) or not cut
+        found = _violation(explored, formula, max(deadline, now()) + bounds.milliseconds / 4000)
     except TooLong:
-        return False
+        found, cut = None, True
+    return found or _prefix(explored, formula, bounds) or not cut
 
 
 def _violation(explored: Explored, formula: Property, deadline: float) -> Lasso | None:
     """What was explored so far is held against the property. Raises TooLong."""
     truth = explored.truth
     return violation(formula, explored.initial, explored.successors, lambda k, state: truth[k][state], deadline)
+
+
+def _prefix(explored: Explored, formula: Property, bounds: Bounds) -> tuple[int, ...] | None:
+    """A beginning of a run that breaks the property however it goes on: such a run need not close."""
+    truth, deadline = explored.truth, now() + bounds.milliseconds / 4000
+    try:
+        return refuted_prefix(
+            formula, explored.initial, explored.successors, lambda k, state: truth[k][state], deadline
+        )
+    except TooLong:
+        return None
+
+
+def _broken_prefix(explored: Explored, name: str, formula: Property, prefix: tuple[int, ...]) -> Answer:
+    machine, steps = explored.machine, explored.concrete(list(prefix))
+    return _shown_run(machine, machine.frame, name, formula, steps, None, None, _bound(explored))
 
 
 def _broken(explored: Explored, name: str, formula: Property, lasso: Lasso) -> Answer:
@@ -296,13 +333,20 @@ def _shown_run(
     """A run that breaks the property, as a counterexample."""
     trace = tuple(step.shown(_interesting(machine, frame, formula)) for step in steps)
     false = _false_at(machine, frame, formula, steps)
+    bad = _refuted_at(steps, formula, _judges(machine, frame, formula)) if false is None and back is None else None
     if stuck is not None:
         told = f"stuck after step {len(steps)}: {stuck.text()}"
     elif false is not None:
         told = f"at step {false + 1} it is false"
         steps, trace, back = steps[: false + 1], trace[: false + 1], None
     else:
-        told = f"from step {back + 1} on, the run repeats" if back is not None else ""
+        if bad is not None:
+            steps, trace = steps[: bad + 1], trace[: bad + 1]
+        told = (
+            f"from step {back + 1} on, the run repeats"
+            if back is not None
+            else f"after step {len(steps)} nothing can mend it"
+        )
     broken = sorted({clause for step in steps for clause in step.broken})
     if broken:
         told += f"; on the way an assumption does not hold: {', '.join(broken)}"
@@ -310,7 +354,7 @@ def _shown_run(
     if stuck is not None and not stuck.genuine:
         doubt = "perhaps only because the scenario lacks the value"
     else:
-        doubt = _doubt(machine, formula, steps, back, stays=stuck is not None, cut=false is not None)
+        doubt = _doubt(machine, formula, steps, back, stays=stuck is not None, cut=false is not None or back is None)
     if doubt:
         summary = f"{told}: {doubt}"
         return Answer(Verdict.UNKNOWN, summary, shown, bound=bound, details={"exhaustive": False})
@@ -335,9 +379,9 @@ def _doubt_of(
     known = [truth for truth in run if truth is not None]
     if len(known) < len(run):
         return "but over the scenario's values only is it sure that the property is broken"
-    # of ``always F``, up to a step at which F is false, it is broken however the run goes on
-    end = len(known) - 1 if cut else back
-    return "" if end is not None and not holds(formula, known, end) else "but replayed it does not break the property"
+    # up to its last step it is broken however the run goes on, or the run goes round
+    broken = refuted_at(formula, known) is not None if cut else back is not None and not holds(formula, known, back)
+    return "" if broken else "but replayed it does not break the property"
 
 
 def _false_at(machine: Machine, frame: Frame, formula: Property, steps: Sequence[Step]) -> int | None:

@@ -118,6 +118,13 @@ class Choices:
     short: str = ""
     """In what way `shells` are not all there are."""
 
+    natural: bool = False
+    """Whether it, or what it has at a point, is a natural number."""
+
+    def fits(self, value: Value) -> bool:
+        """Whether a value that an equation gives is of its sort: the scenario's values do not matter to it."""
+        return not (self.natural and isinstance(value, int) and value < 0)
+
     def begin(self) -> tuple[Value, ...] | None:
         return self.shells if self.shells is not None else self.values
 
@@ -203,8 +210,7 @@ class Narrowing:
             begin = self.choices[name].begin()
             forced = None if free else self._forced(name, None, valuation, wanted)
             if forced is not None:
-                allowed = self.choices[name].values if self.choices[name].shells is None else None
-                return name, tuple(value for value in forced if allowed is None or value in allowed)
+                return name, tuple(filter(self.choices[name].fits, forced))
             if begin is not None and (best is None or len(begin) < len(best[1])):
                 best = name, begin
         if best is not None:
@@ -220,7 +226,7 @@ class Narrowing:
         wanted: list[tuple[str, Point]] = []
         forced = None if free else self._forced(name, point, valuation, wanted)
         if forced is not None:
-            return tuple(value for value in forced if values is None or value in values)
+            return tuple(filter(self.choices[name].fits, forced))
         if values is None and (foreign := [(n, p) for n, p in wanted if n not in self.choices]):
             raise Undecided(foreign)
         if values is None:

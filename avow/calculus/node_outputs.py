@@ -18,7 +18,7 @@ from avow.formulas.formula import free_variables, substitute
 from avow.formulas.values import FunctionValue, Value, show
 from avow.formulas.values import Sequence as SequenceValue
 from avow.language.contract import Clause, Node, Port
-from avow.language.sorts import BOOL, FunctionSort, SequenceSort
+from avow.language.sorts import BOOL, FunctionSort, NaturalSort, SequenceSort, Sort
 from avow.language.terms import Role, Term, Variable
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
@@ -102,17 +102,18 @@ def possible(world: World, node: str, port: Port) -> Choices:
     try:
         match sort:
             case FunctionSort():
-                return Choices(world.results(node, port), "", (FunctionValue({}, ANY),))
+                natural = isinstance(sort.result, NaturalSort)
+                return Choices(world.results(node, port), "", (FunctionValue({}, ANY),), natural=natural)
             case SequenceSort(item=item) if world.domain(("out", node), port) is None and sort not in world.domains:
                 shells: tuple[Value, ...] = tuple(SequenceValue((ANY,) * n) for n in range(MAX_LENGTH + 1))
                 unknown = f"the elements of {node}.{port.name} are not known"
                 short = f"sequences of more than {MAX_LENGTH} elements are not tried for {node}.{port.name}"
                 return Choices(world.plain_values(item), unknown, shells, short)
             case _:  # any sort whose values can be tried
-                return Choices(world.candidates(node, port))
+                return Choices(world.candidates(node, port), natural=isinstance(sort, NaturalSort))
     except CannotRun as reason:
         shells = (FunctionValue({}, ANY),) if isinstance(sort, FunctionSort) else None  # type: ignore[assignment]
-        return Choices(None, str(reason), shells)
+        return Choices(None, str(reason), shells, natural=isinstance(_values_of(sort), NaturalSort))
 
 
 class Answerer:
@@ -148,6 +149,8 @@ class Answerer:
         """The searched relations that the guarantees allow whatever the inputs; None where that is no help."""
         self._answers: dict[object, tuple[Values, ...]] = {}
         self._broken: dict[object, tuple[str, ...]] = {}
+        self.asked: dict[object, Values] = {}
+        """The inputs of each question, by its place among the answers."""
 
     def _judge(self, clause: Clause) -> Holds:
         about = f"{self.node.name}.{clause.name}"
@@ -185,7 +188,12 @@ class Answerer:
         found = self._answers.get(index)
         if found is None:
             found = self._answers[index] = self._solve(inputs, bool(broken))
+            self.asked[index] = inputs
         return found, broken
+
+    def found(self, index: object) -> tuple[Values, ...]:
+        """What was answered at a place of `asked`."""
+        return self._answers[index]
 
     def _solve(self, inputs: Values, free: bool) -> tuple[Values, ...]:
         relations, searched = ({}, self.all_relations) if free else (self._defined(inputs), self.searched)
@@ -254,7 +262,7 @@ class Answerer:
             meanings = {}
             for variable, value in by_variable(node, inputs).items():
                 if is_open(value):
-                    solver.add(*_known_of(translator, variable, value))
+                    solver.add(*known_of(translator, variable, value))
                 else:
                     meanings[variable] = translator.value(value, variable.sort)
             solver.add(*translator.background([p.variable for p in node.outputs]))
@@ -272,11 +280,15 @@ class Answerer:
         return Stuck(node.name, shown, names, False)
 
 
+def _values_of(sort: Sort) -> Sort:
+    return sort.result if isinstance(sort, FunctionSort) else sort
+
+
 def _is_lazy(port: Port) -> bool:
     return isinstance(port.sort, FunctionSort | SequenceSort)
 
 
-def _known_of(translator: Translator, variable: Variable, value: Value) -> list[object]:
+def known_of(translator: Translator, variable: Variable, value: Value) -> list[object]:
     """What is decided of an open value."""
     match value, variable.sort:
         case FunctionValue(table=table), FunctionSort(parameters=parameters, result=result):

@@ -14,6 +14,7 @@ from random import Random
 
 from avow.base.graphs import components, cycles_in
 from avow.calculus.choices import Values, by_variable, search
+from avow.calculus.cuts import first_cut, is_restricted
 from avow.calculus.narrowing import Narrowing, Unknown, forcings
 from avow.calculus.node_outputs import MAX_ANSWERS, Answerer, Doubts, Stuck, judge, possible
 from avow.calculus.open_values import Holds, Undecided, decided
@@ -88,6 +89,20 @@ class Machine:
         """Why what holds of every step found may not hold of every step that the scenario allows."""
         inexact = [f"{name} could be judged over the scenario's values only" for name in sorted(self.doubts.inexact)]
         return [*sorted(self.incomplete), *inexact]
+
+    def look_for_cuts(self, deadline: float) -> None:
+        """Notes where the contracts allow an output that the scenario's values leave out: what follows on it was not
+        looked at. `deadline` is in seconds of `avow.solving.limits.now`."""
+        for answerer in self.nodes.values():
+            cut = first_cut(answerer, deadline)
+            if cut:
+                self.incomplete.add(cut)
+        self.incomplete.update(stuck.text() for stuck in self.stuck.values() if not stuck.genuine)
+        for endpoint in self.memory:
+            condition, _ = self._initially(endpoint)
+            port = self.frame.node(endpoint.node).output(endpoint.port)
+            if condition is None and is_restricted(self.world, self.nodes[endpoint.node], port):
+                self.incomplete.add(f"before the first step {endpoint} may have other values than the scenario's")
 
     def _unspecified(self) -> Iterator[str]:
         """Of a type of which nothing is known one value is tried: all there is to it where no clause looks at it."""

@@ -102,6 +102,77 @@ def accepted_run(
     return None
 
 
+@dataclass(frozen=True, slots=True)
+class Monitor:
+    """Whether the runs that begin so can still be accepted, whatever comes after (bad prefixes: Kupferman and Vardi,
+    "Model checking of safety properties", FMSD 2001). `live`: nodes of the automaton from which some run is accepted.
+    """
+
+    automaton: Automaton[object]
+    live: frozenset[int]
+
+    def begin(self) -> frozenset[int]:
+        return self.live.intersection(self.automaton.initial)
+
+    def at(self, nodes: frozenset[int], label: int) -> frozenset[int]:
+        """The nodes that fit the step that is read."""
+        positive, negative = self.automaton.positive, self.automaton.negative
+        return frozenset(n for n in nodes if label & positive[n] == positive[n] and not label & negative[n])
+
+    def after(self, nodes: frozenset[int]) -> frozenset[int]:
+        """The nodes that may come next; with none, every run that begins so is rejected."""
+        return frozenset(t for n in nodes for t in self.automaton.successors[n] if t in self.live)
+
+
+def monitor(automaton: Automaton[A]) -> Monitor:
+    """What tells the bad prefixes of the property whose runs the automaton accepts."""
+    ahead = automaton.successors
+    live: set[int] = set()
+    for part in strong_components(range(len(ahead)), ahead.__getitem__):  # a component after those that it leads to
+        members = set(part)
+        endless = len(part) > 1 or part[0] in ahead[part[0]]
+        accepted = endless and all(members & accepting for accepting in automaton.accepting)
+        if accepted or any(target in live for node in part for target in ahead[node]):
+            live |= members
+    return Monitor(automaton, frozenset(live))  # type: ignore[arg-type]
+
+
+def rejected_prefix(
+    initial: Iterable[int],
+    following: Successors,
+    label_of: Callable[[int], int],
+    wanted: Monitor,
+    tick: Callable[[], None] | None = None,
+) -> tuple[int, ...] | None:
+    """A shortest way through a graph after which no continuation at all is accepted, or None if there is none."""
+    before: dict[tuple[int, frozenset[int]], tuple[int, frozenset[int]] | None] = {}
+    queue = deque[tuple[int, frozenset[int]]]()
+
+    def meet(state: int, nodes: frozenset[int], earlier: tuple[int, frozenset[int]] | None) -> None:
+        place = (state, wanted.at(nodes, label_of(state)))
+        if place not in before:
+            before[place] = earlier
+            queue.append(place)
+
+    for state in initial:
+        meet(state, wanted.begin(), None)
+    while queue:
+        if tick is not None:
+            tick()
+        place = queue.popleft()
+        state, nodes = place
+        if not nodes:
+            way = [state]
+            while (earlier := before[place]) is not None:
+                place = earlier
+                way.append(place[0])
+            return tuple(reversed(way))
+        later = wanted.after(nodes)
+        for target in following(state):
+            meet(target, later, place)
+    return None
+
+
 def _fair_core(
     component: list[int],
     successors: Successors,
