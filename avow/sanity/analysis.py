@@ -161,8 +161,8 @@ class _Analysis:
         subject = claim.subject or ""
         methods: dict[Property, Callable[[str], _Finding]] = {
             Property.ASSUMPTIONS_SATISFIABLE: lambda _: self._satisfiable(),
-            Property.CONSISTENT: lambda _: self._consistent(),
-            Property.REALIZABLE: lambda _: self._realizable(),
+            Property.CONSISTENT: lambda _: self._in_small_types(self._consistent()),
+            Property.REALIZABLE: lambda _: self._in_small_types(self._realizable(), "consistent"),
             Property.TAUTOLOGY: self._tautology,
             Property.VACUOUS: self._vacuous,
             Property.REDUNDANT: self._redundant,
@@ -180,6 +180,18 @@ class _Analysis:
     def _satisfiable(self) -> _Finding:
         finding = self._possible(self.assumptions, "no input meets {} together", "no input meets {}")
         return self._with_all_sets(finding, self.assumptions)
+
+    def _in_small_types(self, finding: _Finding, because: str = "") -> _Finding:
+        """What was not refuted is, if it fails where the unspecified types have few elements."""
+        from avow.sanity.sizes import in_small_types
+
+        if finding.verdict is Verdict.REFUTED:
+            return finding
+        verdict, reason = in_small_types(self.assumptions, self.guarantees, timeout_ms=self.limit, seed=self.seed)
+        clauses = tuple(self.guarantees) if verdict is Verdict.REFUTED else ()
+        if verdict is Verdict.PROVED:
+            return finding
+        return _Finding(verdict, reason, clauses, because=self._if_refuted(because))
 
     def _consistent(self) -> _Finding:
         together = {**self.assumptions, **self.guarantees}

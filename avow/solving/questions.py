@@ -53,6 +53,7 @@ __all__ = [
     "Unsupported",
     "check",
     "entails",
+    "opaque_sorts",
     "replay",
     "search_tables",
     "solve",
@@ -180,7 +181,7 @@ def replay(
     same formulas, if there is one, lends its context.
     """
     formulas = tuple(formulas)
-    unspecified = sorted({sort for f in formulas for sort in _opaque_sorts(f)}, key=lambda sort: sort.name)
+    unspecified = sorted({sort for f in formulas for sort in opaque_sorts(f)}, key=lambda sort: sort.name)
     try:
         for more in range(4 if unspecified else 1):
             found = _replay(Translator(beside), formulas, values, unspecified, more, timeout_ms)
@@ -222,7 +223,7 @@ def _replay(
     return None
 
 
-def _opaque_sorts(formula: Term) -> set[OpaqueSort]:
+def opaque_sorts(formula: Term) -> set[OpaqueSort]:
     """The unspecified sorts that a formula's terms and bound variables have, or have as parts."""
     sorts: dict[Sort, None] = {}
     for part in subterms(formula):
