@@ -142,7 +142,7 @@ CONTRACTS = {
         "Id : {};",
         "inputs( a : Id, b : Id ) outputs( c : Id )",
         "guarantee( c != a ) guarantee( c != b )",
-        "realizable",
+        "consistent",
         "undetermined-c",
     ),
     "a chain of ten": (
