@@ -203,18 +203,19 @@ def test_the_charges_of_the_scenario_are_a_step_apart() -> None:
 
 @pytest.mark.slow
 def test_every_step_on_the_grid_is_looked_at() -> None:
+    """But of the charges that the contract allows only those of the table: so it is no exhaustive check."""
     for name in ("R1_grid", "PLANS_grid"):
         outcome = requirement(name)
-        assert outcome.verdict is Verdict.CHECKED, outcome.summary
-        assert outcome.details["exhaustive"] is True
+        assert outcome.verdict is Verdict.TESTED, outcome.summary
+        assert "the scenario's values cut runs off" in outcome.summary
 
 
 def test_a_small_mission_on_the_grid(tmp_path: Path) -> None:
     of = compose(copy(tmp_path, SMALL, use="0.08"))
     for name in ("R1_grid", "PLANS_grid"):
         outcome = requirement(name, of=of)
-        assert outcome.verdict is Verdict.CHECKED, outcome.summary
-        assert outcome.details["exhaustive"] is True
+        assert outcome.verdict is Verdict.TESTED, outcome.summary
+        assert "the scenario's values cut runs off" in outcome.summary
 
 
 FREE_MOVES = "(in.step(out.planC(k), out.planC(k + 1)) and in.free(out.planC(k)) and in.free(out.planC(k + 1)))"
