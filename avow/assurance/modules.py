@@ -54,7 +54,7 @@ def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
         side = [v for v in under if v.obligation.kind is Kind.COMPOSITION]
         shown = [v for v in side if v.standing.supports]
         conditions = f"{len(shown)} of {count(len(side), 'condition')} met" if side else ""
-        supposes = tuple(numbers[key] for key in r.supposes)
+        supposes = tuple(numbers[key] for key in r.supposes if key in numbers)
         failing = r.failing or r.below
         found.append(
             RequirementModule(r, _because(case, r), _strategy(r, len(away)), tuple(away), conditions, supposes, failing)

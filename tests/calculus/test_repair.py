@@ -211,4 +211,7 @@ def test_whatever_is_offered_does_it(tmp_path: Path, seed: int) -> None:
                 assume = clause.removeprefix("assume ")
                 plan = f'environment: {{{offer["of"]}: {{assume: "{assume}", because: offered}}}}'
                 again = make(tmp_path / f"{name}{number}", system({}), plan)
-            assert outcomes(again)[name].verdict is Verdict.PROVED, (name, offer, system({}))
+            settled = outcomes(again)
+            # a guarantee of b helps only where b's own assumption is met: the kernel does not take it without
+            unmet = settled["whole.b.A1"].verdict is not Verdict.PROVED and "the kernel" in settled[name].summary
+            assert unmet or settled[name].verdict is Verdict.PROVED, (name, offer, system({}))

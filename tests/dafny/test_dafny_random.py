@@ -14,7 +14,7 @@ from rosmonitoring.test_agreement import RCL, formula
 from avow.backend_kit.protocol import Limits
 from avow.backends.dafny.modules import generate
 from avow.backends.dafny.runner import verify
-from avow.evaluation.evaluate import evaluate
+from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.values import Data, Element, FunctionValue, Value
 from avow.language.load import load_contract
 from avow.language.sorts import REAL, DataSort, EnumSort, FunctionSort, NaturalSort, Sort
@@ -66,7 +66,10 @@ def test_dafny_and_the_evaluator_agree(seed: int, tmp_path: Path) -> None:
         used = claim[claim.index("(") + 1 : -1].split(", ") if "()" not in claim else []
         for case in range(2):
             values = {ports[u]: value(rng, ports[u]) for u in used}
-            held = evaluate(node.clause(name).formula, {v.qualified: x for v, x in values.items()})
+            try:
+                held = evaluate(node.clause(name).formula, {v.qualified: x for v, x in values.items()})
+            except NotEvaluable:  # over infinitely many values nothing decides it
+                continue
             truths[f"{name}_{case}"] = held
             call = f"Contract.{name}({', '.join(literal(values[ports[u]], ports[u].sort) for u in used)})"
             lemmas += [

@@ -13,8 +13,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "docs/examples"
 VERDICTS = {
-    "warehouse": "Holds if 2 suppositions hold",
-    "ventilator": "Holds",
+    "warehouse": "Holds if 4 suppositions hold",
+    "ventilator": "Holds if 2 suppositions hold",
     "geofence": "Holds if 2 suppositions hold",
 }
 
