@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "docs/examples"
 VERDICTS = {
     "warehouse": "Holds if 4 suppositions hold",
-    "ventilator": "Holds if 2 suppositions hold",
+    "ventilator": "Holds",
     "geofence": "Holds if 2 suppositions hold",
 }
 
