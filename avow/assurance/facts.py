@@ -185,7 +185,14 @@ def facts_of_case(case: Case) -> Facts:
         digests=case.digests,
         requirements=tuple(
             Requirement(
-                r.id, r.text, r.formula or None, r.temporal or None, r.supported_by, r.span, confirmed=r.confirmed
+                r.id,
+                r.text,
+                r.formula or None,
+                r.temporal or None,
+                r.supported_by,
+                r.span,
+                confirmed=r.confirmed,
+                linked=r.linked,
             )
             for r in case.requirements
         ),

@@ -226,6 +226,8 @@ class RequirementView:
     confirmed: Confirmation | None = None
     suspect: bool = False
     """Whether its sentence, or what is linked to it, is another than was confirmed."""
+    linked: str = ""
+    """Digest of what the names under `supported_by` say in the contract."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,6 +44,7 @@ def requirement_view(
         span=requirement.span,
         confirmed=requirement.confirmed,
         suspect=requirement.suspect,
+        linked=requirement.linked,
     )
 
 

@@ -71,6 +71,7 @@ def compose_slice(system: System) -> ComposeSlice:
         contract_files=(),
         model=_NOTHING,
         messages=(),
+        requirements=tuple(replace(r, confirmed=None, linked="") for r in system.plan.requirements),
         nodes=tuple(replace(node, methods=()) for node in system.plan.nodes),
         policy=_NOTHING,
         expected=None,

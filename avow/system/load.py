@@ -10,6 +10,7 @@ from avow.language.contract import Contract
 from avow.system.formulas import check_formulas
 from avow.system.graph import dataflow
 from avow.system.include import include, still_open
+from avow.system.links import with_links
 from avow.system.names import check_names
 from avow.system.plan import System
 from avow.system.plan_file import bare_plan, fill_methods, read_plan
@@ -68,7 +69,7 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System]) -> 
     if any(fault.is_error for fault in faults):
         raise Rejected(*faults)
     guarantees = {node.name: tuple(clause.name for clause in node.guarantees) for node in contract.nodes}
-    system = System(fill_methods(plan, guarantees), contract)
+    system = System(with_links(fill_methods(plan, guarantees), contract), contract)
     graph = dataflow(system)
     system = still_open(system, graph)
     faults += tuple(fault for fault in graph.findings if fault.is_error) + check_formulas(system, graph)

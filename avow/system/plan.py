@@ -186,12 +186,14 @@ class Requirement:
     formula_span: Span | None = field(default=None, compare=False, repr=False)
     """Where the formula or the temporal property stands."""
     confirmed: Confirmation | None = None
+    linked: str = ""
+    """Digest of what the names under `supported_by` say in the contract: see `avow.system.links`."""
 
     @property
     def digest(self) -> str:
-        """Of the sentence, without regard to white space, and of what is linked to it."""
-        linked = sorted(self.supported_by)
-        parts = (" ".join(self.text.split()), self.formula or "", self.temporal or "", *linked)
+        """Of the sentence, without regard to white space, and of what is linked to it: names, and what they say."""
+        names = sorted(self.supported_by)
+        parts = (" ".join(self.text.split()), self.formula or "", self.temporal or "", *names, self.linked)
         return digest(repr(parts))[:16]
 
     @property

@@ -10,9 +10,9 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from datetime import date
 from pathlib import Path
 
+from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import digest
 from avow.system.paths import inside
@@ -310,9 +310,10 @@ class _PlanReader:
         if piece is None:
             return None
         texts = {key: " ".join(part.text.split()) for key, part in (piece.entries or {}).items()}
-        if not _is_date(texts["on"]):
+        wrong = wrong_day(texts["on"])
+        if wrong:
             place = f"requirements.{name}.confirmed"
-            self.fault("PLAN105", f"{place}: {texts['on']!r} is no date of the calendar", piece.entries["on"].span)  # type: ignore[index]
+            self.fault("PLAN105", f"{place}: {wrong}", piece.entries["on"].span)  # type: ignore[index]
         return Confirmation(**texts)
 
     def goals(self) -> Iterator[ComposeGoal]:
@@ -406,8 +407,9 @@ class _PlanReader:
             texts = {name: part.text for name, part in (piece.entries or {}).items()}
             for field in ("date", "expires"):
                 part = piece.at(field)
-                if part is not None and not _is_date(part.text):
-                    self.fault("PLAN105", f"{key}: {part.text!r} is no date of the calendar", part.span)
+                wrong = wrong_day(part.text, past=field == "date") if part is not None else ""
+                if part is not None and wrong:
+                    self.fault("PLAN105", f"{key}: {wrong}", part.span)
             matched = piece.at("matched")
             if matched is not None and not is_wild(texts["obligation"]):
                 message = (
@@ -457,11 +459,3 @@ def _texts(piece: Piece | None) -> list[str]:
     if piece.items is not None:
         return [item.text for item in piece.items]
     return [piece.text]
-
-
-def _is_date(text: str) -> bool:
-    try:
-        date.fromisoformat(text)
-    except ValueError:
-        return False
-    return True

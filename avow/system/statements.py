@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from datetime import date
 
+from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.plain import identifiers
 from avow.system.plan import Plan, Statement, System
@@ -92,15 +92,8 @@ def _statement(place: str, piece: Piece, faults: list[Diagnostic]) -> Statement:
         if names:
             message = f"{place}: says is for readers who do not know the contract, but names {', '.join(names)}"
             faults.append(Diagnostic("PLAN115", message, says.span, hint="say it in words"))
-    if until is not None and not _is_date(texts["until"]):
-        faults.append(Diagnostic("PLAN105", f"{place}: {texts['until']!r} is no date of the calendar", until.span))
+    wrong = wrong_day(texts["until"], past=False) if until is not None else ""
+    if until is not None and wrong:
+        faults.append(Diagnostic("PLAN105", f"{place}: {wrong}", until.span))
     words = {key: texts.get(key, "") for key in ("says", "because", "who", "until")}
     return Statement(place, span=piece.span, **words)
-
-
-def _is_date(text: str) -> bool:
-    try:
-        date.fromisoformat(text)
-    except ValueError:
-        return False
-    return True

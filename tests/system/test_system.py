@@ -379,8 +379,47 @@ def test_a_sentence_that_was_changed_is_a_warning_with_what_to_write(tmp_path: P
     assert [d.code for d in unconfirmed(make(tmp_path / "c", A, plan.format("It does not", digest)))] == ["PLAN129"]
     wrong = faults(tmp_path / "d", A, plan.format("It does", digest).replace("2026-01-01", "2026-02-30"))
     assert [d.code for d in wrong] == ["PLAN105"]
+    (to_come,) = faults(tmp_path / "f", A, plan.format("It does", digest).replace("2026-01-01", "2999-01-01"))
+    assert "still to come" in to_come.message
     listed = "expected: [{obligation: a/guarantee/g, verdict: refuted, matched: [a/guarantee/g]}]"
     assert [d.code for d in faults(tmp_path / "e", A, listed)] == ["PLAN110"]
+
+
+@pytest.mark.parametrize(
+    ("link", "edit", "suspect"),
+    [
+        ("a.g1", ("out.x <= 5", "out.x <= 6"), True),
+        ("a", ("out.x <= 5", "out.x <= 6"), True),
+        ("D", ("out.x <= 5", "out.x <= 6"), True),
+        ("a.g1", ("Top = 9", "Top = 8"), True),
+        ("a.g1", ("x : REAL )", "x : INTEGER )"), True),
+        ("a.g1", ('"It stays low"', '"It stays"'), True),
+        ("a.g1", ("out.x <= 7", "out.x <= 6"), False),
+        ("a", ("out.x <= 7", "out.x <= 6"), True),
+        ("a.g1", ("guarantee g1", "// nothing\n  guarantee g1"), False),
+        ("a", ("( out.x <= 5 and out.x <= Top )", "(\n out.x <= 5 and  out.x <= Top )"), False),
+    ],
+)
+def test_a_changed_guarantee_makes_what_is_linked_to_it_suspect(
+    tmp_path: Path, link: str, edit: tuple[str, str], suspect: bool
+) -> None:
+    from avow.system.statements import unconfirmed
+
+    rcl = (
+        "context { Top = 9; } node a { inputs( r : REAL ) outputs( x : REAL ) topics()\n"
+        'guarantee g1 "It stays low" ( out.x <= 5 and out.x <= Top )\n guarantee g2 ( out.x <= 7 ) }\n'
+    )
+    plan = (
+        "compose: {{D: {{select: [a]}}}}\n"
+        "requirements: {{R: {{text: T, supported_by: [{0}], "
+        "confirmed: {{who: A. P., on: 2026-01-01, sentence: '{1}'}}}}}}"
+    )
+    (first,) = unconfirmed(make(tmp_path / "a", rcl, plan.format(link, "?")))
+    digest = str(first.hint).partition('sentence: "')[2].partition('"')[0]
+    assert not list(unconfirmed(make(tmp_path / "b", rcl, plan.format(link, digest))))
+    assert edit[0] in rcl
+    changed = make(tmp_path / "c", rcl.replace(*edit), plan.format(link, digest))
+    assert [d.code for d in unconfirmed(changed)] == ["PLAN129"] * suspect
 
 
 def test_what_is_supposed_without_plain_words_is_a_warning(tmp_path: Path) -> None:

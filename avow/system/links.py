@@ -1,0 +1,44 @@
+"""What the names under a requirement's `supported_by` say in the contract: a confirmation covers it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from avow.base.files import digest
+from avow.language.contract import Contract, Node
+from avow.language.printer import show_sort, show_term
+from avow.system.folding import leaves
+from avow.system.plan import Plan
+
+
+def with_links(plan: Plan, contract: Contract) -> Plan:
+    """The plan, each requirement of which knows what its links say: sentences, formulas (constants by their values) and
+    the types of the ports that they may speak of. White space, comments and the order of clauses say nothing."""
+    known = {node.name: node for node in contract.nodes}
+    inside = leaves(plan)
+    derived = {goal.name: goal.select for goal in plan.compose}
+
+    def said(name: str) -> Iterator[str]:
+        owner, dot, clause = name.partition(".")
+        if dot and owner in known:
+            yield from _said(known[owner], clause)
+            return
+        for part in derived.get(name, (name,)):
+            for node in inside.get(part, (part,)):
+                if node in known:
+                    yield from _said(known[node])
+
+    requirements = tuple(
+        replace(r, linked=digest(repr(sorted({text for name in r.supported_by for text in said(name)}))))
+        for r in plan.requirements
+    )
+    return replace(plan, requirements=requirements)
+
+
+def _said(node: Node, name: str | None = None) -> Iterator[str]:
+    clauses = [g for g in node.guarantees if name in (None, g.name)]
+    for clause in clauses:
+        yield repr((node.name, clause.name, " ".join((clause.sentence or "").split()), show_term(clause.formula)))
+    for port in (*node.inputs, *node.outputs) if clauses else ():
+        yield repr((node.name, port.role.name, port.name, show_sort(port.sort)))
