@@ -36,9 +36,11 @@ def ledger_of(path: Path) -> Ledger:
 
 
 def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obligation, ...]:
-    """Those without a current record that still can be believed; in a fresh run, those without one of this run."""
+    """Those without a current record that still can be believed; in a fresh run, those without one of this run. What a
+    method of the plan takes on it settles together, so that an answer does not depend on what else was open."""
     ledger = ledger_of(workspace.ledger(work.system.name))
-    return tuple(o for o in work.obligations if not _is_settled(workspace, ledger, work, o, run))
+    found = tuple(o for o in work.obligations if not _is_settled(workspace, ledger, work, o, run))
+    return work.obligations if found and not work.is_engine else found
 
 
 def _is_settled(workspace: Workspace, ledger: Ledger, work: Work, obligation: Obligation, run: Run) -> bool:

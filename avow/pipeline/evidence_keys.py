@@ -1,10 +1,12 @@
 """On what a method's answer depends beside the claim itself, the options, the plan's files and the tools.
 
-A claim's digest covers its clause and the node's assumptions. A method may see more: the types of *all* the node's
-ports (a program is run on inputs that the clause does not mention), the values of the contract's constants (an option
-or a program may name one), the scenario, and what the node is wired to. What is left out here would make evidence look
-current that is not; so a backend is taken to see all of it unless it says that it does not (`uses_scenario`,
-`uses_steps`, `uses_wiring`), and a constant counts as soon as its name occurs anywhere in the options or files.
+A claim's digest covers its clause and the node's assumptions. A method may see more: the other guarantees that it takes
+on (it settles them together), the types of *all* the node's ports (a program is run on
+inputs that the clause does not mention), the values of the contract's constants (an option or a program may name one),
+the scenario, and what the node is wired to. What is left out here would make evidence look current that is not; so a
+backend is taken to see all of it unless it says that it does not (`uses_scenario`, `uses_steps`, `uses_wiring`), and a
+constant, or another guarantee of the node, counts as soon as its name occurs anywhere in the options or files. Of such
+a guarantee a method sees the name only.
 """
 
 from __future__ import annotations
@@ -44,6 +46,11 @@ class Named:
         """Those that are named, or one of whose elements or constructors is. (The ports' own are known anyhow.)"""
         return tuple((name, sort) for name, sort in contract.types if any(map(self, (name, *_words(sort)))))
 
+    def others(self, job: Job) -> frozenset[str]:
+        """The node's guarantees that the method does not take on, but names."""
+        taken = {o.name for o in job.obligations}
+        return frozenset(c.name for c in job.node.guarantees if c.name not in taken and self(c.name))
+
     def constants(self, contract: Contract) -> tuple[tuple[str, Term], ...]:
         return tuple((name, value) for name, value in contract.constants if self(name))
 
@@ -75,13 +82,20 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
     named = Named.of(options, tool.files(job))
     constants = sorted([name, digest(value)] for name, value in named.constants(job.contract))
     types = sorted([name, sort_digest(sort)] for name, sort in named.types(job.contract))
-    parts: list[Any] = [_ports(job.node), sorted(a.name for a in job.node.assumptions), constants, types]
+    parts: list[Any] = [_ports(job.node), _settled_together(job), sorted(named.others(job)), constants, types]
     scenario = job.system.plan.scenario
     if tool.uses_scenario and scenario:
         parts.append(scenario.digest if tool.uses_steps else scenario.content)
     if tool.uses_wiring:
         parts.append(_wiring(job.system, job.node, tool.name))
     return json.dumps(parts)
+
+
+def _settled_together(job: Job) -> list[list[str]]:
+    """The clauses that the method sees, in whatever order they stand."""
+    assumed = [(clause, digest(clause.formula)) for clause in job.node.assumptions]
+    taken = [(job.clause(o), o.digest) for o in job.obligations]
+    return sorted([c.kind.value, c.name, meaning] for c, meaning in (*assumed, *taken))
 
 
 def _ports(node: Node) -> list[list[str]]:

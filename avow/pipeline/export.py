@@ -34,15 +34,15 @@ def key(work: Work) -> str:
     """An artifact may show more than its obligations' meaning (names, sentences): all that its slice says."""
     from avow.pipeline.blobs import encode
 
-    assert work.cut is not None
-    cut = encode(work.cut(), work.system.plan.root.absolute())
+    assert work.shown is not None
+    cut = encode(work.shown(), work.system.plan.root.absolute())
     return digest(json.dumps([cut.decode("utf-8", "surrogatepass"), sorted(work.keys.items())]))
 
 
 def generated(work: Work) -> Mapping[str, str]:
-    """The files that the backend makes of the work's slice. Raises Rejected."""
-    assert work.cut is not None
-    cut = work.cut()
+    """The files that the backend makes of the work's slice and its sentences. Raises Rejected."""
+    assert work.shown is not None
+    cut = work.shown()
     assert isinstance(cut, MethodSlice)
     tool = method_backend(work.system, planned_method(work))
     method = cut.system.plan.node(cut.node).methods[0]

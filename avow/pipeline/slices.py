@@ -16,8 +16,8 @@ from avow.calculus.providers import ProviderClaim, provider_claims
 from avow.calculus.variables import Frame
 from avow.formulas.finite import Ranges
 from avow.formulas.values import Value
-from avow.language.contract import Contract, Node
-from avow.language.terms import Variable
+from avow.language.contract import Clause, Contract, Node
+from avow.language.terms import TRUE, Variable
 from avow.pipeline.evidence_keys import Named, method_options
 from avow.pipeline.work import is_portable
 from avow.system.graph import Edge, dataflow
@@ -84,14 +84,15 @@ def compose_slice(system: System) -> ComposeSlice:
     return ComposeSlice(System(plan, replace(system.contract, files=())))
 
 
-def method_slice(tool: Backend, job: Job) -> MethodSlice:
+def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodSlice:
+    """`sentences`: with those of the clauses, which no answer may depend on; generated files show them."""
     plan = job.system.plan
     named = Named.of(method_options(job.method), tool.files(job))
     edges = dataflow(job.system).feeding(job.node.name) if tool.uses_wiring else ()
     sources = {edge.source.node for edge in edges} - {job.node.name}
     contract = job.contract
     nodes = tuple(
-        n if n.name == job.node.name else replace(n, assumptions=(), guarantees=())
+        _own(job, named, sentences) if n.name == job.node.name else replace(n, assumptions=(), guarantees=())
         for n in contract.nodes
         if n.name == job.node.name or n.name in sources
     )
@@ -107,6 +108,20 @@ def method_slice(tool: Backend, job: Job) -> MethodSlice:
     )
     cut_contract = Contract((), named.types(contract), named.constants(contract), nodes)
     return MethodSlice(System(cut, cut_contract), job.node.name, job.method.id)
+
+
+def _own(job: Job, named: Named, sentences: bool) -> Node:
+    """The node with the guarantees that the method takes on; of others that it names there is the name only."""
+    taken, others = {o.name for o in job.obligations}, named.others(job)
+
+    def seen(clause: Clause) -> Clause:
+        """Without how it is written and where it stands."""
+        formula = TRUE if clause.name in others else clause.formula
+        return replace(clause, formula=formula, position=0, text="", sentence=clause.sentence if sentences else None)
+
+    assumed = map(seen, job.node.assumptions)
+    promised = (seen(c) for c in job.node.guarantees if c.name in taken | others)
+    return replace(job.node, assumptions=tuple(assumed), guarantees=tuple(promised))
 
 
 def _told(node: NodePlan, backend: str) -> NodePlan:

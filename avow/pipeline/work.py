@@ -52,6 +52,8 @@ class Work:
     limits: Limits = field(default_factory=Limits)
     cut: Callable[[], Slice] | None = field(default=None, compare=False, repr=False)
     """What the engine gets to see; none for what needs no engine."""
+    shown: Callable[[], Slice] | None = field(default=None, compare=False, repr=False)
+    """What a method's generated files show."""
     files: tuple[Path, ...] = field(default=(), compare=False, repr=False)
     """The plan's files that the answer depends on."""
     texts: str = field(default="", compare=False, repr=False)
@@ -167,6 +169,7 @@ def method_work(system: System, node: Node, method: Method) -> Work:
         engine=tool.name,
         limits=_limits(method, options),
         cut=lambda: method_slice(tool, job),
+        shown=lambda: method_slice(tool, job, sentences=True),
         files=tool.files(job),
     )
 
@@ -281,10 +284,11 @@ def _work(
     engine: str | None = None,
     limits: Limits | None = None,
     cut: Callable[[], Slice] | None = None,
+    shown: Callable[[], Slice] | None = None,
     files: tuple[Path, ...] = (),
 ) -> Work:
     keys = _keys(obligations, method, *parts)
-    return Work(system, node, method, engine or method, obligations, keys, limits or Limits(), cut, files)
+    return Work(system, node, method, engine or method, obligations, keys, limits or Limits(), cut, shown, files)
 
 
 def _keys(obligations: Iterable[Obligation], method: str, *parts: str) -> dict[str, str]:

@@ -17,6 +17,7 @@ from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compi
 from avow.evaluation.truth import judge
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
+from avow.language.printer import show_term
 from avow.language.terms import Implies, Quantified, Quantifier, Role, Term, Variable
 
 from .numbers import Decimal, NotANumber, exact
@@ -286,7 +287,7 @@ class Monitor:
             watched.tally.triggered = True
 
     def _blame(self, clause: Clause) -> tuple[Fault, str]:
-        said = clause.sentence or clause.text or clause.name
+        said = clause.sentence or clause.text or show_term(clause.formula, "unicode")
         if clause.kind is ClauseKind.ASSUMPTION:
             return Fault.ASSUMPTION, said
         for assumed in self._assumptions:

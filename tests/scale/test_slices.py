@@ -13,9 +13,11 @@ import pytest
 
 from avow.backend_kit.protocol import Limits
 from avow.base.workspace import Workspace
+from avow.language.terms import TRUE
 from avow.pipeline.asking import request_of
 from avow.pipeline.blobs import Garbled, decode, encode
 from avow.pipeline.requests import Request, read_response, request_bytes
+from avow.pipeline.slices import MethodSlice
 from avow.pipeline.work import Catalogue, Work, catalogue
 from avow.pipeline.worker import Refused, keys_of
 from avow.system.load import load_system
@@ -140,16 +142,41 @@ def keys_or_refusal(data: bytes, folder: Path) -> Mapping[str, str] | None:
 
 @pytest.mark.parametrize("engine", ["sanity", "hoare"])
 def test_a_change_of_any_part_changes_a_key_or_is_refused(folder: Path, engine: str) -> None:
+    """Of a method, every key: it settles all that it takes on together."""
     work = next(w for w in works(folder) if w.engine == engine and w.node == "light")
     assert work.cut is not None
     unseen = set()
     tried = 0
     for place, data in mutated(encode(work.cut(), folder)):
         tried += 1
-        if keys_or_refusal(data, folder) == work.keys and place not in _SHOWN:
+        found = keys_or_refusal(data, folder) or {}
+        kept = [found.get(name) == key for name, key in work.keys.items()]
+        if (all(kept) if engine == "sanity" else any(kept)) and place not in _SHOWN:
             unseen.add(place)
     assert tried > 30
     assert not unseen
+
+
+def test_a_method_sees_of_the_other_guarantees_no_more_than_a_name_that_it_was_told(folder: Path) -> None:
+    plan = (folder / "plan.yaml").read_text()
+    (folder / "plan.yaml").write_text(plan.replace("light.imp}", "light.imp, guarantees: [fast]}"))
+    work = next(w for w in works(folder) if w.engine == "hoare" and w.node == "light")
+    assert work.cut is not None
+    cut = work.cut()
+    assert isinstance(cut, MethodSlice)
+    assert [c.name for c in cut.system.contract.node("light").guarantees] == ["fast"]
+    model = folder / "models" / "light.imp"
+    model.write_text(model.read_text() + "// what is slow is green\n")
+    named = next(w for w in works(folder) if w.engine == "hoare" and w.node == "light")
+    assert named.cut is not None
+    cut = named.cut()
+    assert isinstance(cut, MethodSlice)
+    assert [(c.name, c.formula == TRUE) for c in cut.system.contract.node("light").guarantees] == [
+        ("fast", False),
+        ("slow", True),
+    ]
+    (folder / "system.rcl").write_text(CONTRACT.replace("in.speed <= 30", "in.speed < 30"))
+    assert next(w for w in works(folder) if w.engine == "hoare" and w.node == "light").keys == named.keys
 
 
 def test_a_part_that_is_left_out_is_refused(folder: Path) -> None:
