@@ -81,6 +81,8 @@ class Limits:
     seconds: float = 60.0
     megabytes: int = 4096
     seed: int = 0
+    asked: bool = False
+    """A person gave the seconds on the command line: they stand in place of the plan's and of an engine's own."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,16 +84,26 @@ def workspace(start: Path | None = None) -> Workspace:
     return found
 
 
-def system_folder(name: str) -> Path:
-    """A system by its folder, or by its name in the current workspace. Raises Rejected."""
-    if not name:
-        raise Rejected(Diagnostic("CLI002", "the system's name is empty", hint="the current folder is written `.`"))
-    path = Path(name)
+def named_folder(path: Path) -> Path | None:
+    """The folder of the system that is given by its folder, its plan, or its name in the current workspace."""
     if path.is_dir():
         return path
+    if path.name == "plan.yaml" and path.is_file():
+        return path.parent
     found = find_workspace(Path.cwd().resolve())
-    if found is not None and (found.contracts / name).is_dir():
-        return found.contracts / name
+    if found is not None and len(path.parts) == 1 and (found.contracts / path).is_dir():
+        return found.contracts / path
+    return None
+
+
+def system_folder(name: str) -> Path:
+    """As `named_folder`. Raises Rejected where there is none."""
+    if not name:
+        raise Rejected(Diagnostic("CLI002", "the system's name is empty", hint="the current folder is written `.`"))
+    folder = named_folder(Path(name))
+    if folder is not None:
+        return folder
+    found = find_workspace(Path.cwd().resolve())
     known = ", ".join(p.name for p in found.systems()) if found else ""
     raise Rejected(
         Diagnostic(
@@ -115,5 +125,6 @@ def require_systems(place: Workspace, names: Iterable[str]) -> tuple[str, ...]:
 def name_of(place: Workspace, name: str) -> str:
     """A system's name, where its folder in ``contracts/`` may be given; anything else as it stands."""
     path = Path(name)
-    inside = path.is_dir() and path.resolve().parent == place.contracts.resolve()
-    return path.resolve().name if inside else name
+    folder = path.parent if path.name == "plan.yaml" else path
+    inside = folder.is_dir() and folder.resolve().parent == place.contracts.resolve()
+    return folder.resolve().name if inside else name

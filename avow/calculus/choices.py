@@ -47,6 +47,7 @@ def search(
     constraints: Sequence[Term],
     known: Mapping[Variable, Value],
     seed: int,
+    milliseconds: int,
 ) -> tuple[list[Values], bool]:
     """Every choice of outputs that meets the constraints: a bit for each point of a relation, found by Z3.
 
@@ -54,7 +55,7 @@ def search(
     """
     translator = Translator()
     solver = z3.Solver(ctx=translator.context)
-    solver.set("timeout", 10_000)
+    solver.set("timeout", milliseconds)
     solver.set("random_seed", seed)
     try:
         meanings: dict[Variable, Any] = {v: translator.value(value, v.sort) for v, value in known.items()}

@@ -166,7 +166,7 @@ class Answerer:
         about = [clause.formula for clause in self.node.guarantees if set(ports_of(clause.formula)) <= own]
         if not self.searched or not about:
             return None
-        found, complete = search(self.searched, (), about, {}, self.seed)
+        found, complete = search(self.searched, (), about, {}, self.seed, self.world.milliseconds)
         return tuple(found) if complete and len(found) <= MAX_FOUND else None
 
     # -- answers -------------------------------------------------------------------------------------------------------
@@ -233,7 +233,9 @@ class Answerer:
             raise CannotRun(f"{self.node.name} has relations to choose after a function that is not known everywhere")
         spoken = {v for f in constraints for v in ports_of(f)}
         given = {v: value for v, value in by_variable(self.node, known).items() if v in spoken}
-        answers, complete = search(searched, () if alone else together, constraints, given, self.seed)
+        answers, complete = search(
+            searched, () if alone else together, constraints, given, self.seed, self.world.milliseconds
+        )
         if not complete:
             self.doubts.incomplete.add(f"{self.node.name} has more than {MAX_FOUND} answers to one input")
         if not alone:
@@ -257,7 +259,7 @@ class Answerer:
         names = tuple(clause.name for clause in node.guarantees)
         translator = Translator()
         solver = z3.Solver(ctx=translator.context)
-        solver.set("timeout", 5_000)
+        solver.set("timeout", self.world.milliseconds)
         try:
             meanings = {}
             for variable, value in by_variable(node, inputs).items():

@@ -196,7 +196,7 @@ class Machine:
             points = self.world.points(endpoint.node, port)
             constraints = [] if condition is None else [condition]
             known = by_variable(self.frame.node(endpoint.node), given)
-            answers, complete = search(((port, points),), (), constraints, known, self.seed)
+            answers, complete = search(((port, points),), (), constraints, known, self.seed, self.world.milliseconds)
             found = tuple(answer[port.name] for answer in answers)
         else:
             clauses = [] if condition is None else [Clause(ClauseKind.GUARANTEE, "initial", 1, condition)]

@@ -6,10 +6,12 @@ import json
 
 import click
 
+from avow.cli.options import json_option
+
 
 @click.command()
-@click.argument("systems", nargs=-1)
-@click.option("--json", "as_json", is_flag=True, help="For machines.")
+@click.argument("systems", metavar="[SYSTEM]...", nargs=-1)
+@json_option()
 @click.option(
     "--sign", type=click.Path(exists=True, dir_okay=False), help="Sign each ledger's head with this private key."
 )
@@ -34,7 +36,7 @@ def command(
     acknowledge: str | None,
     who: str | None,
 ) -> int:
-    """Re-digest everything that the ledgers of SYSTEMS (all, if none is named) refer to; name each discrepancy.
+    """Re-digest everything that the ledger of each SYSTEM (its name or folder; all, if none is named) refers to.
 
     Exit code 1 if the ledger or a file behind today's evidence was tampered with, or a ledger is not the one that the
     index of ledgers, the reports here or --against know; changed inputs are told, but only make evidence stale.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from avow.cli.paths import PathArgument
+from avow.cli.options import ContractArgument, json_option
 
 if TYPE_CHECKING:
     from avow.base.codes import Code
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("paths", nargs=-1, required=True, type=PathArgument())
-@click.option("--json", "as_json", is_flag=True, help="For machines: see avow/language/check.schema.json.")
+@click.argument("paths", metavar="SYSTEM...", nargs=-1, required=True, type=ContractArgument())
+@json_option("see avow/language/check.schema.json")
 @click.option("--sarif", is_flag=True, help="For machines: SARIF 2.1.0.")
 @click.option("--off", "off", multiple=True, metavar="CODE", help="A warning that is not wanted (may be repeated).")
 @click.option("--separately", is_flag=True, help="Each file is a contract of its own, also within one folder.")
@@ -37,13 +37,13 @@ def command(
 ) -> int:
     """Check contracts: syntax, names, types, and lints.
 
-    PATHS are .rcl files or systems' folders. Files of one folder are one contract. Of a system's folder, the plan is
-    checked too: its names, and what each method's tool says of its options. Code 2 where anything is an error.
+    Each SYSTEM is a system's name or folder, or an .rcl file. Files of one folder are one contract. Of a system, the
+    plan is checked too: its names, and what each method's tool says of its options. Code 2 where anything is an
+    error.
     """
     from avow import __version__
     from avow.base.rendering import render, summary, to_json, to_sarif
 
-    paths = tuple(map(_folder, paths))
     found: list[Diagnostic] = []
     files = 0
     for group, group_off in _groups(paths, separately, found):
@@ -65,19 +65,6 @@ def command(
             _explain(found)
         click.echo(f"{files} file{'' if files == 1 else 's'}: {summary(found)}")
     return 2 if any(d.is_error for d in found) else 0
-
-
-def _folder(path: Path) -> Path:
-    """A plan stands for its system, and a system's name for its folder."""
-    if path.name == "plan.yaml":
-        return path.parent
-    from avow.base.workspace import find_workspace
-
-    if len(path.parts) == 1 and not path.suffix and not path.exists():
-        place = find_workspace(Path.cwd().resolve())
-        if place is not None and (place.contracts / path).is_dir():
-            return place.contracts / path
-    return path
 
 
 def _explain(found: list[Diagnostic]) -> None:

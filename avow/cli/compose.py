@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from avow.cli.paths import PathArgument
-from avow.cli.solver_options import seconds_option, seed_option
+from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
 
 if TYPE_CHECKING:
     from avow.base.verdict import Outcome
@@ -19,9 +18,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("path", type=PathArgument())
+@click.argument("path", metavar="SYSTEM", type=ContractArgument())
 @click.option("--goal", "goals", multiple=True, metavar="NAME", help="Only this derivation (may be repeated).")
-@click.option("--json", "as_json", is_flag=True, help="For machines: see docs/schemas/compose.schema.json.")
+@json_option("see docs/schemas/compose.schema.json")
 @click.option("--latex", "as_latex", is_flag=True, help="The derivations as LaTeX, nothing else.")
 @click.option("--rcl", "as_rcl", is_flag=True, help="The derived system-level contract as RCL, nothing else.")
 @click.option("--graph", "as_graph", is_flag=True, help="The dataflow graph as text, nothing else.")
@@ -39,8 +38,8 @@ def command(
 ) -> int:
     """Combine the contracts of a system's nodes by the rules R1-R4, and discharge the side conditions.
 
-    PATH is a system's folder, its name in this workspace, or an .rcl file (without a plan, names link). Code 1 where a
-    side condition is refuted or not inductive, or a loop cannot start, 2 for bad input.
+    SYSTEM is a system's name or folder, or an .rcl file (without a plan, ports of one name are connected). Code 1 where
+    a side condition is refuted or not inductive, or a loop cannot start, 2 for bad input.
     """
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.verdict import Verdict

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from avow.cli.options import json_option
+
 if TYPE_CHECKING:
     from avow.assurance.compare import Change
 
@@ -17,14 +19,21 @@ _SHOWN = 3
 @click.command()
 @click.argument("old")
 @click.argument("new", required=False)
-@click.option("--json", "as_json", is_flag=True, help="For machines.")
+@json_option()
 @click.option("--html", "page", type=click.Path(dir_okay=False), help="Write a page to this file, too.")
-@click.option("--fail-on", type=click.Choice(["worse"]), help="Exit code 1 where less is shown, or more supposed.")
-def command(old: str, new: str | None, as_json: bool, page: str | None, fail_on: str | None) -> int:
+@click.option(
+    "--fail-on",
+    type=click.Choice(["worse", "never"]),
+    default="worse",
+    show_default=True,
+    help="Exit code 1 where less is shown or more supposed than before, or never.",
+)
+def command(old: str, new: str | None, as_json: bool, page: str | None, fail_on: str) -> int:
     """What changed from OLD to NEW, and why: claims, what they mean, where they stand, gates, what was asked again.
 
     Each is a report (its folder or report.json), a ledger (.jsonl), or a git revision of the workspace: then the
     contracts and plans of that revision are held against today's ledger. NEW is the workspace as it is, if left out.
+    Exit code 1 where something got worse.
     """
     from avow.assurance.compare import compare
     from avow.cli.snapshots import pair
@@ -55,7 +64,7 @@ def command(old: str, new: str | None, as_json: bool, page: str | None, fail_on:
         for system in dict.fromkeys(s for s, _ in changes):
             click.echo(f"{system}:")
             _tell([change for s, change in changes if s == system])
-    return 1 if fail_on and any(change.is_worse for _, change in changes) else 0
+    return 1 if fail_on == "worse" and any(change.is_worse for _, change in changes) else 0
 
 
 def _tell(changes: list[Change]) -> None:

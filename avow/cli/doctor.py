@@ -6,9 +6,11 @@ import json
 
 import click
 
+from avow.cli.options import json_option
+
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="For machines.")
+@json_option()
 def command(as_json: bool) -> int:
     """Which backends' tools are here, which versions, and the one command that installs a missing one."""
     from avow.pipeline.doctor import findings

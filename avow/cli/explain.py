@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.base.diagnostics import Rejected
+from avow.cli.options import json_option
 
 if TYPE_CHECKING:
     from avow.assurance.model import Case
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("name", metavar="ID")
-@click.option("--json", "as_json", is_flag=True, help="For machines.")
+@json_option()
 def command(name: str, as_json: bool) -> int:
     """Any name of a report. Of an obligation: its formula, where it stands, its evidence, how to run it again.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import stat
 import sys
 from pathlib import Path
@@ -9,30 +10,32 @@ from typing import TYPE_CHECKING
 
 import click
 
-from avow.cli.paths import PathArgument
+from avow.cli.options import ContractArgument, json_option
 
 if TYPE_CHECKING:
     from avow.base.diagnostics import Diagnostic
 
 
 @click.command()
-@click.argument("paths", nargs=-1, required=True, type=PathArgument(allow_dash=True))
+@click.argument("paths", metavar="SYSTEM...", nargs=-1, required=True, type=ContractArgument(allow_dash=True))
 @click.option("--check", is_flag=True, help="Change nothing; code 1 where a file is not in the canonical layout.")
 @click.option("--diff", is_flag=True, help="Change nothing; show what would change.")
-def command(paths: tuple[Path, ...], check: bool, diff: bool) -> int:
+@json_option("which files are changed, or would be")
+def command(paths: tuple[Path, ...], check: bool, diff: bool, as_json: bool) -> int:
     """Put contracts into the canonical layout, in place. Comments are kept, and the meaning.
 
-    PATHS are .rcl files, folders of them, or - for the standard input. A file with a syntax error stays as it is.
+    Each SYSTEM is a system's name, a folder, an .rcl file, or - for the standard input. A file with a syntax error
+    stays as it is.
     """
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.files import write
-    from avow.base.rendering import printable, render
+    from avow.base.rendering import printable, render, to_json
     from avow.language.format import format_text
     from avow.language.load import MAX_BYTES, decode, read_source
     from avow.language.source import Source
 
     faults: list[Diagnostic] = []
-    changed = 0
+    changed: list[str] = []
     for path in _files(paths, faults):
         source = decode(sys.stdin.buffer.read(MAX_BYTES + 1), "<stdin>") if str(path) == "-" else read_source(path)
         if not isinstance(source, Source):
@@ -43,18 +46,20 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool) -> int:
         except Rejected as rejected:
             faults.extend(rejected.diagnostics)
             continue
-        if str(path) == "-" and not (check or diff):
+        if str(path) == "-" and not (check or diff or as_json):
             click.echo(formatted, nl=False)
             continue
         before = source.text if str(path) == "-" else path.read_bytes().decode("utf-8")
         if formatted == before:
             continue
-        changed += 1
+        changed.append(printable(str(path)))
         if diff:
-            _show_diff(before, formatted, source.file)
+            if not as_json:
+                _show_diff(before, formatted, source.file)
         elif check:
-            click.echo(f"{printable(str(path))} is not in the canonical layout")
-        else:
+            if not as_json:
+                click.echo(f"{printable(str(path))} is not in the canonical layout")
+        elif str(path) != "-":
             target = path.resolve()  # through a symbolic link, not in its place
             mode = target.stat().st_mode
             if not mode & stat.S_IWUSR:
@@ -62,7 +67,11 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool) -> int:
                 continue
             write(target, formatted)
             target.chmod(stat.S_IMODE(mode))
-            click.echo(f"formatted {printable(str(path))}")
+            if not as_json:
+                click.echo(f"formatted {printable(str(path))}")
+    if as_json:
+        told = {"changed": changed, "written": not (check or diff), "faults": to_json(faults)["diagnostics"]}
+        click.echo(json.dumps(told, indent=1, ensure_ascii=False))
     if faults:
         click.echo(render(faults), err=True)
         return 2

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
 
+from avow.cli.options import json_option
 from avow.cli.paths import PathArgument
 
 _DODO = '''"""The pipeline as doit tasks: `doit verify` does everything for every system under contracts/."""
@@ -39,7 +41,8 @@ _MONITOR = """\
 @click.command()
 @click.argument("directory", type=PathArgument(file_okay=False))
 @click.option("--template", type=click.Choice(["ros1", "ros2", "plain"]), default="plain", show_default=True)
-def command(directory: Path, template: str) -> int:
+@json_option()
+def command(directory: Path, template: str, as_json: bool) -> int:
     """Make DIRECTORY a workspace with one system that verifies. Nothing that exists is overwritten.
 
     With a template for ROS it is a package, too, whose test runs `avow verify`, and a monitor judges a recorded run.
@@ -65,6 +68,11 @@ def command(directory: Path, template: str) -> int:
     write(directory / "dodo.py", _DODO)
     for folder in ("artifacts", "reports"):
         write(directory / folder / "README.md", f"Made by `doit verify`: see Avow's documentation of {folder}/.\n")
+    if as_json:
+        click.echo(
+            json.dumps({"workspace": str(directory), "systems": ["thermostat"], "next": "doit verify"}, indent=1)
+        )
+        return 0
     go = "" if directory.resolve() == Path.cwd() else f"  cd {directory}\n"
     click.echo(f"{directory}: a workspace with one system, contracts/thermostat\n\nnext:\n{go}  doit verify")
     return 0

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+import io
+import json
+import os
+from typing import TYPE_CHECKING, Any
+
 import click
+
+from avow.cli.options import json_option, node_option, planned_seconds_option
+
+if TYPE_CHECKING:
+    from avow.pipeline.mutation import Score
 
 
 @click.command()
 @click.argument("system")
 @click.option("--method", help="Only methods of this id.")
-@click.option("--node", help="Only this node.")
+@node_option()
+@json_option("every score; what is told on the way goes to standard error")
+@planned_seconds_option()
 @click.option("--limit", type=click.IntRange(1), default=4, show_default=True, help="Mutants for each guarantee.")
 @click.option("-n", "jobs", type=click.IntRange(1), default=2, show_default=True, help="How many at once.")
-def command(system: str, method: str | None, node: str | None, limit: int, jobs: int) -> int:
+def command(
+    system: str, method: str | None, nodes: tuple[str, ...], as_json: bool, seconds: float | None, limit: int, jobs: int
+) -> int:
     """Put near misses of each guarantee in its place and see whether the methods that support it notice.
 
     Scores go into the ledger and the report, which is rendered again. Evidence that notices no mutant is hollow: it
@@ -23,33 +37,64 @@ def command(system: str, method: str | None, node: str | None, limit: int, jobs:
     from avow.base.diagnostics import Rejected
     from avow.base.workspace import system_folder, workspace
     from avow.pipeline.mutation import hunt
-    from avow.pipeline.run_info import new_run
+    from avow.pipeline.run_info import SECONDS, new_run
     from avow.pipeline.tasks import execute
     from avow.pipeline.workload import survey
 
     place = workspace()
+    if seconds is not None:
+        os.environ[SECONDS] = str(seconds)
     surveyed = survey(system_folder(system))
     if isinstance(surveyed, Rejected):
         raise surveyed
     every = [w for w in surveyed.catalogue.works if not w.is_engine]
-    for what, name, known in (("node", node, {w.node for w in every}), ("method", method, {w.method for w in every})):
-        if name is not None and name not in known:
+    asked = [("node", name, {w.node for w in every}) for name in nodes]
+    asked += [("method", method, {w.method for w in every})] if method is not None else []
+    for what, name, known in asked:
+        if name not in known:
             raise click.UsageError(f"no {what} of the plan is called '{name}'; known: {', '.join(sorted(known))}")
-    works = tuple(w for w in every if method in (None, w.method) and node in (None, w.node))
-    scores = []
+    works = tuple(w for w in every if method in (None, w.method) and (not nodes or w.node in nodes))
+    scores: list[Score] = []
     for score in hunt(place, works, new_run(), limit, jobs):  # minutes may lie between two of them
         scores.append(score)
-        lost = f"   survives: {'; '.join(score.survivors)}" if score.survivors else ""
-        lost += f"   not judged: {'; '.join(score.unjudged)}" if score.unjudged else ""
-        click.echo(f"{score.obligation.partition('/')[2]:<44} {score.method:<14} {score.killed}/{score.mutants}{lost}")
-        for found in score.differences:
-            click.echo(f"    {found.change}: {found.formula}")
-            click.echo(f"      {found.why}.")
-            click.echo(f"      {score.blind(found)}.")
-        for change, reason in zip(score.unjudged, score.reasons, strict=False):
-            click.echo(f"    {change}: not judged: {reason}")
+        if not as_json:
+            _tell(score)
     hollow = [s for s in scores if s.hollow]
-    if not scores:
+    if as_json:
+        click.echo(json.dumps({"scores": [_data(score) for score in scores]}, indent=1, ensure_ascii=False))
+    elif not scores:
         click.echo("no current evidence to examine: run `doit verify` first")
+    if not scores:
         return 0
-    return execute(place.root, [f"report:{surveyed.system.name}"]) or (1 if hollow else 0)
+    # the report is rendered again; where the answer is JSON, its lines are not for standard output
+    answer = io.StringIO() if as_json else None
+    return execute(place.root, [f"report:{surveyed.system.name}"], answer=answer) or (1 if hollow else 0)
+
+
+def _tell(score: Score) -> None:
+    lost = f"   survives: {'; '.join(score.survivors)}" if score.survivors else ""
+    lost += f"   not judged: {'; '.join(score.unjudged)}" if score.unjudged else ""
+    click.echo(f"{score.obligation.partition('/')[2]:<44} {score.method:<14} {score.killed}/{score.mutants}{lost}")
+    for found in score.differences:
+        click.echo(f"    {found.change}: {found.formula}")
+        click.echo(f"      {found.why}.")
+        click.echo(f"      {score.blind(found)}.")
+    for change, reason in zip(score.unjudged, score.reasons, strict=False):
+        click.echo(f"    {change}: not judged: {reason}")
+
+
+def _data(score: Score) -> dict[str, Any]:
+    return {
+        "obligation": score.obligation,
+        "method": score.method,
+        "killed": score.killed,
+        "mutants": score.mutants,
+        "survivors": list(score.survivors),
+        "not_judged": [
+            {"change": change, "reason": reason} for change, reason in zip(score.unjudged, score.reasons, strict=False)
+        ],
+        "differences": [
+            {"change": d.change, "formula": d.formula, "why": d.why, "blind": score.blind(d)} for d in score.differences
+        ],
+        "hollow": score.hollow,
+    }

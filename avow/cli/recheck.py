@@ -7,16 +7,17 @@ from pathlib import Path
 
 import click
 
-from avow.cli.paths import PathArgument
+from avow.cli.options import ContractArgument, json_option
 
 
 @click.command()
-@click.argument("path", type=PathArgument())
+@click.argument("path", metavar="SYSTEM", type=ContractArgument())
 @click.argument("certificates", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-def command(path: Path, certificates: Path) -> int:
+@json_option()
+def command(path: Path, certificates: Path, as_json: bool) -> int:
     """Establish again what certificates say of a system, with nothing but the kernel, Z3, and cvc5 where it is here.
 
-    PATH is a system's folder or its name; CERTIFICATES a file certificates.json of its artifacts, or report.json.
+    SYSTEM is a system's name or folder; CERTIFICATES a file certificates.json of its artifacts, or report.json.
     Code 1 where a claim is not established from contract and plan as they are, and where a label is not that of
     the claims under it; code 2 where there is nothing to establish.
     """
@@ -48,15 +49,20 @@ def command(path: Path, certificates: Path) -> int:
         for mark, same in known.by_digest.items()
     }
     solvers = Solvers(second=Second() if "cvc5" in versions() else None)
-    refused = 0
+    told: list[dict[str, object]] = []
+
+    def refuse(scope: str, claim: str, why: str) -> None:
+        told.append({"scope": scope, "claim": claim, "established": False, "why": why})
+        if not as_json:
+            click.echo(f"refused      {scope}: {claim and claim + ': '}{why}")
+
     try:
         for scope, certificate in found.items():
             shown = [entry for entry in certificate.entries if entry.how is How.SHOWN and not entry.node]
             about = {label for entry in shown for label in scopes.get(entry.digest, ())}
             unlike = certificate.scope != scope or (shown and scope not in about)
             if unlike or (certificate.entries and not shown and scope.startswith(requirement_scope(""))):
-                refused += 1
-                click.echo(f"refused      {scope}: its label is not that of the claims in it")
+                refuse(scope, "", "its label is not that of the claims in it")
             kernel = Kernel(known, certificate, solvers)
             for i, entry in enumerate(certificate.entries):
                 if entry.how is not How.SHOWN:
@@ -65,12 +71,21 @@ def command(path: Path, certificates: Path) -> int:
                 try:
                     claim = kernel.establish(i)
                 except Refused as why:
-                    refused += 1
-                    click.echo(f"refused      {scope}: {called}: {why}")
+                    refuse(scope, called, str(why))
                     continue
-                rests = f"on {len(claim.hypotheses)} hypotheses" + (", vacuous" if claim.vacuous else "")
+                rests_on = len(claim.hypotheses)
+                told.append(
+                    {"scope": scope, "claim": called, "established": True, "solvers": claim.solvers}
+                    | {"hypotheses": rests_on, "vacuous": claim.vacuous, "key": claim.key}
+                )
+                if as_json:
+                    continue
+                rests = f"on {rests_on} hypotheses" + (", vacuous" if claim.vacuous else "")
                 click.echo(f"certified-{claim.solvers}  {scope}: {called}, {rests}, key {claim.key[:12]}")
     finally:
         solvers.close()
-    click.echo(", ".join(f"{name} {version}" for name, version in versions().items()))
-    return 1 if refused else 0
+    if as_json:
+        click.echo(json.dumps({"claims": told, "solvers": dict(versions())}, indent=1, ensure_ascii=False))
+    else:
+        click.echo(", ".join(f"{name} {version}" for name, version in versions().items()))
+    return 0 if all(claim["established"] for claim in told) else 1

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from avow.cli.paths import PathArgument
-from avow.cli.solver_options import milliseconds, seconds_option, seed_option
+from avow.cli.options import ContractArgument, json_option, milliseconds, seconds_option, seed_option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,11 +20,11 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("concrete", type=PathArgument())
-@click.argument("abstract", type=PathArgument())
+@click.argument("concrete", type=ContractArgument())
+@click.argument("abstract", type=ContractArgument())
 @click.option("--node", metavar="NAME", help="Only this node, or NEW=OLD; by default every node of ABSTRACT.")
 @click.option("--rename", "renames", multiple=True, metavar="NEW=OLD", help="CONCRETE's port NEW is ABSTRACT's OLD.")
-@click.option("--json", "as_json", is_flag=True, help="For machines.")
+@json_option()
 @seconds_option(10.0)
 @seed_option()
 def command(
@@ -39,8 +38,8 @@ def command(
 ) -> int:
     """Does CONCRETE refine ABSTRACT: assume no more, and guarantee no less?
 
-    Each is an .rcl file, whose nodes are compared one by one, or a system's folder, of which the contract that is
-    derived of all its nodes is compared. Nodes and ports are matched by name (--node, --rename); a single node on
+    Each is an .rcl file, whose nodes are compared one by one, or a system's name or folder, of which the contract that
+    is derived of all its nodes is compared. Nodes and ports are matched by name (--node, --rename); a single node on
     each side whatever its name.
 
     Code 1 where it does not, where the solver gave up, or where the answer is vacuous: CONCRETE's guarantees cannot

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import click
 
+from avow.cli.options import json_option
+
 
 @click.command()
-@click.argument("systems", nargs=-1)
+@click.argument("systems", metavar="[SYSTEM]...", nargs=-1)
 @click.option(
     "--check",
     "folder",
     type=click.Path(exists=True, file_okay=False),
     help="Does the report in this folder say what the ledger says?",
 )
-@click.option("--json", "as_json", is_flag=True, help="For machines (with --check).")
+@json_option()
 def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
-    """Render the reports of SYSTEMS (all, if none is named) from their ledgers; nothing is verified.
+    """Render the report of each SYSTEM (its name or folder; else all) from its ledger; nothing is verified.
 
     With --check DIR nothing is written: every record that the report in DIR quotes is looked up in the ledger, every
     conclusion drawn again, every format rendered again and compared.
@@ -31,7 +34,9 @@ def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
 
     place = workspace()
     systems = require_systems(place, systems)
-    return execute(place.root, [f"report:{name}" for name in systems] or ["report"])
+    return execute(
+        place.root, [f"report:{name}" for name in systems] or ["report"], answer=sys.stdout if as_json else None
+    )
 
 
 def _check(folder: object, as_json: bool) -> int:

@@ -6,12 +6,13 @@ import json
 
 import click
 
+from avow.cli.options import json_option
 from avow.cli.paths import PathArgument
 
 
 @click.command()
 @click.argument("file", type=PathArgument(exists=True, dir_okay=False))
-@click.option("--json", "as_json", is_flag=True, help="For machines.")
+@json_option()
 def command(file: str, as_json: bool) -> int:
     """The requirements in FILE (CSV or ReqIF) as the `requirements:` section of a plan.yaml, on standard output."""
     from pathlib import Path

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from avow.cli.paths import PathArgument
-from avow.cli.solver_options import milliseconds, seconds_option, seed_option
+from avow.cli.options import ContractArgument, json_option, milliseconds, node_option, seconds_option, seed_option
 
 if TYPE_CHECKING:
     from avow.base.verdict import Counterexample
@@ -20,9 +19,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("path", type=PathArgument())
-@click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
-@click.option("--json", "as_json", is_flag=True, help="For machines: see docs/schemas/sanity.schema.json.")
+@click.argument("path", metavar="SYSTEM", type=ContractArgument())
+@node_option()
+@json_option("see docs/schemas/sanity.schema.json")
 @click.option("--all", "everything", is_flag=True, help="List also what is as it should be.")
 @seconds_option(3)
 @seed_option()
@@ -30,7 +29,8 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     """Ask of every node whether its contract is worth verifying: can its assumptions hold, do its guarantees agree, is
     there an output for every input that it allows, does every clause say something?
 
-    PATH is a system's folder or an .rcl file. Code 1 where something is refuted that is an error, 2 for bad input.
+    SYSTEM is a system's name or folder, or an .rcl file. Code 1 where something is refuted that is an error, 2 for bad
+    input.
     """
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.workspace import system_folder

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from avow.cli.options import json_option
 from avow.cli.paths import PathArgument
 
 
@@ -12,7 +13,7 @@ from avow.cli.paths import PathArgument
 @click.option("--as", "who", required=True, help="Name and role.")
 @click.option("--until", required=True, metavar="YYYY-MM-DD", help="The last day on which the signature stands.")
 @click.option("--key", type=PathArgument(exists=True, dir_okay=False), help="A private key (`avow audit --new-key`).")
-@click.option("--json", "as_json", is_flag=True, help="For machines.")
+@json_option()
 def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     """Sign a report: an in-toto statement of its verdict, suppositions and weakenings, in signed/SYSTEM/.
 

@@ -7,19 +7,23 @@ from pathlib import Path
 
 import click
 
+from avow.cli.options import ContractArgument, json_option, milliseconds, seconds_option, seed_option
+
 
 @click.command()
-@click.argument("system")
-@click.option("--seed", default=0, show_default=True, help="Another seed, another run; the same seed, the same run.")
+@click.argument("path", metavar="SYSTEM", type=ContractArgument())
+@seed_option()
+@seconds_option(10)
 @click.option("--steps", type=click.IntRange(1, 100_000), help="How many steps; by default the plan's, or 20.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a step (JSON lines).")
+@json_option("one JSON object a step (JSON lines)")
 @click.option("--all", "everything", is_flag=True, help="Show also inputs that never change.")
-def command(system: str, seed: int, steps: int | None, as_json: bool, everything: bool) -> int:
+def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: bool, everything: bool) -> int:
     """Run the contracts: the environment gives values of the plan's scenario, each node answers with any output that
-    meets its guarantees. SYSTEM is a folder or a name in this workspace.
+    meets its guarantees. SYSTEM is a system's name or folder.
 
     Code 1 where the system gets stuck: a node has no answer that its contract allows. Code 2 without a usable scenario.
     """
+    from dataclasses import replace
     from random import Random
 
     from avow.base.diagnostics import Diagnostic, Rejected
@@ -30,10 +34,9 @@ def command(system: str, seed: int, steps: int | None, as_json: bool, everything
     from avow.formulas.values import show
     from avow.system.load import load_path
 
-    path = Path(system)
-    loaded = load_path(path if path.suffix == ".rcl" else system_folder(system))
+    loaded = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
     try:
-        machine = Machine(world(frame(loaded)), seed)
+        machine = Machine(replace(world(frame(loaded)), milliseconds=milliseconds(seconds)), seed)
         scenario = loaded.plan.scenario
         length = steps or (scenario.steps if scenario else None) or 20
         walk = machine.walk(Random(seed), length)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
+from avow.cli.options import ContractArgument, json_option, node_option
 from avow.cli.paths import PathArgument
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ notations are those of the backends (`avow.backend_kit.protocol.Backend`)."""
 
 
 @click.command()
-@click.argument("paths", nargs=-1, required=True, type=PathArgument())
+@click.argument("paths", metavar="SYSTEM...", nargs=-1, required=True, type=ContractArgument())
 @click.option(
     "--to",
     "notation",
@@ -33,29 +34,37 @@ notations are those of the backends (`avow.backend_kit.protocol.Backend`)."""
     metavar="NOTATION",
     help=f"One of {', '.join(sorted(NOTATIONS))}; or one that a backend offers, such as dafny or rml.",
 )
-@click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
+@node_option()
 @click.option("-o", "--output", type=PathArgument(), help="Write to this file, or (dafny, rml) into this folder.")
-def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], output: Path | None) -> int:
+@json_option("each file's text, or where it was written, and what is left out")
+def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], output: Path | None, as_json: bool) -> int:
     """Print a contract in another notation.
 
-    PATHS are the .rcl files of one contract, or a system's folder (whose plan the notations of backends may need). Code
-    1 where guarantees are left out, since the notation cannot say them; 2 where nothing can be translated.
+    Each SYSTEM is an .rcl file (several are one contract), or a system's name or folder (whose plan the notations of
+    backends may need). Code 1 where guarantees are left out, since the notation cannot say them; 2 where nothing can be
+    translated.
     """
     from avow.backend_kit.registry import trust_plugins
 
     trust_plugins()
     if notation not in NOTATIONS:
-        return _by_backend(notation, paths, nodes, output)
+        return _by_backend(notation, paths, nodes, output, as_json)
     from avow.language.load import load_contract
 
     contract = _only(load_contract(_files(paths)), nodes)
     module = importlib.import_module(NOTATIONS[notation])
     translate = cast("Callable[[Contract], str]", getattr(module, f"to_{notation}"))
-    _put(translate(contract), output)
+    text = translate(contract)
+    if not as_json or output is not None:
+        _put(text, output)
+    if as_json:
+        click.echo(_data(notation, {output.name if output else "": text}, [], output))
     return 0
 
 
-def _by_backend(notation: str, paths: tuple[Path, ...], nodes: tuple[str, ...], output: Path | None) -> int:
+def _by_backend(
+    notation: str, paths: tuple[Path, ...], nodes: tuple[str, ...], output: Path | None, as_json: bool
+) -> int:
     from dataclasses import replace
 
     from avow.backend_kit.registry import translators
@@ -81,11 +90,14 @@ def _by_backend(notation: str, paths: tuple[Path, ...], nodes: tuple[str, ...], 
         files.update({f"{_folder(node.name, system)}/{name}": text for name, text in made.files.items()})
     if not files:
         missing = [replace(fault, severity=Severity.ERROR) for fault in missing]
-    if refused or missing:
+    if as_json:
+        click.echo(_data(notation, files, [*refused, *missing], output))
+    elif refused or missing:
         click.echo(render([*refused, *missing]), err=True)
     if not files:
         return 2
-    _put_all(files, output)
+    if not as_json or output is not None:
+        _put_all(files, output, told=not as_json)
     return 1 if refused or missing else 0
 
 
@@ -107,7 +119,18 @@ def _folder(node: str, system: System) -> str:
     return node if len(folded) == 1 else f"{node}_{folded.index(node) + 1}"
 
 
-def _put_all(files: dict[str, str], output: Path | None) -> None:
+def _data(notation: str, files: dict[str, str], left_out: list[Diagnostic], output: Path | None) -> str:
+    import json
+
+    from avow.base.rendering import to_json
+
+    listed = [{"name": name, "text": text} for name, text in files.items()]
+    written = None if output is None else str(output)
+    whole = {"notation": notation, "files": listed, "written": written, "left_out": to_json(left_out)["diagnostics"]}
+    return json.dumps(whole, indent=1, ensure_ascii=False)
+
+
+def _put_all(files: dict[str, str], output: Path | None, *, told: bool) -> None:
     """Several files go into a folder; on the terminal, each under its name."""
     from avow.base.files import write
 
@@ -121,7 +144,8 @@ def _put_all(files: dict[str, str], output: Path | None) -> None:
         if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
             raise click.UsageError(f"the backend wants to write outside the folder: {name}")
         write(output / name, text)
-        click.echo(f"wrote {output / name}")
+        if told:
+            click.echo(f"wrote {output / name}")
 
 
 def _put(text: str, output: Path | None) -> None:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import os
+import sys
 from typing import TYPE_CHECKING
 
 import click
 
 from avow.base.diagnostics import Rejected
+from avow.cli.options import json_option, planned_seconds_option
 
 if TYPE_CHECKING:
     from avow.pipeline.cluster import Cluster
 
 
 @click.command()
-@click.argument("systems", nargs=-1)
+@click.argument("systems", metavar="[SYSTEM]...", nargs=-1)
+@json_option("what came of each system; what is told on the way goes to standard error")
+@planned_seconds_option()
 @click.option("--fresh", is_flag=True, help="Believe no earlier run: settle every obligation anew.")
 @click.option("-n", "jobs", type=click.IntRange(0), help="How many tasks at once (default: 2, or the cluster's slots).")
 @click.option("--on", "address", help="Send works to a cluster: dask+tls://HOST:PORT (docs/scale.md).")
@@ -25,12 +29,19 @@ if TYPE_CHECKING:
     "--sandbox", is_flag=True, help="Run programs under test sealed (bubblewrap): no network, nothing written, or not."
 )
 def command(
-    systems: tuple[str, ...], fresh: bool, jobs: int | None, address: str | None, explain: bool, sandbox: bool
+    systems: tuple[str, ...],
+    as_json: bool,
+    seconds: float | None,
+    fresh: bool,
+    jobs: int | None,
+    address: str | None,
+    explain: bool,
+    sandbox: bool,
 ) -> int:
-    """Verify every system under contracts/, or only SYSTEMS (their names)."""
+    """Verify every system under contracts/, or only each SYSTEM (its name or folder)."""
     from avow.base.workspace import require_systems, workspace
     from avow.isolation.level import SANDBOX
-    from avow.pipeline.run_info import EXPLAIN, FRESH
+    from avow.pipeline.run_info import EXPLAIN, FRESH, SECONDS
     from avow.pipeline.tasks import execute
 
     place = workspace()
@@ -39,6 +50,8 @@ def command(
         os.environ[FRESH] = "1"
     if sandbox:
         os.environ[SANDBOX] = "required"
+    if seconds is not None:
+        os.environ[SECONDS] = str(seconds)
     if explain:
         os.environ[EXPLAIN] = "1"
     wanted = [f"verify:{name}" for name in systems] or ["verify"]
@@ -46,7 +59,7 @@ def command(
     if jobs is None:
         jobs = max(2, cluster.slots) if cluster else 2
     try:
-        return execute(place.root, wanted, jobs)
+        return execute(place.root, wanted, jobs, sys.stdout if as_json else None)
     finally:
         if cluster:
             cluster.close()

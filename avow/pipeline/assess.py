@@ -33,7 +33,7 @@ from avow.pipeline.discharge import ledger_of
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
 from avow.pipeline.recheck import counting_now, kernel_run
 from avow.pipeline.results import Result
-from avow.pipeline.run_info import EXPLAIN, Run
+from avow.pipeline.run_info import EXPLAIN, Run, asked_seconds
 from avow.pipeline.state import State
 from avow.pipeline.workload import Survey
 
@@ -157,7 +157,7 @@ def build(assessment: Assessment) -> Case:
             f"doit verify:{system.name}",
             _revision(workspace),
             {
-                "seconds for each tool": "60, unless the plan says otherwise",
+                "seconds for each tool": _seconds_in_words(),
                 "seed": "0, unless the plan says otherwise",
             },
         ),
@@ -243,6 +243,11 @@ def _key(assessment: Assessment) -> str:
             [SCHEMA, signed, graded, surveyed.digest, keys, ledger.head, damage, str(_today()), __version__, explain]
         )
     )
+
+
+def _seconds_in_words() -> str:
+    asked = asked_seconds()
+    return "60, unless the plan says otherwise" if asked is None else f"{asked:g}, as asked for this run"
 
 
 def _signatures(assessment: Assessment) -> list[Path]:

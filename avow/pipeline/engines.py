@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from avow.backend_kit.protocol import Limits, Report
 from avow.evidence.obligation import Obligation
@@ -16,6 +17,8 @@ def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits
     from avow.solving.questions import z3_version
 
     bounds = Bounds(seed=limits.seed)
+    if limits.asked:
+        bounds = replace(bounds, milliseconds=max(1, int(limits.seconds * 1000)))
     linked = {asked.claim.name: asked for asked in cut.linked}
     own = {o.id: o.name for o in obligations if o.name not in linked}
     found = outcomes(cut.node, own, scenario=cut.given, ranges=cut.ranges, bounds=bounds)

@@ -92,7 +92,7 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         self.runtime_errors.append(msg)
 
     def complete_run(self) -> None:
-        from avow.pipeline.summary import append_job_summary, print_obligations, print_summary
+        from avow.pipeline.summary import append_job_summary, print_obligations, print_summary, results_json
 
         results = self._state.results
         process.kill_all()  # nothing of ours may outlive the run, also when it was interrupted
@@ -107,6 +107,8 @@ class PipelineReporter(ConsoleReporter):  # type: ignore[misc]
         )
         print_summary(results.all, broken, self._earlier(), self._done, time.monotonic() - self._start, self.outstream)
         append_job_summary(results.all, broken)
+        if self._state.answer:
+            self._state.answer.write(results_json(results.all, broken, self._earlier(), results.exit_code))
         if sys.exc_info()[0] is None and not self._seen.issuperset(self._selected):
             self.runtime_errors.append("not all of it was run: is the number after -n below 0?")
         for message in self.runtime_errors:

@@ -14,8 +14,20 @@ FRESH = "AVOW_FRESH"
 """Environment variable that makes a run settle everything anew (`avow verify --fresh` sets it)."""
 
 
+SECONDS = "AVOW_SECONDS"
+"""Environment variable with the time for one question, in place of the plan's (`avow verify --seconds` sets it)."""
+
 ON = "AVOW_ON"
 """Environment variable with the cluster that works are sent to (`avow verify --on` sets it)."""
+
+
+def asked_seconds() -> float | None:
+    """What `SECONDS` says; None where it says nothing that is a time."""
+    try:
+        seconds = float(os.environ.get(SECONDS, ""))
+    except ValueError:
+        return None
+    return seconds if 0 < seconds < float("inf") else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,9 +24,9 @@ from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
 from avow.isolation.observed import Observed, Seen, from_json, look, to_json
 from avow.pipeline.results import Result
-from avow.pipeline.run_info import EXPLAIN, FRESH, ON
+from avow.pipeline.run_info import EXPLAIN, FRESH, ON, SECONDS
 
-_ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX, ON)
+_ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX, ON, SECONDS)
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
 """Avow's own code, wherever it is installed."""
 

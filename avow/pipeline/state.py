@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from avow.base.workspace import Workspace
 from avow.pipeline.results import Results
@@ -32,6 +32,8 @@ class State:
     """System → what the kernel established again in this run, in words."""
     read: bool = False
     """Contracts were read: the run had something to do."""
+    answer: IO[str] | None = None
+    """Where the run's results go as JSON, if anybody wants them so; what people read goes to standard error then."""
     shortcut: Shortcut = field(init=False)
 
     def __post_init__(self) -> None:

@@ -60,6 +60,24 @@ def print_summary(
     console.print(f"({f'{done} stages run' if done else idle}, {seconds:.1f} s)")
 
 
+def results_json(results: Sequence[Result], broken: Sequence[str], earlier: Sequence[str], exit_code: int) -> str:
+    """The same for machines (`avow verify --json`)."""
+    listed = [
+        {
+            "system": r.system,
+            "verdict": r.verdict,
+            "tone": r.tone,
+            "exit_code": r.exit_code,
+            "counts": dict(r.counts),
+            "gates": [{"title": title, "passed": passed, "reason": reason} for title, passed, reason in r.gates],
+            "report": r.report,
+        }
+        for r in sorted(results, key=lambda r: r.system)
+    ]
+    whole = {"systems": listed, "not_done": list(broken), "earlier_state": list(earlier)}
+    return json.dumps({**whole, "exit_code": 2 if broken else exit_code}, indent=1, ensure_ascii=False) + "\n"
+
+
 _MOST = 240
 """Characters of a failing gate's reason on the terminal."""
 

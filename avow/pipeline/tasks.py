@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from avow.base.workspace import Workspace
 from avow.pipeline.reporter import reporter_of
@@ -22,10 +22,10 @@ class Pipeline:
     """A run of the pipeline in one workspace, for `dodo.py` and for commands.
 
     `asked` is doit's command line without the program's name: it tells whether only verification is wanted, so that a
-    run with nothing to do reads no contract.
+    run with nothing to do reads no contract. `answer` gets the results as JSON; all else goes to standard error then.
     """
 
-    def __init__(self, root: Path, asked: Sequence[str]) -> None:
+    def __init__(self, root: Path, asked: Sequence[str], answer: IO[str] | None = None) -> None:
         if _runs(asked) and not {"-a", "--always-execute"}.isdisjoint(asked):
             os.environ[FRESH] = "1"  # believe no earlier run: else each stage would find that there is nothing to do
         if asked[:1] == ["forget"]:
@@ -34,7 +34,7 @@ class Pipeline:
             )
             print("`doit -a` (`avow verify --fresh`) settles everything anew.", file=sys.stderr)
             raise SystemExit(2)
-        self._state = State(Workspace(root))
+        self._state = State(Workspace(root), answer=answer)
         self._wanted = wanted(asked)
 
     def config(self) -> dict[str, Any]:
@@ -54,6 +54,7 @@ class Pipeline:
             "num_process": 2,
             "par_type": "thread",
             "verbosity": 2,
+            **({"outfile": sys.stderr} if self._state.answer else {}),
         }
 
     def tasks(self) -> Iterator[Task]:
@@ -80,14 +81,14 @@ def _runs(asked: Sequence[str]) -> bool:
     return first not in ("list", "info", "clean", "forget", "help", "ignore", "dumpdb", "strace", "auto", "reset-dep")
 
 
-def execute(root: Path, tasks: Sequence[str], jobs: int = 2) -> int:
-    """Run tasks of a workspace as doit does, in its folder; the exit code."""
+def execute(root: Path, tasks: Sequence[str], jobs: int = 2, answer: IO[str] | None = None) -> int:
+    """Run tasks of a workspace as doit does, in its folder; the exit code. `answer`: as `Pipeline` has it."""
     from doit.cmd_base import ModuleTaskLoader
     from doit.doit_cmd import DoitMain
 
     os.chdir(root)
     asked = ["run", "-n", str(jobs), *tasks]
-    run = Pipeline(root, asked)
+    run = Pipeline(root, asked, answer)
     return int(DoitMain(ModuleTaskLoader({"DOIT_CONFIG": run.config(), "task_avow": run.tasks})).run(asked) or 0)
 
 

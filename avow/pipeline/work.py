@@ -24,6 +24,7 @@ from avow.language.contract import Contract, Node
 from avow.language.printer import show_term
 from avow.pipeline.engine_code import backend_digest, engine_digest
 from avow.pipeline.evidence_keys import method_options, surroundings
+from avow.pipeline.run_info import asked_seconds
 from avow.system.plan import Method, System
 
 if TYPE_CHECKING:
@@ -268,7 +269,11 @@ def catalogue(system: System) -> Catalogue:
         compose_work(composition),
         *method_works(system),
     )
-    works = tuple(replace(work, texts=texts) for work in works)
+    asked = asked_seconds()
+    works = tuple(
+        replace(work, texts=texts, limits=replace(work.limits, seconds=asked, asked=True) if asked else work.limits)
+        for work in works
+    )
     guarantees = (guarantee(system, node, c.name) for node in system.contract.nodes for c in node.guarantees)
     every = {o.id: o for work in works if work.is_engine for o in work.obligations}
     every |= {o.id: o for o in guarantees}

@@ -87,7 +87,7 @@ def answer(asked: bytes) -> bytes:
             report = _execute(request, root)
         except Refused as refused:
             return response_bytes(Response(digest, None, str(refused), platform.node()))
-        if process.ended_by_others():
+        if process.ended_by_others() or request.limits.asked:
             report = replace(report, outcomes=tuple(map(_asked_again, report.outcomes)))
         process.end_orphans()  # nothing that a tool or a subject left running outlives its answer
         told = json.dumps(to_json(report), default=str).replace(f"{place}/", "")
@@ -97,7 +97,7 @@ def answer(asked: bytes) -> bytes:
 
 
 def _asked_again(outcome: Outcome) -> Outcome:
-    """What is open after a tool was killed from outside is for the next run to ask again."""
+    """What is open after a tool was killed from outside, or within a time for this run only, is for the next run."""
     if outcome.verdict not in (Verdict.ERROR, Verdict.UNKNOWN):
         return outcome
     return replace(outcome, details={**outcome.details, RETRY: True})

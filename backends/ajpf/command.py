@@ -17,9 +17,15 @@ def command() -> None:
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--environment", type=click.Path(path_type=Path), help="What there is to perceive (YAML); else nothing.")
 @click.option("--semantics", type=click.Choice(["mcapl", "edge"]), default="mcapl", show_default=True)
-@click.option("--seed", default=0, show_default=True, help="Another seed, other draws; the same seed, the same run.")
+@click.option(
+    "--seed",
+    default=0,
+    show_default=True,
+    type=click.IntRange(0, 2**31 - 1),
+    help="Where random choices start: the same seed, the same answer.",
+)
 @click.option("--steps", type=click.IntRange(1, 100_000), default=200, show_default=True, help="At most so many.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object a step (JSON lines).")
+@click.option("--json", "as_json", is_flag=True, help="For machines: one JSON object a step (JSON lines).")
 def run(file: Path, environment: Path | None, semantics: str, seed: int, steps: int, as_json: bool) -> int:
     """One run of the agent in FILE, told step by step, by the interpreter whose every run the method `ajpf` checks.
 

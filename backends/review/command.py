@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import click
 
 
@@ -14,13 +16,17 @@ def command() -> None:
 @click.argument("system")
 @click.argument("node")
 @click.option("--method", help="The review's id, where the node has several.")
+@click.option("--json", "as_json", is_flag=True, help="For machines.")
 @click.option("--renewed", metavar="DATE", help="Everything that changed was read again on this date.")
-def stamp(system: str, node: str, method: str | None, renewed: str | None) -> int:
+def stamp(system: str, node: str, method: str | None, as_json: bool, renewed: str | None) -> int:
     """Fill the digests in that the review of NODE in SYSTEM lacks. Never refreshes one by habit: see --renewed."""
     from avow.base.workspace import system_folder
 
     from .stamp import stamp as fill
 
     said = fill(system_folder(system), node, method=method, renewed=renewed)
+    if as_json:
+        click.echo(json.dumps({"stamped": list(said)}, indent=1, ensure_ascii=False))
+        return 0
     click.echo("\n".join(said) or "nothing to stamp: every digest is as it should be")
     return 0

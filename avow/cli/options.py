@@ -1,0 +1,98 @@
+"""What is the same in every command: how a system is named, `--json`, `--seconds`, `--seed`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+import click
+
+from avow.cli.paths import PathArgument
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable
+
+Command = TypeVar("Command", bound="Callable[..., object]")
+
+MAX_SECONDS = 86_400.0
+
+
+class ContractArgument(PathArgument):
+    """An .rcl file, a system's folder or plan.yaml, or the name of a system in this workspace; gives its path.
+
+    What is neither there nor a system's name stays as it was written, for the command to refuse.
+    """
+
+    def convert(
+        self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None
+    ) -> str | bytes | os.PathLike[str]:
+        from avow.base.workspace import named_folder
+
+        path = super().convert(value, param, ctx)
+        assert isinstance(path, Path)
+        return named_folder(path) or path
+
+
+class _Seconds(click.ParamType[float]):
+    """A time above 0 and of at most a day; `nan` and `inf` are numbers to Python, not times."""
+
+    name = "seconds"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            seconds = float(str(value))
+        except ValueError:
+            self.fail(f"{str(value)[:60]!r} is no number", param, ctx)
+        if not 0 < seconds <= MAX_SECONDS:
+            self.fail(f"{seconds}: a time above 0 is wanted, of at most a day", param, ctx)
+        return seconds
+
+
+def seconds_option(default: float) -> Callable[[Command], Command]:
+    """``--seconds``: the time for one question to the solver."""
+    return click.option(
+        "--seconds",
+        type=_Seconds(),
+        metavar="SECONDS",
+        default=default,
+        show_default=True,
+        help="Time for one question to the solver.",
+    )
+
+
+def planned_seconds_option() -> Callable[[Command], Command]:
+    """``--seconds`` where the plan has times of its own: given, it stands in place of them."""
+    return click.option(
+        "--seconds",
+        type=_Seconds(),
+        metavar="SECONDS",
+        help="Time for one question to the solver, and for one run of a tool, whatever the plan says.",
+    )
+
+
+def seed_option() -> Callable[[Command], Command]:
+    """``--seed``: where random choices start."""
+    return click.option(
+        "--seed",
+        default=0,
+        show_default=True,
+        type=click.IntRange(0, 2**31 - 1),
+        help="Where random choices start: the same seed, the same answer.",
+    )
+
+
+def json_option(what: str = "") -> Callable[[Command], Command]:
+    """``--json``: the answer as data on standard output; what else there is to say goes to standard error."""
+    text = "For machines" + (f": {what}." if what else ".")
+    return click.option("--json", "as_json", is_flag=True, help=text)
+
+
+def node_option() -> Callable[[Command], Command]:
+    """``--node``: only some nodes."""
+    return click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
+
+
+def milliseconds(seconds: float) -> int:
+    """As the solver wants it, never 0 (which it takes for no limit at all)."""
+    return max(1, int(seconds * 1000))
