@@ -18,9 +18,7 @@ from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.evidence.status import Status, roll_up
 from avow.system.plan import Finding, is_wild
-
-LASTS_DAYS = 365
-"""How long an accepted finding without an expiry is accepted, from its date."""
+from avow.tuning.shown import FINDING_DAYS
 
 FINDINGS = frozenset({Status.REFUTED, Status.CONTRADICTORY, Status.VACUOUS, Status.CIRCULAR})
 """Statuses that say that something is wrong (the others say that something is lacking)."""
@@ -43,7 +41,7 @@ def expiry(finding: Finding) -> date | None:
     try:
         if finding.expires:
             return date.fromisoformat(finding.expires)
-        return date.fromisoformat(finding.date or "") + timedelta(days=LASTS_DAYS)
+        return date.fromisoformat(finding.date or "") + timedelta(days=FINDING_DAYS)
     except (ValueError, OverflowError):
         return None
 

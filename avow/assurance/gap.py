@@ -17,9 +17,7 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status, effective, join, link_rank, weigh
 from avow.isolation.level import Isolation
 from avow.isolation.observed import ISOLATION
-
-_LONG = 160
-"""So much of a tool's own words stands in a suggestion."""
+from avow.tuning.shown import TOOL_WORDS
 
 
 def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date) -> str | None:
@@ -203,7 +201,7 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
 
 
 def _clipped(text: str) -> str:
-    return text if len(text) <= _LONG else f"{text[:_LONG].rpartition(' ')[0]} …"
+    return text if len(text) <= TOOL_WORDS else f"{text[:TOOL_WORDS].rpartition(' ')[0]} …"
 
 
 def _two_answers(view: ObligationView) -> str:

@@ -16,11 +16,8 @@ from typing import NoReturn
 from xml.parsers import expat
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.tuning.sizes import REQIF_BYTES, REQIF_DEPTH
 
-_MOST_DEPTH = 400
-"""Elements within elements: beyond any export, well below what a program's stack bears."""
-_MOST_BYTES = 200_000_000
-"""Of a file, and of all files that an archive holds, unpacked."""
 _BLOCKS = frozenset(
     (
         "p",
@@ -91,7 +88,7 @@ class _ReqifReader:
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
         tag = name.rpartition("}")[2]
-        if len(self.path) >= _MOST_DEPTH:
+        if len(self.path) >= REQIF_DEPTH:
             raise Rejected(Diagnostic("REQS003", f"{self.file}: elements nest too deeply", self.at()))
         self.path.append(tag)
         if self.in_text:
@@ -230,8 +227,8 @@ def _documents(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             inside = [i for i in archive.infolist() if i.filename.lower().endswith((".reqif", ".xml"))]
-            if sum(i.file_size for i in inside) > _MOST_BYTES:
-                raise Rejected(Diagnostic("REQS001", f"{file} unpacks to more than {_MOST_BYTES // 1_000_000} MB"))
+            if sum(i.file_size for i in inside) > REQIF_BYTES:
+                raise Rejected(Diagnostic("REQS001", f"{file} unpacks to more than {REQIF_BYTES // 1_000_000} MB"))
             found = []
             for item in inside:
                 with archive.open(item) as stream:  # no more than it says: an archive may lie about its sizes

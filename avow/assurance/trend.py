@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from avow.assurance.model import Case
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, roll_up
-
-MOST = 24
-"""Runs shown: the newest."""
+from avow.tuning.shown import TREND_RUNS
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,4 +44,4 @@ def trend(case: Case) -> tuple[Point, ...]:
             supported = sum(n for status, n in counts.items() if status.supports)
             refuted = counts[Status.REFUTED] + counts[Status.CONTRADICTORY]
             points.append(Point(record.run, record.started, supported, refuted, total - supported - refuted))
-    return tuple(points[-MOST:])
+    return tuple(points[-TREND_RUNS:])

@@ -20,8 +20,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-KEEP = 4_000_000
-"""Characters of output kept: a tool that prints without end must not fill the memory."""
+from avow.tuning.sizes import OUTPUT_KEPT
 
 _FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -signal.SIGTERM})
 """How a tool ends that somebody ended: a person, or a system out of memory. A crash of its own is none of them."""
@@ -237,5 +236,5 @@ def _stdin(text: str | None) -> Iterator[int]:
 
 def _read(file: object) -> str:
     file.seek(0)  # type: ignore[attr-defined]
-    data: bytes = file.read(KEEP)  # type: ignore[attr-defined]
+    data: bytes = file.read(OUTPUT_KEPT)  # type: ignore[attr-defined]
     return data.decode("utf-8", errors="replace")

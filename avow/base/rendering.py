@@ -17,11 +17,10 @@ from urllib.parse import quote
 from avow.base.codes import Code
 from avow.base.codes_workspace import CORE_CODES
 from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.tuning.shown import SOURCE_COLUMNS
+from avow.tuning.sizes import SOURCE_SHOWN
 
-_WIDTH = 100
 _TAB = 4
-_READ = 20_000_000
-"""Bytes of a file that are looked at for the lines to show."""
 _COLOURS = {Severity.ERROR: "31", Severity.WARNING: "33", Severity.NOTE: "36"}
 
 
@@ -68,7 +67,7 @@ def _read(path: Path) -> str:
     if not path.is_file():
         return ""
     with path.open("rb") as stream:
-        return stream.read(_READ).decode("utf-8", "replace")
+        return stream.read(SOURCE_SHOWN).decode("utf-8", "replace")
 
 
 def _block(diagnostic: Diagnostic, lines: _Lines, colour: bool) -> str:
@@ -118,9 +117,9 @@ def _excerpt(line: str, span: Span) -> tuple[str, int, int]:
     end = span.end_column - 1 if span.end_line == span.line else len(line)
     end = max(min(end, len(line)), start + 1)
     first, last, before, after = 0, len(line), "", ""
-    if len(line) > _WIDTH:
-        first = max(0, start - _WIDTH // 2)
-        last = min(len(line), first + _WIDTH)
+    if len(line) > SOURCE_COLUMNS:
+        first = max(0, start - SOURCE_COLUMNS // 2)
+        last = min(len(line), first + SOURCE_COLUMNS)
         before, after = ("…" if first else ""), ("…" if last < len(line) else "")
         end = min(end, last)
     shown, indent, length = before, len(before), 0

@@ -14,6 +14,7 @@ from pathlib import Path
 from avow.base import process
 from avow.base.files import write
 from avow.base.notes import cache_folder
+from avow.tuning.running import VERSION_SECONDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +59,7 @@ def _version(path: str, arguments: tuple[str, ...], pattern: str) -> str:
     if key in known:
         return known[key]
     try:
-        done = process.run([path, *arguments], seconds=20)
+        done = process.run([path, *arguments], seconds=VERSION_SECONDS)
     except (process.ToolMissing, OSError):
         return "unknown"
     found = re.search(pattern, done.stdout + "\n" + done.stderr)

@@ -14,11 +14,9 @@ from avow.language.terms import Apply, Iff, Quantified, Quantifier, Role, Term, 
 from avow.solving.models import Model
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
+from avow.tuning.bounds import CHOICES_FOUND
 
 Values = dict[str, Value]
-
-MAX_FOUND = 300
-"""Answers that the solver is asked for, where they cannot be enumerated."""
 
 
 def by_variable(node: Node, values: Values) -> dict[Variable, Value]:
@@ -81,7 +79,7 @@ def search(
                 return found, True
             if status != z3.sat:
                 raise CannotRun(f"the solver cannot decide which outputs are allowed: {solver.reason_unknown()}")
-            if len(found) >= MAX_FOUND:
+            if len(found) >= CHOICES_FOUND:
                 return found, False
             model = solver.model()
             reader = Model(translator, model)

@@ -19,10 +19,7 @@ from avow.solving.limits import now
 from avow.solving.models import Model
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
-
-#: Inputs that are asked about however late it is: what a slow machine says of a cut is what a fast one says. Most
-#: cuts show at the first inputs; a question takes some milliseconds.
-ALWAYS_ASKED = 20
+from avow.tuning.bounds import INPUTS_ALWAYS_ASKED
 
 
 def is_restricted(world: World, node: Answerer, port: Port) -> bool:
@@ -40,7 +37,7 @@ def first_cut(node: Answerer, deadline: float) -> str:
     if not ports:
         return ""
     for place, (index, inputs) in enumerate(node.asked.items()):
-        if place >= ALWAYS_ASKED and now() > deadline:
+        if place >= INPUTS_ALWAYS_ASKED and now() > deadline:
             return f"time ran out to see whether {node.node.name} may answer otherwise than the scenario has it"
         free = bool(node.broken(inputs))
         found = _other(node, ports, inputs, node.found(index), free)

@@ -21,11 +21,7 @@ from avow.calculus.repair import Offer, environment, initial_values, offers, pro
 from avow.calculus.variables import Facts, Frame, closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
-
-NARROW_MS = 4_000
-
-DEEPER_SECONDS = 4.0
-"""For more steps, where one step of induction fails."""
+from avow.tuning.effort import DEEPER_SECONDS, NARROW_MS
 
 Hypotheses = dict[str, Term]
 

@@ -14,11 +14,8 @@ from avow.base.verdict import Verdict
 from avow.formulas.formula import substitute
 from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
 from avow.solving.questions import Entailment, entails
-
-QUICK_MS = 1_500
-"""Most side conditions are settled in a fraction of this."""
-
-_CANDIDATES = 4
+from avow.tuning.bounds import WITNESSES_TRIED
+from avow.tuning.effort import QUICK_MS
 
 
 def implied(hypotheses: Mapping[str, Term], goal: Term, *, timeout_ms: int, seed: int = 0) -> Entailment:
@@ -58,5 +55,5 @@ def _witnessed(goal: Term, witnesses: list[tuple[Variable, ...]]) -> Iterator[Te
         return
     sorts = [v.sort for v in goal.variables]
     fitting = [names for names in witnesses if [name.sort for name in names] == sorts]
-    for names in fitting[:_CANDIDATES]:
+    for names in fitting[:WITNESSES_TRIED]:
         yield substitute(goal.body, dict(zip(goal.variables, names, strict=True)))

@@ -13,9 +13,7 @@ from avow.formulas.values import Data, Element, Value
 from avow.language.sorts import BoolSort, DataSort, EnumSort, SetSort, Sort, TupleSort
 from avow.language.terms import Compare, Construct, EnumValue, In, Literal, Not, SetTerm, Term, TupleTerm, Variable
 from avow.solving.questions import entails, solve
-
-MOST = 24
-"""Values that are tried: each is a question to the solver."""
+from avow.tuning.bounds import VALUES_TRIED
 
 
 def enumerated(
@@ -26,7 +24,7 @@ def enumerated(
     spoken = free_variables(goal).union(*map(free_variables, known.values()))
     finite = [(v, values) for v in ports if v in spoken and (values := finite_values(v.sort))]
     # A relation's values are as finite as its points, and a question each: only what can be written as a set is tried.
-    if not finite or math.prod(len(values) for _, values in finite) > MOST:
+    if not finite or math.prod(len(values) for _, values in finite) > VALUES_TRIED:
         return None
     good: list[tuple[Term, ...]] = []
     bad: list[tuple[Term, ...]] = []

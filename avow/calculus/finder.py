@@ -25,14 +25,8 @@ from avow.kernel.statements import Kind, Statement, Statements
 from avow.kernel.text import Text, Untranslatable
 from avow.language.terms import And, Quantified, Quantifier
 from avow.solving.z3_module import z3
-
-DEEPEST = 3
-"""The k of k-induction, at most."""
-
-_SEARCH = 1_500_000
-"""Z3's steps for one question of the search."""
-
-_SEARCH_MS = 2_000
+from avow.tuning.bounds import DEEPEST_INDUCTION, PREMISES_TRIED
+from avow.tuning.effort import CERTIFICATE_MS, CERTIFICATE_STEPS
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +60,6 @@ _Base = tuple[_Uses, tuple[str, ...]]
 """Uses, and the digests of initial conditions."""
 
 _Witness = tuple[int, int] | None
-
-_CANDIDATES = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +193,7 @@ class Finder:
         for now in (near, list(done)) if len(near) < len(done) else (near,):
             yield self.same_step(item, now)
         if self.delayed:
-            for depth in range(1, DEEPEST + 1):
+            for depth in range(1, DEEPEST_INDUCTION + 1):
                 yield self.inductive(item, list(done), depth)
 
     def near(self, item: Item, done: Mapping[Item, None]) -> list[Item]:
@@ -312,7 +304,7 @@ class Finder:
             and part.quantifier is Quantifier.EXISTS
             and [v.sort for v in part.variables] == sorts
         ]
-        return found[:_CANDIDATES]
+        return found[:PREMISES_TRIED]
 
     # -- the certificate -----------------------------------------------------------------------------------------------
 
@@ -362,8 +354,8 @@ class Finder:
         try:
             context = z3.Context()
             solver = z3.Solver(ctx=context)
-            solver.set("rlimit", _SEARCH)
-            solver.set("timeout", _SEARCH_MS)
+            solver.set("rlimit", CERTIFICATE_STEPS)
+            solver.set("timeout", CERTIFICATE_MS)
             solver.set("smt.arith.nl.grobner", False)
             solver.from_string("\n".join(lines))
             said = solver.check(*(z3.Bool(f"track{k}", context) for k in range(len(written))))

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from avow.base.verdict import Counterexample, Verdict
-from avow.calculus.entailment import QUICK_MS, implied
+from avow.calculus.entailment import implied
 from avow.calculus.variables import Frame
 from avow.formulas.formula import free_variables, rename
 from avow.formulas.values import Value, show
@@ -20,15 +20,11 @@ from avow.language.sorts import FunctionSort
 from avow.language.terms import Role, Term, Variable
 from avow.solving.limits import now
 from avow.solving.questions import Entailment
-
-DEEPEST = 3
-"""The k of k-induction, at most."""
-
-LONGEST = 24
-"""Steps unrolled from the initial values, at most."""
+from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_UNROLLING
+from avow.tuning.effort import QUICK_MS
+from avow.tuning.shown import STEP_VARIABLES
 
 _BEFORE = "@before"
-_MAX_SHOWN = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,14 +96,14 @@ def deeper(asked: Steps, seconds: float, seed: int = 0, claim_name: str = "the c
         left = int((end - now()) * 1000)
         return implied(hypotheses, asked.claim, timeout_ms=min(QUICK_MS, left), seed=seed) if left > 50 else None
 
-    for length in range(2, LONGEST + 1):
+    for length in range(2, LONGEST_UNROLLING + 1):
         answer = ask(asked.run(length))
         if answer is None:
             return Deeper()
         if answer.verdict is Verdict.REFUTED:
             return Deeper(run=_run(answer.values, length, claim_name), steps=length, engine=answer.engine)
         sure = length if answer.verdict is Verdict.PROVED and sure == length - 1 else sure
-        if sure == length <= DEEPEST:
+        if sure == length <= DEEPEST_INDUCTION:
             answer = ask(asked.known(length) | asked.kept(length))
             if answer is not None and answer.verdict is Verdict.PROVED and not answer.vacuous:
                 return Deeper(proved=_plain(answer.needed), steps=length, engine=answer.engine)
@@ -122,7 +118,7 @@ def _plain(labels: Sequence[str]) -> tuple[str, ...]:
     """However many steps before, as one step before: what a proof rests on is the same clause."""
     found: dict[str, None] = {}
     for label in labels:
-        for by in range(2, DEEPEST + 1):
+        for by in range(2, DEEPEST_INDUCTION + 1):
             if label.endswith(f" {by} steps before"):
                 label = label.removesuffix(f" {by} steps before") + " one step before"
         if not label.startswith("the claim "):
@@ -143,6 +139,6 @@ def _run(values: Mapping[Variable, Value], length: int, claim: str) -> Counterex
             fixed = isinstance(variable.sort, FunctionSort) and times == 0
             if times == earlier or (fixed and variable.role is Role.INPUT):
                 shown[name] = show(value)
-        trace.append(tuple(shown.items())[:_MAX_SHOWN])
+        trace.append(tuple(shown.items())[:STEP_VARIABLES])
     last = trace[-1] if trace else ()
     return Counterexample(last, f"{claim} is false at step {length} of a run from the initial values", tuple(trace))

@@ -29,14 +29,8 @@ from avow.formulas.values import Value
 from avow.language.terms import Term
 from avow.solving.limits import now
 from avow.system.temporal import Operator, Property, State, Temporal, states_of
-
-MAX_STATES = 50_000
-RUNS = 20
-RUN_LENGTH = 60
-"""Runs tried before a search, and their length."""
-
-MAX_SHOWN = 12
-"""Variables shown of each step of a run."""
+from avow.tuning.bounds import RUN_LENGTH, RUNS_TRIED, STATES_CHECKED
+from avow.tuning.shown import STEP_VARIABLES
 
 _Memory = tuple[object, ...]
 
@@ -159,7 +153,7 @@ def refuting_run(machine: Machine, name: str, claim: Term, bounds: Bounds) -> tu
         before |= dict.fromkeys(machine.initial())
         waiting = deque(before)
         while waiting:
-            if now() > end or len(before) > MAX_STATES:
+            if now() > end or len(before) > STATES_CHECKED:
                 return None, f"no run of the {len(before)} kinds of steps looked at over the scenario makes it false"
             memory = waiting.popleft()
             for step in machine.judged(memory, (holds,)):
@@ -183,7 +177,7 @@ def _false_at_the_end(machine: Machine, name: str, claim: Term, steps: list[Step
         return None
     spoken = [v.qualified for v in sorted(free_variables(claim), key=lambda v: v.qualified)]
     outputs = [f"{node}.{port.name}" for node in machine.order for port in machine.frame.node(node).outputs]
-    names = list(dict.fromkeys([*spoken, *outputs]))[:MAX_SHOWN]
+    names = list(dict.fromkeys([*spoken, *outputs]))[:STEP_VARIABLES]
     trace = tuple(step.shown([n for n in names if n not in machine.constants]) for step in steps)
     told = f"{name} is false at step {len(steps)} of a run of the composed contracts"
     broken = sorted({clause for step in steps for clause in step.broken})
@@ -200,7 +194,7 @@ def _tried(machine: Machine, frame: Frame, name: str, formula: Property, bounds:
     deadline = now() + bounds.milliseconds / 4000
     judges = _judges(machine, frame, formula)
     best: tuple[Walk, int | None] | None = None  # a run that gets stuck tells more than one that goes round
-    for _ in range(RUNS):
+    for _ in range(RUNS_TRIED):
         walk = machine.walk(random, RUN_LENGTH, until_repeat=True, judges=tuple(judges.values()))
         if walk.steps and (walk.back is not None or (walk.stuck is not None and walk.stuck.genuine)):
             back = len(walk.steps) - 1 if walk.back is None else walk.back
@@ -214,7 +208,7 @@ def _tried(machine: Machine, frame: Frame, name: str, formula: Property, bounds:
         return None
     walk, closes = best
     stuck = None if closes is None else walk.stuck
-    return _shown_run(machine, frame, name, formula, list(walk.steps), closes, stuck, {"runs": RUNS})
+    return _shown_run(machine, frame, name, formula, list(walk.steps), closes, stuck, {"runs": RUNS_TRIED})
 
 
 def _breaks(steps: Sequence[Step], back: int, formula: Property, judges: dict[State, Holds]) -> bool:
@@ -263,7 +257,7 @@ def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | t
         explored.depth = max(explored.depth, depth)
         if memory in explored.following:
             continue
-        if (deepest is not None and depth >= deepest) or len(explored.steps) > MAX_STATES:
+        if (deepest is not None and depth >= deepest) or len(explored.steps) > STATES_CHECKED:
             cut = True
             continue
         if now() > deadline:
@@ -403,7 +397,7 @@ def _interesting(machine: Machine, frame: Frame, formula: Property) -> list[str]
     given = [values for choices in machine.environment.values() for values in choices]
     chosen = [name for name in given[0] if len({_key(values[name]) for values in given}) > 1]
     outputs = [f"{node}.{port.name}" for node in machine.order for port in frame.node(node).outputs]
-    return list(dict.fromkeys([*about, *chosen, *outputs]))[:MAX_SHOWN]
+    return list(dict.fromkeys([*about, *chosen, *outputs]))[:STEP_VARIABLES]
 
 
 def _key(value: Value) -> object:

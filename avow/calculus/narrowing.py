@@ -18,14 +18,7 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause
 from avow.language.sorts import FunctionSort
 from avow.language.terms import And, Apply, Compare, Implies, Role, Term, Variable
-
-MAX_TRIED = 100_000
-"""Partial answers looked at for one question; beyond it, the search is not exhaustive."""
-
-
-MAX_TRIED_AGAIN = 2_000
-"""The same, once a search was cut short: nothing will be exhaustive any more, and there are other inputs to try."""
-
+from avow.tuning.bounds import PARTIAL_ANSWERS, PARTIAL_ANSWERS_AGAIN
 
 # -- equations ---------------------------------------------------------------------------------------------------------
 
@@ -145,7 +138,7 @@ class Narrowing:
     incomplete: set[str] = field(default_factory=set)
     """Why a search that came to its end still is not exhaustive."""
 
-    most: int = MAX_TRIED
+    most: int = PARTIAL_ANSWERS
 
     def answers(self, inputs: Mapping[str, Value], limit: int, *, free: bool = False) -> tuple[list[Values], bool]:
         """Every output that meets the guarantees (with `free`, every output at all), each open where that does not
@@ -158,7 +151,7 @@ class Narrowing:
             outputs, pending = stack.pop()
             tried += 1
             if tried > self.most or len(found) > limit:
-                self.most = min(self.most, MAX_TRIED_AGAIN)
+                self.most = min(self.most, PARTIAL_ANSWERS_AGAIN)
                 return found[:limit], False
             judged = self._judge({**inputs, **outputs}, outputs, pending)
             if judged is None:

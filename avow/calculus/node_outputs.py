@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from avow.calculus.choices import MAX_FOUND, Values, by_variable, definition, search
+from avow.calculus.choices import Values, by_variable, definition, search
 from avow.calculus.narrowing import Choices, Narrowing, Unknown, forcings
 from avow.calculus.open_values import ANY, Holds, Undecided, is_open, lazy_names, opened
 from avow.calculus.scenario import CannotRun, Point, World, key
@@ -23,12 +23,7 @@ from avow.language.terms import Role, Term, Variable
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
 from avow.system.formulas import ports_of
-
-MAX_ANSWERS = 4_000
-"""Answers of one node to one input; with more, a search is not exhaustive."""
-
-MAX_LENGTH = 4
-"""Sequences of up to so many elements are tried, unless an equation or the scenario gives the sequence."""
+from avow.tuning.bounds import CHOICES_FOUND, NODE_ANSWERS, SEQUENCE_LENGTHS
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +100,9 @@ def possible(world: World, node: str, port: Port) -> Choices:
                 natural = isinstance(sort.result, NaturalSort)
                 return Choices(world.results(node, port), "", (FunctionValue({}, ANY),), natural=natural)
             case SequenceSort(item=item) if world.domain(("out", node), port) is None and sort not in world.domains:
-                shells: tuple[Value, ...] = tuple(SequenceValue((ANY,) * n) for n in range(MAX_LENGTH + 1))
+                shells: tuple[Value, ...] = tuple(SequenceValue((ANY,) * n) for n in range(SEQUENCE_LENGTHS + 1))
                 unknown = f"the elements of {node}.{port.name} are not known"
-                short = f"sequences of more than {MAX_LENGTH} elements are not tried for {node}.{port.name}"
+                short = f"sequences of more than {SEQUENCE_LENGTHS} elements are not tried for {node}.{port.name}"
                 return Choices(world.plain_values(item), unknown, shells, short)
             case _:  # any sort whose values can be tried
                 return Choices(world.candidates(node, port), natural=isinstance(sort, NaturalSort))
@@ -167,7 +162,7 @@ class Answerer:
         if not self.searched or not about:
             return None
         found, complete = search(self.searched, (), about, {}, self.seed, self.world.milliseconds)
-        return tuple(found) if complete and len(found) <= MAX_FOUND else None
+        return tuple(found) if complete and len(found) <= CHOICES_FOUND else None
 
     # -- answers -------------------------------------------------------------------------------------------------------
 
@@ -209,11 +204,11 @@ class Answerer:
         """The answers with these relations."""
         known = {**inputs, **{f"out.{name}": value for name, value in relations.items()}}
         try:
-            found, complete = self.narrowing.answers(known, MAX_ANSWERS, free=free)
+            found, complete = self.narrowing.answers(known, NODE_ANSWERS, free=free)
         except Unknown as unknown:
             raise CannotRun(str(unknown)) from None
         if not complete:
-            self.doubts.incomplete.add(f"{self.node.name} has more than {MAX_ANSWERS} answers to one input")
+            self.doubts.incomplete.add(f"{self.node.name} has more than {NODE_ANSWERS} answers to one input")
         return tuple({**relations, **{name[4:]: value for name, value in answer.items()}} for answer in found)
 
     def _found_by_z3(
@@ -237,7 +232,7 @@ class Answerer:
             searched, () if alone else together, constraints, given, self.seed, self.world.milliseconds
         )
         if not complete:
-            self.doubts.incomplete.add(f"{self.node.name} has more than {MAX_FOUND} answers to one input")
+            self.doubts.incomplete.add(f"{self.node.name} has more than {CHOICES_FOUND} answers to one input")
         if not alone:
             return tuple({**relations, **answer} for answer in answers)
         return tuple(found for answer in answers for found in self._narrowed(inputs, {**relations, **answer}, free))

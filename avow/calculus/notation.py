@@ -15,10 +15,7 @@ from avow.calculus.derivation import Derivation, Goal, Rule, Settled, SideCondit
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.language.styles import latex_escape
 from avow.system.graph import Edge
-
-MAX_NODES_WRITTEN = 40
-"""A rule over more nodes is shown in its first and last lines."""
-
+from avow.tuning.shown import RULE_NODES
 
 # -- a little mathematics ----------------------------------------------------------------------------------------------
 
@@ -158,7 +155,7 @@ def _lines(
 
 
 def _shortened(children: tuple[Derivation, ...]) -> Iterator[Derivation | None]:
-    if len(children) <= MAX_NODES_WRITTEN:
+    if len(children) <= RULE_NODES:
         yield from children
         return
     yield from children[:3]
@@ -181,7 +178,7 @@ def _linking(part: Derivation) -> Iterator[Line]:
     for edge in part.linking:
         by_consumer.setdefault(edge.target.node, []).append(edge)
     for number, (consumer, edges) in enumerate(by_consumer.items()):
-        if number >= MAX_NODES_WRITTEN:
+        if number >= RULE_NODES:
             yield Line(("…",))
             return
         parts: list[Part] = [Symbol("i", consumer), "="]
@@ -197,7 +194,7 @@ def _condition_lines(part: Derivation, settled: Mapping[SideCondition, Settled])
     """One line for each consumer, as the paper has it; which of its assumptions rests on what is remarked."""
     consumers = tuple(dict.fromkeys(condition.consumer for condition in part.side_conditions))
     for number, consumer in enumerate(consumers):
-        if number >= MAX_NODES_WRITTEN:
+        if number >= RULE_NODES:
             yield Line(("…",))
             return
         conditions = [condition for condition in part.side_conditions if condition.consumer == consumer]

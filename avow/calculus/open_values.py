@@ -18,6 +18,7 @@ from avow.formulas.formula import free_variables
 from avow.formulas.values import Data, FunctionValue, Opaque, Value
 from avow.language.sorts import FunctionSort, SequenceSort
 from avow.language.terms import Term
+from avow.tuning.bounds import POINTS_OF_ARGUMENTS
 
 Values = dict[str, Value]
 Point = tuple[Value, ...]
@@ -60,8 +61,6 @@ def is_open(value: Value) -> bool:
 Lazy = tuple[tuple[str, tuple[Point, ...] | None], ...]
 """Variables whose values may be open; of a function, all points that there are, if they are finitely many."""
 
-MAX_POINTS = 10_000
-
 
 def lazy_names(formula: Term, domains: Domains | None = None) -> Lazy:
     """The free variables of a formula whose values may be open. `domains`: for quantifiers over these values only."""
@@ -75,7 +74,7 @@ def lazy_names(formula: Term, domains: Domains | None = None) -> Lazy:
 def _points(sort: FunctionSort, domains: Domains | None) -> tuple[Point, ...] | None:
     ranges = [finite_values(parameter, domains) for parameter in sort.parameters]
     known = [values for values in ranges if values is not None]
-    if len(known) < len(ranges) or math.prod(map(len, known)) > MAX_POINTS:
+    if len(known) < len(ranges) or math.prod(map(len, known)) > POINTS_OF_ARGUMENTS:
         return None
     return tuple(product(*known))
 

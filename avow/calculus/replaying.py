@@ -21,10 +21,10 @@ from avow.language.terms import Role, Term
 from avow.solving.questions import replay
 from avow.system.formulas import initial_condition, ports_of
 from avow.system.temporal import Operator, Property, State, states_of
+from avow.tuning.bounds import COMPLETIONS
+from avow.tuning.effort import REPLAY_MS
 
 Truth = Mapping[State, bool]
-_COMPLETIONS = 3
-"""Values tried in the places that the search left undecided."""
 
 
 def completions(machine: Machine, steps: Sequence[Step]) -> Iterator[tuple[Step, ...]]:
@@ -32,7 +32,7 @@ def completions(machine: Machine, steps: Sequence[Step]) -> Iterator[tuple[Step,
     all its open places."""
     yield tuple(steps)
     if any(is_open(value) for step in steps for value in step.values.values()):
-        for choice in range(_COMPLETIONS):
+        for choice in range(COMPLETIONS):
             yield tuple(replace(step, values=_completed(machine, step.values, choice)) for step in steps)
 
 
@@ -115,7 +115,7 @@ def _truth(machine: Machine, formula: Term, values: Mapping[str, Value]) -> bool
     if any(map(is_open, given.values())):
         return None
     wanted = formula if found else negation(formula)
-    return found if replay((wanted,), given, timeout_ms=1_000) else None
+    return found if replay((wanted,), given, timeout_ms=REPLAY_MS) else None
 
 
 # -- the property ------------------------------------------------------------------------------------------------------

@@ -15,8 +15,8 @@ from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.certificates import hint_of, labels
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Case, Phase
-from avow.calculus.discharge import DEEPER_SECONDS, Bounds
-from avow.calculus.entailment import QUICK_MS, implied
+from avow.calculus.discharge import Bounds
+from avow.calculus.entailment import implied
 from avow.calculus.finder import Hint
 from avow.calculus.induction import deeper, steps
 from avow.calculus.model_checking import judge, refuting_run
@@ -29,6 +29,7 @@ from avow.language.terms import Term
 from avow.solving.questions import Entailment
 from avow.system.plan import Requirement
 from avow.system.temporal import Property, State, Temporal, parse_property, parse_state, show_property
+from avow.tuning.effort import DEEPER_SECONDS, QUICK_MS
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,8 +34,8 @@ from avow.language.sorts import (
 )
 from avow.system.names import ports_named
 from avow.system.plan import Scenario
-
-MAX_CANDIDATES = 20_000
+from avow.tuning.bounds import SMALL_TABLE, VALUES_OF_A_PORT
+from avow.tuning.shown import DOMAIN_VALUES
 
 _SORTS: dict[str, Sort] = {"BOOL": BOOL, "INTEGER": INTEGER, "NATURAL": NATURAL, "REAL": REAL, "STRING": STRING}
 
@@ -80,7 +80,7 @@ class World:
         if texts is not None:
             return tuple(dict.fromkeys(self.parse(text, sort.result) for text in texts))
         found = self.plain_values(sort.result)
-        if found is None or len(found) > MAX_CANDIDATES:
+        if found is None or len(found) > VALUES_OF_A_PORT:
             raise CannotRun(
                 f"what values {node}.{port.name} has is not said; give scenario.domains: {{out.{port.name}: …}}"
             )
@@ -109,7 +109,7 @@ class World:
         ranges = [finite_values(sort, self.domains) for sort in sorts]
         known = [r for r in ranges if r is not None]
         if len(known) == len(ranges):
-            return tuple(product(*known)) if math.prod(map(len, known)) <= MAX_CANDIDATES else None
+            return tuple(product(*known)) if math.prod(map(len, known)) <= VALUES_OF_A_PORT else None
         found: dict[Point, None] = {}
         for signature, rows in self.rows():
             for start in range(len(signature) - len(sorts) + 1):
@@ -157,7 +157,7 @@ class World:
         if isinstance(port.sort, FunctionSort):
             raise CannotRun(f"{name}: say where it holds: scenario.interpret: {{in.{port.name}: table(column, …)}}")
         found = self.plain_values(port.sort)
-        if found is None or len(found) > MAX_CANDIDATES:
+        if found is None or len(found) > VALUES_OF_A_PORT:
             why = "has infinitely many values" if found is None else "has too many values"
             raise CannotRun(f"{name} ({port.type_name}) {why}; give scenario.domains: {{{owners[0]}.{port.name}: …}}")
         return tuple(found)
@@ -232,7 +232,8 @@ def restrictions(world: World) -> tuple[str, ...]:
         sort = named.get(name) or (ports[0][1].sort if ports else None)
         everything = None if sort is None or isinstance(sort, FunctionSort) else finite_values(sort)
         if everything is None or sort is None or not set(everything) <= {world.parse(text, sort) for text in texts}:
-            shown = ", ".join(texts[:_SHOWN]) + (f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else "")
+            more = len(texts) - DOMAIN_VALUES
+            shown = ", ".join(texts[:DOMAIN_VALUES]) + (f" and {more} more" if more > 0 else "")
             found.append(f"scenario.domains.{name}: it is one of {shown}")
     for name, (table, columns) in scenario.interpret.items():
         found.append(f"scenario.interpret.{name}: it is as {table}({', '.join(columns)}) has it")
@@ -252,8 +253,6 @@ def _is_sampled(world: World, sort: Sort) -> bool:
     return finite_values(sort) is None
 
 
-_SHOWN = 8
-_LARGE = 3
 _KEYS: dict[int, tuple[FunctionValue, object]] = {}
 
 
@@ -261,7 +260,7 @@ def key(value: Value) -> object:
     """Equal for equal values, and quick to look up (functions hash poorly)."""
     if not isinstance(value, FunctionValue):
         return value
-    if len(value.table) <= _LARGE:
+    if len(value.table) <= SMALL_TABLE:
         return _function_key(value)
     # Maps and plans are met again and again, and stay the same objects: a key is made once.
     known = _KEYS.get(id(value))

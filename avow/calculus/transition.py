@@ -16,7 +16,7 @@ from avow.base.graphs import components, cycles_in
 from avow.calculus.choices import Values, by_variable, search
 from avow.calculus.cuts import first_cut, is_restricted
 from avow.calculus.narrowing import Narrowing, Unknown, forcings
-from avow.calculus.node_outputs import MAX_ANSWERS, Answerer, Doubts, Stuck, judge, possible
+from avow.calculus.node_outputs import Answerer, Doubts, Stuck, judge, possible
 from avow.calculus.open_values import Holds, Undecided, decided
 from avow.calculus.scenario import CannotRun, World, key
 from avow.formulas.values import Value, show
@@ -25,6 +25,7 @@ from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
 from avow.language.terms import Role, Term
 from avow.system.formulas import initial_condition, ports_of
 from avow.system.plan import Endpoint
+from avow.tuning.bounds import NODE_ANSWERS
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +205,7 @@ class Machine:
             outputs = {name: possible(self.world, endpoint.node, port)}
             try:
                 narrowed, complete = Narrowing(outputs, tuple(guarantees), forcings(clauses), self.incomplete).answers(
-                    given, MAX_ANSWERS
+                    given, NODE_ANSWERS
                 )
             except Unknown as unknown:
                 raise CannotRun(f"the initial value of {endpoint}: {unknown}") from None

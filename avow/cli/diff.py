@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.cli.options import json_option
+from avow.tuning.shown import DIFF_REASONS
 
 if TYPE_CHECKING:
     from avow.assurance.compare import Change
-
-_SHOWN = 3
-"""Reasons on the terminal; the page and the JSON have all."""
 
 
 @click.command()
@@ -74,7 +72,7 @@ def _tell(changes: list[Change]) -> None:
             if change.old_formula != change.new_formula:
                 click.echo(f"      was: {change.old_formula}")
                 click.echo(f"      now: {change.new_formula}")
-            for line in change.why[:_SHOWN]:
+            for line in change.why[:DIFF_REASONS]:
                 click.echo(f"      {line}")
     again = [change for change in changes if change.kind == "rerun"]
     if again:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from avow.cli.options import ContractArgument, json_option
+from avow.tuning.sizes import CONTRACT_BYTES
 
 if TYPE_CHECKING:
     from avow.base.diagnostics import Diagnostic
@@ -31,13 +32,13 @@ def command(paths: tuple[Path, ...], check: bool, diff: bool, as_json: bool) -> 
     from avow.base.files import write
     from avow.base.rendering import printable, render, to_json
     from avow.language.format import format_text
-    from avow.language.load import MAX_BYTES, decode, read_source
+    from avow.language.load import decode, read_source
     from avow.language.source import Source
 
     faults: list[Diagnostic] = []
     changed: list[str] = []
     for path in _files(paths, faults):
-        source = decode(sys.stdin.buffer.read(MAX_BYTES + 1), "<stdin>") if str(path) == "-" else read_source(path)
+        source = decode(sys.stdin.buffer.read(CONTRACT_BYTES + 1), "<stdin>") if str(path) == "-" else read_source(path)
         if not isinstance(source, Source):
             faults.append(source)
             continue

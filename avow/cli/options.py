@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, TypeVar
 import click
 
 from avow.cli.paths import PathArgument
+from avow.tuning.sizes import LONGEST_TIMEOUT
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable
 
 Command = TypeVar("Command", bound="Callable[..., object]")
-
-MAX_SECONDS = 86_400.0
 
 
 class ContractArgument(PathArgument):
@@ -44,7 +43,7 @@ class _Seconds(click.ParamType[float]):
             seconds = float(str(value))
         except ValueError:
             self.fail(f"{str(value)[:60]!r} is no number", param, ctx)
-        if not 0 < seconds <= MAX_SECONDS:
+        if not 0 < seconds <= LONGEST_TIMEOUT:
             self.fail(f"{seconds}: a time above 0 is wanted, of at most a day", param, ctx)
         return seconds
 

@@ -22,6 +22,7 @@ from avow.conformance.seeded import Seeded, settle, verdicts
 from avow.language.contract import Node
 from avow.pipeline.evidence_keys import surroundings
 from avow.system.plan import System
+from avow.tuning.running import CONFORMANCE_PATIENCE
 
 _HOSTILE = ("class", "ensures", "lambda", "None", "self", "exit", "con", "x" * 120)
 """Names that are plain words of the contract language, and something else to a tool, a file system or Python."""
@@ -37,8 +38,6 @@ _LIES = (None, "", "exit 1", "kill -9 $$", "head -c 100000 /dev/zero", "echo uns
 
 _ENOUGH = Limits(seconds=120.0)
 _HARDLY = Limits(seconds=0.05)
-_PATIENCE = 60.0
-"""Seconds within which a discharge with hardly any time must be back, on a busy machine."""
 
 
 class Conformance:
@@ -255,7 +254,7 @@ class Conformance:
         """It comes back soon, with a verdict for each claim: the right one, or one that says that it gave up."""
         begun, children = time.monotonic(), _children()
         found = verdicts(job, settle(self.backend, job, tmp_path / "made", _HARDLY))
-        assert time.monotonic() - begun < _PATIENCE
+        assert time.monotonic() - begun < CONFORMANCE_PATIENCE
         gave_up = (Verdict.UNKNOWN, Verdict.ERROR, Verdict.NOT_RUN)
         for name, verdict in found.items():
             assert verdict in (case.verdicts[name], *gave_up), (name, verdict)

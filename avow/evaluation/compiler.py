@@ -53,13 +53,11 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+from avow.tuning.bounds import VALUES_ENUMERATED
 
 Env = list[Any]
 Code = Callable[[Env], Any]
 Domains = Mapping[Sort, Sequence[Value]]
-
-ENUMERATION_LIMIT = 1_000_000
-"""More values than this are not enumerated: the answer would not come in useful time."""
 
 
 class NotEvaluable(Exception):  # noqa: N818 - it names a state, not a fault
@@ -98,7 +96,7 @@ def finite_values(sort: Sort, domains: Domains | None = None) -> tuple[Value, ..
 def _tuples(sorts: Sequence[Sort], domains: Domains | None) -> tuple[tuple[Value, ...], ...] | None:
     ranges = [finite_values(sort, domains) for sort in sorts]
     known = [r for r in ranges if r is not None]
-    if len(known) != len(ranges) or math.prod(len(r) for r in known) > ENUMERATION_LIMIT:
+    if len(known) != len(ranges) or math.prod(len(r) for r in known) > VALUES_ENUMERATED:
         return None
     return tuple(product(*known))
 
@@ -262,7 +260,7 @@ class Compiler:
 
         def run(env: Env) -> Any:
             start, end = low(env), high(env)
-            if end - start >= ENUMERATION_LIMIT:
+            if end - start >= VALUES_ENUMERATED:
                 raise NotEvaluable("the sequence is too long to write out")
             return values.Sequence(tuple(range(start, end + 1)))
 

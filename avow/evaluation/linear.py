@@ -9,8 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-LIMIT = 4_000
-"""Elimination stops (`TooMany`) when there are more constraints than this."""
+from avow.tuning.bounds import CONSTRAINTS
 
 
 class TooMany(Exception):  # noqa: N818 - it names what happened
@@ -74,7 +73,7 @@ def satisfy(constraints: Sequence[Constraint], names: Sequence[str]) -> dict[str
         others = [c for c in current if not c.left.coefficient(name)]
         removed.append((name, about))
         current = list(dict.fromkeys([*others, *_eliminate(name, about)]))
-        if len(current) > LIMIT:
+        if len(current) > CONSTRAINTS:
             raise TooMany
     if not all(c.holds({}) for c in current):
         return None
@@ -110,7 +109,7 @@ def _eliminate(name: str, about: Sequence[Constraint]) -> list[Constraint]:
             ]
     lower = [c for c in about if c.left.coefficient(name) < 0]
     upper = [c for c in about if c.left.coefficient(name) > 0]
-    if len(lower) * len(upper) > LIMIT:
+    if len(lower) * len(upper) > CONSTRAINTS:
         raise TooMany
     found = []
     for low in lower:

@@ -31,11 +31,10 @@ from avow.language.terms import (
     Term,
     Variable,
 )
+from avow.tuning.bounds import LINEAR_CASES
 
 Alternatives = Callable[[Env], list[tuple[Constraint, ...]]]
 """The formula as a disjunction of systems, given the other variables' values."""
-
-_LIMIT = 256
 
 
 def linear_step(
@@ -228,7 +227,7 @@ def _any(sides: Sequence[Alternatives | None]) -> Alternatives | None:
 
 
 def _product(left: list[tuple[Constraint, ...]], right: list[tuple[Constraint, ...]]) -> list[tuple[Constraint, ...]]:
-    if len(left) * len(right) > _LIMIT:
+    if len(left) * len(right) > LINEAR_CASES:
         raise NotEvaluable("the inequalities fall into too many cases")
     if right == [()]:
         return left

@@ -14,14 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from avow.evaluation.compiler import (
-    ENUMERATION_LIMIT,
-    Code,
-    Compiler,
-    Env,
-    NotEvaluable,
-    finite_values,
-)
+from avow.evaluation.compiler import Code, Compiler, Env, NotEvaluable, finite_values
 from avow.evaluation.disjunctions import Part, alternatives, branches, conjunction, occurring, relations
 from avow.evaluation.patterns import pattern, patterns
 from avow.evaluation.unrestricted_variables import leftover_steps
@@ -41,13 +34,10 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+from avow.tuning.bounds import DISJUNCTION_DEPTH, ROWS_WITHOUT_INDEX, VALUES_ENUMERATED
 
 Doubt = NotEvaluable | None
 """What comes with a candidate: None where it surely satisfies the body, else why that could not be found out."""
-
-
-_DEPTH = 5
-"""How far disjunctions within disjunctions are followed: the cost of planning is exponential in it."""
 
 
 class Unrestricted(NotEvaluable):
@@ -268,7 +258,7 @@ class Plan:
         self, options: Sequence[tuple[Term, bool]], unbound: set[str], variables: Sequence[Variable] = ()
     ) -> Step | None:
         """A disjunction restricts what every one of its sides restricts."""
-        if self._depth >= _DEPTH:
+        if self._depth >= DISJUNCTION_DEPTH:
             return None
         plans: list[Plan] = []
         common = frozenset(unbound)
@@ -439,7 +429,7 @@ class _Lookup:
         self._index: dict[tuple[Any, ...], list[tuple[Any, Any]]] = {}
 
     def rows(self, table: Mapping[Any, Any], env: Env) -> Iterable[tuple[Any, Any]]:
-        if not self._known or len(table) <= _FEW:
+        if not self._known or len(table) <= ROWS_WITHOUT_INDEX:
             return list(table.items())
         if table is not self._table:
             index: dict[tuple[Any, ...], list[tuple[Any, Any]]] = {}
@@ -449,11 +439,8 @@ class _Lookup:
         return self._index.get(tuple([code(env) for code in self._codes]), ())
 
 
-_FEW = 3
-
-
 def _integers(low: int, high: int) -> range:
-    if high - low >= ENUMERATION_LIMIT:
+    if high - low >= VALUES_ENUMERATED:
         raise NotEvaluable(f"there are {high - low + 1} integers to try")
     return range(low, high + 1)
 

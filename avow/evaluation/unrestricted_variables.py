@@ -42,9 +42,7 @@ from avow.language.terms import (
     TupleTerm,
     Variable,
 )
-
-_LIMIT = 2_000
-"""More representatives than this for one variable are refused: the search would be too slow to be of use."""
+from avow.tuning.bounds import REPRESENTATIVES
 
 
 def leftover_steps(
@@ -89,7 +87,7 @@ def _generic(
         for code in constants:
             _collect(code(env), carrier, named)
         candidates = _representatives(sort, named, ordered, copies)
-        if len(candidates) > _LIMIT:
+        if len(candidates) > REPRESENTATIVES:
             raise NotEvaluable(f"there are {len(candidates)} values to try for {variable.name}")
         for value in candidates:
             env[slot] = value

@@ -2,8 +2,8 @@
 
 For targets whose terms have no conditionals (RML's conditions, say). `xor`, `abs`, `min`, `max` and conditionals are
 gone afterwards, but for those in a quantified formula within a term; `mod` and `div` stay, for they are no choice
-between terms. The meaning is the same, the size may double with each conditional in one atom, and more than `LIMIT`
-atoms are refused.
+between terms. The meaning is the same, the size may double with each conditional in one atom, and more than
+`ATOMS_MADE` atoms are refused.
 """
 
 from __future__ import annotations
@@ -28,18 +28,16 @@ from avow.language.terms import (
     Quantified,
     Term,
 )
-
-LIMIT = 500
-"""Atoms made, at most."""
+from avow.tuning.bounds import ATOMS_MADE
 
 
 class TooManyCases(Exception):  # noqa: N818 - it names what the formula has
-    """Its conditionals make more than `LIMIT` atoms."""
+    """Its conditionals make more than `ATOMS_MADE` atoms."""
 
 
 def lifted(formula: Term) -> Term:
     """The formula without operators that choose between terms. Raises TooManyCases."""
-    return run(_formula(formula, iter(range(LIMIT))))
+    return run(_formula(formula, iter(range(ATOMS_MADE))))
 
 
 def _formula(term: Term, left: Iterator[int]) -> Steps[Term]:

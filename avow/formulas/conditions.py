@@ -33,11 +33,8 @@ from avow.language.terms import (
     Term,
     Variable,
 )
-
-MAX_DEPTH = 150
-"""Deeper formulas are not taken apart."""
-MAX_CLAUSES = 16
-"""Nor are disjunctions of conjunctions that would become more than so many disjunctions."""
+from avow.tuning.bounds import DISJUNCTIONS_MADE
+from avow.tuning.sizes import CONDITION_DEPTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +55,7 @@ class Condition:
 
 def conditions(formula: Term) -> tuple[Condition, ...]:
     """Every condition under which the formula demands something, each once; none where it always demands all of it."""
-    if depth(formula) > MAX_DEPTH:
+    if depth(formula) > CONDITION_DEPTH:
         return ()
     found: dict[Condition, None] = {}
     for clause in _clauses(rename_apart(formula), True):
@@ -161,7 +158,7 @@ def _joined(parts: list[tuple[Term, bool]], halve: bool) -> Iterator[_Clause]:
     count = 1
     for some in choices:
         count *= len(some)
-    if count > MAX_CLAUSES:
+    if count > DISJUNCTIONS_MADE:
         choices = [[_Clause((), (term if positive else negation(term),))] for term, positive in parts]
     for chosen in product(*choices):
         items = tuple(dict.fromkeys(item for clause in chosen for item in clause.items))

@@ -14,9 +14,7 @@ from avow.formulas.renaming import map_children
 from avow.formulas.values import Element, Value
 from avow.language.sorts import BOOL, EnumSort, IntegerSort, NaturalSort, RealSort, Sort, StringSort
 from avow.language.terms import Compare, EnumValue, Literal, Quantified, Quantifier, Term, Variable
-
-_MANY = 400
-"""A quantifier over more (combinations of) values stays as it is, and ranges over everything."""
+from avow.tuning.bounds import VALUES_WRITTEN_OUT
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +45,8 @@ class Ranges:
         body = self.within(term.body)
         few = {v: terms for v in term.variables if (terms := _terms(self.sorts.get(v.sort, ()), v.sort))}
         rest = tuple(v for v in term.variables if v not in few)
-        if not few or prod(map(len, few.values())) > _MANY or (term.quantifier is Quantifier.UNIQUE and rest):
+        unlike = term.quantifier is Quantifier.UNIQUE and rest
+        if not few or unlike or prod(map(len, few.values())) > VALUES_WRITTEN_OUT:
             return Quantified(term.quantifier, term.variables, body, term.span)
         cases = [substitute(body, dict(zip(few, choice, strict=True))) for choice in product(*few.values())]
         match term.quantifier:

@@ -11,9 +11,9 @@ from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Generic, TypeVar, assert_never
 
-A = TypeVar("A", bound=Hashable)
+from avow.tuning.bounds import AUTOMATON_NODES
 
-MAX_NODES = 5_000
+A = TypeVar("A", bound=Hashable)
 
 
 class TooLarge(Exception):  # noqa: N818 - it names what happened
@@ -203,7 +203,7 @@ def build(goal: Normal[A]) -> Automaton[A]:
             continue
         at = known[key] = len(nodes)
         nodes.append(node)
-        if len(nodes) > MAX_NODES:
+        if len(nodes) > AUTOMATON_NODES:
             raise TooLarge
         stack.append(_Node({at}, list(node.next), set(), set()))
     return _finished(nodes, formulas, inner)

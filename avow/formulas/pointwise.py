@@ -17,10 +17,8 @@ from avow.formulas.renaming import map_children, rename_apart
 from avow.formulas.traversal import depth, subterms
 from avow.language.sorts import FunctionSort, Sort
 from avow.language.terms import And, Apply, Compare, Implies, Or, Quantified, Quantifier, Role, Term, Variable
-
-_DEPTH = 150
-_PARTS = 100
-"""A guarantee with more parts, once `or` is spread over `and`, is left as it is."""
+from avow.tuning.bounds import POINTWISE_PARTS
+from avow.tuning.sizes import CONDITION_DEPTH
 
 Values = Mapping[Variable, Variable]
 
@@ -42,7 +40,7 @@ def pointwise(guarantees: Mapping[str, Term], outputs: Sequence[Variable]) -> Po
     """The guarantees about one point that say the same; None where they say something of several points at once, or
     of outputs that are no functions with parameters of the same sorts."""
     kinds = {v.sort.parameters if isinstance(v.sort, FunctionSort) else None for v in outputs}
-    if len(kinds) != 1 or any(depth(formula) > _DEPTH for formula in guarantees.values()):
+    if len(kinds) != 1 or any(depth(formula) > CONDITION_DEPTH for formula in guarantees.values()):
         return None
     parameters = kinds.pop()
     if parameters is None:
@@ -54,7 +52,7 @@ def pointwise(guarantees: Mapping[str, Term], outputs: Sequence[Variable]) -> Po
         parts: list[Term] = []
         for over, body in _parts(rename_apart(push_negations(formula)), (), values):
             part = _at(over, body, point, values)
-            if part is None or len(parts) >= _PARTS:
+            if part is None or len(parts) >= POINTWISE_PARTS:
                 return None
             parts.append(part)
         found[label] = conjunction(parts)

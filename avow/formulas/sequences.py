@@ -43,11 +43,10 @@ from avow.language.terms import (
     Term,
     Variable,
 )
+from avow.tuning.bounds import SEQUENCE_SHOWN
+from avow.tuning.sizes import REWRITTEN_DEPTH
 
 Label = TypeVar("Label")
-
-_DEPTH = 200
-_LONGEST = 1_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +81,7 @@ class Flat(Generic[Label]):
         for variable, (length, element) in self.parts.items():
             count, at = found.get(length, 0), found.get(element)
             assert isinstance(count, int)
-            if count > _LONGEST or (count and not isinstance(at, FunctionValue)):
+            if count > SEQUENCE_SHOWN or (count and not isinstance(at, FunctionValue)):
                 return None
             values[variable] = SequenceValue(
                 tuple(at(k) for k in range(count)) if isinstance(at, FunctionValue) else ()
@@ -100,7 +99,7 @@ def flatten(formulas: Mapping[Label, Term], sequences: Iterable[Variable]) -> Fl
             return None
         element = Variable(variable.role, f"{variable.name} (elements)", FunctionSort((INTEGER,), sort.item))
         parts[variable] = (Variable(variable.role, f"{variable.name} (length)", NATURAL), element)
-    if not parts or any(depth(formula) > _DEPTH for formula in formulas.values()):
+    if not parts or any(depth(formula) > REWRITTEN_DEPTH for formula in formulas.values()):
         return None
     changed = {label: _change(formula, parts) for label, formula in formulas.items()}
     if any(free_variables(formula) & parts.keys() for formula in changed.values()):

@@ -15,8 +15,7 @@ from avow.formulas.traversal import depth
 from avow.formulas.values import Value
 from avow.language.sorts import TupleSort
 from avow.language.terms import Compare, In, Not, Quantified, SetTerm, Term, TupleTerm, Variable
-
-_DEPTH = 200
+from avow.tuning.sizes import REWRITTEN_DEPTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +38,7 @@ class Untupled:
 def untupled(formulas: Mapping[tuple[bool, str], Term], variables: Iterable[Variable]) -> Untupled | None:
     """The formulas without these variables' tuples; None if none of the variables is one."""
     parts = {v: made for v in variables if isinstance(made := _made(v), TupleTerm)}
-    if not parts or any(depth(formula) > _DEPTH for formula in formulas.values()):
+    if not parts or any(depth(formula) > REWRITTEN_DEPTH for formula in formulas.values()):
         return None
     return Untupled({label: _split(substitute(formula, parts)) for label, formula in formulas.items()}, parts)
 

@@ -18,9 +18,6 @@ from avow.base import process
 from avow.isolation.level import Isolation, available, sealed
 from avow.isolation.observed import Observed, interpreter, recorded
 
-PATIENCE = 10.0
-"""Seconds that a subject may take for one answer."""
-
 _SCRATCH = "/tmp/avow-scratch"
 """Where a sealed subject may write."""
 

@@ -24,7 +24,10 @@ LOOK = 400_000
 """Steps to look for a contradiction among premises: it decides nothing but whether a claim is called vacuous."""
 
 NET_MS = 60_000
+"""For what Z3's steps do not count; it is met only by a fault of the solver."""
+
 SECOND_MS = 5_000
+"""For the second solver's answer to one question: cvc5 counts no steps that mean the same on every version."""
 
 
 class Said(StrEnum):

@@ -22,14 +22,8 @@ from avow.language.syntax import (
     Truth,
     children,
 )
-
-_EXHAUSTIVE = 10
-"""Up to this many letters every assignment is tried, else `_SAMPLES` of them."""
-_SAMPLES = 2000
-_EFFORT = 400_000
-"""Samples times operators, at most: a formula of thousands of parts gets fewer samples."""
-_SHOWN = 12
-"""So many parts of a formula are shown, and the rest is left out."""
+from avow.tuning.bounds import ASSIGNMENTS_SAMPLED, LETTERS_EXHAUSTED, SAMPLES_BY_SIZE
+from avow.tuning.shown import FORMULA_PARTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,12 +102,12 @@ def _literal(tree: TermSyntax, text: str, letters: dict[str, int]) -> tuple[int 
 
 
 def _assignments(count: int, size: int) -> Iterator[list[bool]]:
-    if count <= _EXHAUSTIVE and size << count <= _EFFORT:
+    if count <= LETTERS_EXHAUSTED and size << count <= SAMPLES_BY_SIZE:
         for number in range(1 << count):
             yield [bool(number >> i & 1) for i in range(count)]
         return
     source = random.Random(count)
-    for _ in range(max(20, min(_SAMPLES, _EFFORT // size))):
+    for _ in range(max(20, min(ASSIGNMENTS_SAMPLED, SAMPLES_BY_SIZE // size))):
         weight = source.random()
         yield [source.random() < weight for _ in range(count)]
 
@@ -149,7 +143,7 @@ def _reduce(values: list[bool], signs: list[str], level: str) -> tuple[list[bool
 
 def _bracketed(tree: Connective, text: str, among: int = 1) -> str:
     """The formula as it is read, with parentheses around what binds tighter. `among`: so many others stand around."""
-    most = max(2, _SHOWN // among)
+    most = max(2, FORMULA_PARTS // among)
     left_out = len(tree.items) - most
     parts = []
     for part in tree.items if left_out <= 0 else (*tree.items[: most - 1], tree.items[-1]):

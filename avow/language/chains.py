@@ -2,8 +2,8 @@
 
 ``a + b + c`` is ``(a + b) + c`` and ``a -> b -> c`` is ``a -> (b -> c)``, as everywhere. A chain of thousands so made
 would be a tree thousands of levels deep, on which Python's recursion (equality, hashing, every later pass) ends. A
-chain of more than `LONG` operators therefore becomes the term of an equivalent text with parentheses. The laws used are
-exact for booleans, integers and reals alike:
+chain of more than `CHAIN` operators therefore becomes the term of an equivalent text with parentheses. The laws used
+are exact for booleans, integers and reals alike:
 
     a -> b -> c      is  (a and b) -> c
     a <=> b <=> c    is  a <=> (b <=> c)
@@ -23,13 +23,7 @@ from avow.base.diagnostics import Span
 from avow.language.conversions import widen
 from avow.language.sorts import INTEGER, NATURAL, REAL
 from avow.language.terms import And, Arithmetic, Iff, Implies, Term, Widen
-
-LONG = 64
-"""Up to so many operators a chain becomes the tree that it is written as; and no chain's tree is deeper."""
-
-_BLOCK = 8
-"""How many terms are put together at each level of a long chain. 8 ** 7 is more than a text may have tokens, and a
-spine of 7 levels is 7 * 8 < LONG terms long."""
+from avow.tuning.bounds import CHAIN, CHAIN_BLOCK
 
 _Place = Callable[[int, int], Span]
 _Item = TypeVar("_Item")
@@ -43,7 +37,7 @@ def implication(parts: Sequence[Term], span: _Place) -> Term:
     while isinstance(inner, Implies):  # it prints without parentheses, so it counts
         conditions.append(inner.left)
         inner = inner.right
-    if len(conditions) > LONG:
+    if len(conditions) > CHAIN:
         return Implies(And(tuple(conditions), span(0, last)), inner, span(0, last))
     result = conclusion
     for i in range(last - 1, -1, -1):
@@ -59,7 +53,7 @@ def equivalence(parts: Sequence[Term], span: _Place) -> Term:
         chain.append(inner.right)
         inner = inner.left
     chain = [inner, *reversed(chain), *parts[1:]]
-    if len(chain) - 1 <= LONG:
+    if len(chain) - 1 <= CHAIN:
         result = parts[0]
         for i, part in enumerate(parts[1:], 1):
             result = Iff(result, part, span(0, i))
@@ -73,18 +67,18 @@ def equivalence(parts: Sequence[Term], span: _Place) -> Term:
 def arithmetic(operators: Sequence[str], operands: Sequence[Term], span: _Place) -> Term | None:
     """``a + b - c`` or ``a * b / c``, of numeric terms; None where it divides so often that it stays deep."""
     chain = [*_spine(operands[0], operators[0]), *zip(operators, operands[1:], strict=True)]
-    if len(chain) - 1 <= LONG:
+    if len(chain) - 1 <= CHAIN:
         result = operands[0]
         for i, (operator, operand) in enumerate(zip(operators, operands[1:], strict=True), 1):
             result = _combine(operator, result, operand, span(0, i))
         return result
     whole = span(0, len(operands) - 1)
-    while len(chain) > _BLOCK:
+    while len(chain) > CHAIN_BLOCK:
         shorter = _shorter_sum(chain, whole) if operators[0] in "+-" else _shorter_product(chain, whole)
         if len(shorter) == len(chain):
             break
         chain = shorter
-    return None if len(chain) - 1 > LONG else _fold(chain, whole)
+    return None if len(chain) - 1 > CHAIN else _fold(chain, whole)
 
 
 _Link = tuple[str, Term]
@@ -142,4 +136,4 @@ def _shorter_product(chain: Sequence[_Link], span: Span) -> list[_Link]:
 
 
 def _blocks(items: Sequence[_Item]) -> Iterable[Sequence[_Item]]:
-    return (items[i : i + _BLOCK] for i in range(0, len(items), _BLOCK))
+    return (items[i : i + CHAIN_BLOCK] for i in range(0, len(items), CHAIN_BLOCK))

@@ -17,8 +17,7 @@ from avow.language.environment import Environment, did_you_mean
 from avow.language.flat import flat
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
-from avow.language.limits import MAX_DECLARED, MAX_REFERENCES, sort_extent, term_extent
-from avow.language.parser import MAX_DEPTH
+from avow.language.limits import sort_extent, term_extent
 from avow.language.scope import Scope
 from avow.language.sorts import (
     Constructor,
@@ -55,6 +54,7 @@ from avow.language.syntax import (
     walk,
 )
 from avow.language.terms import EnumValue, Quantified, SetTerm, Term, subterms
+from avow.tuning.sizes import DECLARED_PARTS, NESTING, REFERENCES_AHEAD
 
 
 @dataclass(slots=True)
@@ -122,8 +122,8 @@ class Declarations:
             return
         environment, name = self.environment, declared.name.text
         environment.places[name] = declared.place
-        if self.open > MAX_REFERENCES:
-            message = f"`{name}` stands at the end of a row of {MAX_REFERENCES} declarations that refer to later ones"
+        if self.open > REFERENCES_AHEAD:
+            message = f"`{name}` stands at the end of a row of {REFERENCES_AHEAD} declarations that refer to later ones"
             hint = "declare a name before the declarations that use it"
             declared.reports.error("RCL110", message, declared.name.start, declared.name.end, hint=hint)
             environment.broken.add(name)
@@ -147,10 +147,10 @@ class Declarations:
     def is_small(self, name: str, extent: tuple[int, int], place: Token, reports: Reports) -> bool:
         """Whether a sort or value is not too large or deep to be worked with; reports it if it is."""
         size, depth = extent
-        if size <= MAX_DECLARED and depth <= MAX_DEPTH:
+        if size <= DECLARED_PARTS and depth <= NESTING:
             return True
-        what = f"{size:,} parts" if size > MAX_DECLARED else f"{depth} levels"
-        most = f"{MAX_DECLARED:,}" if size > MAX_DECLARED else str(MAX_DEPTH)
+        what = f"{size:,} parts" if size > DECLARED_PARTS else f"{depth} levels"
+        most = f"{DECLARED_PARTS:,}" if size > DECLARED_PARTS else str(NESTING)
         if size >= 10**15:
             what = "astronomically many parts"
         message = f"`{name}` has {what} once all the names in it are written out; {most} is the most"

@@ -10,9 +10,6 @@ from fractions import Fraction
 
 from avow.language.bounds import FLIPPED, OPPOSITE
 
-LONGEST = 4_000
-"""So many characters of a sentence are read."""
-
 _LESS = r"(?:less|fewer|smaller|lower|shorter|earlier|sooner|closer|nearer|slower|colder|cooler|lighter)"
 _MORE = r"(?:greater|more|larger|higher|longer|bigger|later|farther|further|faster|hotter|warmer|heavier)"
 _PHRASES = (

@@ -10,12 +10,7 @@ from typing import NamedTuple
 
 from avow.language.foreign import FOREIGN_TYPES, SIGNS, foreign, invisible, wide
 from avow.language.source import Reports
-
-MAX_TOKENS = 1_000_000
-"""A text with more is no contract; a megabyte of RCL has some 250,000."""
-
-MAX_DIGITS = 500
-"""Longer numbers are rejected: nobody means them, and arithmetic on them costs more than it is worth."""
+from avow.tuning.sizes import DIGITS, TOKENS
 
 
 class Token(NamedTuple):
@@ -132,9 +127,9 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
         else:
             at = other.read(str(kind), piece, start, at)
     other.finish()
-    if len(found) > MAX_TOKENS:
-        last = found[MAX_TOKENS]
-        reports.error("RCL003", f"the text has more than {MAX_TOKENS:,} words and signs", last.start, last.end)
+    if len(found) > TOKENS:
+        last = found[TOKENS]
+        reports.error("RCL003", f"the text has more than {TOKENS:,} words and signs", last.start, last.end)
         return []
     return found
 
@@ -304,8 +299,8 @@ def _number(reports: Reports, match: re.Match[str], start: int, end: int) -> Tok
         reports.error("RCL105", message, start, end, hint=_about_tail(number, tail))
         reports.odd.add(start)
         return Token("NUMBER", "1", start, end)
-    if len(number) > MAX_DIGITS:
-        message = f"this number has {len(number)} digits; {MAX_DIGITS} is the most"
+    if len(number) > DIGITS:
+        message = f"this number has {len(number)} digits; {DIGITS} is the most"
         reports.error("RCL105", message, start, end)
         return Token("NUMBER", "1", start, end)
     return Token("NUMBER", number, start, end)

@@ -12,15 +12,6 @@ from typing import TypeVar
 from avow.language.sorts import DataSort, FunctionSort, SequenceSort, SetSort, Sort, TupleSort
 from avow.language.terms import Term
 
-MAX_DECLARED = 20_000
-"""So many parts a constant or a type may have, written out."""
-
-MAX_WRITTEN_OUT = 2_000_000
-"""So many parts all formulas of a contract may have together, constants written out."""
-
-MAX_REFERENCES = 100
-"""Declarations that stand before what they refer to: so long a row of them."""
-
 _Part = TypeVar("_Part")
 
 

@@ -23,9 +23,7 @@ from avow.language.scope import BOTH_ROLES, Scope
 from avow.language.sorts import Sort
 from avow.language.source import Reports, Source
 from avow.language.terms import Role, Term, Variable
-
-MAX_BYTES = 4_000_000
-"""A larger file is no contract."""
+from avow.tuning.sizes import CONTRACT_BYTES
 
 _NOTHING = Contract((), (), (), ())
 
@@ -76,7 +74,7 @@ def read_source(path: Path) -> Source | Diagnostic:
         if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # opening a folder fails by itself
             return Diagnostic("RCL002", "the file cannot be read: it is a device or a pipe", start)
         with path.open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
+            data = stream.read(CONTRACT_BYTES + 1)
     except OSError as error:
         return Diagnostic("RCL002", f"the file cannot be read: {error.strerror or error}", start)
     except ValueError:  # a NUL in the name
@@ -87,8 +85,8 @@ def read_source(path: Path) -> Source | Diagnostic:
 def decode(data: bytes, file: str) -> Source | Diagnostic:
     """The text that a file's (or a pipe's) bytes are, or why they are none."""
     start = Span(file, 1, 1, 1, 1)
-    if len(data) > MAX_BYTES:
-        return Diagnostic("RCL003", f"the file is larger than {MAX_BYTES // 1_000_000} MB", start)
+    if len(data) > CONTRACT_BYTES:
+        return Diagnostic("RCL003", f"the file is larger than {CONTRACT_BYTES // 1_000_000} MB", start)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -107,8 +105,8 @@ def decode(data: bytes, file: str) -> Source | Diagnostic:
 
 def clean_text(text: str, file: str) -> Source | Diagnostic:
     """A text as the lexer wants it: without byte order mark, with plain line ends; or why it is none."""
-    if len(text) > MAX_BYTES:
-        return Diagnostic("RCL003", f"the text is larger than {MAX_BYTES // 1_000_000} MB", Span(file, 1, 1, 1, 1))
+    if len(text) > CONTRACT_BYTES:
+        return Diagnostic("RCL003", f"the text is larger than {CONTRACT_BYTES // 1_000_000} MB", Span(file, 1, 1, 1, 1))
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     at = text.find("\0")
     if at >= 0:

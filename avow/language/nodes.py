@@ -11,14 +11,14 @@ from avow.language.declarations import Declarations
 from avow.language.environment import did_you_mean
 from avow.language.flat import flat
 from avow.language.lexer import Token, unquote
-from avow.language.limits import MAX_WRITTEN_OUT, sort_extent, term_extent
+from avow.language.limits import sort_extent, term_extent
 from avow.language.outline import ClauseSyntax, NodeSyntax
-from avow.language.parser import MAX_DEPTH
 from avow.language.printer import show_type
 from avow.language.scope import Scope
 from avow.language.source import Reports
 from avow.language.syntax import RosType, UnspecifiedType
 from avow.language.terms import Role, Term
+from avow.tuning.sizes import CONTRACT_PARTS, NESTING
 
 ROS_BUILTINS = (
     *("bool", "byte", "char", "string", "wstring", "time", "duration", "float32", "float64"),
@@ -118,14 +118,14 @@ def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bo
     before = environment.written_out
     environment.written_out += size
     hint = "use fewer or smaller constants"
-    if environment.written_out > MAX_WRITTEN_OUT >= before:
-        message = f"up to here, the formulas have more than {MAX_WRITTEN_OUT:,} parts once constants are written out"
+    if environment.written_out > CONTRACT_PARTS >= before:
+        message = f"up to here, the formulas have more than {CONTRACT_PARTS:,} parts once constants are written out"
         reports.error("RCL110", message, place.start, place.end, hint=hint)
-    elif depth > 2 * MAX_DEPTH:
-        message = f"with its constants written out, this is nested {depth} levels deep; {2 * MAX_DEPTH} is the most"
+    elif depth > 2 * NESTING:
+        message = f"with its constants written out, this is nested {depth} levels deep; {2 * NESTING} is the most"
         reports.error("RCL110", message, place.start, place.end, hint=hint)
         return False
-    return environment.written_out <= MAX_WRITTEN_OUT
+    return environment.written_out <= CONTRACT_PARTS
 
 
 def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]:

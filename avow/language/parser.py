@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, overload
 
-from avow.language.chains import LONG
 from avow.language.lexer import Token
 from avow.language.source import Reports
 from avow.language.syntax import (
@@ -60,10 +59,8 @@ from avow.language.syntax import (
     UnspecifiedType,
 )
 from avow.language.terms import Quantifier
-
-MAX_DEPTH = 150
-"""How deep a formula or type may be nested. Every later pass may recurse as deep as this. A chain of operators is no
-nesting: its terms are made shallow by `avow.language.chains`."""
+from avow.tuning.bounds import CHAIN
+from avow.tuning.sizes import NESTING
 
 QUANTIFIERS = {"FORALL": Quantifier.FORALL, "EXISTS": Quantifier.EXISTS, "UNIQUE": Quantifier.UNIQUE}
 STARTS = ("declaration", "ports", "topics", "formula")
@@ -110,10 +107,10 @@ def parse(start: str, tokens: Sequence[Token], reports: Reports, end: int, begin
         return None
     if start in ("formula", "topics") and reports.is_torn(begin, end):
         return None  # what it says would be something else
-    if tree.depth > MAX_DEPTH:
+    if tree.depth > NESTING:
         reports.error(
             "RCL110",
-            f"this is nested {tree.depth} levels deep; {MAX_DEPTH} is the most",
+            f"this is nested {tree.depth} levels deep; {NESTING} is the most",
             tree.start,
             min(tree.end, tree.start + 1),
             hint="split the clause, or name its parts",
@@ -246,7 +243,7 @@ def _deepest(parts: Iterable[Any]) -> int:
 
 def _chain_depth(operands: Sequence[Any]) -> int:
     """A chain of operators counts as deep as its term becomes."""
-    return _deepest(operands) - 1 + min(len(operands) - 1, LONG)
+    return _deepest(operands) - 1 + min(len(operands) - 1, CHAIN)
 
 
 _Binders = tuple[Binder, ...]

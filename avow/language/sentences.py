@@ -14,7 +14,7 @@ from fractions import Fraction
 
 from avow.language.bounds import bounds, constant
 from avow.language.contract import Clause, Node
-from avow.language.english import LONGEST, Comparison, both_ways, comparisons, is_one_way, mentions
+from avow.language.english import Comparison, both_ways, comparisons, is_one_way, mentions
 from avow.language.printer import show_number, show_term
 from avow.language.sorts import BOOL, DataSort, EnumSort, components
 from avow.language.terms import (
@@ -33,8 +33,8 @@ from avow.language.terms import (
     Variable,
     subterms,
 )
-
-_SHOWN = 60
+from avow.tuning.shown import SENTENCE_CHARACTERS
+from avow.tuning.sizes import SENTENCE
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ def mismatches(clause: Clause, elements: Mapping[str, str]) -> Iterator[Mismatch
 
 def differences(sentence: str, formula: Term, elements: Mapping[str, str]) -> Iterator[Mismatch]:
     """What a sentence is seen to say otherwise than a formula in which these elements could stand."""
-    sentence = sentence[:LONGEST]
+    sentence = sentence[:SENTENCE]
     yield from _comparisons(sentence, formula)
     yield from _directions(sentence, formula)
     yield from _elements(sentence, formula, elements)
@@ -118,7 +118,7 @@ def _plain(number: Fraction) -> str:
 
 def _short(text: str) -> str:
     text = " ".join(text.split())
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 1]}…"
+    return text if len(text) <= SENTENCE_CHARACTERS else f"{text[: SENTENCE_CHARACTERS - 1]}…"
 
 
 # --- one way or both -------------------------------------------------------------------------------------------------

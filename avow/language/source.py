@@ -7,10 +7,7 @@ from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
-
-MAX_DIAGNOSTICS = 200
-"""More than this of one file are of no use to anyone: reading ends there."""
-
+from avow.tuning.shown import DIAGNOSTICS
 
 _LONG_NAME = re.compile(r"(`[^`]{50})[^`]{30,}`")
 
@@ -91,7 +88,7 @@ class Reports:
     @property
     def full(self) -> bool:
         """Whether nothing more is kept, so that looking for more is in vain."""
-        return len(self.found) >= MAX_DIAGNOSTICS
+        return len(self.found) >= DIAGNOSTICS
 
     @property
     def failed(self) -> bool:

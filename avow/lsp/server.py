@@ -20,6 +20,7 @@ from avow.lsp import answers
 from avow.lsp.answers import Document, StatusLookup, Symbol
 from avow.lsp.surroundings import about_plan, companions, file_of
 from avow.system.load import PLAN_FILE
+from avow.tuning.running import CHARACTERS_PER_SECOND, NOTICED_SECONDS
 
 _SEVERITIES = {
     Severity.ERROR: types.DiagnosticSeverity.Error,
@@ -33,13 +34,6 @@ _KINDS = {
     "assumption": types.SymbolKind.Event,
     "guarantee": types.SymbolKind.Function,
 }
-
-
-CHARACTERS_PER_SECOND = 500_000
-"""About how fast texts are checked: a text so long that it takes a while is checked when its author pauses."""
-
-NOTICED = 0.05
-"""So many seconds are a while."""
 
 
 def _nothing(file: str) -> StatusLookup:
@@ -103,7 +97,7 @@ def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageSer
         if Path(file_of(uri)).name == PLAN_FILE:
             return  # a plan is read from the disk, once it is saved
         pause = len(_text(server, uri)) / CHARACTERS_PER_SECOND
-        if pause < NOTICED:
+        if pause < NOTICED_SECONDS:
             refresh_all(uri)
             return
         if uri in later:

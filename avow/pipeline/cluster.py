@@ -22,17 +22,12 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.pipeline.executors import GRACE, Asked, Came, answered
+from avow.pipeline.executors import Asked, Came, answered
 from avow.pipeline.requests import Tools
+from avow.tuning.running import CLUSTER_CONNECT, CLUSTER_RETRIES, WORKER_GRACE
 
 _TLS = {"ca": "AVOW_TLS_CA", "cert": "AVOW_TLS_CERT", "key": "AVOW_TLS_KEY"}
 """Environment: files of the certificate authority, of this side's certificate and of its key."""
-
-_CONNECT = 30.0
-"""Seconds."""
-
-_RETRIES = 2
-"""How often a work whose worker died is given to another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +113,7 @@ class Cluster:
                 security=address.security(),
                 deserializers=["msgpack"],
                 set_as_default=False,
-                timeout=_CONNECT,
+                timeout=CLUSTER_CONNECT,
                 name="avow",
             )
         except (OSError, TimeoutError, ValueError) as error:
@@ -140,7 +135,7 @@ class Cluster:
         return sum(info["nthreads"] for info in self._client.scheduler_info(n_workers=-1)["workers"].values())
 
     def submit(self, asked: Asked) -> None:
-        seconds = asked.request.seconds + GRACE
+        seconds = asked.request.seconds + WORKER_GRACE
         with self._lock:
             if asked.key in self._futures:
                 return
@@ -151,7 +146,7 @@ class Cluster:
                 seconds,
                 key=f"avow-{asked.key}",
                 pure=False,
-                retries=_RETRIES,
+                retries=CLUSTER_RETRIES,
                 resources={resource(tool): 1 for tool in asked.request.wanted},
             )
             self._futures[asked.key] = future
@@ -182,7 +177,7 @@ def _fetched(asked: Asked, future: Any) -> Came:
     if future.status != "finished":
         return Came(asked.key, failure="the workers that had it were lost, or did not take it on")
     try:
-        said = future.result(timeout=_CONNECT)
+        said = future.result(timeout=CLUSTER_CONNECT)
     except Exception as error:  # what cannot be read is no answer, whatever it is
         return Came(asked.key, failure=f"the answer cannot be read: {type(error).__name__}"[:200])
     if not isinstance(said, bytes) or said[:1] not in (b"+", b"-"):
@@ -217,7 +212,7 @@ def serve(address: Address, slots: int, tools: Tools) -> None:
             resources={resource(tool): slots for tool in tools if tool[1]},
             host="127.0.0.1" if not address.secure else None,
             dashboard=False,
-            death_timeout=_CONNECT,
+            death_timeout=CLUSTER_CONNECT,
         )
         async with worker:
             await worker.finished()

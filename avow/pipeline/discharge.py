@@ -27,6 +27,7 @@ from avow.pipeline.export import folder
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
+from avow.tuning.bounds import CASES_KEPT
 
 
 @functools.cache
@@ -108,17 +109,13 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     return report.outcomes
 
 
-KEPT = 50
-"""Cases of one claim that are tried again."""
-
-
 def _kept(workspace: Workspace, work: Work, obligations: tuple[Obligation, ...]) -> dict[str, list[Any]]:
     """Obligation → the cases that refuted it once, newest first, whatever the subject and the options were."""
     ledger, found = ledger_of(workspace.ledger(work.system.name)), dict[str, list[Any]]()
     for o in obligations:
         cases = [e.evidence.details[CASE] for e in reversed(ledger.refutations(o.id, o.digest, work.engine))]
         if cases:
-            found[o.id] = list({json.dumps(case, sort_keys=True): case for case in cases}.values())[:KEPT]
+            found[o.id] = list({json.dumps(case, sort_keys=True): case for case in cases}.values())[:CASES_KEPT]
     return found
 
 

@@ -12,6 +12,9 @@ from avow.backend_kit.protocol import Backend
 from avow.base.files import digest_file
 
 _ROOMS = (
+    "tuning/effort.py",
+    "tuning/bounds.py",
+    "tuning/sizes.py",
     "base",
     "isolation",
     "language",

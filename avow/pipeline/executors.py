@@ -18,12 +18,7 @@ from typing import Protocol
 from avow.base.process import Completed
 from avow.pipeline import forks
 from avow.pipeline.requests import Request, request_bytes, request_digest
-
-GRACE = 90.0
-"""Seconds above the tool's own limits that a worker gets to translate and write."""
-
-_LATE = 3600.0
-"""Seconds above all that for works that wait for their turn."""
+from avow.tuning.running import QUEUE_PATIENCE, WORKER_GRACE
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +105,7 @@ class Local:
 
     def _run(self, asked: Asked, stopped: threading.Event) -> None:
         try:
-            came = answered(asked.data, asked.key, asked.request.seconds + GRACE, self._cwd, stopped.is_set)
+            came = answered(asked.data, asked.key, asked.request.seconds + WORKER_GRACE, self._cwd, stopped.is_set)
         except Exception as error:  # whoever asked waits for an answer
             came = Came(asked.key, failure=f"{type(error).__name__}: {error}")
         with self._lock:
@@ -163,7 +158,7 @@ class Desk:
         if first:
             self.executor.submit(asked)
         # the executor bounds the time; what lies beyond that is its own fault, and must not hang a run
-        came = waiting.there.wait(request.seconds + GRACE + _LATE)
+        came = waiting.there.wait(request.seconds + WORKER_GRACE + QUEUE_PATIENCE)
         with self._lock:
             waiting.asked_by -= 1
             if not waiting.asked_by:  # who asks again later wants to know how it is then

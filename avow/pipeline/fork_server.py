@@ -23,6 +23,7 @@ from typing import NoReturn
 
 from avow.base.process import die_with, forget_orphans, kill_tree
 from avow.pipeline import worker
+from avow.tuning.running import FORK_MESSAGE
 
 PRELOADED = (
     "avow.calculus.interpretation",
@@ -35,8 +36,6 @@ PRELOADED = (
     "avow.system.formulas",
 )
 """What nearly every work needs, directly or not."""
-
-_MESSAGE = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +83,7 @@ def serve(control: socket.socket) -> int:
 def _next(control: socket.socket, events: selectors.BaseSelector) -> _Fork | None:
     """Start what the next message asks for; None at the end of all messages."""
     try:
-        message, descriptors, _, _ = socket.recv_fds(control, _MESSAGE, 2)
+        message, descriptors, _, _ = socket.recv_fds(control, FORK_MESSAGE, 2)
     except OSError:
         message, descriptors = b"", []
     if not message:

@@ -26,6 +26,8 @@ from pathlib import Path
 
 from avow.base import process
 from avow.base.process import Completed
+from avow.tuning.running import FORK_LOOK, FORK_START, FORK_STOP
+from avow.tuning.sizes import OUTPUT_KEPT
 
 WORKER = "avow.pipeline.worker"
 PLAIN = "AVOW_PLAIN_WORKERS"
@@ -37,15 +39,6 @@ def _python() -> dict[str, str]:
     the same modules again."""
     return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": process.python_path()}
 
-
-_START = 60.0
-"""Seconds that the server gets for its imports."""
-
-_LOOK = 0.5
-"""Seconds between two looks whether a work is still wanted."""
-
-_STOP = 15.0
-"""Seconds that it gets to kill a fork."""
 
 _lock = threading.Lock()
 _servers: list[_Server] = []
@@ -132,7 +125,7 @@ class _Server:
     def ready(self) -> bool:
         """Wait until it has imported everything."""
         try:
-            self._control.settimeout(_START)
+            self._control.settimeout(FORK_START)
             ready = self._control.recv(16) == b"ready"
             self._control.settimeout(None)
         except OSError:
@@ -163,7 +156,7 @@ class _Server:
                 if not ended:
                     _end(mine)
             errors.seek(0)
-            text = errors.read(process.KEEP).decode("utf-8", errors="replace")
+            text = errors.read(OUTPUT_KEPT).decode("utf-8", errors="replace")
             return Completed((WORKER, *arguments), code, "", text, time.monotonic() - start)
 
     def close(self) -> None:
@@ -182,7 +175,7 @@ def _code(connection: socket.socket, end: float, stopped: Callable[[], bool] | N
     said = b""
     while True:
         left = end - time.monotonic()
-        connection.settimeout(max(0.001, left if stopped is None else min(left, _LOOK)))
+        connection.settimeout(max(0.001, left if stopped is None else min(left, FORK_LOOK)))
         try:
             said = connection.recv(32)
         except TimeoutError:
@@ -200,5 +193,5 @@ def _end(connection: socket.socket) -> None:
     """Have the fork killed, and wait until it is."""
     with contextlib.suppress(OSError):
         connection.shutdown(socket.SHUT_WR)
-        connection.settimeout(_STOP)
+        connection.settimeout(FORK_STOP)
         connection.recv(32)

@@ -29,6 +29,7 @@ from avow.kernel.solvers import Second, Solvers, versions
 from avow.pipeline.engine_code import trusted_parts
 from avow.pipeline.work import COMPOSE, texts_digest
 from avow.system.plan import System
+from avow.tuning.running import RECHECK_SECOND
 
 FILE = "certificates.json"
 
@@ -82,13 +83,9 @@ def kernel_run(entries: Sequence[Entry], root: Path, system: System, run: str) -
         start = time.monotonic()
         # Z3's answers first: what cvc5 is asked is only what holds already
         good = [r for r in records if _holds(r, root, system) is not None]
-        allowance = max(LEAST_FOR_SECOND, sum(r.seconds for r in good) - (time.monotonic() - start))
+        allowance = max(RECHECK_SECOND, sum(r.seconds for r in good) - (time.monotonic() - start))
         checked.runs[asked] = _twice(good, texts, system, run, allowance, checked.solvers)
     return checked.runs[asked]
-
-
-LEAST_FOR_SECOND = 1.0
-"""Seconds that the second solver has at least: its process has to begin."""
 
 
 def _twice(

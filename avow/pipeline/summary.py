@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import IO
 
 from avow.pipeline.results import Result
+from avow.tuning.shown import GATE_REASON
 
 GOOD = ("proved", "checked", "tested", "monitored", "reviewed", "justified")
 BAD = ("refuted", "contradictory", "error", "missing", "stale", "vacuous", "unknown", "not-run", "unsupported")
@@ -78,17 +79,12 @@ def results_json(results: Sequence[Result], broken: Sequence[str], earlier: Sequ
     return json.dumps({**whole, "exit_code": 2 if broken else exit_code}, indent=1, ensure_ascii=False) + "\n"
 
 
-_MOST = 240
-"""Characters of a failing gate's reason on the terminal."""
-
-
 def _few(reason: str) -> str:
     """The reason as far as a person reads it there; what to do next is kept."""
     why, mark, step = reason.partition("; next: ")
-    short = (
-        why if len(why) <= _MOST else f"{why[:_MOST].rpartition(';')[0] or why[: _MOST - 1] + '…'}; all in the report"
-    )
-    return short + mark + step.partition("; next: ")[0]
+    if len(why) > GATE_REASON:
+        why = f"{why[:GATE_REASON].rpartition(';')[0] or why[: GATE_REASON - 1] + '…'}; all in the report"
+    return why + mark + step.partition("; next: ")[0]
 
 
 def _gates(result: Result) -> str:

@@ -19,10 +19,9 @@ from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
 from avow.report.page import asset, environment
+from avow.tuning.shown import NODE_BOXES
 
 TONE_MARKS = {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}
-_BOXES = 12
-"""So many guarantees of a node have a box each; more are grouped by where they stand."""
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
 WORDS = (
     ("proved", "for all inputs, by a sound method"),
@@ -138,7 +137,7 @@ def _guarantee(case: Case, view: ObligationView) -> dict[str, Any]:
 
 
 def _boxes(cells: Sequence[dict[str, Any]], basis: NodeBasis) -> list[tuple[Tone, tuple[str, str]]]:
-    if len(cells) <= _BOXES:
+    if len(cells) <= NODE_BOXES:
         return [(cell["tone"], (cell["word"], cell["view"].obligation.claim)) for cell in cells]
     tones = {cell["word"]: cell["tone"] for cell in cells}
     return [(tones.get(part.split(" ", 1)[1], Tone.RED), (part, "")) for part in basis.words.split(", ")]

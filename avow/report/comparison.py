@@ -10,6 +10,7 @@ from markupsafe import Markup
 from avow.assurance.compare import ORDER, Change
 from avow.evidence.status import Status
 from avow.report.page import asset, environment
+from avow.tuning.shown import CHANGES_UNFOLDED
 
 _HEADINGS = {
     "gate": "Gates of the policy",
@@ -40,8 +41,6 @@ _TONES = {
     "better": "good",
     "rerun": "plain",
 }
-FOLDED = 40
-"""Longer groups are folded, but for what got worse."""
 
 
 def render_comparison(old: str, new: str, changes: Sequence[tuple[str, Change]]) -> str:
@@ -64,7 +63,7 @@ def render_comparison(old: str, new: str, changes: Sequence[tuple[str, Change]])
             counts=[(kind, counts[kind], _WORDS[kind], _tone(kind, changes)) for kind in ORDER if counts[kind]],
             headings=_HEADINGS,
             known={status.value for status in Status},
-            folded=FOLDED,
+            folded=CHANGES_UNFOLDED,
             style=Markup(asset("style.css")),  # our own file
         )
     )

@@ -9,15 +9,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from avow.base.verdict import Counterexample
+from avow.tuning.shown import ROWS_LEFT_OUT, RUN_ROWS
 
 ANOTHER = " (another)"
 """Ends the name of a second value that the contract allows just as well."""
 _FIRST, _LAST = 8, 12
 """Rows of a long run that are shown on paper, which has no scroll bar: where it starts, and where it goes wrong."""
-MOST = 200
-"""Rows of a run that the page shows at all."""
-_SHORT = 3
-"""Leaving out fewer rows than this is not worth a note."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +90,8 @@ def run(example: Counterexample) -> Run:
         cells = tuple(Cell(text, new) for text, new in zip(told, changed, strict=True))
         rows.append(StepRow(label, cells, small, first == example.loop, False))
         before = told
-    shown = rows[:MOST]
-    if len(shown) > _FIRST + _LAST + _SHORT:
+    shown = rows[:RUN_ROWS]
+    if len(shown) > _FIRST + _LAST + ROWS_LEFT_OUT:
         shown = [
             StepRow(r.label, r.cells, r.small, r.returns, _FIRST <= at < len(shown) - _LAST)
             for at, r in enumerate(shown)

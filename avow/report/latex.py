@@ -10,6 +10,7 @@ from avow.assurance.naming import short
 from avow.report.exchange import headline
 from avow.report.source import plain_lines
 from avow.report.wording import clean, verdict_line, worth
+from avow.tuning.shown import CONTRACT_LINES
 
 
 def _read(table: str) -> dict[str, str]:
@@ -36,10 +37,6 @@ _DANGEROUS = re.compile(
     r"|verbatiminput|lstinputlisting)(?![A-Za-z])|\^\^"
 )
 """Commands that do more than print: a derivation's LaTeX that holds one is shown as plain text instead."""
-
-
-_LINES = 1200
-"""Lines of a contract in the appendix, which then says so."""
 
 
 def latex(text: str) -> str:
@@ -105,12 +102,12 @@ def _latex_source(source: SourceView) -> Iterable[str]:
     lines = list(plain_lines(source))
     yield rf"\section{{{latex(source.path)}, as written}}"
     yield r"{\footnotesize\ttfamily\raggedright\setlength{\parskip}{0pt}"
-    for line in lines[:_LINES]:
+    for line in lines[:CONTRACT_LINES]:
         shown = line.expandtabs(2)
         margin = len(shown) - len(shown.lstrip(" "))
         yield rf"\hangindent={margin / 2 + 2:g}em {'~' * margin}{latex(shown[margin:])}\strut\par"
-    if len(lines) > _LINES:
-        yield rf"\normalfont and {len(lines) - _LINES} more lines: see report.json\par"
+    if len(lines) > CONTRACT_LINES:
+        yield rf"\normalfont and {len(lines) - CONTRACT_LINES} more lines: see report.json\par"
     yield "}"
 
 

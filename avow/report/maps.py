@@ -16,6 +16,7 @@ from markupsafe import Markup, escape
 from avow.assurance.model import MapView
 from avow.base.verdict import Counterexample
 from avow.report.example import is_small
+from avow.tuning.shown import MAP_STEPS
 
 _NUMBER = r"[-+−]?\d{1,12}(?:[./]\d{1,12})?"
 _COORDINATES = re.compile(rf"\(\s*({_NUMBER})\s*,\s*({_NUMBER})\s*\)")
@@ -24,7 +25,6 @@ _PORT = re.compile(r"^[A-Za-z_]\w*\.[A-Za-z_]\w*")
 """Values of ports are the contract's; what else a tool tells (beliefs, percepts) may hold pairs that are no places."""
 _SIZE = 300.0
 _MARGIN = 26.0
-_MOST_STEPS = 200
 _STYLE = (
     "<style>text{font:10px 'Libertinus Serif',serif;fill:#5b6472}.spot{fill:#5b6472}.hit{fill:#a01c15}"
     ".off{stroke:#a01c15;stroke-width:2;fill:none}"
@@ -99,7 +99,7 @@ def _path(example: Counterexample, view: MapView, known: dict[str, Place]) -> It
     """A place is entered in the step in which it is first spoken of again: beliefs and relations persist."""
     before: set[Place] = set()
     last = None
-    for at, step in enumerate(example.trace[:_MOST_STEPS]):
+    for at, step in enumerate(example.trace[:MAP_STEPS]):
         now = dict.fromkeys(p for name, value in step for p in _places(name, value, view, known))
         for place in now:
             if place not in before and place != last:

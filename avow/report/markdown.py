@@ -14,12 +14,9 @@ from avow.evidence.status import Status
 from avow.report.short import markdown_head
 from avow.report.source import plain_lines
 from avow.report.wording import bound_text, clean, gate_line, mutation, open_line, where, worth
+from avow.tuning.shown import SUMMARY_ROWS, SUMMARY_SOURCE
 
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]#|<>~&$])")
-_LONG = 200
-"""Rows of a table in the summary; all of them are in report.json."""
-_MOST_SOURCE = 40_000
-"""Characters of contracts in the summary: code hosts cut a comment at some 65,000."""
 
 
 _BOUNDED = (Status.CHECKED, Status.TESTED, Status.MONITORED)
@@ -85,12 +82,12 @@ def _remarks(case: Case) -> Iterable[str]:
     found = [item for item in case.open_items if item.kind == REMARK]
     if found:
         yield "## Remarks on contracts and models"
-        yield "\n".join(f"- {_md(item.title)} ({_md(item.text)})" for item in found[:_LONG])
+        yield "\n".join(f"- {_md(item.title)} ({_md(item.text)})" for item in found[:SUMMARY_ROWS])
 
 
 def _contracts(case: Case) -> Iterable[str]:
     """The contracts' texts between fences that are longer than any within."""
-    room = _MOST_SOURCE
+    room = SUMMARY_SOURCE
     for source in case.sources:
         if not source.is_contract:
             continue
@@ -130,8 +127,8 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     lines = ["| " + " | ".join(row) + " |" for row in rows]
     if not lines:
         return "None." if len(head) > 2 else ""
-    more = f"\n\nand {len(lines) - _LONG} more: see report.json" if len(lines) > _LONG else ""
-    return "\n".join(["| " + " | ".join(head) + " |", "|" + " --- |" * len(head), *lines[:_LONG]]) + more
+    more = f"\n\nand {len(lines) - SUMMARY_ROWS} more: see report.json" if len(lines) > SUMMARY_ROWS else ""
+    return "\n".join(["| " + " | ".join(head) + " |", "|" + " --- |" * len(head), *lines[:SUMMARY_ROWS]]) + more
 
 
 def _md(text: str) -> str:

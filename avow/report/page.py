@@ -26,19 +26,9 @@ from avow.report.gsn import cae_rows
 from avow.report.maps import draw_map
 from avow.report.support_counts import resting
 from avow.report.wording import history
+from avow.tuning.shown import ARGUMENT_ELEMENTS, FINDING_CHARACTERS, GUARANTEE_ROWS, OBLIGATIONS_IN_FULL, ROWS_UNFOLDED
 
 KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.WELL_FORMED)
-_OPEN_AT_ONCE = 60
-"""So many rows of a long list are shown at once; the rest is folded."""
-_IN_FULL = 1500
-"""So many obligations are shown with everything, those with something to tell first; the others in brief, so that a
-page over ten thousand is still a page that opens."""
-_ROWS = 600
-"""So many guarantees have a row of their own in the summary; beyond that a node has one."""
-_A_LINE = 240
-"""Characters of a finding in the answer; all of it stands with the obligation."""
-_LISTED = 2500
-"""So many elements of the argument are listed on one page; all are in gsn.yaml."""
 
 
 _Matrix = list[tuple[str, str, list[tuple[ObligationView, list[Status | None]]]]]
@@ -109,8 +99,8 @@ def render_page(case: Case, json_digest: str = "") -> str:
             views=views,
             known=known,
             counts=_counts(case.obligations),
-            matrix=matrix if rows <= _ROWS else [],
-            condensed=_condensed(matrix) if rows > _ROWS else [],
+            matrix=matrix if rows <= GUARANTEE_ROWS else [],
+            condensed=_condensed(matrix) if rows > GUARANTEE_ROWS else [],
             outline_of=_outlines(argument),
             graph=_graph(case),
             places=places,
@@ -135,7 +125,7 @@ def render_page(case: Case, json_digest: str = "") -> str:
             json_digest=json_digest,
             cae=list(cae_rows(case)),
             kinds=[kind for kind in KINDS if any(view.obligation.kind is kind for view in views)],
-            open_at_once=_OPEN_AT_ONCE,
+            open_at_once=ROWS_UNFOLDED,
         )
     )
 
@@ -230,10 +220,10 @@ def _reading_order(case: Case) -> Any:
 
 
 def _in_full(views: Sequence[ObligationView]) -> set[str]:
-    if len(views) <= _IN_FULL:
+    if len(views) <= OBLIGATIONS_IN_FULL:
         return {view.id for view in views}
     telling = [view.id for view in views if not view.standing.supports or view.handled or history(view)]
-    return set(telling[:_IN_FULL])
+    return set(telling[:OBLIGATIONS_IN_FULL])
 
 
 def _brief(view: ObligationView, places: Mapping[str, tuple[int, int]]) -> Markup:
@@ -261,7 +251,7 @@ def _found(view: ObligationView) -> str:
     """What refutes a claim, in a line; empty where nothing does."""
     shown = next((e.counterexample for e in (v.entry.evidence for v in view.counting) if e.counterexample), None)
     text = shown.text() if shown is not None and not view.status.supports else ""
-    return text if len(text) <= _A_LINE else text[: _A_LINE - 1] + "…"
+    return text if len(text) <= FINDING_CHARACTERS else text[: FINDING_CHARACTERS - 1] + "…"
 
 
 def _by_item(items: Sequence[OpenItem]) -> dict[str, list[OpenItem]]:
@@ -324,7 +314,7 @@ def _outlines(argument: Argument) -> dict[str, list[tuple[int, Element]]]:
     """Each requirement's argument as an indented list: (depth, element), for those who do not look at pictures."""
     known = {element.id: element for element in argument.elements}
     found: dict[str, list[tuple[int, Element]]] = {}
-    room = _LISTED
+    room = ARGUMENT_ELEMENTS
     for requirement, start in argument.goals:
         if room <= 0:
             break

@@ -20,15 +20,8 @@ from avow.report.answers_page import TONE_MARKS, full_reason, some
 from avow.report.maps import map_picture
 from avow.report.source import plain_lines
 from avow.report.wording import MARKS, bound_text, clean, in_lines, protocol, tone, worth
+from avow.tuning.shown import CONTRACT_LINES, PDF_COLUMNS, PDF_OBLIGATIONS
 
-_MOST = 500
-"""Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
-
-_LINES = 1200
-"""Lines of a contract in the PDF, which then says so."""
-
-_MOST_COLUMNS = 9
-"""Columns of a run that fit on a page; a wider one is told by its reason alone."""
 _GATE = {
     "passes": {"word": "passes", "tone": "good"},
     "fails": {"word": "fails", "tone": "bad"},
@@ -54,7 +47,7 @@ def render_pdf(case: Case) -> bytes:
 
 
 def _data(case: Case) -> dict[str, Any]:
-    views = case.obligations[:_MOST]
+    views = case.obligations[:PDF_OBLIGATIONS]
     levels = {node.name: node.criticality for node in case.nodes}
     nodes = dict.fromkeys(v.obligation.node for v in views if v.obligation.kind is Kind.GUARANTEE)
     facts = [("system", case.system), ("grade", f"{case.grade}: {case.grade_reason}"), ("policy", case.policy.name)]
@@ -86,10 +79,10 @@ def _data(case: Case) -> dict[str, Any]:
                 "next": i.suggestion,
                 "status": _word(i.kind),
             }
-            for i in case.open_items[:_MOST]
+            for i in case.open_items[:PDF_OBLIGATIONS]
             if not i.advice
         ],
-        "remarks": [f"{i.title} ({i.text})" for i in case.open_items if i.kind == REMARK][:_MOST],
+        "remarks": [f"{i.title} ({i.text})" for i in case.open_items if i.kind == REMARK][:PDF_OBLIGATIONS],
         "matrix": [
             {
                 "name": node,
@@ -128,8 +121,12 @@ def _data(case: Case) -> dict[str, Any]:
 
 def _source(source: SourceView) -> dict[str, Any]:
     lines = list(plain_lines(source))
-    more = f"and {len(lines) - _LINES} more lines: see report.json" if len(lines) > _LINES else ""
-    return {"path": source.path, "lines": [[str(at), line] for at, line in enumerate(lines[:_LINES], 1)], "more": more}
+    more = f"and {len(lines) - CONTRACT_LINES} more lines: see report.json" if len(lines) > CONTRACT_LINES else ""
+    return {
+        "path": source.path,
+        "lines": [[str(at), line] for at, line in enumerate(lines[:CONTRACT_LINES], 1)],
+        "more": more,
+    }
 
 
 def _first(case: Case) -> dict[str, Any]:
@@ -238,7 +235,7 @@ def _counter(case: Case, shown: Counterexample) -> dict[str, Any]:
         "why": shown.explanation or "what the contract leaves open",
         "values": [[v.name, v.value, v.other] for v in told],
         "other": any(v.other for v in told),
-        "columns": list(found.columns) if found.columns and len(found.columns) <= _MOST_COLUMNS else [],
+        "columns": list(found.columns) if found.columns and len(found.columns) <= PDF_COLUMNS else [],
         "rows": [[row.label + (" ↺" if row.returns else ""), *([c.text, c.new] for c in row.cells)] for row in rows],
         "note": "; ".join(notes),
         "maps": [{"svg": svg, "told": words} for svg, words in pictures if svg],

@@ -21,11 +21,7 @@ from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.language.pygments_lexer import RclLexer
 from avow.report.wording import MARKS, anchor, clean, tone
-
-_PLAIN_BEYOND = 400_000
-"""Characters of a file that are still coloured: colours triple a page, and nobody reads that much of it."""
-_ANCHORED = 4_000
-"""So many lines have an anchor each; of longer files only those that something in the report points at."""
+from avow.tuning.shown import ANCHORED_LINES, COLOURED_CHARACTERS
 
 _COLOURS: tuple[tuple[_TokenType, str], ...] = (
     (Comment, "c"),
@@ -78,7 +74,7 @@ def lines_of(case: Case, number: int) -> Markup:
     lines = _coloured(source)
     rows = []
     for at, shown in enumerate(lines, 1):
-        name = f' id="{line_anchor(number, at)}"' if len(lines) <= _ANCHORED or at in needed else ""
+        name = f' id="{line_anchor(number, at)}"' if len(lines) <= ANCHORED_LINES or at in needed else ""
         rows.append(f"<div{name}>{''.join(notes.get(at, ()))}{shown or ' '}</div>")
     return Markup("".join(rows))  # every piece is escaped
 
@@ -111,7 +107,7 @@ def _lexer(is_contract: bool) -> Lexer:
 
 def _coloured(source: SourceView) -> list[str]:
     """The text's lines as HTML."""
-    if len(source.text) > _PLAIN_BEYOND:
+    if len(source.text) > COLOURED_CHARACTERS:
         return [_shown(line) for line in visible_lines(source.text)]
     text = "\n".join(visible_lines(source.text))
     lines = [""]

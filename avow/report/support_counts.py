@@ -7,14 +7,13 @@ from collections import Counter
 from avow.assurance.model import Case
 from avow.assurance.naming import derivation_claim, requirement_claim
 from avow.evidence.status import Status
-
-_MOST_STEPS = 2_000_000
+from avow.tuning.bounds import SUPPORT_STEPS
 
 
 def resting(case: Case) -> dict[str, list[tuple[Status, int]]]:
     """How many claims of which status each supported requirement rests on, through derivations and all: one word for
     the weakest of them does not tell that five others were only tested. Empty where that would take too long."""
-    if len(case.requirements) * len(case.obligations) > _MOST_STEPS:
+    if len(case.requirements) * len(case.obligations) > SUPPORT_STEPS:
         return {}
     below = {view.id: view.rests_on for view in case.obligations}
     below |= {derivation_claim(d.derivation.name): d.rests_on for d in case.derivations}

@@ -13,6 +13,7 @@ from avow.assurance.model import Case, EvidenceView, ObligationView
 from avow.evidence.obligation import Kind
 from avow.evidence.record import RETRY, Evidence
 from avow.evidence.status import Status, weigh
+from avow.tuning.shown import DETAILS, FORMULA_COLUMNS
 
 MARKS = {
     Status.PROVED: "✔",
@@ -59,7 +60,6 @@ MEANINGS = {
 }
 
 _DIGEST = re.compile(r"[0-9a-f]{64}\Z")
-_MOST_DETAILS = 6000
 _GOOD = frozenset({Status.PROVED, Status.CHECKED})
 _BAD = frozenset({Status.REFUTED, Status.CONTRADICTORY, Status.CIRCULAR})
 
@@ -185,7 +185,6 @@ def banner_tone(case: Case) -> str:
 
 _CONNECTIVES = ("→↔⇒⇔", "∨", "∧")
 """Weakest first."""
-_LONG_FORMULA = 88
 
 
 def in_lines(formula: str) -> str:
@@ -196,7 +195,7 @@ def in_lines(formula: str) -> str:
     stack = [(0, formula)]
     while stack:
         margin, text = stack.pop()
-        parts = _split(text) if len(text) + margin > _LONG_FORMULA and margin <= 32 else []
+        parts = _split(text) if len(text) + margin > FORMULA_COLUMNS and margin <= 32 else []
         if parts:
             stack += [(margin + indent, part) for indent, part in reversed(parts)]
         else:
@@ -313,7 +312,7 @@ def details_text(evidence: Evidence) -> str:
         key: value for key, value in evidence.details.items() if key not in shown and value not in ("", [], {}, None)
     }
     text = "\n".join(_indented(rest, ""))
-    return text if len(text) <= _MOST_DETAILS else text[:_MOST_DETAILS] + "\n… (all of it is in report.json)"
+    return text if len(text) <= DETAILS else text[:DETAILS] + "\n… (all of it is in report.json)"
 
 
 def _indented(value: object, margin: str) -> Iterator[str]:

@@ -24,6 +24,7 @@ from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, claims, node_key, triggers
 from avow.sanity.results import Bounds, Patience, SanityResult, as_outcome, listing
 from avow.solving.limits import now
+from avow.tuning.effort import CONSISTENT_MS
 
 if TYPE_CHECKING:
     from avow.sanity.conflicts import Conflict
@@ -118,10 +119,6 @@ def _result(node: Node, claim: Claim, finding: _Finding, seconds: float) -> Sani
     )
 
 
-_GLANCE_MS = 300
-"""Whether a contract is consistent is asked for so long; then, whether it is realizable, which says more."""
-
-
 class _Analysis:
     """One node under analysis. Each claim is settled once, others ask for it."""
 
@@ -196,8 +193,8 @@ class _Analysis:
     def _consistent(self) -> _Finding:
         together = {**self.assumptions, **self.guarantees}
         texts = ("no inputs and outputs meet {} together", "no inputs and outputs meet {}")
-        finding = self._possible(together, *texts, limit=_GLANCE_MS)
-        if finding.verdict is Verdict.UNKNOWN and self.limit > _GLANCE_MS:
+        finding = self._possible(together, *texts, limit=CONSISTENT_MS)
+        if finding.verdict is Verdict.UNKNOWN and self.limit > CONSISTENT_MS:
             answer, bounded = self._realizability()
             if answer.verdict is Verdict.PROVED and not bounded:
                 allowed = self._other("assumptions-satisfiable")

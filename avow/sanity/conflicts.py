@@ -21,6 +21,8 @@ from avow.solving.counterexample import show_values
 from avow.solving.limits import now
 from avow.solving.questions import Unsupported, solve
 from avow.solving.z3_module import z3
+from avow.tuning.bounds import CONFLICTS
+from avow.tuning.effort import CONFLICT_MS
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +80,6 @@ def conflicts(
     return tuple(_explain(tuple(sorted(clauses, key=order.__getitem__)), group, at, seed) for clauses, at in listed)
 
 
-_MANY = 8
-
-
 def contradictions(
     formulas: Mapping[str, Term], first: Iterable[str], *, timeout_ms: int, seed: int = 0
 ) -> tuple[tuple[str, ...], ...]:
@@ -91,7 +90,7 @@ def contradictions(
     found = [frozenset(first)]
     waiting: list[frozenset[str]] = [frozenset()]
     for without in waiting:  # which grows
-        if now() > deadline or len(found) >= _MANY:
+        if now() > deadline or len(found) >= CONFLICTS:
             break
         core = next((known for known in found if not known & without), None)
         if core is None:
@@ -116,7 +115,7 @@ def _minimal_sets(group: Group, at: Mapping[Variable, Value], deadline: float, s
             if now() > deadline and size > 2:
                 return minimal
             formulas = {label: group.guarantees[label] for label in group.guarantees if label in chosen}
-            if solve(formulas, given=at, variables=group.outputs, timeout_ms=500, seed=seed).status == "unsat":
+            if solve(formulas, given=at, variables=group.outputs, timeout_ms=CONFLICT_MS, seed=seed).status == "unsat":
                 minimal.append(chosen)
     return minimal
 
@@ -131,7 +130,7 @@ def _explain(clauses: tuple[str, ...], group: Group, at: Mapping[Variable, Value
 def _demand(formula: Term, outputs: Sequence[Variable], at: Mapping[Variable, Value], seed: int) -> str:
     """What a guarantee asks for at this input, in the contract's words."""
     mentioned = [output for output in outputs if output in free_variables(formula)]
-    answer = solve([formula], given=at, variables=mentioned, timeout_ms=500, seed=seed)
+    answer = solve([formula], given=at, variables=mentioned, timeout_ms=CONFLICT_MS, seed=seed)
     if answer.status == "unsat":
         return "cannot be met"
     if answer.status != "sat":
@@ -151,13 +150,13 @@ def _shown(formula: Term, output: Variable, value: Value, at: Mapping[Variable, 
         return ""
     other = Variable(Role.INPUT, "the value shown", output.sort)
     different = Not(Compare("==", output, other))
-    if solve([formula, different], given={**at, other: value}, timeout_ms=500, seed=seed).status == "unsat":
+    if solve([formula, different], given={**at, other: value}, timeout_ms=CONFLICT_MS, seed=seed).status == "unsat":
         return show(value)
     if isinstance(output.sort, DataSort) and isinstance(value, Data):
         fields = output.sort.constructor(value.constructor).parameters
         bound = tuple(Variable(Role.BOUND, f"field {k}", sort) for k, sort in enumerate(fields))
         built = Compare("==", output, Construct(value.constructor, bound, output.sort))
         made: Term = Quantified(Quantifier.EXISTS, bound, built) if bound else built
-        if solve([formula, Not(made)], given=at, timeout_ms=500, seed=seed).status == "unsat":
+        if solve([formula, Not(made)], given=at, timeout_ms=CONFLICT_MS, seed=seed).status == "unsat":
             return f"{value.constructor}(…)" if bound else value.constructor
     return ""

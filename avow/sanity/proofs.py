@@ -42,11 +42,12 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.sanity.witness_candidates import MAX_DEPTH, Candidates, Definition
+from avow.sanity.witness_candidates import Candidates, Definition
 from avow.sanity.witnesses import Fixed, Witness, meanings_of
 from avow.solving.questions import Translator, Unsupported, check, entails, replay, solve
 from avow.solving.translation import Expr, Meaning
 from avow.solving.z3_module import z3
+from avow.tuning.sizes import REWRITTEN_DEPTH
 
 Formulas = Mapping[str, Term]
 
@@ -118,7 +119,7 @@ def _implies(one: Term, other: Term, timeout_ms: int, seed: int) -> bool:
     def proved(left: Term, right: Term) -> bool:
         return entails([left], right, timeout_ms=timeout_ms, seed=seed).verdict is Verdict.PROVED
 
-    pushed = push_negations(other) if depth(other) <= MAX_DEPTH else other
+    pushed = push_negations(other) if depth(other) <= REWRITTEN_DEPTH else other
     return proved(pushed, other) if _is_instance(one, pushed) else proved(one, other)
 
 

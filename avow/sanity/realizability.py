@@ -25,6 +25,7 @@ from avow.language.terms import Apply, Quantified, Quantifier, Role, Term, Varia
 from avow.sanity.proofs import confirmed, implied, refutes
 from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
 from avow.solving.limits import budget, now
+from avow.tuning.effort import CONFIRMING_MS, REALIZABLE_SHARE
 
 __all__ = ["Formulas", "Given", "Group", "Question", "Realizability", "Search", "groups", "possible", "realizable"]
 
@@ -66,7 +67,7 @@ def realizable(
     """Decide it: see `Question`."""
     asked = Question(tuple(inputs), tuple(outputs), assumptions, guarantees, given or {}, timeout_ms, seed, doubtful)
     start = now()
-    with budget(timeout_ms * _ALTOGETHER):
+    with budget(timeout_ms * REALIZABLE_SHARE):
         for method in (_with_items, _with_functions):
             answer = method(asked)
             if answer is not None:
@@ -80,10 +81,6 @@ def possible(formulas: Formulas, *, timeout_ms: int, seed: int = 0) -> bool:
     no inputs. It helps where functions are wanted that are no tables, such as ``f(x) = x``. False proves nothing."""
     wanted = sorted(frozenset().union(*map(free_variables, formulas.values())), key=lambda v: v.qualified)
     return realizable((), wanted, {}, formulas, timeout_ms=timeout_ms, seed=seed).verdict is Verdict.PROVED
-
-
-_ALTOGETHER = 1.2
-"""The share of the limit for everything that is done, as long as it comes to an end by itself."""
 
 
 def _grouped(asked: Question) -> Realizability:
@@ -107,7 +104,7 @@ def _grouped(asked: Question) -> Realizability:
 def _searched(asked: Question, group: Group, timeout_ms: int) -> Realizability:
     """What the search says of a group, if a question of its own confirms it."""
     answer = asked.search(group, timeout_ms).decide(asked.doubtful)
-    limit = max(_AGAIN_MS, timeout_ms)
+    limit = max(CONFIRMING_MS, timeout_ms)
     match answer.verdict:
         case Verdict.PROVED:
             good = confirmed(
@@ -127,7 +124,7 @@ def _refutes(asked: Question, group: Group, inputs: Given, limit: int) -> bool:
 
 def _same(asked: Question, assumptions: Formulas, guarantees: Formulas) -> bool:
     """Whether what was shown with these formulas was shown of the question."""
-    limit = max(_AGAIN_MS, asked.timeout_ms)
+    limit = max(CONFIRMING_MS, asked.timeout_ms)
     return implied(guarantees, asked.guarantees, timeout_ms=limit, seed=asked.seed) and implied(
         asked.assumptions, assumptions, timeout_ms=limit, seed=asked.seed
     )
@@ -143,7 +140,7 @@ def _at_a_point(asked: Question, group: Group) -> Realizability | None:
         return None
     inputs = (*asked.inputs, *there.point)
     answer = _searched(replace(asked, inputs=inputs), Group(there.guarantees, there.outputs), asked.timeout_ms // 2)
-    limit = max(_AGAIN_MS, asked.timeout_ms // 2)
+    limit = max(CONFIRMING_MS, asked.timeout_ms // 2)
     match answer.verdict:
         case Verdict.PROVED:
             point = tuple(replace(v, role=Role.BOUND) for v in there.point)
@@ -160,10 +157,6 @@ def _at_a_point(asked: Question, group: Group) -> Realizability | None:
         case _:  # some other way may tell more
             good = False
     return answer if good else None
-
-
-_AGAIN_MS = 500
-"""For a question that should only confirm an answer."""
 
 
 def _with_items(asked: Question) -> Realizability | None:
@@ -195,7 +188,7 @@ def _with_items(asked: Question) -> Realizability | None:
         case Verdict.REFUTED:
             group = asked.group(answer.group)
             at = apart.values(asked.inputs, answer.inputs)
-            good = _refutes(asked, group, at, max(_AGAIN_MS, asked.timeout_ms // 2))
+            good = _refutes(asked, group, at, max(CONFIRMING_MS, asked.timeout_ms // 2))
             return replace(answer, inputs=at, group=tuple(group.guarantees)) if good else None
         case _:  # some other way may tell more
             return None

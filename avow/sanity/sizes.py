@@ -13,8 +13,7 @@ from avow.formulas.formula import conjunction, disjunction
 from avow.language.sorts import OpaqueSort
 from avow.language.terms import Compare, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.solving.questions import opaque_sorts, solve
-
-_SIZES = (1, 2)
+from avow.tuning.bounds import SIZES_TRIED
 
 
 def in_small_types(
@@ -25,7 +24,7 @@ def in_small_types(
     together = {**assumptions, **guarantees}
     sorts = sorted({sort for f in together.values() for sort in opaque_sorts(f)}, key=lambda sort: sort.name)
     verdict, reason = Verdict.PROVED, ""
-    for size in _SIZES if sorts else ():
+    for size in SIZES_TRIED if sorts else ():
         types = {f"size of {sort.name}": _has(sort, size) for sort in sorts}
         found = solve({**together, **types}, timeout_ms=timeout_ms, seed=seed, shown=False).status
         if found == "sat":

@@ -50,12 +50,8 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-
-MAX_DEPTH = 200
-"""Formulas nested deeper are not searched for witnesses (they remain correct to ask about, only harder)."""
-
-_BOUNDS = 4
-"""Half way between so many numbers, each with each, values are looked for."""
+from avow.tuning.bounds import NUMBERS_PAIRED
+from avow.tuning.sizes import REWRITTEN_DEPTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,10 +95,10 @@ def candidates(outputs: Sequence[Variable], assumptions: Iterable[Term], guarant
     """Read the candidates off a contract's formulas."""
     found = Candidates(tuple(outputs))
     for formula in assumptions:
-        if depth(formula) <= MAX_DEPTH:
+        if depth(formula) <= REWRITTEN_DEPTH:
             _visit(found, push_negations(formula), {}, (), ())
     for formula in guarantees:
-        if depth(formula) <= MAX_DEPTH:
+        if depth(formula) <= REWRITTEN_DEPTH:
             _visit(found, push_negations(formula), {}, (), ())
     return found
 
@@ -329,7 +325,7 @@ def _halfway(found: Candidates, output: Variable, bound: Term) -> list[Term]:
     half = Literal(Fraction(1, 2), REAL)
     sums = [Arithmetic("+", other, bound, REAL) for other in others if other != bound]
     others.append(bound)
-    del others[_BOUNDS:]
+    del others[NUMBERS_PAIRED:]
     return [Arithmetic("*", half, both, REAL) for both in sums]
 
 

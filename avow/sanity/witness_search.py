@@ -20,12 +20,8 @@ from avow.solving.limits import now
 from avow.solving.questions import Translator, Unsupported, check, entails, replay, search_tables, solve
 from avow.solving.translation import Expr, Meaning
 from avow.solving.z3_module import z3
-
-_PATIENT_MS = 300
-"""From this much time on for one attempt, all that is known of the chosen constants is told."""
-
-_TRIES = 6
-"""So many inputs for which there is an output after all, one after the other, and something else is tried."""
+from avow.tuning.bounds import WITNESS_REFUTATIONS
+from avow.tuning.effort import WITNESS_PATIENT_MS
 
 Formulas = Mapping[str, Term]
 Given = Mapping[Variable, Value]
@@ -183,13 +179,13 @@ class Search:
         translator = Translator()
         fixed = self._fixed(translator)
         facts = self._defeated(translator, guarantees, fixed, few, limit)
-        if limit >= _PATIENT_MS:
+        if limit >= WITNESS_PATIENT_MS:
             facts += [translator.term(axiom, fixed) for axiom in self.found.least]
         facts += translator.background([*self.inputs, *self.found.constants])
         tracked = [(label, translator.term(formula, fixed)) for label, formula in self.assumptions.items()]
         answer = check(translator, facts, tracked=tracked, timeout_ms=limit, seed=self.seed)
         if answer.status == "unsat":
-            proof = self._shown(guarantees, self._asked(few), limit >= _PATIENT_MS)
+            proof = self._shown(guarantees, self._asked(few), limit >= WITNESS_PATIENT_MS)
             return Realizability(Verdict.PROVED, needed=answer.core, engine="z3, by witnesses", proofs=(proof,))
         self.reason = answer.reason or self.reason
         return None
@@ -246,7 +242,7 @@ class Search:
         if none are found in `limit` ms. `few`: only so many witnesses are to be defeated from the start."""
         end = now() + limit / 1000
         known = len(self.witnesses)
-        while now() < end and (few is None or len(self.witnesses) < known + _TRIES):
+        while now() < end and (few is None or len(self.witnesses) < known + WITNESS_REFUTATIONS):
             inputs = self._defeat(self.group.guarantees, possible, int((end - now()) * 1000), few)
             if inputs is None:
                 return None

@@ -55,14 +55,11 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.sanity.witness_candidates import MAX_DEPTH, Candidates, Definition
+from avow.sanity.witness_candidates import Candidates, Definition
 from avow.solving.translation import Expr, Meaning, Translator
 from avow.solving.z3_module import z3
-
-MAX_PER_OUTPUT = 24
-MAX_WITNESSES = 96
-ARGUMENTS = 12
-"""How many terms are tried for one argument of a constructor or one quantified variable."""
+from avow.tuning.bounds import WITNESS_ARGUMENTS, WITNESSES, WITNESSES_PER_OUTPUT
+from avow.tuning.sizes import REWRITTEN_DEPTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,20 +87,20 @@ Witness = Mapping[Variable, Meant]
 
 
 def witnesses(found: Candidates) -> list[Witness]:
-    """Combinations of candidates, the likeliest first; at most `MAX_WITNESSES`."""
+    """Combinations of candidates, the likeliest first; at most `WITNESSES`."""
     choices: list[list[Term | Definition]] = []
     for output in found.outputs:
         if isinstance(output.sort, FunctionSort):
             choices.append(list(_functions(found, output, output.sort)))
         else:
             terms = _unique([*found.values.get(output, ()), *_ground(found, output.sort)])
-            choices.append(list(islice(terms, MAX_PER_OUTPUT)))
+            choices.append(list(islice(terms, WITNESSES_PER_OUTPUT)))
     result = []
-    for combination in islice(product(*choices), MAX_WITNESSES * 4):
+    for combination in islice(product(*choices), WITNESSES * 4):
         witness = _resolve(dict(zip(found.outputs, combination, strict=True)), found)
         if witness is not None and witness not in result:
             result.append(witness)
-        if len(result) >= MAX_WITNESSES:
+        if len(result) >= WITNESSES:
             break
     return result
 
@@ -111,7 +108,7 @@ def witnesses(found: Candidates) -> list[Witness]:
 def instantiate(found: Candidates, guarantee: Term, *, wide: bool = True) -> Term:
     """A stronger guarantee: `exists` that concern an output are replaced by their instances at known terms; if not
     `wide`, only at terms that were read together."""
-    if depth(guarantee) > MAX_DEPTH:
+    if depth(guarantee) > REWRITTEN_DEPTH:
         return guarantee
     return _instantiate(found, push_negations(guarantee), wide)
 
@@ -212,7 +209,9 @@ def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
             made: list[Term] = []
             for constructor in constructors:
                 pools = [_ground(found, parameter, level + 1) for parameter in constructor.parameters]
-                combinations = sorted(product(*(list(enumerate(pool))[:ARGUMENTS] for pool in pools)), key=_spread)
+                combinations = sorted(
+                    product(*(list(enumerate(pool))[:WITNESS_ARGUMENTS] for pool in pools)), key=_spread
+                )
                 made.extend(
                     Construct(constructor.name, tuple(term for _, term in combination), sort)
                     for combination in combinations[:12]
@@ -220,7 +219,8 @@ def _ground(found: Candidates, sort: Sort, level: int = 0) -> list[Term]:
             return list(_unique([*seen, *made]))
         case TupleSort(items=items) if level < 2:
             pools = [_ground(found, item, level + 1) for item in items]
-            combinations = sorted(product(*(list(enumerate(pool))[:ARGUMENTS] for pool in pools)), key=_spread)
+            tried = (list(enumerate(pool))[:WITNESS_ARGUMENTS] for pool in pools)
+            combinations = sorted(product(*tried), key=_spread)
             return list(_unique([*seen, *(TupleTerm(tuple(t for _, t in c), sort) for c in combinations[:12])]))
         case SequenceSort():
             return list(_unique([*seen, SequenceTerm((), sort)]))
@@ -297,7 +297,7 @@ def _places(found: Candidates, variables: Sequence[Variable], wide: bool) -> lis
     sorts = [variable.sort for variable in variables]
     if not wide:
         return [block for block in found.blocks if [term.sort for term in block] == sorts]
-    pools = [list(enumerate(_ground(found, sort)))[:ARGUMENTS] for sort in sorts]
+    pools = [list(enumerate(_ground(found, sort)))[:WITNESS_ARGUMENTS] for sort in sorts]
     combinations = sorted(product(*pools), key=_spread)[:24]
     return [tuple(term for _, term in combination) for combination in combinations]
 

@@ -10,15 +10,15 @@ from typing import Literal as OneOf
 
 import z3
 
-from avow.solving.limits import WALL, allowed, watchdog
+from avow.solving.limits import allowed, watchdog
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Translator
+from avow.tuning.bounds import SMALL_NUMBER
+from avow.tuning.effort import QUESTION_MS, SMALLER_MODEL_MS, WALL_CLOCK
 
 Status = OneOf["sat", "unsat", "unknown"]
 
 Engine = OneOf["smt", "qsat"]
-
-DEFAULT_TIMEOUT_MS = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ def check(
     translator: Translator,
     assertions: Iterable[Expr],
     *,
-    timeout_ms: int = DEFAULT_TIMEOUT_MS,
+    timeout_ms: int = QUESTION_MS,
     seed: int = 0,
     tracked: Iterable[tuple[str, Expr]] = (),
     engine: Engine = "smt",
@@ -63,9 +63,6 @@ def check(
     return Answer(status, found, tuple(dict.fromkeys(order)), reason, time.monotonic() - start)
 
 
-_AT_ONCE_MS = 150
-
-
 def with_small_numbers(
     translator: Translator, assertions: Iterable[Expr], numbers: Iterable[Expr], answer: Answer, *, seed: int = 0
 ) -> Answer:
@@ -75,22 +72,19 @@ def with_small_numbers(
     if answer.model is None or all(map(_is_small, map(answer.model.evaluate, numbers))):
         return answer
     assertions = list(assertions)
-    for least, most in ((0, 9), (-9, 9), (-_SMALL, _SMALL)):
+    for least, most in ((0, 9), (-9, 9), (-SMALL_NUMBER, SMALL_NUMBER)):
         within = [z3.And(least <= number, number <= most) for number in numbers]
-        again = check(translator, [*assertions, *within], timeout_ms=_AT_ONCE_MS, seed=seed)
+        again = check(translator, [*assertions, *within], timeout_ms=SMALLER_MODEL_MS, seed=seed)
         if again.model is not None:
             return again
     return answer
 
 
-_SMALL = 99
-
-
 def _is_small(value: Expr) -> bool:
     if z3.is_int_value(value):
-        return abs(int(value.as_long())) <= _SMALL
+        return abs(int(value.as_long())) <= SMALL_NUMBER
     if z3.is_rational_value(value):
-        return abs(int(value.numerator_as_long())) <= _SMALL * int(value.denominator_as_long())
+        return abs(int(value.numerator_as_long())) <= SMALL_NUMBER * int(value.denominator_as_long())
     return True
 
 
@@ -154,7 +148,7 @@ def limited(translator: Translator, timeout_ms: int) -> Iterator[None]:
 
 def _wall(timeout_ms: int) -> int:
     """Z3 counts wall-clock time: its limit is only for where the watchdog cannot help."""
-    return max(1, int(timeout_ms)) * WALL * 2
+    return max(1, int(timeout_ms)) * WALL_CLOCK * 2
 
 
 def _ask_qsat(

@@ -14,8 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-WALL = 20
-"""Wall-clock time allowed, as a multiple of the limit in processor time."""
+from avow.tuning.effort import WALL_CLOCK
 
 
 def now() -> float:
@@ -67,7 +66,7 @@ def watchdog(milliseconds: int, interrupt: Callable[[], None]) -> Iterator[threa
     """
     limit = milliseconds / 1000
     used = _clock()
-    watched = _Watched(used, used() + limit, time.monotonic() + limit * WALL + 1, interrupt)
+    watched = _Watched(used, used() + limit, time.monotonic() + limit * WALL_CLOCK + 1, interrupt)
     _kennel.dog.watch(watched, limit)
     try:
         yield watched.interrupted

@@ -33,12 +33,9 @@ from avow.language.sorts import (
 from avow.language.terms import Variable
 from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
+from avow.tuning.bounds import TABLE_POINTS
 
 _ESCAPE = re.compile(r"\\u\{([0-9a-fA-F]+)\}|\\u([0-9a-fA-F]{4})|\\x([0-9a-fA-F]{2})")
-
-
-_SAMPLES = 128
-"""Tables read off a function that is given by comparisons have no more points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +140,7 @@ class Model:
         """The rest tells arguments apart by comparing them (``2 <= x``): its values at the points that are named there
         are added to the table, and what its last branch yields is taken for the default."""
         places = _compared(rest, len(sort.parameters))
-        if math.prod(map(len, places)) > _SAMPLES:
+        if math.prod(map(len, places)) > TABLE_POINTS:
             return default_value(sort.result)
         try:
             for place in itertools.product(*places):

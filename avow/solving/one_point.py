@@ -11,12 +11,7 @@ from collections.abc import Iterator, Sequence
 
 from avow.solving.z3_module import z3
 from avow.solving.z3_sorts import Expr
-
-_FEW = 16
-"""A quantifier over more whole numbers stays one."""
-
-_MANY = 64
-"""Conjunctions of more parts are left alone: each part may be looked at once for each variable."""
+from avow.tuning.bounds import NUMBERS_WRITTEN_OUT, PARTS_SEARCHED
 
 
 def eliminate_points(constants: Sequence[Expr], conjuncts: Sequence[Expr]) -> tuple[list[Expr], list[Expr]]:
@@ -24,7 +19,7 @@ def eliminate_points(constants: Sequence[Expr], conjuncts: Sequence[Expr]) -> tu
     conjuncts then."""
     left = list(constants)
     parts = _flat(conjuncts)
-    while len(parts) <= _MANY:
+    while len(parts) <= PARTS_SEARCHED:
         step = _step(left, parts)
         if step is None:
             break
@@ -37,7 +32,7 @@ def expand(constants: Sequence[Expr], conjuncts: Sequence[Expr]) -> Iterator[tup
     """The same for each of a variable's few values, where the conjuncts bound a whole number by numbers."""
     left, parts = list(constants), list(conjuncts)
     for constant in left:
-        values = _range(constant, parts) if z3.is_int(constant) and len(parts) <= _MANY else None
+        values = _range(constant, parts) if z3.is_int(constant) and len(parts) <= PARTS_SEARCHED else None
         if values is not None:
             rest = [c for c in left if c is not constant]
             for number in values:
@@ -58,7 +53,7 @@ def _range(constant: Expr, parts: Sequence[Expr]) -> range | None:
                     high = min(number - strict, number if high is None else high)
                 else:
                     low = max(number + strict, number if low is None else low)
-    if low is None or high is None or high - low >= _FEW:
+    if low is None or high is None or high - low >= NUMBERS_WRITTEN_OUT:
         return None
     return range(low, high + 1)
 

@@ -29,20 +29,13 @@ from avow.language.sorts import (
     components,
 )
 from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
-from avow.solving.checking import (
-    DEFAULT_TIMEOUT_MS,
-    Answer,
-    Engine,
-    Status,
-    check,
-    with_small_numbers,
-    z3_version,
-)
+from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers, z3_version
 from avow.solving.counterexample import show_values
 from avow.solving.limits import allowed, budget, now
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
+from avow.tuning.effort import ANOTHER_SOLVER_MS, FIRST_LOOK_MS, QUESTION_MS, QUESTION_SHARE, ROUNDS
 
 __all__ = [
     "Answer",
@@ -97,7 +90,7 @@ class Entailment:
 def solve(
     formulas: Mapping[str, Term] | Iterable[Term],
     *,
-    timeout_ms: int = DEFAULT_TIMEOUT_MS,
+    timeout_ms: int = QUESTION_MS,
     seed: int = 0,
     variables: Iterable[Variable] = (),
     given: Mapping[Variable, Value] | None = None,
@@ -112,7 +105,7 @@ def solve(
     start = time.monotonic()
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
     free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
-    with budget(timeout_ms * _ALTOGETHER):
+    with budget(timeout_ms * QUESTION_SHARE):
         try:
             solution = _within_bounds(labelled, free, given or {}, timeout_ms, seed) or _solve(
                 Translator(), labelled, free, given or {}, timeout_ms, seed
@@ -123,7 +116,7 @@ def solve(
             solution = Solution("unknown", reason=f"Z3: {error}")
         if solution.status == "unknown" and not shown and _has_solution(labelled, free, given or {}, timeout_ms, seed):
             solution = Solution("sat")
-        patient = solution.status == "unknown" and not given and timeout_ms >= _PATIENT_MS
+        patient = solution.status == "unknown" and not given and timeout_ms >= ANOTHER_SOLVER_MS
         if patient and allowed(timeout_ms):
             solution = _second_opinion(labelled, timeout_ms) or solution
     return Solution(
@@ -140,7 +133,7 @@ def entails(
     hypotheses: Mapping[str, Term] | Iterable[Term],
     goal: Term,
     *,
-    timeout_ms: int = DEFAULT_TIMEOUT_MS,
+    timeout_ms: int = QUESTION_MS,
     seed: int = 0,
     variables: Iterable[Variable] = (),
     given: Mapping[Variable, Value] | None = None,
@@ -233,20 +226,6 @@ def opaque_sorts(formula: Term) -> set[OpaqueSort]:
     return {sort for sort in components(*sorts) if isinstance(sort, OpaqueSort)}
 
 
-_ROUNDS = ((0.025, 0.1), (0.1, 0.2), (0.275, 0.3))
-"""Parts of the time allowed, for the solver's own methods and for functions as tables: short rounds of different
-methods before any gets long."""
-
-_GLANCE_MS = 30
-"""Where there are functions, the solver's own methods answer at once or mostly not at all; then tables are tried."""
-
-_ALTOGETHER = 1.3
-"""The share of the limit for everything that is done to answer one question, replays of what is found included."""
-
-_PATIENT_MS = 1_500
-"""From this much time on, another solver is worth its start."""
-
-
 def _solve(
     translator: Translator,
     labelled: Mapping[str, Term],
@@ -270,10 +249,10 @@ def _solve(
         return [*translator.opaque_facts(), *parts]
 
     reason = ""
-    for plain, tables in _ROUNDS:
+    for plain, tables in ROUNDS:
         limit = max(1, int(timeout_ms * plain))
-        if functions and plain == _ROUNDS[0][0]:
-            limit = min(limit, _GLANCE_MS)
+        if functions and plain == ROUNDS[0][0]:
+            limit = min(limit, FIRST_LOOK_MS)
         answer = check(translator, background, timeout_ms=limit, seed=seed, tracked=tracked)
         if answer.status == "unsat":
             return Solution("unsat", core=answer.core)

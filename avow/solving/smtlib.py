@@ -16,9 +16,7 @@ from avow.formulas.formula import free_variables
 from avow.language.terms import Term
 from avow.solving.translation import Translator
 from avow.solving.z3_module import z3
-
-_STARTING = 2.0
-"""Seconds that cvc5's process may take beyond the limit of the question."""
+from avow.tuning.effort import CVC5_START_SECONDS
 
 
 def export(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") -> str:
@@ -80,7 +78,7 @@ def ask_cvc5(script: str, *, timeout_ms: int = 10_000) -> str | None:
     if importlib.util.find_spec("cvc5") is None:
         return None
     command = (sys.executable, "-P", "-m", "avow.solving.cvc5_process", str(timeout_ms))
-    done = process.run(command, seconds=timeout_ms / 1000 + _STARTING, stdin=script)
+    done = process.run(command, seconds=timeout_ms / 1000 + CVC5_START_SECONDS, stdin=script)
     if done.timed_out:
         return "unknown"
     return done.stdout.strip() or None

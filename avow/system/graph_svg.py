@@ -9,6 +9,7 @@ from itertools import pairwise
 
 from avow.base.graphs import components
 from avow.system.graph import Edge, Graph
+from avow.tuning.shown import NODES_DRAWN, SUBSYSTEMS_DRAWN
 
 _WIDTH, _HEIGHT = 150, 46
 _GAP_X, _GAP_Y = 110, 34
@@ -19,17 +20,12 @@ _ARROWHEAD = (
     '<defs><marker id="arrow" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
     '<path d="M0,0 L8,4 L0,8 z" fill="#444"/></marker></defs>'
 )
-MAX_DRAWN = 200
-"""More nodes than this are not drawn: nobody would find anything in the picture."""
-
-MAX_SHEETS = 40
-"""Subsystems of which the inside is drawn."""
 
 
 def svg(graph: Graph, composed: Container[str] = ()) -> str:
     """The graph as SVG. Delayed edges are dashed; inputs from the environment are in italics, before who reads them;
     nodes that are `composed` of others have a double border."""
-    if len(graph.nodes) > MAX_DRAWN:
+    if len(graph.nodes) > NODES_DRAWN:
         return _message(f"{len(graph.nodes)} nodes, {len(graph.edges)} edges: too many to draw")
     drawn = _drawn(graph, composed)
     title = f"<title>{escape(f'{len(graph.nodes)} nodes, {len(graph.edges)} edges')}</title>"
@@ -44,8 +40,8 @@ def sheet(parts: Sequence[tuple[str, Graph]]) -> str:
         return svg(parts[0][1])
     body: list[str] = []
     width = height = 0
-    for name, graph in parts[:MAX_SHEETS]:
-        if len(graph.nodes) > MAX_DRAWN:
+    for name, graph in parts[:SUBSYSTEMS_DRAWN]:
+        if len(graph.nodes) > NODES_DRAWN:
             drawn = _Drawn(600, 60, (f'<text x="20" y="35">{len(graph.nodes)} nodes: too many to draw</text>',))
         else:
             drawn = _drawn(graph, names)
@@ -57,9 +53,9 @@ def sheet(parts: Sequence[tuple[str, Graph]]) -> str:
         body.append(f'<g transform="translate(0 {height})">{heading}')
         body += [*drawn.parts, "</g>"]
         width, height = max(width, drawn.width), height + drawn.height
-    if len(parts) > MAX_SHEETS:
+    if len(parts) > SUBSYSTEMS_DRAWN:
         height += _LANE
-        body.append(f'<text x="8" y="{height - 8}">and {len(parts) - MAX_SHEETS} more subsystems</text>')
+        body.append(f'<text x="8" y="{height - 8}">and {len(parts) - SUBSYSTEMS_DRAWN} more subsystems</text>')
     title = f"<title>{escape(f'{len(parts[0][1].nodes)} nodes, {len(names)} subsystems')}</title>"
     return "\n".join([_opened(width, height), title, _ARROWHEAD, *body, "</svg>"])
 

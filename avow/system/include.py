@@ -17,11 +17,9 @@ from avow.language.contract import Contract
 from avow.system.folding import holders, outermost
 from avow.system.graph import Graph, dataflow
 from avow.system.plan import Connection, Endpoint, EnvironmentInput, Plan, Statement, Subsystem, System
+from avow.tuning.sizes import INCLUDED_NODES
 
 Load = Callable[[Path], System]
-
-MAX_NODES = 5_000
-"""Two copies of two copies of …: soon too many."""
 
 
 def include(plan: Plan, contract: Contract, load: Load) -> tuple[Plan, Contract, tuple[Diagnostic, ...]]:
@@ -40,8 +38,8 @@ def include(plan: Plan, contract: Contract, load: Load) -> tuple[Plan, Contract,
             faults += rejected.diagnostics
             continue
         clashes = _clashes(subsystem, contract, part.contract)
-        if len(contract.nodes) + len(part.contract.nodes) > MAX_NODES:
-            message = f"subsystems.{subsystem.name}: more than {MAX_NODES} nodes in all"
+        if len(contract.nodes) + len(part.contract.nodes) > INCLUDED_NODES:
+            message = f"subsystems.{subsystem.name}: more than {INCLUDED_NODES} nodes in all"
             clashes = [Diagnostic("PLAN110", message, subsystem.options.at("system"))]
         faults += clashes
         if not clashes:

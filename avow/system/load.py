@@ -15,11 +15,9 @@ from avow.system.names import check_names
 from avow.system.plan import System
 from avow.system.plan_file import bare_plan, fill_methods, read_plan
 from avow.system.subsystems import check_subsystems, resolved
+from avow.tuning.sizes import SYSTEMS_WITHIN
 
 PLAN_FILE = "plan.yaml"
-
-MAX_DEPTH = 30
-"""Systems within systems."""
 
 
 def load_system(folder: Path) -> System:
@@ -51,8 +49,8 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System]) -> 
         if inner in chain:
             shown = " → ".join(name.name for name in (*chain[chain.index(inner) :], inner))
             raise Rejected(Diagnostic("PLAN110", f"systems take in one another: {shown}"))
-        if len(chain) > MAX_DEPTH:
-            raise Rejected(Diagnostic("PLAN110", f"systems are taken in to more than {MAX_DEPTH} levels"))
+        if len(chain) > SYSTEMS_WITHIN:
+            raise Rejected(Diagnostic("PLAN110", f"systems are taken in to more than {SYSTEMS_WITHIN} levels"))
         if inner not in known:
             known[inner] = _load(inner, chain, known)
         return known[inner]

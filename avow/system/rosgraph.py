@@ -17,8 +17,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.system.graph import Graph
 from avow.system.plan import System
 from avow.system.schema import suggest
-
-MAX_BYTES = 5_000_000
+from avow.tuning.sizes import ROS_GRAPH_BYTES
 
 _TOKEN = re.compile(
     r'\s+|//[^\n]*|\#[^\n]*|/\*.*?\*/|(?P<string>"(?:[^"\\]|\\.)*")|(?P<arrow>->|--)'
@@ -54,12 +53,12 @@ class Account:
 def read_ros_graph(path: Path) -> RosGraph:
     """Raises Rejected, located, for a file that is none of the known forms."""
     try:
-        data = path.read_bytes()[: MAX_BYTES + 1]
+        data = path.read_bytes()[: ROS_GRAPH_BYTES + 1]
         text = data.decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise Rejected(_fault(path, 1, f"the ROS graph cannot be read: {error}")) from None
-    if len(data) > MAX_BYTES:
-        raise Rejected(_fault(path, 1, f"the ROS graph has more than {MAX_BYTES} bytes"))
+    if len(data) > ROS_GRAPH_BYTES:
+        raise Rejected(_fault(path, 1, f"the ROS graph has more than {ROS_GRAPH_BYTES} bytes"))
     if re.search(r"\b(di)?graph\b[^{\n]*\{", text):
         return _from_dot(text, path)
     if any(_HEADER.match(line) for line in text.splitlines()):

@@ -24,15 +24,14 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+from avow.tuning.bounds import VALUES_LOOKED_AT
 
 BASE_SORTS: dict[str, Sort] = {"BOOL": BOOL, "INTEGER": INTEGER, "NATURAL": NATURAL, "REAL": REAL, "STRING": STRING}
-_MOST = 500
-"""So many values of one domain or column are looked at; a table may have a million."""
 
 
 def unusable(where: str, texts: tuple[str, ...], sort: Sort, contract: Contract, span: Span) -> Iterator[Diagnostic]:
     """The first of the values that is none of the sort."""
-    for text in list(dict.fromkeys(texts))[:_MOST]:
+    for text in list(dict.fromkeys(texts))[:VALUES_LOOKED_AT]:
         reason = _wrong(text, sort, contract)
         if reason is not None:
             message = f"{where}: {text!r} is no value of {show_type(sort)}: {reason}"

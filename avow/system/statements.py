@@ -9,8 +9,8 @@ from avow.base.diagnostics import Diagnostic, Severity
 from avow.base.plain import identifiers
 from avow.system.plan import Plan, Statement, System
 from avow.system.strict_yaml import Piece
+from avow.tuning.sizes import STATEMENT_WORDS
 
-MOST_WORDS = 14
 _ARGUMENTS = {"persistence": "persistence", "one_output": "one-output", "entered": "entered"}
 
 
@@ -29,7 +29,7 @@ def without_words(system: System) -> Iterator[Diagnostic]:
                 f"{statement.place}: no plain words yet",
                 statement.span,
                 Severity.WARNING,
-                hint=f"add  says: …  (at most {MOST_WORDS} words), and  who: …, until: …",
+                hint=f"add  says: …  (at most {STATEMENT_WORDS} words), and  who: …, until: …",
             )
 
 
@@ -85,8 +85,8 @@ def _statement(place: str, piece: Piece, faults: list[Diagnostic]) -> Statement:
     says, until = piece.at("says"), piece.at("until")
     if says is not None:
         number = len(texts["says"].split())
-        if number > MOST_WORDS:
-            message = f"{place}: says has {number} words; at most {MOST_WORDS} fit a report's first screen"
+        if number > STATEMENT_WORDS:
+            message = f"{place}: says has {number} words; at most {STATEMENT_WORDS} fit a report's first screen"
             faults.append(Diagnostic("PLAN115", message, says.span, hint="the whole reason is for  because"))
         names = identifiers(texts["says"])
         if names:

@@ -17,11 +17,7 @@ import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.system.plan import Located
-
-MAX_BYTES = 8_000_000
-MAX_PIECES = 400_000
-"""Pieces of a document after its aliases are expanded."""
-MAX_DEPTH = 60
+from avow.tuning.sizes import PLAN_BYTES, PLAN_DEPTH, PLAN_PIECES
 
 _INTEGER = re.compile(r"-?(0|[1-9][0-9]*)\Z")
 _DECIMAL = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][-+]?[0-9]{1,3})?\Z")
@@ -81,8 +77,8 @@ def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
 
     Raises Rejected, with the place, for anything that is not one YAML document.
     """
-    if len(data) > MAX_BYTES:
-        raise Rejected(_error("PLAN101", f"the file has {len(data)} bytes; at most {MAX_BYTES} are read", file, 1, 1))
+    if len(data) > PLAN_BYTES:
+        raise Rejected(_error("PLAN101", f"the file has {len(data)} bytes; at most {PLAN_BYTES} are read", file, 1, 1))
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -171,8 +167,8 @@ class _Builder:
     def open(self, event: Any) -> None:
         if self.wants_key():
             raise self.reject(event, "PLAN102", "a key must be plain text")
-        if len(self.stack) >= MAX_DEPTH:
-            raise self.reject(event, "PLAN101", f"nested deeper than {MAX_DEPTH} levels")
+        if len(self.stack) >= PLAN_DEPTH:
+            raise self.reject(event, "PLAN101", f"nested deeper than {PLAN_DEPTH} levels")
         mapping = isinstance(event, yaml.MappingStartEvent)
         piece = Piece(self.span(event), items=None if mapping else [], entries={} if mapping else None)
         self.stack.append(_Frame(piece, event.anchor))
@@ -210,8 +206,8 @@ class _Builder:
             self.problem(event, "PLAN102", f"the key {key!r} is given twice", ("first given here", first))
 
     def put(self, event: Any, piece: Piece) -> None:
-        if len(self.stack) + piece.depth > MAX_DEPTH:
-            raise self.reject(event, "PLAN101", f"nested deeper than {MAX_DEPTH} levels")
+        if len(self.stack) + piece.depth > PLAN_DEPTH:
+            raise self.reject(event, "PLAN101", f"nested deeper than {PLAN_DEPTH} levels")
         if not self.stack:
             self.root = piece
             return
@@ -223,8 +219,8 @@ class _Builder:
             frame.piece.entries[frame.key] = piece
             frame.key = None
         frame.piece.size += piece.size
-        if frame.piece.size > MAX_PIECES:
-            raise self.reject(event, "PLAN101", f"more than {MAX_PIECES} pieces once its aliases are expanded")
+        if frame.piece.size > PLAN_PIECES:
+            raise self.reject(event, "PLAN101", f"more than {PLAN_PIECES} pieces once its aliases are expanded")
 
     def refuse_tag(self, event: Any) -> None:
         if event.tag is not None:

@@ -12,9 +12,7 @@ from avow.base.diagnostics import Diagnostic, Span
 from avow.system.plan import Table
 from avow.system.schema import suggest
 from avow.system.strict_yaml import Piece
-
-MAX_CELLS = 1_000_000
-MAX_VALUES = 100_000
+from avow.tuning.sizes import RANGE_VALUES, TABLE_CELLS
 
 _COLUMNS_OF = re.compile(r"\s*([^\s(),]+)\s*\(\s*([^()]*)\)\s*\Z")
 _CELL = re.compile(r"\b([A-Za-z_][A-Za-z0-9_-]*)\.([A-Za-z_][A-Za-z0-9_]*)")
@@ -44,8 +42,8 @@ def read_csv(name: str, path: Path, span: Span) -> tuple[Table | None, tuple[Dia
                 continue
             found = tuple(cell.strip() for cell in row)
             cells += len(found)
-            if cells > MAX_CELLS:
-                return fault(f"{path.name} has more than {MAX_CELLS} cells", reader.line_num)
+            if cells > TABLE_CELLS:
+                return fault(f"{path.name} has more than {TABLE_CELLS} cells", reader.line_num)
             if header is None:
                 header = found
                 if "" in header or len(set(header)) != len(header):
@@ -117,8 +115,8 @@ def domain(piece: Piece, tables: dict[str, Table]) -> tuple[str, ...] | str:
         low, high = int(span[1]), int(span[2])
         if high < low:
             return f"the range {text} is empty"
-        if high - low >= MAX_VALUES:
-            return f"the range {text} has more than {MAX_VALUES} values"
+        if high - low >= RANGE_VALUES:
+            return f"the range {text} has more than {RANGE_VALUES} values"
         return tuple(str(number) for number in range(low, high + 1))
     return _each_row(text, tables)
 

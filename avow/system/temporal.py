@@ -16,6 +16,7 @@ from itertools import pairwise
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Contract
 from avow.language.terms import Term
+from avow.tuning.sizes import PROPERTY_DEPTH, PROPERTY_LENGTH
 
 
 class Operator(StrEnum):
@@ -50,8 +51,6 @@ class Temporal:
 
 Property = State | Temporal
 
-MAX_DEPTH = 60
-MAX_LENGTH = 50_000
 
 _TEMPORAL = ("always", "eventually", "next", "until")
 _UNARY = ("not", "always", "eventually", "next")
@@ -69,7 +68,7 @@ class _Token:
 
 def parse_property(text: str, contract: Contract, span: Span | None = None) -> Property:
     """A temporal property. Raises Rejected with every fault found."""
-    if len(text) > MAX_LENGTH:
+    if len(text) > PROPERTY_LENGTH:
         raise Rejected(Diagnostic("PLAN114", "the property is too long", span))
     parser = _Parser(text, contract, span, _tokens(text))
     return parser.parse(0, len(parser.tokens), 0)
@@ -155,7 +154,7 @@ class _Parser:
     tokens: tuple[_Token, ...]
 
     def parse(self, start: int, end: int, depth: int) -> Property:
-        if depth > MAX_DEPTH:
+        if depth > PROPERTY_DEPTH:
             raise self.fault("nested too deeply", start)
         if start >= end:
             raise self.fault("a formula is missing here", start)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from avow.base.process import Completed, ToolMissing, run
 from avow.base.tools import Tool
+from avow.tuning.running import VERSION_SECONDS
 
 INSTALL = (
     "apt-get install git ant openjdk-17-jdk-headless && git clone --depth 1 https://github.com/mcapl/mcapl "
@@ -76,7 +77,7 @@ def _find(home_text: str, java: str) -> Installation | None:
     if not home_text or not (home / "lib" / "3rdparty").is_dir() or not (home / "bin").is_dir():
         return None
     try:
-        said = run([java, "-version"], seconds=10)
+        said = run([java, "-version"], seconds=VERSION_SECONDS)
     except ToolMissing:
         return None
     version = re.search(r'version "(11[^"]*)"', said.stdout + said.stderr)
@@ -90,7 +91,7 @@ def _find(home_text: str, java: str) -> Installation | None:
 def _revision(home: Path) -> str:
     """The commit of MCAPL's checkout; where it is none, a digest of its controller's class."""
     if (home / ".git").exists() and shutil.which("git"):
-        said = run(["git", "-C", str(home), "rev-parse", "--short=10", "HEAD"], seconds=10)
+        said = run(["git", "-C", str(home), "rev-parse", "--short=10", "HEAD"], seconds=VERSION_SECONDS)
         if said.code == 0 and said.stdout.strip():
             return said.stdout.strip()
     compiled = home / "bin" / "ajpf" / "MCAPLcontroller.class"

@@ -22,8 +22,7 @@ from .syntax import (
     unify,
     variables,
 )
-
-MAX_RULE_DEPTH = 60
+from .tuning import RULE_DEPTH
 
 
 class TooDeep(Exception):  # noqa: N818 - it names what happened
@@ -96,7 +95,7 @@ class Reasoner:
             if found is not None:
                 yield found
         for rule in self.rules.get(key, ()):
-            if depth >= MAX_RULE_DEPTH:
+            if depth >= RULE_DEPTH:
                 raise TooDeep
             renamed = renamed_rule(rule, f"'{next(self.fresh)}")
             found = unify(goal, renamed.head, bindings)

@@ -28,10 +28,10 @@ from avow.system.strict_yaml import read_yaml
 
 from .parser import parse_fact
 from .syntax import Struct, show
+from .tuning import DRAWS
 
 NOTHING = "nothing"
 KEEP = "keep"
-MAX_DRAWS = 4096
 
 _WORDS = {"type": "array", "items": {"type": "string"}, "minItems": 1}
 _NARROWED = {"type": "object", "additionalProperties": _WORDS}
@@ -190,8 +190,8 @@ def _read(located: Located) -> Environment:
     size = 1
     for group in groups.values():
         size *= len(group)
-    if size > MAX_DRAWS:
-        faults.append(Diagnostic("AJPF111", f"{size} possible draws; at most {MAX_DRAWS}", located.at("percepts")))
+    if size > DRAWS:
+        faults.append(Diagnostic("AJPF111", f"{size} possible draws; at most {DRAWS}", located.at("percepts")))
 
     def narrow(given: Mapping[str, list[str]], *path: str) -> dict[str, tuple[int, ...]]:
         result = {}

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from .beliefs import TooDeep
 from .builtin import Crash
 from .interpreter import Agent, State
-
-MAX_STATES = 2_000_000
+from .tuning import INTENTIONS, STATES
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +37,9 @@ class Graph:
         return len(self.targets)
 
 
-_MANY = 6
-"""So many intentions at once, and the agent has probably fallen behind its percepts for good."""
-
-
 def _backlog(newest: Sequence[State]) -> str:
     most = max(len(state.queue) for state in newest)
-    if most < _MANY:
+    if most < INTENTIONS:
         return ""
     return (
         f", with up to {most} intentions at once: each action draws percepts, and the agent falls behind them. Guards "
@@ -53,7 +48,7 @@ def _backlog(newest: Sequence[State]) -> str:
     )
 
 
-def explore(agent: Agent, *, states: int = MAX_STATES, seconds: float = 60.0, megabytes: int = 4096) -> Graph:
+def explore(agent: Agent, *, states: int = STATES, seconds: float = 60.0, megabytes: int = 4096) -> Graph:
     """Every reachable state, breadth first, as far as the bounds let it (`Graph.unfinished`)."""
     deadline = time.monotonic() + seconds
     memory = _memory() + megabytes

@@ -24,9 +24,8 @@ from .psl import Always, Eventually, Formula, Implies
 from .psl_parser import instantiate
 from .reading import Left, read_properties
 from .scenario import Decider, domain_of, range_of
-from .shape import MAX_DEPTH, TooComplex
-
-MAX_PROPERTIES = 5_000
+from .shape import TooComplex
+from .tuning import FORMULA_DEPTH, PROPERTIES
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +136,7 @@ def _claim(clause: Clause, mapper: Mapper, setup: Setup, keys: set[str]) -> Clai
 
 
 def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], keys: set[str]) -> Claim:
-    if depth(clause.formula) > MAX_DEPTH:
+    if depth(clause.formula) > FORMULA_DEPTH:
         raise TooComplex
     found: dict[Formula, Property] = {}
     about: dict[Formula, list[str]] = {}
@@ -178,8 +177,8 @@ def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], key
                 about.setdefault(formula, [])
                 if said and said not in about[formula]:
                     about[formula].append(said)
-                if len(found) > MAX_PROPERTIES:
-                    raise NotCovered(f"more than {MAX_PROPERTIES} instances", clause.span)
+                if len(found) > PROPERTIES:
+                    raise NotCovered(f"more than {PROPERTIES} instances", clause.span)
             if not made:
                 settled.append(f"{said or 'the guarantee'}: the scenario and the table alone make it true")
     properties = tuple(

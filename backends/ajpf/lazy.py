@@ -12,9 +12,7 @@ from .checker import Property, label_states
 from .explore import Graph
 from .interpreter import Agent, State
 from .psl import Formula, Not, atoms
-
-TAIL = 5_000
-"""Steps that a bad prefix is followed for, till a state comes again: a run has to be shown whole."""
+from .tuning import TAIL
 
 
 class _Part:

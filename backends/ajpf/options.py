@@ -30,9 +30,7 @@ from .scenario import domain_of
 from .schema import SCHEMA
 from .shape import TooComplex, shape
 from .syntax import Program
-
-MAX_INSTANCES = 1_000
-DEFAULT_STATES = 1_000_000
+from .tuning import DEFAULT_STATES, INDEX_VALUES
 
 _BINDER = re.compile(r"\b(?:forall|exists|exists_unique)\s*\(([^|;]*)[|;]")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*'*")
@@ -186,8 +184,8 @@ class _OptionsReader:
             table, dot, column = text.partition(".")
             if span:
                 low, high = int(span[1]), int(span[2])
-                if high - low >= MAX_INSTANCES:
-                    return f"more than {MAX_INSTANCES} instances"
+                if high - low >= INDEX_VALUES:
+                    return f"more than {INDEX_VALUES} instances"
                 cells = range(low, high + 1)
             elif dot and self.job.system.plan.scenario is not None:
                 try:
@@ -201,7 +199,7 @@ class _OptionsReader:
         found = tuple(dict.fromkeys(int(str(cell)) for cell in cells))
         if not found:
             return "the range is empty"
-        return found if len(found) <= MAX_INSTANCES else f"more than {MAX_INSTANCES} instances"
+        return found if len(found) <= INDEX_VALUES else f"more than {INDEX_VALUES} instances"
 
     def sorts(self) -> dict[str, Sort]:
         """Pattern variables by default have the sorts that the node's own clauses give to these names."""

@@ -15,7 +15,6 @@ from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 from .syntax import (
     CONS,
-    MAX_DEPTH,
     NIL,
     RECEIVED,
     SENT,
@@ -35,8 +34,7 @@ from .syntax import (
     is_ground,
     show,
 )
-
-MAX_BYTES = 2_000_000
+from .tuning import PROGRAM_BYTES, TERM_DEPTH
 
 _SAID = {
     "ATOM": "a name",
@@ -57,8 +55,8 @@ def read_program(path: Path, shown: str | None = None) -> Program:
         data = path.read_bytes()
     except OSError as error:
         raise Rejected(Diagnostic("AJPF101", f"cannot be read: {error.strerror or error}", _at(name, 1, 1))) from None
-    if len(data) > MAX_BYTES:
-        raise Rejected(Diagnostic("AJPF101", f"{len(data)} bytes; at most {MAX_BYTES} are read", _at(name, 1, 1)))
+    if len(data) > PROGRAM_BYTES:
+        raise Rejected(Diagnostic("AJPF101", f"{len(data)} bytes; at most {PROGRAM_BYTES} are read", _at(name, 1, 1)))
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -178,8 +176,8 @@ class _Builder(Transformer):  # type: ignore[misc]
     def struct(self, meta: Any, parts: list[Any]) -> Struct:
         args = tuple(p for p in parts[1:] if p is not None)
         depth = 1 + max((self.depths[id(a)][0] if id(a) in self.depths else 1 for a in args), default=0)
-        if depth > MAX_DEPTH:
-            raise Rejected(Diagnostic("AJPF102", f"a term nested more than {MAX_DEPTH} deep", self.span(meta)))
+        if depth > TERM_DEPTH:
+            raise Rejected(Diagnostic("AJPF102", f"a term nested more than {TERM_DEPTH} deep", self.span(meta)))
         made = Struct(str(parts[0]), args)
         self.depths[id(made)] = (depth, made)  # the reference keeps the id from being used again
         return made
@@ -225,8 +223,8 @@ class _Builder(Transformer):  # type: ignore[misc]
         return self.measured(made)
 
     def measured(self, made: Struct) -> Struct:
-        if deeper(made, MAX_DEPTH):
-            raise Rejected(Diagnostic("AJPF102", f"a term nested more than {MAX_DEPTH} deep", _at(self.file, 1, 1)))
+        if deeper(made, TERM_DEPTH):
+            raise Rejected(Diagnostic("AJPF102", f"a term nested more than {TERM_DEPTH} deep", _at(self.file, 1, 1)))
         return made
 
     @_build

@@ -28,9 +28,7 @@ from .psl import (
     atoms,
 )
 from .syntax import Struct, Term, Var
-
-MAX_LENGTH = 20_000
-MAX_NESTING = 60
+from .tuning import PROPERTY_LENGTH, PROPERTY_NESTING
 
 _TOKEN = re.compile(r"\s*(\[\]|<>|->|\|\||[~&(),+\-]|[A-Za-z_][A-Za-z0-9_']*|[0-9]+(?:\.[0-9]+)?|\Z|.)", re.DOTALL)
 _NUMBER = re.compile(r"[0-9]+(\.[0-9]+)?\Z")
@@ -54,8 +52,8 @@ class _Token:
 
 def parse_psl(text: str) -> Formula:
     """Raises Malformed."""
-    if len(text) > MAX_LENGTH:
-        raise Malformed(f"longer than {MAX_LENGTH} characters", 0)
+    if len(text) > PROPERTY_LENGTH:
+        raise Malformed(f"longer than {PROPERTY_LENGTH} characters", 0)
     parser = _Parser(_tokens(text))
     formula = parser.property(0)
     if parser.now.text:
@@ -96,8 +94,8 @@ class _Parser:
 
     def property(self, depth: int) -> Formula:
         """One kind of operator at a level: a mixture is refused, as AJPF's precedences are not what people expect."""
-        if depth > MAX_NESTING:
-            raise Malformed(f"brackets nested more than {MAX_NESTING} deep", self.now.offset)
+        if depth > PROPERTY_NESTING:
+            raise Malformed(f"brackets nested more than {PROPERTY_NESTING} deep", self.now.offset)
         items = [self.unary(depth)]
         operator = self.now
         while self.now.text in ("&", "||", "U", "R", "->"):
@@ -177,8 +175,8 @@ class _Parser:
         return term
 
     def term(self, depth: int) -> Term:
-        if depth > MAX_NESTING:
-            raise Malformed(f"terms nested more than {MAX_NESTING} deep", self.now.offset)
+        if depth > PROPERTY_NESTING:
+            raise Malformed(f"terms nested more than {PROPERTY_NESTING} deep", self.now.offset)
         token = self.take()
         if token.text == "_":
             return Var("_")

@@ -21,8 +21,7 @@ from .matching import match
 from .options import Extra
 from .psl import Always, Eventually, Formula, Implies
 from .shape import shape
-
-MAX_ALTERNATIVES = 8
+from .tuning import ALTERNATIVES
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,13 +125,13 @@ def _units(mapped: Mapped) -> Iterator[Unit]:
 def _alternatives(trigger: Formula) -> Sequence[Formula]:
     """The disjuncts of a trigger, unless they are many."""
     if isinstance(trigger, psl.Or):
-        return trigger.items if len(trigger.items) <= MAX_ALTERNATIVES else [trigger]
+        return trigger.items if len(trigger.items) <= ALTERNATIVES else [trigger]
     if not isinstance(trigger, psl.And):
         return [trigger]
     rows: list[list[Formula]] = [[]]
     for item in trigger.items:
         choices = item.items if isinstance(item, psl.Or) else (item,)
         rows = [[*row, choice] for row in rows for choice in choices]
-        if len(rows) > MAX_ALTERNATIVES:
+        if len(rows) > ALTERNATIVES:
             return [trigger]
     return [psl.conjunction(row) for row in rows]

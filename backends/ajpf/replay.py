@@ -24,9 +24,8 @@ from .options import Setup
 from .printer import program_text
 from .structure import Lasso
 from .syntax import DeedKind, plain
+from .tuning import REPLAY_SECONDS
 
-SECONDS = 20.0
-"""For one run. An agent that stands still for ever is ended; what it told counts."""
 _VARIABLE = re.compile(r"(?<![A-Za-z0-9_.\"])[A-Z_~][A-Za-z0-9_]*(?:[\^'~][0-9']*)*")
 
 
@@ -91,7 +90,7 @@ def replay(installation: Installation, setup: Setup, graph: Graph, lasso: Lasso)
             raise Unable(wrong)
         command = [installation.java, "-cp", installation.class_path("."), "ail.mas.AIL", "agent.ail"]
         try:
-            done = run(command, cwd=folder, seconds=SECONDS, env={"AJPF_HOME": str(installation.home)})
+            done = run(command, cwd=folder, seconds=REPLAY_SECONDS, env={"AJPF_HOME": str(installation.home)})
         except ToolMissing as error:
             raise Unable(str(error)) from None
     told = [line.removeprefix(MARK) for line in done.stdout.splitlines() if line.startswith(MARK)]

@@ -28,21 +28,10 @@ from .options import Setup, read
 from .replay import Unable, replay
 from .settle import Frame, Settled, outcome
 from .structure import Lasso
+from .tuning import GRACE, LAZY_SHARE, LAZY_STATES, PART_STATES, SPIN_SECONDS, SPIN_SHARE
 from .words import Wording, explain
 
 ENGINE = "Avow's own Gwendolen checker"
-GRACE = 0.5
-"""Of the time limit, what may be used beyond it to look for violations in what could be explored."""
-LAZY = 200_000
-"""States after which the properties are asked for one by one, each on the part of the state space that it needs."""
-PART = 20_000
-"""States of such a part."""
-LAZY_SHARE = 0.02
-"""Of the time that is left, what one property may use for that."""
-SPIN_SHARE = 0.5
-"""Of the time that is left, what Spin may use for its second opinion."""
-SPIN_SECONDS = 20.0
-"""The most that a second opinion may take that the plan did not ask for."""
 
 _SAID = {
     Said.HOLDS: Verdict.CHECKED,
@@ -121,12 +110,14 @@ class _Run:
     def explored(self, properties: Sequence[Property], probed: bool) -> Checker | None:
         setup = self.setup
         agent = Agent(setup.program, setup.environment, setup.semantics, probed=probed)
-        graph = explore(agent, states=min(LAZY, setup.states), seconds=self.left(), megabytes=self.limits.megabytes)
+        graph = explore(
+            agent, states=min(LAZY_STATES, setup.states), seconds=self.left(), megabytes=self.limits.megabytes
+        )
         if graph.unfinished is not None:
             properties = [p for p in properties if not self.settled_early(agent, p)]
             if not properties:
                 return None
-            if len(graph) > LAZY:
+            if len(graph) > LAZY_STATES:
                 graph = explore(agent, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
         self.bound["states"] += len(graph)
         self.bound["transitions"] += graph.transitions
@@ -147,7 +138,7 @@ class _Run:
     def settled_early(self, agent: Agent, p: Property) -> bool:
         """Whether the property was decided on the part of the state space that it needs (`lazy.open_part`)."""
         try:
-            part = open_part(agent, p, min(PART, self.setup.states), self.left() * LAZY_SHARE)
+            part = open_part(agent, p, min(PART_STATES, self.setup.states), self.left() * LAZY_SHARE)
         except (TooDeep, TooLarge, RecursionError):
             return False
         if part is None:

@@ -37,13 +37,7 @@ from avow.language.terms import (
     Widen,
 )
 
-MAX_DEPTH = 120
-MAX_ITEMS = 256
-"""More disjuncts (or conjuncts) than this under one quantifier are not multiplied out."""
-
-
-MAX_PARTS = 20_000
-"""More parts than this are not written out."""
+from .tuning import FORMULA_DEPTH, MULTIPLIED_OUT, PARTS
 
 
 class TooComplex(Exception):  # noqa: N818 - it names what happened
@@ -52,7 +46,7 @@ class TooComplex(Exception):  # noqa: N818 - it names what happened
 
 def shape(term: Term) -> Term:
     """The normal form of a formula. Raises TooComplex."""
-    if depth(term) > MAX_DEPTH or _written_out(term) > MAX_PARTS:
+    if depth(term) > FORMULA_DEPTH or _written_out(term) > PARTS:
         raise TooComplex
     return _formula(term, True)
 
@@ -209,7 +203,7 @@ def _multiplied(exists: bool, variables: tuple[Variable, ...], body: Term) -> Te
     for item in inner(body):
         choices = outer(item) if isinstance(item, kind) and names & bound_names(item) else (item,)
         rows = [[*row, choice] for row in rows for choice in choices]
-        if len(rows) > MAX_ITEMS:
+        if len(rows) > MULTIPLIED_OUT:
             raise TooComplex
     if len(rows) == 1:
         return body

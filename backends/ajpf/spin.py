@@ -15,6 +15,7 @@ from pathlib import Path
 from avow.base.files import write
 from avow.base.process import ToolMissing, run
 from avow.base.tools import Tool
+from avow.tuning.running import VERSION_SECONDS
 
 from . import promela, psl
 from .checker import Checker, Property
@@ -36,7 +37,7 @@ def version() -> str | None:
     if shutil.which("gcc") is None:
         return None
     try:
-        said = run(["spin", "-V"], seconds=10)
+        said = run(["spin", "-V"], seconds=VERSION_SECONDS)
     except ToolMissing:
         return None
     found = re.search(r"Spin Version (\S+)", said.stdout + said.stderr)

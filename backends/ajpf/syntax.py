@@ -8,9 +8,6 @@ from enum import StrEnum
 
 from avow.base.diagnostics import Span
 
-MAX_DEPTH = 40
-"""Terms nested deeper are refused by the parsers, so that every walk over a term may recurse."""
-
 
 @dataclass(frozen=True, slots=True)
 class Var:

@@ -17,16 +17,14 @@ from . import psl
 from .automaton import build
 from .psl import Atom, Formula, Modality
 from .syntax import Term, Var
-
-MAX_STEPS = 4_000
-"""Cases that are looked at, in all, before a formula is taken for one that depends on the agent."""
+from .tuning import TAUTOLOGY_CASES
 
 _EXISTENTIAL = (Modality.DID, Modality.WANTS, Modality.INTENDS, Modality.INTENDS_TO_DO, Modality.PERCEPT)
 
 
 @dataclass(slots=True)
 class Steps:
-    left: int = MAX_STEPS
+    left: int = TAUTOLOGY_CASES
 
 
 def is_valid(formula: Formula) -> bool:

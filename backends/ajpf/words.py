@@ -24,9 +24,7 @@ from .psl import Formula
 from .psl_parser import Malformed, index_names, instantiate
 from .structure import Lasso
 from .syntax import Struct, Term, show
-
-MAX_INDICES = 400
-"""Combinations of index values that a row is tried with in each step."""
+from .tuning import INDICES_TRIED
 
 Step = tuple[tuple[str, str], ...]
 
@@ -195,7 +193,7 @@ def _instances(
     total = 1
     for domain in domains:
         total *= len(domain)
-    if psl.is_temporal(row.formula) or total > MAX_INDICES:
+    if psl.is_temporal(row.formula) or total > INDICES_TRIED:
         return
     for choice in product(*domains):
         values = dict(zip(names, choice, strict=True))
@@ -221,7 +219,7 @@ def _numbers(graph: Graph, visited: Sequence[State]) -> list[int]:
             stack += term.args
             if not term.args and term.functor.isascii() and term.functor.isdigit() and len(term.functor) < 10:
                 found.add(int(term.functor))
-    return sorted(found) if len(found) <= MAX_INDICES else []
+    return sorted(found) if len(found) <= INDICES_TRIED else []
 
 
 def _agent_cells(graph: Graph, state: State, always: frozenset[Struct]) -> Step:

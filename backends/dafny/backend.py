@@ -21,6 +21,7 @@ from .modules import PROBE_FILE, Generated, generate, lines_map, one_line
 from .printer import NotExpressible
 from .runner import INSTALL, dafny
 from .scanner import Scan, scan
+from .tuning import PROGRAM_BYTES
 
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -34,8 +35,6 @@ SCHEMA: dict[str, Any] = {
     "required": ["implementation"],
     "additionalProperties": False,
 }
-
-MAX_BYTES = 2_000_000
 
 
 class DafnyBackend(Backend):
@@ -162,8 +161,10 @@ def _implementation(job: Job) -> tuple[Path, str]:
     path = existing_file(job, "implementation", name, wrong="DFY101", absent="DFY102", hint=hint)
     try:
         data = path.read_bytes()
-        if len(data) > MAX_BYTES:
-            raise Rejected(Diagnostic("DFY102", f"'{name}' has {len(data)} bytes; at most {MAX_BYTES} are read", place))
+        if len(data) > PROGRAM_BYTES:
+            raise Rejected(
+                Diagnostic("DFY102", f"'{name}' has {len(data)} bytes; at most {PROGRAM_BYTES} are read", place)
+            )
         return path, data.decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise Rejected(Diagnostic("DFY102", f"'{name}' cannot be read: {error}", place)) from None

@@ -15,12 +15,13 @@ from avow.formulas.values import Value, show
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Variable
+from avow.tuning.effort import JUDGE_MS
 
 from .names import Names
 from .printer import Vocabulary
+from .tuning import VALUES_SHOWN
 
 _LINE = re.compile(r"(?P<name>[\w'?]+)#\d+(?:@@\d+)? -> (?P<value>\(- \d+(?:\.\d+)?\)|-?\d+(?:\.\d+)?|true|false)\s*")
-_SHOWN = 3
 
 
 def candidates(model: str, node: Node) -> tuple[Mapping[str, str], ...]:
@@ -31,7 +32,7 @@ def candidates(model: str, node: Node) -> tuple[Mapping[str, str], ...]:
         shown = {variable.qualified: show(value) for variable, value in values.items()}
         if shown and shown not in found and _allowed(node, values):
             found.append(shown)
-        if len(found) == _SHOWN:
+        if len(found) == VALUES_SHOWN:
             break
     return tuple(found)
 
@@ -74,4 +75,4 @@ def _allowed(node: Node, values: Mapping[Variable, Value]) -> bool:
     from avow.solving.questions import replay  # Z3 is slow to import
 
     spoken = [a.formula for a in node.assumptions if free_variables(a.formula) <= values.keys()]
-    return not spoken or replay(spoken, values, timeout_ms=2_000) is not False
+    return not spoken or replay(spoken, values, timeout_ms=JUDGE_MS) is not False

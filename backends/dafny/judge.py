@@ -24,9 +24,9 @@ from .candidate import candidates
 from .modules import CALL, ENV_ALWAYS, PROBE_FILE, Generated, without_env_always
 from .runner import Audit, Run, audit, verify
 from .scanner import Scan, resolved_environment
+from .tuning import PROBLEMS_SHOWN
 
 _FINISHED = re.compile(r"Dafny program verifier finished with (\d+) verified, (\d+) errors?(.*)")
-_SHOWN = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +135,7 @@ def _broken(run: Run, scanned: Scan, generated: Generated, shown_name: str) -> S
     else:
         last = [line for line in run.output.splitlines() if line.strip()][-1:]
         summary = f"dafny ended with code {run.code} and without a readable answer: {_few(last)}"
-    return Settled(Verdict.ERROR, "; ".join([summary, *problems[:_SHOWN]]), (), details)
+    return Settled(Verdict.ERROR, "; ".join([summary, *problems[:PROBLEMS_SHOWN]]), (), details)
 
 
 def _taken_for_granted(audited: Audit, scanned: Scan, generated: Generated, shown_name: str) -> tuple[str, ...] | None:
@@ -236,5 +236,5 @@ def _name(file: str, generated: Generated, shown_name: str) -> str:
 
 
 def _few(items: tuple[str, ...] | list[str]) -> str:
-    more = f"; and {len(items) - _SHOWN} more" if len(items) > _SHOWN else ""
-    return "; ".join(items[:_SHOWN]) + more
+    more = f"; and {len(items) - PROBLEMS_SHOWN} more" if len(items) > PROBLEMS_SHOWN else ""
+    return "; ".join(items[:PROBLEMS_SHOWN]) + more

@@ -17,13 +17,13 @@ from avow.base.tools import find_tool
 
 from . import modern
 from .answer import Complaint, Member, complaints, counted, quiet, read_members
+from .tuning import MODEL_CHARACTERS
 
 INSTALL = "apt-get install dafny"
 
 _ANSWER = "answer.xml"
 _RESOLVED = "resolved.txt"
 _MODEL = "model.txt"
-_MAX_MODEL = 4_000_000
 _FINISHED = re.compile(r"Dafny program verifier finished with \d+ verified, \d+ errors?")
 
 
@@ -111,7 +111,7 @@ class _Done:
 
 
 def _answer(done: _Done, members: tuple[Member, ...] | None, resolved: str | None = None) -> Run:
-    said, model = complaints(done.output), done.answers[_MODEL][:_MAX_MODEL]
+    said, model = complaints(done.output), done.answers[_MODEL][:MODEL_CHARACTERS]
     return Run(done.command, done.code, members, said, counted(done.output), done.output, model, resolved)
 
 

@@ -15,10 +15,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from .statistics import root
-
-MAX_LENGTH = 500
-"""Characters; a sum of so many terms is still far from Python's recursion limit."""
-MAX_DEPTH = 50
+from .tuning import EXPRESSION_DEPTH, EXPRESSION_LENGTH
 
 _TOKEN = re.compile(r"\s*(?:(\d{1,40}(?:\.\d{1,40})?)|([^\W\d]\w*)|([-+*/(),]))")
 
@@ -58,8 +55,8 @@ class Expression:
 
 def parse(text: str) -> Expression:
     """Raises Malformed."""
-    if len(text) > MAX_LENGTH:
-        raise Malformed(f"longer than {MAX_LENGTH} characters", 0)
+    if len(text) > EXPRESSION_LENGTH:
+        raise Malformed(f"longer than {EXPRESSION_LENGTH} characters", 0)
     parser = _Parser(text)
     value = parser.sum(0)
     parser.end()
@@ -185,8 +182,8 @@ class _Parser:
         return value
 
     def factor(self, depth: int) -> _Eval:
-        if depth > MAX_DEPTH:
-            raise Malformed(f"nested deeper than {MAX_DEPTH} levels", self.peek()[2])
+        if depth > EXPRESSION_DEPTH:
+            raise Malformed(f"nested deeper than {EXPRESSION_DEPTH} levels", self.peek()[2])
         if self.accept("-"):
             return _each(_negative, (self.factor(depth + 1),))
         if self.accept("("):

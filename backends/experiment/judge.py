@@ -13,9 +13,7 @@ from .options import Experiment
 from .quantity import show
 from .runs import Run
 from .statistics import justified, lower_bound, root, runs_needed, upper_bound
-
-SHOWN = 20
-"""Failing runs that are spelt out."""
+from .tuning import FAILURES_SHOWN
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,8 +163,8 @@ def _counterexample(failed: Sequence[Run], experiment: Experiment) -> Counterexa
         return None
     worst = max(failed, key=lambda run: run.measure.low)
     unit = _unit(experiment.unit)
-    listed = ", ".join(f"{run.name} ({show(run.measure.low)}{unit})" for run in failed[:SHOWN])
-    more = f" and {len(failed) - SHOWN} more" if len(failed) > SHOWN else ""
+    listed = ", ".join(f"{run.name} ({show(run.measure.low)}{unit})" for run in failed[:FAILURES_SHOWN])
+    more = f" and {len(failed) - FAILURES_SHOWN} more" if len(failed) > FAILURES_SHOWN else ""
     explanation = f"beyond {show(experiment.within, 9)}{unit} in run {listed}{more}"
     measure = (experiment.measure.text if experiment.measure else "measure", f"{show(worst.measure.low, 6)}{unit}")
     pairs = (("run", worst.name), *worst.values, measure)

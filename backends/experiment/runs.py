@@ -13,9 +13,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from .expression import Expression, Interval
 from .options import ID_COLUMNS
 from .quantity import decimal
-
-MAX_RUNS = 100_000
-MAX_BYTES = 32_000_000
+from .tuning import RUNS, TABLE_BYTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +63,11 @@ class _RunsReader:
     def rows(self) -> list[tuple[int, list[str]]]:
         try:
             size = self.path.stat().st_size
-            data = self.path.read_bytes() if size <= MAX_BYTES else b""
+            data = self.path.read_bytes() if size <= TABLE_BYTES else b""
         except OSError as error:
             raise self.fail(1, "EXP102", f"cannot be read: {error.strerror or error}") from None
-        if size > MAX_BYTES:
-            raise self.fail(1, "EXP111", f"the file has {size} bytes; at most {MAX_BYTES} are read")
+        if size > TABLE_BYTES:
+            raise self.fail(1, "EXP111", f"the file has {size} bytes; at most {TABLE_BYTES} are read")
         try:
             text = data.decode("utf-8-sig")
         except UnicodeDecodeError as error:
@@ -82,8 +80,8 @@ class _RunsReader:
             for cells in reader:
                 if cells and not (len(cells) == 1 and not cells[0].strip()):
                     rows.append((reader.line_num, [cell.strip() for cell in cells]))
-                if len(rows) > MAX_RUNS + 1:
-                    raise self.fail(reader.line_num, "EXP111", f"more than {MAX_RUNS} runs")
+                if len(rows) > RUNS + 1:
+                    raise self.fail(reader.line_num, "EXP111", f"more than {RUNS} runs")
         except csv.Error as error:
             raise self.fail(reader.line_num, "EXP111", f"not CSV: {error}") from None
         return rows

@@ -13,12 +13,11 @@ from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from math import isqrt
 
+from .tuning import HALVINGS
+
 _DIGITS = Context(prec=80, Emin=-(10**15), Emax=10**15)
 _SLACK = Decimal(10) ** -40
 """Far above the rounding of 80 digits over any number of runs that is accepted, far below anything that matters."""
-
-_STEPS = 24
-"""Halvings in a bisection: bounds are given to better than one part in ten million."""
 
 
 def tail(failures: int, runs: int, probability: Fraction) -> Decimal:
@@ -50,7 +49,7 @@ def upper_bound(failures: int, runs: int, confidence: Fraction) -> Fraction:
     if failures >= runs:
         return Fraction(1)
     low, high = Fraction(failures, runs), Fraction(1)
-    for _ in range(_STEPS):
+    for _ in range(HALVINGS):
         middle = (low + high) / 2
         if justified(failures, runs, middle, confidence):
             high = middle

@@ -32,17 +32,13 @@ from .outline import outline, show
 from .parser import parse_program
 from .program import Program, While, has_loops, statements
 from .triples import Triple, every_run, triples
+from .tuning import BRIEFLY_SECONDS, ENDLESS_MS
 from .witness import Breach, breach
 from .wp import Condition, TooLarge, conditions
-
-BRIEFLY = 5.0
-"""Seconds for whether the program has an output for every input, where that can only turn `unknown` into `refuted`."""
 
 GIVEN = frozenset({Verdict.PROVED, Verdict.PARTIAL, Verdict.JUSTIFIED})
 """What an obligation whose triples are proved gets: whether its loops are shown to end makes the difference."""
 
-SEARCHED = 8_000
-"""Milliseconds for an input on which the program never ends."""
 
 UNFAITHFUL = "Avow's simplified triple does not say what the contract's formulas say: a fault of Avow, please report it"
 
@@ -201,7 +197,7 @@ def settle(job: Job, limits: Limits) -> Report:
     open_ = {o.verdict for o in outcomes} & {*GIVEN, Verdict.UNKNOWN}
     if open_:
         # where nothing is proved that would rest on it, it is worth a look but not the time of another guarantee
-        seconds = limits.seconds if open_ & GIVEN else min(limits.seconds, BRIEFLY)
+        seconds = limits.seconds if open_ & GIVEN else min(limits.seconds, BRIEFLY_SECONDS)
         running = _every_run(work, replace(limits, seconds=seconds))
         logs["every-run.log"] = f"{running.verdict} - {running.why}\n"
         if running.verdict is Verdict.REFUTED:  # it settles also what the guarantee's own triples leave open
@@ -293,7 +289,7 @@ def _every_run(work: Work, limits: Limits) -> Settled:
         failed = [c for c in wanted if not _holds(c, work.settler, deadline)]
         shown = breach(triple, program, failed, max(1000, _left(deadline))) if failed else None
         if shown is None and (_termination(work) or (failed and has_loops(program))):
-            shown = endless_run(triple, program, max(1000, min(_left(deadline), SEARCHED)))
+            shown = endless_run(triple, program, max(1000, min(_left(deadline), ENDLESS_MS)))
     except TooLarge as error:
         return Settled(triple, Verdict.UNKNOWN, str(error))
     except RecursionError:

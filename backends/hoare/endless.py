@@ -23,12 +23,9 @@ from .guesses import NUMERIC, filled, guesses, starting_from
 from .interpreter import Endless, Fault, Machine, NoEnd, State
 from .program import Assign, Block, If, Program, Update, While, statements, variable
 from .triples import Triple, equation
+from .tuning import LASTING_MS, UNENDED_RUNS
 from .witness import Breach, first_state
 from .wp import Conditions, TooLarge, defined, weakest
-
-_UNENDED = 4
-"""Runs that were given up and for which a lasting predicate was sought in vain; after them no more are tried."""
-_QUESTION_MS = 1_000
 
 
 def endless_run(triple: Triple, program: Program, milliseconds: int) -> Breach | None:
@@ -37,7 +34,7 @@ def endless_run(triple: Triple, program: Program, milliseconds: int) -> Breach |
     machine, given_up = Machine(), 0
     wanted = starting_from(triple, program)
     for values in _candidates(triple, program, wanted):
-        if time.monotonic() > deadline or given_up >= _UNENDED:
+        if time.monotonic() > deadline or given_up >= UNENDED_RUNS:
             return None
         start = first_state(triple, program, values)
         if start is None:
@@ -64,7 +61,7 @@ def _candidates(triple: Triple, program: Program, wanted: tuple[Variable, ...]) 
                 reached = _reached(program.body, loop, goal)
             except TooLarge:
                 continue
-            found = solve([triple.full_pre, reached], timeout_ms=_QUESTION_MS)
+            found = solve([triple.full_pre, reached], timeout_ms=LASTING_MS)
             if found.status == "sat":
                 yield filled(found.values, wanted)
     yield from guesses(triple, program, wanted)
@@ -132,7 +129,7 @@ def goes_on(loop: While, heads: Sequence[State], program: Program) -> bool:
 
 
 def _implied(known: Sequence[Term], goal: Term) -> bool:
-    return entails(known, goal, timeout_ms=_QUESTION_MS).verdict is Verdict.PROVED
+    return entails(known, goal, timeout_ms=LASTING_MS).verdict is Verdict.PROVED
 
 
 def _true(term: Term, state: State) -> bool:

@@ -32,12 +32,9 @@ from avow.solving.translation import Unsupported
 
 from .program import Assign, If, Match, Program, Statement, Update, While, statements
 from .triples import Triple
+from .tuning import GUESS_MS, INPUTS_TRIED, LENGTHS, VALUE_DEPTH
 
 NUMERIC: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
-TRIED = 300
-"""Inputs tried."""
-_LENGTHS = (0, 1, 2, 3, 6)
-_DEEPEST = 3
 
 
 def starting_from(triple: Triple, program: Program) -> tuple[Variable, ...]:
@@ -61,17 +58,17 @@ def guesses(triple: Triple, program: Program, wanted: tuple[Variable, ...]) -> I
         (),
         *((Compare("==", Length(v, NATURAL), Literal(n, NATURAL)),) for v in sequences for n in (1, 2, 3)),
     ):
-        found = solve([pre, *extra], timeout_ms=1000)
+        found = solve([pre, *extra], timeout_ms=GUESS_MS)
         if found.status == "sat" or not extra:
             bases.append(filled(found.values if found.status == "sat" else {}, wanted))
             yield bases[-1]
-    if len(finite) == len(free) and math.prod(map(len, finite.values())) <= TRIED:
+    if len(finite) == len(free) and math.prod(map(len, finite.values())) <= INPUTS_TRIED:
         for point in itertools.product(*finite.values()):
             yield {**bases[0], **dict(zip(finite, point, strict=True))}
         return
     rng = random.Random(0)
     draw = _Draw(rng, sorted({*small, *beside}), sorted(_strings((pre, triple.post, *expressions(program)))))
-    for _ in range(TRIED):
+    for _ in range(INPUTS_TRIED):
         base = rng.choice(bases)
         yield {**base, **{v: draw.value(v.sort) for v in free if v not in base or rng.random() < 0.7}}
 
@@ -103,11 +100,11 @@ class _Draw:
             case TupleSort(items=items):
                 return tuple(self.value(item, depth + 1) for item in items)
             case SequenceSort(item=item):
-                length = rng.choice(_LENGTHS) if depth < _DEEPEST else 0
+                length = rng.choice(LENGTHS) if depth < VALUE_DEPTH else 0
                 return Sequence(tuple(self.value(item, depth + 1) for _ in range(length)))
             case DataSort(constructors=constructors):
                 plain = [c for c in constructors if not any(isinstance(p, DataSort) for p in c.parameters)]
-                made = rng.choice(plain if plain and depth >= _DEEPEST else constructors)
+                made = rng.choice(plain if plain and depth >= VALUE_DEPTH else constructors)
                 return Data(made.name, tuple(self.value(p, depth + 1) for p in made.parameters))
             case FunctionSort(parameters=parameters, result=result):
                 points = [tuple(self.value(p, depth + 1) for p in parameters) for _ in range(rng.randrange(4))]

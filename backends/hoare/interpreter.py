@@ -13,22 +13,18 @@ from avow.language.sorts import NATURAL, FunctionSort, Sort
 from avow.language.terms import Term
 
 from .program import Assign, Block, If, Match, Skip, Statement, Update, While
+from .tuning import LOOP_STATES, RUN_STEPS
 from .wp import defined
 
 _UNDEFINED = "a division by zero, an element that the sequence does not have, or a negative number for a natural one,"
 
-STEPS = 5_000
-"""Statements after which a run is given up."""
-
-_HEADS = 4
-"""So many of a loop's last states are told of a run that was given up."""
 
 State = dict[str, Value]
 
 
 class NoEnd(Exception):  # noqa: N818 - it names a state
-    """The program has not ended within `STEPS`. `loop` is the innermost loop that it was in, and `heads` are the last
-    states in which its test was found true."""
+    """The program has not ended within `RUN_STEPS`. `loop` is the innermost loop that it was in, and `heads` are the
+    last states in which its test was found true."""
 
     def __init__(self) -> None:
         super().__init__("no end")
@@ -74,7 +70,7 @@ class Machine:
         return self.compiled[id(term)][1](state)
 
     def _ended(self) -> None:
-        if self.steps > STEPS:
+        if self.steps > RUN_STEPS:
             self.endless += 1
             raise NoEnd
 
@@ -122,7 +118,7 @@ class Machine:
         """Brent's search for a circle: the state is held against one that is taken anew after 1, 2, 4… rounds. What a
         round does depends on nothing but the state, so that one met twice is met for ever."""
         held, rounds, power = dict(state), 0, 1
-        heads: deque[State] = deque(maxlen=_HEADS)
+        heads: deque[State] = deque(maxlen=LOOP_STATES)
         try:
             while self._compute(loop.condition, state, loop.span):
                 heads.append(dict(state))

@@ -39,9 +39,7 @@ from .syntax import (
     Unary,
     WhileStatement,
 )
-
-DEEPEST = 120
-"""Nesting beyond which a program is refused: later passes recurse over it."""
+from .tuning import NESTING
 
 
 def parse_program(text: str, file: str) -> Source:
@@ -82,7 +80,7 @@ def _parse(text: str, file: str, start: str, place: Span | None = None) -> Any:
         raise error.orig_exc from None
     deep = _too_deep(result)
     if deep is not None:
-        raise Rejected(Diagnostic("HOARE100", f"nested more than {DEEPEST} levels deep", deep))
+        raise Rejected(Diagnostic("HOARE100", f"nested more than {NESTING} levels deep", deep))
     return result
 
 
@@ -139,7 +137,7 @@ def _too_deep(root: Any) -> Span | None:
         if isinstance(node, tuple):
             stack.extend((item, depth) for item in node)
         elif is_dataclass(node) and not isinstance(node, Span):
-            if depth > DEEPEST:
+            if depth > NESTING:
                 span: Span = getattr(node, "span")  # noqa: B009 - every node of the syntax has one
                 return span
             stack.extend((getattr(node, f.name), depth + 1) for f in fields(node))

@@ -34,10 +34,8 @@ from .interpreter import Endless, Fault, Machine, NoEnd, State
 from .outline import show
 from .program import Assign, Program, Update, has_loops, statements
 from .triples import Triple
+from .tuning import ENDLESS_RUNS
 from .wp import Condition
-
-_ENDLESS = 3
-"""Runs without an end after which no more inputs are tried."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +63,7 @@ def breach(triple: Triple, program: Program, failed: Sequence[Condition], millis
             found = _shown(triple, program, machine, values)
             if found is not None:
                 return found
-            if machine.endless >= _ENDLESS:
+            if machine.endless >= ENDLESS_RUNS:
                 break
     return None
 

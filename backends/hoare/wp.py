@@ -38,16 +38,14 @@ from avow.language.terms import (
 
 from .program import Assign, Block, If, Match, Skip, Statement, Update, While, statements, variable
 from .triples import Triple, rename_bound
-
-LARGEST = 50_000
-"""Nodes of a formula beyond which a program is too much for this method: branches in sequence double it."""
+from .tuning import FORMULA_NODES
 
 
 class TooLarge(Exception):  # noqa: N818 - it names what happened
-    """The weakest precondition has grown beyond `LARGEST`."""
+    """The weakest precondition has grown beyond `FORMULA_NODES`."""
 
     def __init__(self, span: Span) -> None:
-        super().__init__(f"the weakest precondition of the statement at {span} has more than {LARGEST} parts")
+        super().__init__(f"the weakest precondition of the statement at {span} has more than {FORMULA_NODES} parts")
         self.span = span
 
 
@@ -102,7 +100,7 @@ def weakest(body: Block, post: Term, side: Conditions) -> Term:
     """The weakest precondition of some statements. Raises TooLarge."""
     for statement in reversed(body):
         post = _statement(statement, post, side)
-        if _size(post) > LARGEST:
+        if _size(post) > FORMULA_NODES:
             raise TooLarge(statement.span)
     return post
 
@@ -286,4 +284,4 @@ def _when(condition: Term, consequence: Term) -> Term:
 
 
 def _size(term: Term) -> int:
-    return sum(1 for _ in zip(range(LARGEST + 1), subterms(term), strict=False))
+    return sum(1 for _ in zip(range(FORMULA_NODES + 1), subterms(term), strict=False))

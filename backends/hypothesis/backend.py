@@ -25,11 +25,7 @@ from avow.isolation.observed import from_json
 
 from . import export, wire
 from .subject import subject
-
-CONFIDENCE = 0.95
-
-RARE = 20
-"""Rejected cases for each one that was tried, beyond which the assumptions are too rarely met to say anything."""
+from .tuning import CONFIDENCE, REJECTED_CASES
 
 
 def problems(job: Job) -> tuple[Diagnostic, ...]:
@@ -163,7 +159,7 @@ def _doubt(answer: Mapping[str, Any], own: Mapping[str, Any], valid: int, reject
     """Why the cases do not count, if they do not."""
     if answer["stopped"].startswith("no values"):
         return f"inputs cannot be generated: {answer['stopped'].partition(': ')[2]}"
-    if valid == 0 or answer["stopped"] == "assumptions" or (valid < wanted and rejected > RARE * valid):
+    if valid == 0 or answer["stopped"] == "assumptions" or (valid < wanted and rejected > REJECTED_CASES * valid):
         return f"the assumptions are met too rarely: {valid} of {valid + rejected} generated inputs"
     if answer["stopped"] == "time":
         return f"only {valid} of {wanted} cases in the time given"

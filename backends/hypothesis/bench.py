@@ -24,26 +24,23 @@ from avow.base.process import adopt_orphans
 from avow.formulas.values import Value, show
 from avow.isolation import judge
 from avow.isolation.observed import to_json
-from avow.isolation.subject import PATIENCE, Subject, SubjectFailed
+from avow.isolation.subject import Subject, SubjectFailed
 from avow.language.sorts import BoolSort, FunctionSort, Sort
+from avow.tuning.running import SUBJECT_PATIENCE
 
 from . import wire
 from .convention import Malformed, outputs, received, sent
 from .export import KEPT
-from .generate import BYTES, Failing, Generator, Impossible, Inputs, Source
+from .generate import Failing, Generator, Impossible, Inputs, Source
 from .judging import Trigger, blamed, guarantee, judged
 from .pools import constants, parse_cell, pools
+from .tuning import BATCH, CASE_BYTES, SHRINKING_SECONDS
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
 # and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
 if hasattr(providers, "is_local_module_file"):
     providers.is_local_module_file = lambda path: False
 
-SHRINKING = 4.0
-"""Seconds spent on making a failing case simpler."""
-
-BATCH = 50
-"""Cases that are put to the subject at a time."""
 
 Case = tuple[Inputs, dict[str, Value]]
 
@@ -68,7 +65,7 @@ class Bench:
         root = _root(data, folder)
         written = constants(_text(root / data["subject"]["file"]))
         self.generator = Generator(self.inputs_sorts, pools(formulas, self._rows(), written))
-        self.subject = Subject(root / data["subject"]["file"], data["subject"]["function"], PATIENCE, root)
+        self.subject = Subject(root / data["subject"]["file"], data["subject"]["function"], SUBJECT_PATIENCE, root)
         self._aims = tuple(_aim(t) for g in self.guarantees.values() for t in g.triggers)
         self._kept = _kept(folder / KEPT, self.inputs_sorts)
         self.replayed = 0
@@ -87,7 +84,7 @@ class Bench:
     def inputs(self) -> st.SearchStrategy[Inputs]:
         """Inputs that meet the assumptions, mostly: `check` rejects the others."""
 
-        text = st.binary(min_size=BYTES, max_size=BYTES)
+        text = st.binary(min_size=CASE_BYTES, max_size=CASE_BYTES)
         return text.map(lambda data: self.generator.case(Source(data), self._blamed, self._aims))
 
     def configured(self, test: Callable[..., None]) -> Callable[..., None]:
@@ -129,7 +126,7 @@ class Bench:
         os.set_inheritable(channel, False)
         adopt_orphans()
         self.end = time.monotonic() + seconds
-        self.subject.patience = min(PATIENCE, max(1.0, seconds / 4))
+        self.subject.patience = min(SUBJECT_PATIENCE, max(1.0, seconds / 4))
         try:
             stopped = self._sweep()
             smaller = {name: self._shrunk(name) for name, g in self.guarantees.items() if g.failure is not None}
@@ -278,7 +275,7 @@ class Bench:
 
     def _smallest(self, first: Case, broken: Callable[[Inputs], Case | None]) -> Case:
         best = [first]
-        limit = min(self.end or float("inf"), time.monotonic() + SHRINKING)
+        limit = min(self.end or float("inf"), time.monotonic() + SHRINKING_SECONDS)
 
         @seed(self.seed)
         @self._configuration((Phase.generate, Phase.shrink))

@@ -36,6 +36,7 @@ from avow.language.sorts import (
 )
 
 from .pools import Pools, runs, scenario_runs
+from .tuning import ATTEMPTS, CASE_BYTES, COMMON_LENGTHS, OPAQUE_VALUES, VALUE_DEPTH
 
 T = TypeVar("T")
 
@@ -43,14 +44,7 @@ Inputs = dict[str, Value]
 Failing = Callable[[Inputs], tuple[str, ...] | None]
 """The inputs that a failing assumption, or part of a trigger, speaks of; None where nothing fails."""
 
-ATTEMPTS = 6
-DEEPEST = 4
 _PLAIN = BoolSort | RealSort | IntegerSort | NaturalSort | StringSort | EnumSort
-BYTES = 80
-"""Length of the string: as many choices as a case has, in small systems; after it every choice is the simplest."""
-
-_FEW = 4
-_COUNT = 5
 
 
 class Source:
@@ -121,7 +115,7 @@ class Generator:
         of a sequence that of its last element; sequences also of each length."""
         chance = random.Random(0)
         for name, value in _in_turn([(name, self._at_edges(sort)) for name, sort in self.ports.items()]):
-            for data in (b"", chance.randbytes(BYTES)):
+            for data in (b"", chance.randbytes(CASE_BYTES)):
                 yield {**self.case(Source(data), failing), name: value}
 
     def _at_edges(self, sort: Sort) -> Iterator[Value]:
@@ -169,7 +163,7 @@ class Generator:
             case EnumSort(members=members):
                 value = Element(source.of(members))
             case OpaqueSort(name=name):
-                value = Opaque(name, source.below(_FEW))
+                value = Opaque(name, source.below(OPAQUE_VALUES))
             case DataSort():
                 value = self._data(source, sort, near, depth)
             case TupleSort(items=items):
@@ -185,9 +179,9 @@ class Generator:
 
     def _length(self, source: Source, depth: int) -> int:
         """Mostly a few; now and then one of those at which something may change."""
-        chosen = source.below(_COUNT + 1)
-        if chosen < _COUNT or depth > 0 or not self.pools.lengths:
-            return chosen % _COUNT
+        chosen = source.below(COMMON_LENGTHS + 1)
+        if chosen < COMMON_LENGTHS or depth > 0 or not self.pools.lengths:
+            return chosen % COMMON_LENGTHS
         return source.of(self.pools.lengths)
 
     def _number(self, source: Source, sort: Sort, alone: bool) -> Value:
@@ -211,7 +205,7 @@ class Generator:
 
     def _data(self, source: Source, sort: DataSort, near: dict[Any, Any], depth: int) -> Value:
         made = sort.constructors
-        if depth >= DEEPEST:
+        if depth >= VALUE_DEPTH:
             made = tuple(c for c in made if not any(isinstance(p, DataSort) for p in c.parameters))
             if not made:
                 raise Impossible(f"finite values of {sort.name}")
@@ -269,13 +263,13 @@ class Generator:
         if relation and len(groups) == 2 and source.coin():
             # one to one, in order: as maps, routes and registers mostly are
             left, right = (self._pool(source, group, near, depth) for group in groups)
-            count = 1 + source.below(_FEW)
+            count = 1 + source.below(OPAQUE_VALUES)
             rows = [(*a, *b) for a, b in zip(left[:count], right[:count], strict=False)]
             return FunctionValue(dict.fromkeys(rows, True), False)
-        if depth >= DEEPEST:
+        if depth >= VALUE_DEPTH:
             points = []
         else:
-            points = [self._row(source, sort.parameters, near, depth + 1) for _ in range(source.below(_COUNT))]
+            points = [self._row(source, sort.parameters, near, depth + 1) for _ in range(source.below(COMMON_LENGTHS))]
         if relation:
             return FunctionValue(dict.fromkeys(points, True), False)
         default = self._value(source, sort.result, near, depth + 1, True)

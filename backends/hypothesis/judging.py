@@ -13,6 +13,7 @@ from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.values import Value
 from avow.language.printer import show_term
 from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
+from avow.tuning.effort import JUDGE_MS
 
 from . import wire
 from .generate import Inputs
@@ -35,7 +36,7 @@ class Judged:
                 return bool(self.evaluator(valuation))
             except NotEvaluable:
                 pass
-        return judge(self.formula, valuation, timeout_ms=2000)
+        return judge(self.formula, valuation, timeout_ms=JUDGE_MS)
 
 
 @dataclass(slots=True)

@@ -29,26 +29,23 @@ from avow.language.sorts import (
 )
 from avow.language.terms import Arithmetic, Compare, Literal, Negative, Term, Widen
 
+from .tuning import (
+    CONSTANTS_COMBINED,
+    CONSTANTS_READ,
+    LARGEST_CONSTANT,
+    LENGTHS,
+    LONG_SEQUENCE,
+    LONGEST_SEQUENCE,
+    LONGEST_TEXT,
+    SMALL,
+)
+
 STEP = Fraction(1, 1000)
 """How close to a threshold a value is tried on either side."""
 
-MANY = 6
-"""Constants up to which their sums and differences are tried as well."""
 
-LONG = 50
-"""A sequence is also tried with so many elements, whatever is written."""
-LONGEST = 400
-"""Numbers up to which they are taken for lengths."""
-MOST_LENGTHS = 60
-WRITTEN = 300
-"""So many constants of a program are looked at."""
-LARGEST = 10**12
-LONGEST_TEXT = 60
 TINY = Fraction(1, 10**9)
 """Below it the neighbours of a number are too long to be worth writing."""
-
-SMALL = 4
-"""Identifiers and coordinates are drawn from so few that relations meet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +85,7 @@ def pools(
             elif isinstance(part, Compare):
                 solved |= _solved(part)
     around = _around(numbers | solved)
-    few = sorted({*numbers, Fraction(0)}) if len(numbers) <= MANY else []
+    few = sorted({*numbers, Fraction(0)}) if len(numbers) <= CONSTANTS_COMBINED else []
     # An output's threshold may be reached from an input by adding or taking away.
     combined = _simple((*around, *(a + b for a in few for b in few), *(a - b for a in few for b in few)))
     small = tuple(range(SMALL))
@@ -117,14 +114,18 @@ def constants(program: str) -> tuple[frozenset[Fraction], frozenset[str]]:
         return frozenset(), frozenset()
     documentation = {id(part.value) for part in ast.walk(tree) if isinstance(part, ast.Expr)}
     for part in ast.walk(tree):
-        if len(numbers) + len(texts) >= WRITTEN or id(part) in documentation or not isinstance(part, ast.Constant):
+        if (
+            len(numbers) + len(texts) >= CONSTANTS_READ
+            or id(part) in documentation
+            or not isinstance(part, ast.Constant)
+        ):
             continue
         match part.value:
             case bool():
                 continue
-            case int(number) if abs(number) <= LARGEST:
+            case int(number) if abs(number) <= LARGEST_CONSTANT:
                 numbers |= {Fraction(number), Fraction(-number)}
-            case float(number) if math.isfinite(number) and abs(number) <= LARGEST:
+            case float(number) if math.isfinite(number) and abs(number) <= LARGEST_CONSTANT:
                 # as it is written, and as the machine has it
                 numbers |= {Fraction(repr(number)), Fraction(number), -Fraction(repr(number))}
             case str(text) if len(text) <= LONGEST_TEXT:
@@ -146,9 +147,9 @@ def _neighbours(number: Fraction) -> Iterable[Fraction]:
 
 def _lengths(numbers: Iterable[Fraction]) -> tuple[int, ...]:
     """Lengths at, beside and beyond each number that can be one, and those that any sequence may have."""
-    whole = {math.floor(n) for n in numbers if 0 <= n <= LONGEST}
-    found = {n + d for n in whole for d in (-1, 0, 1, 2)} | {2 * n + 1 for n in whole} | {0, 1, 2, LONG}
-    return tuple(sorted(n for n in found if 0 <= n <= 2 * LONGEST + 1))[:MOST_LENGTHS]
+    whole = {math.floor(n) for n in numbers if 0 <= n <= LONGEST_SEQUENCE}
+    found = {n + d for n in whole for d in (-1, 0, 1, 2)} | {2 * n + 1 for n in whole} | {0, 1, 2, LONG_SEQUENCE}
+    return tuple(sorted(n for n in found if 0 <= n <= 2 * LONGEST_SEQUENCE + 1))[:LENGTHS]
 
 
 def _solved(comparison: Compare) -> set[Fraction]:

@@ -12,8 +12,7 @@ from avow.language import sorts, terms
 from avow.language.sorts import Sort
 from avow.language.terms import Quantifier, Role, Term
 
-DEEPEST = 300
-"""Nesting of a formula beyond which it is not written."""
+from .tuning import WIRE_DEPTH
 
 _CLASSES: dict[str, Any] = {
     c.__name__: c
@@ -24,7 +23,7 @@ _CLASSES: dict[str, Any] = {
 
 
 class TooDeep(Exception):  # noqa: N818 - it names what happened
-    """A formula is nested beyond `DEEPEST`."""
+    """A formula is nested beyond `WIRE_DEPTH`."""
 
 
 def encode(value: Term | Sort) -> Any:
@@ -33,7 +32,7 @@ def encode(value: Term | Sort) -> Any:
 
 
 def _encode(value: Any, depth: int) -> Any:
-    if depth > DEEPEST:
+    if depth > WIRE_DEPTH:
         raise TooDeep
     if isinstance(value, tuple):
         return [_encode(item, depth + 1) for item in value]

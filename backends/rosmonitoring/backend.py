@@ -16,6 +16,7 @@ from avow.system.paths import inside
 
 from .codes import CODES
 from .schema import SCHEMA
+from .tuning import VIOLATIONS_KEPT
 
 if TYPE_CHECKING:
     from avow.evidence.obligation import Obligation
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
 
     from .engine import Monitor, Violation
     from .options import Setup
-
-KEPT = 200
-"""Violations of one trace that are written to the log; all are counted."""
 
 
 class RosMonitoringBackend(Backend):
@@ -203,7 +201,7 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
             for violation in monitor.step(recorded.event):
                 run.mapping_faults += violation.fault is Fault.MAPPING
                 run.first.setdefault(f"{violation.fault.name}/{violation.clause}", violation)
-                if len(run.violations) < KEPT:
+                if len(run.violations) < VIOLATIONS_KEPT:
                     run.violations.append(violation)
             if recorded.index % 256 == 0 and time.monotonic() > deadline:
                 run.unknown = f"{name}: time was up after {monitor.events} events"

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .tuning import VIOLATIONS_SHOWN
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -18,16 +20,13 @@ if TYPE_CHECKING:
     from .session import Session
     from .traces import Recorded
 
-SHOWN = 50
-"""Violations shown without --all."""
-
 
 @click.command()
 @click.argument("system")
 @click.argument("trace", required=False)
 @click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one JSON object.")
-@click.option("--all", "show_all", is_flag=True, help=f"Show every violation, not only the first {SHOWN}.")
+@click.option("--all", "show_all", is_flag=True, help=f"Show every violation, not only the first {VIOLATIONS_SHOWN}.")
 @click.option("--serve", "port", type=click.IntRange(0, 65535), help="Answer ROSMonitoring's monitors on this port.")
 def command(
     system: str, trace: str | None, nodes: tuple[str, ...], as_json: bool, show_all: bool, port: int | None
@@ -61,7 +60,7 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
     for recorded in _events(trace):
         for violation in running.step(recorded.event):
             count += 1
-            if not show_all and count > SHOWN:
+            if not show_all and count > VIOLATIONS_SHOWN:
                 continue
             if as_json:
                 shown.append({**violation_json(violation), "line": recorded.line})
@@ -72,8 +71,8 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
         whole = {**running.summary(), "trace": trace, "sha256": digest, "violations": shown}
         click.echo(json.dumps(whole, indent=2, ensure_ascii=False))
     else:
-        if not show_all and count > SHOWN:
-            click.echo(f"… and {count - SHOWN} more (--all shows them)")
+        if not show_all and count > VIOLATIONS_SHOWN:
+            click.echo(f"… and {count - VIOLATIONS_SHOWN} more (--all shows them)")
         _print_summary(running)
     return 0 if running.clean and _anything_judged(running) else 1
 

@@ -6,6 +6,8 @@ import functools
 import math
 from fractions import Fraction
 
+from .tuning import NUMBER_LENGTH
+
 
 class Decimal:
     """A JSON number with a point or an exponent, kept as its text until somebody needs its value."""
@@ -43,9 +45,6 @@ class NotANumber(Exception):  # noqa: N818 - it names what was found
     """NaN, an infinity, or a number too long to be meant."""
 
 
-_LONGEST = 400
-
-
 def exact(raw: object) -> Fraction | int:
     """The value of a number as it came from JSON or from a bag. Raises NotANumber."""
     if isinstance(raw, Decimal):
@@ -67,7 +66,7 @@ def whole(value: int) -> Fraction:
 
 @functools.lru_cache(maxsize=65536)
 def _fraction(text: str) -> Fraction:
-    if len(text) > _LONGEST or abs(_exponent(text)) > _LONGEST:
+    if len(text) > NUMBER_LENGTH or abs(_exponent(text)) > NUMBER_LENGTH:
         raise NotANumber
     try:
         return Exact(text)

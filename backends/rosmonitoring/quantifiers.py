@@ -13,7 +13,6 @@ from fractions import Fraction
 
 from avow.evaluation.disjunctions import Part, alternatives, conjunction
 from avow.evaluation.evaluate import finite_values
-from avow.formulas.cases import LIMIT as CASES
 from avow.formulas.cases import TooManyCases, lifted
 from avow.formulas.renaming import bound_names, rename_apart
 from avow.language.operators import OPERATORS, Why
@@ -49,6 +48,7 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+from avow.tuning.bounds import ATOMS_MADE
 
 from .rml import (
     FALSE,
@@ -64,9 +64,7 @@ from .rml import (
     some,
 )
 from .symbols import Points, Scalar, Symbol, Tracked, Variant, code, constant, equal
-
-LIMIT = 600
-"""Comparisons in a condition; a larger one is refused, since it is checked at every event."""
+from .tuning import COMPARISONS
 
 _NOT_LIFTED = "it stands in a quantified formula within a term"
 
@@ -85,11 +83,13 @@ class Eliminator:
         try:
             found = self._formula(rename_apart(lifted(formula)), {})
         except TooManyCases:
-            raise NotRml(f"its conditionals (`if`, `min`, `max`, `abs`) make more than {CASES} comparisons") from None
+            raise NotRml(
+                f"its conditionals (`if`, `min`, `max`, `abs`) make more than {ATOMS_MADE} comparisons"
+            ) from None
         except RecursionError:
             raise NotRml("the formula is nested too deeply") from None
-        if size(found) > LIMIT:
-            raise NotRml(f"the condition without quantifiers has {size(found)} parts, more than {LIMIT}")
+        if size(found) > COMPARISONS:
+            raise NotRml(f"the condition without quantifiers has {size(found)} parts, more than {COMPARISONS}")
         return found
 
     def _formula(self, term: Term, bound: Bound) -> Condition:

@@ -59,9 +59,7 @@ from .symbols import (
     components,
     constant,
 )
-
-CASES = 64
-"""Combinations of constants that one topic's message may have; more are refused."""
+from .tuning import CASES
 
 
 @dataclass(frozen=True, slots=True)

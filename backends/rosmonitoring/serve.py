@@ -14,7 +14,8 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic, Rejected
 
 from .session import Session, violation_json
-from .traces import MAX_LINE, parse_event
+from .traces import parse_event
+from .tuning import EVENT_CHARACTERS
 
 HOST = "127.0.0.1"
 
@@ -55,7 +56,7 @@ def serve(make: Callable[[], Session], port: int, ready: Callable[[Any], None] |
             return
 
     try:
-        with listen(talk, HOST, port, max_size=MAX_LINE) as server:
+        with listen(talk, HOST, port, max_size=EVENT_CHARACTERS) as server:
             if ready is not None:
                 ready(server)
             server.serve_forever()

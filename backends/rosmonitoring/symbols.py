@@ -36,6 +36,7 @@ from .rml import (
     some,
 )
 from .rules import Constant, Fields, Hold, InOrder, Previous, Rule
+from .tuning import TRACKED_TUPLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +79,10 @@ class Tracked:
                 )
             at.append(argument.number.value)
         name = self.flags.setdefault(tuple(at), f"{self.prefix}_{len(self.flags) + 1}")
-        if len(self.flags) > TRACKED:
-            raise NotRml(f"it asks a relation for more than {TRACKED} tuples")
+        if len(self.flags) > TRACKED_TUPLES:
+            raise NotRml(f"it asks a relation for more than {TRACKED_TUPLES} tuples")
         return compare("==", Name(name), Number(Fraction(1)))
 
-
-TRACKED = 48
 
 Symbol = Scalar | Variant | Points | Tracked
 

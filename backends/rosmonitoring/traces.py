@@ -12,9 +12,7 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 
 from .numbers import Decimal, NotANumber, exact
-
-MAX_LINE = 8_000_000
-"""Characters of one event; a longer line is not an event."""
+from .tuning import EVENT_CHARACTERS
 
 Event = Mapping[str, Any]
 
@@ -62,8 +60,8 @@ def read_lines(lines: Iterable[str], name: str) -> Iterator[Recorded]:
     for number, line in enumerate(lines, start=1):
         if line.isspace():
             continue
-        if len(line) > MAX_LINE:
-            raise Rejected(_fault(name, number, 1, f"the line is longer than {MAX_LINE} characters"))
+        if len(line) > EVENT_CHARACTERS:
+            raise Rejected(_fault(name, number, 1, f"the line is longer than {EVENT_CHARACTERS} characters"))
         index += 1
         try:
             event = parse_event(line)

@@ -13,7 +13,8 @@ from test_ajpf_ltl import Not as Negation
 from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND
 from avow.backends.ajpf.psl_parser import parse_psl
-from avow.backends.ajpf.tautology import MAX_STEPS, Steps, constant, is_satisfiable, is_valid
+from avow.backends.ajpf.tautology import Steps, constant, is_satisfiable, is_valid
+from avow.backends.ajpf.tuning import TAUTOLOGY_CASES
 from avow.base.verdict import Verdict
 from avow.sanity.mutants import mutants
 from avow.system.plan import Scenario
@@ -72,7 +73,7 @@ def test_what_takes_too_long_is_no_tautology():
     steps = Steps()
     formula = parse_psl(f"({' & '.join(f'({n} || ~{n})' for n in names)}) & (B(a, q) & ~B(a, q))")
     assert is_satisfiable(formula, steps)
-    assert steps.left < 0 < MAX_STEPS
+    assert steps.left < 0 < TAUTOLOGY_CASES
 
 
 def test_a_row_that_is_a_tautology_shows_nothing(lift, tmp_path):

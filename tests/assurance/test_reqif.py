@@ -155,7 +155,7 @@ def test_undeclared_entities_and_deep_nesting_are_refused() -> None:
 
 
 def test_archives_that_lie_or_burst_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reqif, "_MOST_BYTES", 1_000_000)
+    monkeypatch.setattr(reqif, "REQIF_BYTES", 1_000_000)
     bomb = io.BytesIO()
     with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("a.reqif", "w") as stream:
         stream.write(b" " * 1_100_000)

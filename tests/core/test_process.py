@@ -13,6 +13,7 @@ import pytest
 from helpers import alive
 
 from avow.base import process
+from avow.tuning.sizes import OUTPUT_KEPT
 
 
 def test_output_and_code_are_the_tools() -> None:
@@ -63,7 +64,7 @@ def test_memory_is_bounded() -> None:
 
 def test_endless_output_is_cut() -> None:
     done = process.run(["bash", "-c", "yes | head -c 9000000"], seconds=20)
-    assert len(done.stdout) == process.KEEP
+    assert len(done.stdout) == OUTPUT_KEPT
 
 
 def test_standard_input_is_closed_unless_given() -> None:

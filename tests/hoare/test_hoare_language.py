@@ -6,8 +6,9 @@ from fractions import Fraction
 
 import pytest
 
-from avow.backends.hoare.parser import DEEPEST, parse_program
+from avow.backends.hoare.parser import parse_program
 from avow.backends.hoare.syntax import AssignStatement, Binary, IfStatement, MatchStatement, Source, WhileStatement
+from avow.backends.hoare.tuning import NESTING
 from avow.base.diagnostics import Diagnostic, Rejected
 
 PAPER = """input := radiation_at(i)
@@ -139,12 +140,12 @@ def test_faults_have_a_place(text: str, line: int, column: int, part: str) -> No
 
 @pytest.mark.parametrize("text", ["-" * 5000 + "1", "not " * 5000 + "a", "+".join(["a"] * 5000)])
 def test_depth_is_refused_not_a_crash(text: str) -> None:
-    assert str(DEEPEST) in fault(f"x := {text}").message
+    assert str(NESTING) in fault(f"x := {text}").message
 
 
 def test_deeply_nested_branches_are_refused() -> None:
     text = "".join(" " * k + "IF a THEN\n" for k in range(3000)) + " " * 3000 + "SKIP"
-    assert str(DEEPEST) in fault(text).message
+    assert str(NESTING) in fault(text).message
 
 
 def test_a_program_may_be_long() -> None:

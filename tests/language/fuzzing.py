@@ -25,9 +25,9 @@ from avow.formulas.formula import node_digest
 from avow.language.contract import Contract
 from avow.language.format import format_text
 from avow.language.load import check_text
-from avow.language.source import MAX_DIAGNOSTICS
 from avow.language.translate import FORMATS
 from avow.solving.contract_smtlib import to_smtlib
+from avow.tuning.shown import DIAGNOSTICS
 
 from .generate import CONTRACT, Formulas, damaged
 
@@ -282,7 +282,7 @@ def examine(text: str) -> Contract | None:
     with at_most(SECONDS):
         contract, found = check_text(text, "f")
         assert (contract is None) == any(d.is_error for d in found)
-        assert len(found) <= MAX_DIAGNOSTICS + 1
+        assert len(found) <= DIAGNOSTICS + 1
         lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
         for diagnostic in found:
             _place(diagnostic, lines)

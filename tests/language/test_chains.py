@@ -8,7 +8,6 @@ from fractions import Fraction
 
 import pytest
 
-from avow.language.chains import LONG
 from avow.language.format import format_text
 from avow.language.load import check_text, parse_formula, parse_term
 from avow.language.printer import show_term
@@ -29,6 +28,7 @@ from avow.language.terms import (
     Widen,
 )
 from avow.language.translate import FORMATS
+from avow.tuning.bounds import CHAIN
 
 MANY = 5_000
 FRAME = """\
@@ -74,7 +74,7 @@ def test_a_chain_is_accepted_laid_out_and_translated(name: str) -> None:
     contract, found = check_text(text, "f")
     assert contract is not None, [d.message for d in found if d.is_error]
     assert all(len(d.message) + len(d.hint or "") < 2000 for d in found)
-    assert depth(contract.nodes[0].guarantees[0].formula) <= LONG + 10
+    assert depth(contract.nodes[0].guarantees[0].formula) <= CHAIN + 10
     formatted = format_text(text, "f")
     assert format_text(formatted, "f") == formatted
     assert check_text(formatted, "f")[0] == contract
@@ -171,7 +171,7 @@ def _folded(signs: list[str], values: list[Fraction]) -> Fraction:
 def test_a_long_chain_means_what_the_short_one_does(seed: int) -> None:
     source = random.Random(seed)
     node, contract = _node()
-    size = source.choice((LONG, LONG + 1, LONG + 2, 70, 129, 513, 800))
+    size = source.choice((CHAIN, CHAIN + 1, CHAIN + 2, 70, 129, 513, 800))
     family = ("+-", "*", "*/")[seed % 3]
     signs = [source.choice(family) for _ in range(size)]
     if family == "*/":
@@ -186,7 +186,7 @@ def test_a_long_chain_means_what_the_short_one_does(seed: int) -> None:
     letters = [source.choice("abo") for _ in range(size + 1)]
     for sign in ("->", "<=>"):
         formula = parse_formula(f" {sign} ".join(letters), node, contract)
-        assert depth(formula) <= LONG + 1
+        assert depth(formula) <= CHAIN + 1
         assert parse_formula(show_term(formula, "rcl"), node, contract) == formula
         for _ in range(20):
             known: dict[str, bool | Fraction] = {n: source.random() < 0.8 for n in "abo"}
@@ -212,8 +212,8 @@ def test_chains_in_chains_read_back(inner: int, outer: int) -> None:
 def test_up_to_the_limit_a_chain_is_the_tree_that_it_is_written_as() -> None:
     node, contract = _node()
     for sign in ("->", "<=>"):
-        term = parse_formula(f" {sign} ".join(["a"] * (LONG + 1)), node, contract)
-        assert depth(term) == LONG + 1
+        term = parse_formula(f" {sign} ".join(["a"] * (CHAIN + 1)), node, contract)
+        assert depth(term) == CHAIN + 1
         short = parse_formula(f" {sign} ".join(["a"] * 4), node, contract)
         assert isinstance(short, Implies | Iff)
         assert not isinstance(short, And | Not | In | Compare | Quantified)

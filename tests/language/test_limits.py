@@ -8,10 +8,11 @@ import pytest
 
 from avow.formulas.formula import node_digest
 from avow.language.format import format_text
-from avow.language.limits import MAX_REFERENCES, sort_extent, term_extent
+from avow.language.limits import sort_extent, term_extent
 from avow.language.load import check_text
 from avow.language.sorts import REAL, DataSort, SequenceSort, TupleSort
 from avow.language.translate import FORMATS
+from avow.tuning.sizes import REFERENCES_AHEAD
 
 NODE = "node n { inputs( i : %s ) outputs( o : BOOL ) topics() guarantee( %s ) }"
 
@@ -63,7 +64,7 @@ def test_constants_in_formulas_count() -> None:
 
 
 def test_declarations_in_a_moderate_row_are_accepted_whatever_their_order() -> None:
-    count = MAX_REFERENCES // 2
+    count = REFERENCES_AHEAD // 2
     assert codes(row(count, "", "T{1} : T{0};", f"T{count - 1} : REAL;") + NODE % ("T0", "o and i > 0")) == []
     assert codes(row(2000, "T0 : REAL;", "T{0} : T{1};") + NODE % ("T1999", "o and i > 0")) == []
 

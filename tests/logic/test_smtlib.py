@@ -89,7 +89,7 @@ def test_scripts_with_sequences_say_how_cvc5_reads_them() -> None:
 def test_a_cvc5_that_does_not_keep_its_time_limit_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """On some scripts it does not look at its clock; nothing but the end of its process ends it."""
     pytest.importorskip("cvc5")
-    monkeypatch.setattr(smtlib, "_STARTING", 0.0)
+    monkeypatch.setattr(smtlib, "CVC5_START_SECONDS", 0.0)
     assert ask_cvc5("(set-logic ALL)\n(check-sat)\n", timeout_ms=1) == "unknown"
     monkeypatch.undo()
     assert ask_cvc5("(set-logic ALL)\n(check-sat)\n", timeout_ms=20_000) == "sat"

@@ -145,7 +145,7 @@ def test_a_work_that_hangs_is_killed_with_all_that_it_started(
     (odd / "pids").unlink(missing_ok=True)
     settle(odd, "answers")  # from here on, a server is there
     for limit in (1.0, 4.0, 16.0, 64.0):  # until the work gets far enough to hang, on a busy machine
-        monkeypatch.setattr(executors, "GRACE", limit - 2 * Limits().seconds)
+        monkeypatch.setattr(executors, "WORKER_GRACE", limit - 2 * Limits().seconds)
         outcome, _ = settle(odd, "hangs")
         assert outcome.verdict is Verdict.UNKNOWN
         assert "no answer within" in outcome.summary
@@ -210,7 +210,7 @@ def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
 
 def test_without_a_server_there_is_a_new_python(odd: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SAID", "without")
-    monkeypatch.setattr(forks, "_START", 0.0)
+    monkeypatch.setattr(forks, "FORK_START", 0.0)
     assert settle(odd, "answers")[0].verdict is Verdict.TESTED
     monkeypatch.setattr(forks, "_Server", None)  # it is not tried again
     assert settle(odd, "answers")[0].verdict is Verdict.TESTED

@@ -1,0 +1,170 @@
+"""How far searches and enumerations go before they give up, which is then said: beyond a bound an answer
+is `unknown` or "not exhaustive", never a proof.
+"""
+
+CHOICES_FOUND = 300
+"""Answers that the solver is asked for, where they cannot be enumerated: each costs one question."""
+
+WITNESSES_TRIED = 4
+"""Tuples of the hypotheses' own names that are put in for `exists`: each is a question, and the right one mostly is
+the first of its types."""
+
+VALUES_TRIED = 24
+"""Values that are tried: each is a question to the solver."""
+
+DEEPEST_INDUCTION = 3
+"""The k of k-induction, at most: each step adds a copy of the system to the question."""
+
+PREMISES_TRIED = 6
+"""Premises from which the witness of a claim that something exists may come: each is a question by itself."""
+
+LONGEST_UNROLLING = 24
+"""Steps unrolled from the initial values, at most: the time for deeper questions is mostly up before."""
+
+STATES_CHECKED = 50_000
+"""Kinds of steps looked at over one scenario, so that memory stays bounded; beyond it, a search is not exhaustive."""
+
+RUNS_TRIED = 20
+"""Runs tried before a search: a violation that is common is found by one of them in a fraction of a search's time."""
+
+RUN_LENGTH = 60
+"""The length of such a run, in steps."""
+
+PARTIAL_ANSWERS = 100_000
+"""Partial answers looked at for one question; beyond it, the search is not exhaustive."""
+
+PARTIAL_ANSWERS_AGAIN = 2_000
+"""The same, once a search was cut short: nothing will be exhaustive any more, and there are other inputs to try."""
+
+NODE_ANSWERS = 4_000
+"""Answers of one node to one input; with more, a search is not exhaustive."""
+
+SEQUENCE_LENGTHS = 4
+"""Sequences of up to so many elements are tried, unless an equation or the scenario gives the sequence: their
+number grows with this as an exponent."""
+
+POINTS_OF_ARGUMENTS = 10_000
+"""Combinations of values that are listed; with more, none are."""
+
+OFFER_HYPOTHESES = 40
+"""Beyond so many hypotheses, eliminating variables takes longer than an offer may."""
+
+OFFER_PLACES = 8
+"""Clauses for which an offer is sought: nobody reads more."""
+
+OFFER_LENGTH = 300
+"""Characters of a clause that is worth offering: a longer one explains nothing."""
+
+OFFER_REWRITINGS = 5
+"""Rounds in which foreign names are replaced by what equations say of them: longer chains of links make longer
+clauses than are worth offering."""
+
+COMPLETIONS = 3
+"""Values tried in the places that the search left undecided."""
+
+VALUES_OF_A_PORT = 20_000
+"""Values of a port that a scenario enumerates; with more, the user is asked for a domain."""
+
+SMALL_TABLE = 3
+"""A function of so few points is compared as it is; a key made once pays for larger ones."""
+
+VALUES_ENUMERATED = 1_000_000
+"""More values than this are not enumerated: the answer would not come in useful time."""
+
+CONSTRAINTS = 4_000
+"""Elimination stops (`TooMany`) when there are more constraints than this: each variable may square their number."""
+
+LINEAR_CASES = 256
+"""Cases into which inequalities may fall: each is an elimination of its own."""
+
+DISJUNCTION_DEPTH = 5
+"""How far disjunctions within disjunctions are followed: the cost of planning is exponential in it."""
+
+ROWS_WITHOUT_INDEX = 3
+"""A table of so few rows is walked through; an index costs more than it saves."""
+
+REPRESENTATIVES = 2_000
+"""More representatives than this for one variable are refused: the search would be too slow to be of use."""
+
+ATOMS_MADE = 500
+"""Atoms made, at most: cases within cases multiply."""
+
+DISJUNCTIONS_MADE = 16
+"""Disjunctions of conjunctions that would become more than so many disjunctions are left as they are: their numbers
+multiply."""
+
+VALUES_WRITTEN_OUT = 400
+"""A quantifier over more (combinations of) values stays as it is, and ranges over everything."""
+
+AUTOMATON_NODES = 5_000
+"""Nodes of a property's automaton: the tableau is exponential in the property's length, and one so large is a slip
+rather than a requirement."""
+
+POINTWISE_PARTS = 100
+"""A guarantee with more parts, once `or` is spread over `and`, is left as it is."""
+
+SEQUENCE_SHOWN = 1_000
+"""Elements of a sequence that a solver's model is read back into: beyond it, the model is given up."""
+
+LETTERS_EXHAUSTED = 10
+"""Up to this many letters every assignment is tried, else samples of them: each letter doubles their number."""
+
+ASSIGNMENTS_SAMPLED = 2000
+"""Assignments tried of more letters: two readings that differ at one in five hundred are told apart 98 times in a
+hundred."""
+
+SAMPLES_BY_SIZE = 400_000
+"""Samples times operators, at most: a formula of thousands of parts gets fewer samples."""
+
+CHAIN = 64
+"""Up to so many operators a chain becomes the tree that it is written as; and no chain's tree is deeper."""
+
+CHAIN_BLOCK = 8
+"""How many terms are put together at each level of a long chain. 8 ** 7 is more than a text may have tokens, and a
+spine of 7 levels is 7 * 8 < CHAIN terms long."""
+
+CONFLICTS = 8
+"""Conflicts that are looked for: whoever mends eight asks again."""
+
+SIZES_TRIED = (1, 2)
+"""Sizes of an opaque type that a contract should allow: with one element nothing differs, two are enough for `!=`."""
+
+NUMBERS_PAIRED = 4
+"""Half way between so many numbers, each with each, values are looked for."""
+
+WITNESS_REFUTATIONS = 6
+"""So many inputs for which there is an output after all, one after the other, and something else is tried."""
+
+WITNESSES_PER_OUTPUT = 24
+"""Candidates for one output: those that the clauses name come first, and the right one is hardly ever a late one."""
+
+WITNESSES = 96
+"""Combinations of them: each is a question to the solver."""
+
+WITNESS_ARGUMENTS = 12
+"""How many terms are tried for one argument of a constructor or one quantified variable."""
+
+SMALL_NUMBER = 99
+"""Numbers of up to two digits are small: a reader takes them in at a glance."""
+
+TABLE_POINTS = 128
+"""Tables read off a function that is given by comparisons have no more points."""
+
+NUMBERS_WRITTEN_OUT = 16
+"""A quantifier over more whole numbers stays one."""
+
+PARTS_SEARCHED = 64
+"""Conjunctions of more parts are left alone: each part may be looked at once for each variable."""
+
+CASES_KEPT = 50
+"""Cases of one claim that are tried again: more cost each later run, and those of the newest tool runs tell most."""
+
+SUPPORT_STEPS = 2_000_000
+"""Requirements times obligations: beyond it, counting who rests on whom takes longer than the rest of the report."""
+
+VALUES_LOOKED_AT = 500
+"""So many values of one domain or column are looked at; a table may have a million."""
+
+INPUTS_ALWAYS_ASKED = 20
+"""Inputs about which a cut by the scenario is sought however late it is, so that a slow machine says what a fast one
+says: most cuts show at the first inputs, and a question takes some milliseconds."""

@@ -1,0 +1,43 @@
+"""Times and retries of a run: workers, the fork server, a cluster, the language server. In wall-clock seconds."""
+
+CHARACTERS_PER_SECOND = 500_000
+"""About how fast texts are checked: a text so long that it takes a while is checked when its author pauses."""
+
+NOTICED_SECONDS = 0.05
+"""So many seconds are a while."""
+
+CONFORMANCE_PATIENCE = 60.0
+"""Seconds within which a discharge with hardly any time must be back, on a busy machine."""
+
+SUBJECT_PATIENCE = 10.0
+"""Seconds that a subject may take for one answer: a robot's step takes milliseconds, its first import seconds."""
+
+CLUSTER_CONNECT = 30.0
+"""Seconds to reach a cluster's scheduler, which may just be starting."""
+
+CLUSTER_RETRIES = 2
+"""How often a work whose worker died is given to another: more often, and the work is what kills them."""
+
+WORKER_GRACE = 90.0
+"""Seconds above the tool's own limits that a worker gets to translate and write."""
+
+QUEUE_PATIENCE = 3600.0
+"""Seconds above all that for works that wait for their turn."""
+
+FORK_MESSAGE = 1 << 20
+"""Bytes of a request to the fork server: a command line and an environment."""
+
+FORK_START = 60.0
+"""Seconds that the server gets for its imports, on a loaded machine."""
+
+FORK_LOOK = 0.5
+"""Seconds between two looks whether a work is still wanted."""
+
+FORK_STOP = 15.0
+"""Seconds that it gets to kill a fork."""
+
+RECHECK_SECOND = 1.0
+"""Seconds that the second solver has at least: its process has to begin."""
+
+VERSION_SECONDS = 20.0
+"""For a tool to say its version: one that runs on Java or .NET takes seconds on a loaded machine."""

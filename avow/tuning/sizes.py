@@ -1,0 +1,83 @@
+"""The largest inputs that are read, and the deepest: beyond them a text is refused with a place and a message, so that
+no input takes all memory or ends in a traceback.
+"""
+
+REQIF_DEPTH = 400
+"""Elements within elements: beyond any export, well below what a program's stack bears."""
+
+REQIF_BYTES = 200_000_000
+"""Of a file, and of all files that an archive holds, unpacked: an archive of a few kilobytes may unpack to anything."""
+
+OUTPUT_KEPT = 4_000_000
+"""Characters of output kept: a tool that prints without end must not fill the memory."""
+
+SOURCE_SHOWN = 20_000_000
+"""Bytes of a file that are looked at for the lines to show."""
+
+LONGEST_TIMEOUT = 86_400.0
+"""A day, in seconds: what asks for more is a slip, and tools' own counters of milliseconds overflow after 24 days."""
+
+CONDITION_DEPTH = 150
+"""Deeper formulas are not taken apart: what takes them apart recurses."""
+
+REWRITTEN_DEPTH = 200
+"""Deeper formulas are asked about as they are: what would rewrite them recurses."""
+
+SENTENCE = 4_000
+"""So many characters of a sentence are read: the lints of sentences look at each word."""
+
+TOKENS = 1_000_000
+"""A text with more is no contract; a megabyte of RCL has some 250,000."""
+
+DIGITS = 500
+"""Longer numbers are rejected: nobody means them, and arithmetic on them costs more than it is worth."""
+
+DECLARED_PARTS = 20_000
+"""So many parts a constant or a type may have, written out: one that doubles another that doubles another soon
+fills the memory."""
+
+CONTRACT_PARTS = 2_000_000
+"""So many parts all formulas of a contract may have together, constants written out."""
+
+REFERENCES_AHEAD = 100
+"""Declarations that stand before what they refer to: so long a row of them, since following it recurses."""
+
+CONTRACT_BYTES = 4_000_000
+"""A larger file is no contract: at forty bytes a line it has a hundred thousand lines."""
+
+NESTING = 150
+"""How deep a formula or type may be nested. Every later pass may recurse as deep as this. A chain of operators is
+no nesting: its terms are made shallow by `avow.language.chains`."""
+
+INCLUDED_NODES = 5_000
+"""Two copies of two copies of …: soon too many."""
+
+SYSTEMS_WITHIN = 30
+"""Systems within systems: each level reads a plan, and a circle that links hide must end."""
+
+ROS_GRAPH_BYTES = 5_000_000
+"""A larger file is no graph of one robot."""
+
+STATEMENT_WORDS = 14
+"""Words of a supposition's `says`: so many fit in a line of a report's first screen."""
+
+PLAN_BYTES = 8_000_000
+"""A larger file is no plan: data belongs in a table beside it."""
+
+PLAN_PIECES = 400_000
+"""Pieces of a document after its aliases are expanded: aliases of aliases make a kilobyte into gigabytes."""
+
+PLAN_DEPTH = 60
+"""Lists within mappings within lists: what the schema allows is a tenth of it, and readers recurse."""
+
+TABLE_CELLS = 1_000_000
+"""Of one table: a map of a thousand by a thousand places."""
+
+RANGE_VALUES = 100_000
+"""Of one range of numbers, which is written out."""
+
+PROPERTY_DEPTH = 60
+"""Brackets of a temporal property: its parser and its automaton recurse."""
+
+PROPERTY_LENGTH = 50_000
+"""Characters of a temporal property: one so long is generated, and no automaton of it would be built."""

@@ -1,0 +1,76 @@
+"""This backend's numbers: how much is read, how far is searched, how much is shown; each with its reason."""
+
+RULE_DEPTH = 60
+"""Belief rules that call each other: one that calls itself never ends, and the search must."""
+
+DRAWS = 4096
+"""Combinations of percepts that an environment may draw in one step: each is a branch of every state."""
+
+STATES = 2_000_000
+"""States explored where nothing else is said; the limit on memory is mostly met before."""
+
+INTENTIONS = 6
+"""So many intentions at once, and the agent has probably fallen behind its percepts for good."""
+
+PROPERTIES = 5_000
+"""Instances of one guarantee: each is a property that is checked by itself."""
+
+TAIL = 5_000
+"""Steps that a bad prefix is followed for, till a state comes again: a run has to be shown whole."""
+
+INDEX_VALUES = 1_000
+"""Values of one index of a mapping's row, which are written out."""
+
+DEFAULT_STATES = 1_000_000
+"""States that a method explores unless its options say otherwise: whoever knows that an agent needs more says so."""
+
+PROGRAM_BYTES = 2_000_000
+"""A larger file is no agent that anybody wrote."""
+
+PROPERTY_LENGTH = 20_000
+"""Characters of a property written by hand."""
+
+PROPERTY_NESTING = 60
+"""Brackets of such a property: the parser recurses, and AJPF's does too."""
+
+ALTERNATIVES = 8
+"""Alternatives of a trigger that are each explained: a reader follows no more."""
+
+REPLAY_SECONDS = 20.0
+"""For one run. An agent that stands still for ever is ended; what it told counts."""
+
+GRACE = 0.5
+"""Of the time limit, what may be used beyond it to look for violations in what could be explored."""
+
+LAZY_STATES = 200_000
+"""States after which the properties are asked for one by one, each on the part of the state space that it needs."""
+
+PART_STATES = 20_000
+"""States of such a part."""
+
+LAZY_SHARE = 0.02
+"""Of the time that is left, what one property may use for that."""
+
+SPIN_SHARE = 0.5
+"""Of the time that is left, what Spin may use for its second opinion."""
+
+SPIN_SECONDS = 20.0
+"""The most that a second opinion may take that the plan did not ask for."""
+
+FORMULA_DEPTH = 120
+"""Deeper guarantees are refused by name: what translates them recurses."""
+
+MULTIPLIED_OUT = 256
+"""More disjuncts (or conjuncts) than this under one quantifier are not multiplied out."""
+
+PARTS = 20_000
+"""More parts than this are not written out."""
+
+TERM_DEPTH = 40
+"""Terms nested deeper are refused by the parsers, so that every walk over a term may recurse."""
+
+TAUTOLOGY_CASES = 4_000
+"""Cases that are looked at, in all, before a formula is taken for one that depends on the agent."""
+
+INDICES_TRIED = 400
+"""Combinations of index values that a row is tried with in each step."""

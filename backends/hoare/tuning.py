@@ -1,0 +1,41 @@
+"""This backend's numbers: how much is read, how far is searched, how much is shown; each with its reason."""
+
+BRIEFLY_SECONDS = 5.0
+"""Seconds for whether the program has an output for every input, where that can only turn `unknown` into `refuted`."""
+
+ENDLESS_MS = 8_000
+"""Milliseconds for an input on which the program never ends: it takes proof and time limit away from nothing, since
+it is asked last."""
+
+LASTING_MS = 1_000
+"""For one question whether a predicate lasts round a loop: such questions are small, and there are many."""
+
+UNENDED_RUNS = 4
+"""Runs that were given up and for which a lasting predicate was sought in vain; after them no more are tried."""
+
+INPUTS_TRIED = 300
+"""Inputs that the program is run on before a proof is tried, which takes far longer."""
+
+LENGTHS = (0, 1, 2, 3, 6)
+"""Lengths of sequences among them: none, one, a pair, an odd and an even number more."""
+
+VALUE_DEPTH = 3
+"""Constructors within constructors among them; deeper values are of plain constructors only, so that they end."""
+
+RUN_STEPS = 5_000
+"""Statements after which a run is given up: some milliseconds, for programs that mostly take a few dozen."""
+
+LOOP_STATES = 4
+"""So many of a loop's last states are told of a run that was given up."""
+
+NESTING = 120
+"""Nesting beyond which a program is refused: later passes recurse over it."""
+
+ENDLESS_RUNS = 3
+"""Runs without an end after which no more inputs are tried."""
+
+FORMULA_NODES = 50_000
+"""Nodes of a formula beyond which a program is too much for this method: branches in sequence double it."""
+
+GUESS_MS = 1_000
+"""For one input that meets the precondition: what is not found at once is left to the proof."""

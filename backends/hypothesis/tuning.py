@@ -1,0 +1,57 @@
+"""This backend's numbers: how much is read, how far is searched, how much is shown; each with its reason."""
+
+CONFIDENCE = 0.95
+"""Of the bound on the probability of failure that is told: the common level, at which the rule of three holds."""
+
+REJECTED_CASES = 20
+"""Rejected cases for each one that was tried, beyond which the assumptions are too rarely met to say anything."""
+
+SHRINKING_SECONDS = 4.0
+"""Seconds spent on making a failing case simpler."""
+
+BATCH = 50
+"""Cases that are put to the subject at a time: so that the time to hand them over is shared."""
+
+ATTEMPTS = 6
+"""Times that the inputs to blame for an unmet assumption are drawn again; a case that stays unmet is rejected and
+counted."""
+
+VALUE_DEPTH = 4
+"""Values within values; deeper ones are of plain constructors and constant functions, so that they end."""
+
+CASE_BYTES = 80
+"""Length of the string that a case is drawn from: as many choices as a case has, in small systems; after it every
+choice is the simplest."""
+
+OPAQUE_VALUES = 4
+"""Elements of an opaque type, and of a relation: so few that two draws meet."""
+
+COMMON_LENGTHS = 5
+"""Sequences and tables mostly have fewer elements than this: short ones fail as well, and read better."""
+
+CONSTANTS_COMBINED = 6
+"""Constants up to which their sums and differences are tried as well."""
+
+LONG_SEQUENCE = 50
+"""A sequence is also tried with so many elements, whatever is written."""
+
+LONGEST_SEQUENCE = 400
+"""Numbers up to which they are taken for lengths."""
+
+LENGTHS = 60
+"""Lengths that are tried, the shortest first."""
+
+CONSTANTS_READ = 300
+"""So many constants of a program are looked at."""
+
+LARGEST_CONSTANT = 10**12
+"""Larger constants are no thresholds of a robot: masks, digests, dates in nanoseconds."""
+
+LONGEST_TEXT = 60
+"""Longer texts of a program are messages, not values."""
+
+SMALL = 4
+"""Identifiers and coordinates are drawn from so few that relations meet."""
+
+WIRE_DEPTH = 300
+"""Nesting of a formula beyond which it is not written."""

@@ -1,0 +1,22 @@
+"""This backend's numbers: how much is read, how far is searched, how much is shown; each with its reason."""
+
+VIOLATIONS_KEPT = 200
+"""Violations of one trace that are written to the log; all are counted."""
+
+VIOLATIONS_SHOWN = 50
+"""Violations shown without --all."""
+
+NUMBER_LENGTH = 400
+"""Digits, and the size of an exponent: longer numbers are no measurements, and cost more than an event may."""
+
+COMPARISONS = 600
+"""Comparisons in a condition; a larger one is refused, since it is checked at every event."""
+
+CASES = 64
+"""Combinations of constants that one topic's message may have; more are refused."""
+
+TRACKED_TUPLES = 48
+"""Tuples of a relation that an RML property follows: each doubles the states that a monitor may be in."""
+
+EVENT_CHARACTERS = 8_000_000
+"""Characters of one event; a longer line is not an event."""
