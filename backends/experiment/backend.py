@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from avow.backend_kit.given import file_path, told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
-from avow.base.diagnostics import Diagnostic, Rejected, Severity
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Outcome, Verdict
 
 from .codes import CODES
@@ -44,7 +44,7 @@ class ExperimentBackend(Backend):
             material = _material(experiment)
         except Rejected as error:
             return error.diagnostics
-        return (*_scaled(job, experiment), *(material.warnings if isinstance(material, Runs) else ()))
+        return material.warnings if isinstance(material, Runs) else ()
 
     def files(self, job: Job) -> tuple[Path, ...]:
         """Whatever the options name, also where they are not in order."""
@@ -64,6 +64,8 @@ class ExperimentBackend(Backend):
             "unit": experiment.unit,
             "confidence": str(experiment.confidence),
             "at_least": str(experiment.at_least) if experiment.at_least is not None else None,
+            "floor": str(experiment.floor),
+            "supposed": experiment.supposed,
             "protocol": experiment.protocol,
         }
         return {"claim.json": json.dumps(claim, indent=2, ensure_ascii=False) + "\n"}
@@ -105,15 +107,6 @@ def _settle(job: Job) -> tuple[Judgement, dict[str, str]]:
         for run in material.runs
     ]
     return judgement, {"measures.tsv": "\n".join(["run\tmeasure\tverdict", *lines]) + "\n"}
-
-
-def _scaled(job: Job, experiment: Experiment) -> Iterator[Diagnostic]:
-    """The measure is the contract's: a number in it is told to whoever reads the answer."""
-    numbers = experiment.measure.numbers if experiment.measure else ()
-    if numbers:
-        told = ", ".join(numbers)
-        message = f"the measure has {told} in it: that scales or shifts what is held against {experiment.within_text}"
-        yield Diagnostic("EXP106", message, job.method.options.at("measure"), Severity.WARNING)
 
 
 def _material(experiment: Experiment) -> Runs | Figures:

@@ -33,9 +33,14 @@ CODES = register(
     declare(
         "EXP106",
         "numbers in the measure",
-        "A number in the measure scales or shifts what is compared with the contract's tolerance.",
-        "Measure what the guarantee speaks of; convert units by `unit` and by a figure with a unit in `within`.",
-        warning=True,
+        "A number in the measure, or a factor that is the same in every run, moves what is held against the tolerance.",
+        "Measure what the guarantee speaks of; convert units by `unit` and by a unit in `within`.",
+    ),
+    declare(
+        "EXP107",
+        "not the contract's tolerance",
+        "The guarantee compares with numbers of its own, and the tolerance is none of them.",
+        "Give one of the guarantee's numbers, or the constant that it names.",
     ),
     declare(
         "EXP111",

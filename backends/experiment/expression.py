@@ -51,6 +51,8 @@ class Expression:
     """Raises ZeroDivisionError, and ValueError for a root of a negative number."""
     numbers: tuple[str, ...] = ()
     """Those that stand in it: a factor or an offset moves the tolerance."""
+    scales: tuple[str, ...] = ()
+    """The columns that multiply or divide: one that is the same in every run is a factor, too."""
 
 
 def parse(text: str) -> Expression:
@@ -60,7 +62,8 @@ def parse(text: str) -> Expression:
     parser = _Parser(text)
     value = parser.sum(0)
     parser.end()
-    return Expression(text, tuple(dict.fromkeys(parser.columns)), value, tuple(parser.numbers))
+    columns, scales = dict.fromkeys(parser.columns), dict.fromkeys(parser.scales)
+    return Expression(text, tuple(columns), value, tuple(parser.numbers), tuple(scales))
 
 
 _Eval = Callable[[Mapping[str, Fraction]], Interval]
@@ -109,8 +112,10 @@ def _hypot(*items: Interval) -> Interval:
     return _sqrt(Interval(sum((s.low for s in squares), Fraction(0)), sum((s.high for s in squares), Fraction(0))))
 
 
-def _min(*items: Interval) -> Interval:
-    return Interval(min(i.low for i in items), min(i.high for i in items))
+def _mean(*items: Interval) -> Interval:
+    return Interval(
+        sum((i.low for i in items), Fraction(0)) / len(items), sum((i.high for i in items), Fraction(0)) / len(items)
+    )
 
 
 def _max(*items: Interval) -> Interval:
@@ -121,10 +126,10 @@ FUNCTIONS: Mapping[str, tuple[Callable[..., Interval], int, int]] = {
     "abs": (_abs, 1, 1),
     "sqrt": (_sqrt, 1, 1),
     "hypot": (_hypot, 1, 8),
-    "min": (_min, 1, 8),
     "max": (_max, 1, 8),
+    "mean": (_mean, 1, 8),
 }
-"""Name → function, least and greatest number of arguments."""
+"""Name → function, least and greatest number of arguments. No `min`: a measure that is cut off lets any run succeed."""
 
 
 class _Parser:
@@ -132,6 +137,7 @@ class _Parser:
         self.text = text
         self.columns: list[str] = []
         self.numbers: list[str] = []
+        self.scales: list[str] = []
         self.tokens: list[tuple[str, str, int]] = []
         position = 0
         while text[position:].strip():
@@ -176,9 +182,11 @@ class _Parser:
         return value
 
     def product(self, depth: int) -> _Eval:
+        first = len(self.columns)
         value = self.factor(depth)
         while sign := self.accept("*", "/"):
             value = _both(_times if sign == "*" else _over, value, self.factor(depth))
+            self.scales += self.columns[first:]
         return value
 
     def factor(self, depth: int) -> _Eval:
@@ -206,13 +214,10 @@ class _Parser:
     def call(self, name: str, position: int, depth: int) -> _Eval:
         if name not in FUNCTIONS:
             raise Malformed(f"no function '{name}'; there are {', '.join(sorted(FUNCTIONS))}", position)
-        read, numbers = len(self.columns), len(self.numbers)
         arguments = [self.sum(depth + 1)]
         while self.accept(","):
             arguments.append(self.sum(depth + 1))
         self.expect(")")
-        if name == "min" and len(self.numbers) > numbers and len(self.columns) > read:
-            raise Malformed("a measure is not clamped: 'min' with a number makes any run a success", position)
         function, least, greatest = FUNCTIONS[name]
         if not least <= len(arguments) <= greatest:
             wanted = str(least) if least == greatest else f"{least} to {greatest}"

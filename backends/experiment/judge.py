@@ -92,11 +92,12 @@ def _verdict(
     if failed and _claim_fails(failed, runs, experiment):
         return Judgement(Verdict.REFUTED, f"{failed} of {runs} runs exceeded {tolerance}", bound, details, example)
     claim = experiment.at_least
-    needed = runs_needed(1 - claim if claim is not None else Fraction(1, 2), experiment.confidence)
-    if claim is None and not justified(0, runs, Fraction(1, 2), experiment.confidence):
+    needed = runs_needed(1 - (claim or experiment.floor), experiment.confidence)
+    if claim is None and not justified(0, runs, 1 - experiment.floor, experiment.confidence):
         return Judgement(
             Verdict.UNKNOWN,
-            f"{good}, but so few runs do not even show that it succeeds more often than not: {needed} are needed",
+            f"{good}, but so few runs do not even show success in {_percent(experiment.floor)} of runs, the least that "
+            f"this criticality asks for: {needed} are needed",
             bound,
             details,
         )
@@ -109,6 +110,8 @@ def _verdict(
             details,
         )
     rests = ["the runs are independent and drawn as the robot will be used"]
+    if experiment.supposed:
+        rests.append(experiment.supposed)
     if failed:
         details["failing runs"] = example.explanation if example else f"{failed}"
         rests.append(f"the guarantee is meant statistically: in at least {_percent(claim or Fraction(0))} of runs")

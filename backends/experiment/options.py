@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -10,11 +11,11 @@ from typing import Any
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic
 from avow.language.sorts import IntegerSort, NaturalSort, RealSort
-from avow.language.terms import Literal, Negative, Term, Widen
+from avow.language.terms import Compare, In, Literal, Negative, Role, Term, Variable, Widen, subterms
 from avow.system.paths import inside
 
 from .expression import Expression, Malformed, parse
-from .quantity import conversion, decimal, figure
+from .quantity import conversion, decimal, figure, show
 
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -25,14 +26,19 @@ SCHEMA: dict[str, Any] = {
         "measure": {"type": "string", "description": "a column, or an expression over columns; never negative"},
         "within": {
             "type": ["number", "string"],
-            "description": "the greatest measure of a run that succeeds: a number, '25 cm', or a constant's name",
+            "description": "the greatest measure of a run that succeeds: the contract's number, as in the guarantee or "
+            "as a constant's name, with a unit where the measure has another",
         },
         "unit": {"type": "string", "description": "the unit of the measure and of numbers without one"},
         "run_column": {"type": "string", "description": "the column that names a run (default: run, or id)"},
-        "confidence": {"type": ["number", "string"], "description": "of the statistical statement, default 0.95"},
+        "confidence": {
+            "type": ["number", "string"],
+            "description": "of the statistical statement: 0.9 or more, default 0.95",
+        },
         "at_least": {
             "type": ["number", "string"],
-            "description": "the claimed probability of success; without it no run at all may fail",
+            "description": "the claimed probability of success, no less than the criticality asks for; without it no "
+            "run at all may fail",
         },
         "protocol": {"type": "string", "description": "how the runs were made, for the report"},
     },
@@ -53,16 +59,21 @@ class Experiment:
     summary: Path | None
     measure: Expression | None
     within: Fraction
-    within_text: str
     unit: str
     id_column: str | None
     confidence: Fraction
     at_least: Fraction | None
+    floor: Fraction
+    """The least success rate that the runs must show, whatever is claimed."""
     protocol: str
+    supposed: str
+    """That the tolerance is what the guarantee allows, where the contract has no number to say so; else empty."""
 
 
 FLOORS = {"high": Fraction(9, 10), "medium": Fraction(4, 5), "low": Fraction(1, 2)}
-"""Criticality of the node → the least success rate that may be claimed."""
+"""Criticality of the node → the least success rate that may be claimed, or shown."""
+
+LEAST_CONFIDENCE = Fraction(9, 10)
 
 
 @dataclass(slots=True)
@@ -88,8 +99,8 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
     measure = _measure(problems, "data" in options)
     within = _within(problems, unit)
     confidence = _probability(problems, "confidence", Fraction(95, 100))
-    if confidence is not None and not Fraction(1, 2) <= confidence < 1:
-        problems.add("confidence", "the confidence must be at least 0.5 and less than 1")
+    if confidence is not None and not LEAST_CONFIDENCE <= confidence < 1:
+        problems.add("confidence", f"the confidence must be at least {float(LEAST_CONFIDENCE):g} and less than 1")
     at_least = _probability(problems, "at_least", None)
     if at_least is not None and not 0 < at_least < 1:
         problems.add(
@@ -108,11 +119,11 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
     protocol = _text(problems, "protocol")
     if problems.found or within is None or confidence is None:
         return None, tuple(problems.found)
-    text = f"{options['within']}"
-    experiment = Experiment(
-        data, summary, measure, within, text, unit, id_column, confidence, at_least, " ".join(protocol.split())
-    )
-    return experiment, ()
+    protocol = " ".join(protocol.split())
+    supposed = "" if within.contracts else f"a tolerance of {within.text} is what the guarantee allows"
+    return Experiment(
+        data, summary, measure, within.value, unit, id_column, confidence, at_least, floor, protocol, supposed
+    ), ()
 
 
 def _path(problems: Problems, key: str) -> Path | None:
@@ -155,39 +166,89 @@ def _measure(problems: Problems, wanted: bool) -> Expression | None:
         found = parse(text)
         if not found.columns:
             problems.add("measure", "the measure reads no column: it is the same for every run", code="EXP103")
+        elif found.numbers:
+            told = ", ".join(found.numbers)
+            hint = "half a width is max(a, b) - mean(a, b); units are converted by 'unit'"
+            problems.add("measure", f"the measure has {told} in it: that moves the tolerance", hint, "EXP106")
         return found
     except Malformed as error:
         problems.add("measure", f"character {error.position + 1} of the measure: {error.message}", code="EXP103")
         return None
 
 
-def _within(problems: Problems, unit: str) -> Fraction | None:
-    value = problems.job.options.get("within")
-    if value is None:
+@dataclass(frozen=True, slots=True)
+class _Tolerance:
+    value: Fraction
+    """In the measure's unit."""
+    text: str
+    contracts: bool
+    """Whether it is a number of the contract."""
+
+
+def _within(problems: Problems, unit: str) -> _Tolerance | None:
+    """The tolerance, held against the contract: where a guarantee compares with numbers it is one of them; where it
+    names none, a constant of the contract, or a person has to say that it is meant."""
+    written = problems.job.options.get("within")
+    if written is None:
         problems.add(None, "an experiment needs 'within': the greatest measure of a run that succeeds")
         return None
-    number = _number(value)
-    if number is None and isinstance(value, str):
-        for name, term in problems.job.contract.constants:
-            if name == value:
-                number = _constant(term)
-                if number is None:
-                    problems.add("within", f"the constant '{name}' is not a number")
-                    return None
-        written = figure(value)
-        if number is None and written is not None:
-            factor = conversion(written.unit, unit) if unit else None
-            if factor is None:
-                wanted = f"the measure is in {unit}" if unit else "the option 'unit' says nothing"
-                problems.add("within", f"cannot compare with '{value}': {wanted}", code="EXP104")
-                return None
-            number = written.value * factor
-    if number is None:
-        names = ", ".join(n for n, t in problems.job.contract.constants if _constant(t) is not None)
-        problems.add("within", f"'{value}' is neither a number nor a constant of the contract", f"constants: {names}")
-    elif number < 0:
+    constants = {n: v for n, t in problems.job.contract.constants if (v := _constant(t)) is not None}
+    found = _read_tolerance(problems, written, unit, constants)
+    if found is None:
+        return None
+    value, number = found
+    if value < 0:
         problems.add("within", "the tolerance is negative: no run could succeed")
-    return number
+    numbers = [_reals(problems.job.node.clause(o.name).formula) for o in problems.job.obligations]
+    for obligation, known in zip(problems.job.obligations, numbers, strict=True):
+        if known and number not in known:
+            told = ", ".join(show(n) for n in sorted(known))
+            message = f"{obligation.name} compares with {told}: {written} is not its tolerance"
+            hint = "a constant with a unit, as in `Tolerance m`, is converted into the measure's"
+            problems.add("within", message, hint, "EXP107")
+    return _Tolerance(value, f"{written}", all(numbers) or number in constants.values())
+
+
+def _read_tolerance(
+    problems: Problems, written: object, unit: str, constants: Mapping[str, Fraction]
+) -> tuple[Fraction, Fraction] | None:
+    """(in the measure's unit; as the contract would write it: without a unit of its own)."""
+    number = _number(written)
+    if number is not None:
+        return number, number
+    name, _, own = written.strip().partition(" ") if isinstance(written, str) else ("", "", "")
+    given = figure(written) if isinstance(written, str) else None
+    if name in constants and not own.strip():
+        return constants[name], constants[name]
+    if name in constants or given is not None:
+        source = own.strip() if name in constants or given is None else given.unit
+        factor = conversion(source, unit) if unit else None
+        if factor is None:
+            wanted = f"the measure is in {unit}" if unit else "the option 'unit' says nothing"
+            problems.add("within", f"cannot compare with '{written}': {wanted}", code="EXP104")
+            return None
+        if name in constants or given is None:
+            return constants[name] * factor, constants[name]
+        return given.value * factor, given.value * factor
+    if any(name == other for other, _ in problems.job.contract.constants):
+        problems.add("within", f"the constant '{name}' is not a number")
+        return None
+    message = f"'{written}' is neither a number nor a constant of the contract"
+    problems.add("within", message, f"constants: {', '.join(constants)}")
+    return None
+
+
+def _reals(formula: Term) -> frozenset[Fraction]:
+    """The real numbers that a guarantee compares with, constants by their values; what only inputs are compared with
+    says when it applies, and zero says which side."""
+    found = set()
+    for comparison in subterms(formula):
+        if isinstance(comparison, Compare | In):
+            parts = [*subterms(comparison)]
+            roles = {part.role for part in parts if isinstance(part, Variable)}
+            if roles != {Role.INPUT}:
+                found |= {abs(v) for p in parts if isinstance(p.sort, RealSort) and (v := _constant(p))}
+    return frozenset(found)
 
 
 def _constant(term: Term) -> Fraction | None:

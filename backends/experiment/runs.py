@@ -56,6 +56,7 @@ class _RunsReader:
             raise self.fail(first[0], "EXP111", "the file has no runs, only the names of its columns")
         names: dict[str, int] = {}
         runs = [run for line, cells in others if (run := self.run(line, cells, columns, names)) is not None]
+        self.factors(first[0], others, columns)
         if self.problems:
             raise Rejected(*self.problems)
         return Runs(tuple(runs), tuple(self.copies(others, columns)))
@@ -134,13 +135,22 @@ class _RunsReader:
             self.add(line, "EXP113", f"column '{column}': {shown} is not a number", hint)
         return number
 
+    def factors(self, line: int, rows: list[tuple[int, list[str]]], columns: list[str]) -> None:
+        """A column that multiplies or divides and is the same in every run."""
+        for name in self.measure.scales:
+            at = columns.index(name)
+            values = {decimal(cells[at]) for _, cells in rows if len(cells) == len(columns)}
+            if len(rows) > 1 and len(values) == 1:
+                message = f"the column '{name}' scales the measure by the same number in every run"
+                self.add(line, "EXP106", message, "measure what the guarantee speaks of")
+
     def copies(self, rows: list[tuple[int, list[str]]], columns: list[str]) -> list[Diagnostic]:
         """Runs that agree in every cell but the name: measured runs rarely do, copied lines always."""
         at = columns.index(self.id_column) if self.id_column else -1
-        seen: dict[tuple[str, ...], int] = {}
+        seen: dict[tuple[Fraction | str, ...], int] = {}
         found = []
         for line, cells in rows:
-            key = tuple(cell for i, cell in enumerate(cells) if i != at)
+            key = tuple(decimal(cell) or cell for i, cell in enumerate(cells) if i != at)
             if key in seen:
                 message = f"this run agrees with the one in line {seen[key]} in every cell: is it a copy?"
                 found.append(Diagnostic("EXP115", message, self.place(line), Severity.WARNING))

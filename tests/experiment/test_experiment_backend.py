@@ -7,6 +7,7 @@ import io
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from avow.backend_kit.protocol import Backend, Limits
 from avow.backends.experiment import BACKEND
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Link, Outcome, Verdict
+from avow.conformance.seeded import Seeded
 
 ROOT = Path(__file__).resolve().parents[2] / "contracts"
 GOOD: dict[str, Any] = {"data": "runs.csv", "measure": "d", "within": 0.25, "unit": "m"}
@@ -69,18 +71,80 @@ def test_equal_runs_are_told_at_any_width(make_job: Callable[..., Any], tmp_path
     ("options", "code"),
     [
         ({"measure": "min(d, 0.2)"}, "EXP103"),
-        ({"measure": "min(0.1 * d, 9)"}, "EXP103"),
+        ({"measure": "min(d, run)"}, "EXP103"),
         ({"measure": "0.1"}, "EXP103"),
         ({"measure": "d / 10"}, "EXP106"),
         ({"measure": "abs(d - 0.1)"}, "EXP106"),
+        ({"measure": "d / ten"}, "EXP106"),
+        ({"measure": "max(d, hypot(d, d) * (d - run) / ten)"}, "EXP106"),
+        ({"confidence": 0.5}, "EXP101"),
         ({"at_least": 0.1}, "EXP105"),
     ],
 )
-def test_what_would_flatter_is_refused_or_told(
+def test_what_would_flatter_is_refused(
     make_job: Callable[..., Any], tmp_path: Path, options: dict[str, Any], code: str
 ) -> None:
-    (tmp_path / "runs.csv").write_text(rows(*[f"0.1{n:02}" for n in range(47)]))
-    assert code in {d.code for d in BACKEND.check(make_job(**{**GOOD, **options}))}
+    runs = "".join(f"{n},0.1{n:02},10{'.0' * (n % 2)}\n" for n in range(47))
+    (tmp_path / "runs.csv").write_text("run,d,ten\n" + runs)
+    job = make_job(**{**GOOD, **options})
+    assert code in {d.code for d in BACKEND.check(job) if d.is_error}
+    assert settle(job).verdict is Verdict.ERROR
+
+
+RCL = """context {{ Tolerance = 0.25; Reach = 3.0; }}
+node drive {{ inputs( goal : REAL ) outputs( x : REAL, there : BOOL ) topics() guarantee arrives ( {0} ) }}
+"""
+COMPARES = "in.goal >= 7.5 -> in.goal - Tolerance <= out.x <= in.goal + Tolerance"
+BOUND = "exists(a in REAL | a - Tolerance <= 0.0 and out.there)"
+NAMES_NONE = "in.goal >= 7.5 -> out.there"
+
+
+@pytest.mark.parametrize(
+    ("formula", "within", "unit", "comes"),
+    [
+        (COMPARES, "Tolerance", "m", "tested"),
+        (COMPARES, 0.25, "m", "tested"),
+        (COMPARES, "25 cm", "m", "tested"),
+        (COMPARES, "Tolerance m", "cm", "tested"),
+        (COMPARES, "25 cm", "cm", "refused"),
+        (COMPARES, "Reach", "m", "refused"),
+        (COMPARES, 7.5, "m", "refused"),
+        (COMPARES, 30, "m", "refused"),
+        (BOUND, 0.25, "m", "tested"),
+        (BOUND, 0.26, "m", "refused"),
+        (NAMES_NONE, "Reach", "m", "tested"),
+        (NAMES_NONE, "300 cm", "m", "tested"),
+        (NAMES_NONE, 30, "m", "supposed"),
+        (NAMES_NONE, 7.5, "m", "supposed"),
+    ],
+)
+def test_the_tolerance_is_the_contracts(
+    tmp_path: Path, formula: str, within: str | float, unit: str, comes: str
+) -> None:
+    options = {"data": "runs.csv", "measure": "d", "within": within, "unit": unit}
+    files = {"runs.csv": rows(*[f"0.1{n:02}" for n in range(47)])}
+    case = Seeded("case", RCL.format(formula), options, {"arrives": Verdict.TESTED}, files)
+    outcome = settle(case.written(BACKEND, tmp_path))
+    match comes:
+        case "tested" | "supposed":
+            assert outcome.verdict is Verdict.TESTED, outcome.summary
+            assert any("is what the guarantee allows" in h for h in outcome.hypotheses) is (comes == "supposed")
+        case _:
+            assert outcome.verdict is Verdict.ERROR
+            assert "is not its tolerance" in outcome.summary
+
+
+@pytest.mark.parametrize(("criticality", "runs"), [("high", 29), ("medium", 14), ("low", 5)])
+def test_the_least_success_rate_follows_from_the_criticality(
+    make_job: Callable[..., Any], tmp_path: Path, criticality: str, runs: int
+) -> None:
+    job = make_job(**GOOD)
+    (node,) = job.system.plan.nodes
+    plan = replace(job.system.plan, nodes=(replace(node, criticality=criticality),))
+    job = replace(job, system=replace(job.system, plan=plan))
+    for number, verdict in ((runs - 1, Verdict.UNKNOWN), (runs, Verdict.TESTED)):
+        (tmp_path / "runs.csv").write_text(rows(*["0.1"] * number))
+        assert settle(job).verdict is verdict
 
 
 def test_one_failing_run_refutes_and_is_named(make_job: Callable[..., Any], tmp_path: Path) -> None:
@@ -107,7 +171,7 @@ def test_too_few_runs_are_never_green(make_job: Callable[..., Any], tmp_path: Pa
     (tmp_path / "runs.csv").write_text(rows("0.1", "0.1"))
     few = settle(make_job(**GOOD))
     assert few.verdict is Verdict.UNKNOWN
-    assert "5 are needed" in few.summary
+    assert "14 are needed" in few.summary
     (tmp_path / "runs.csv").write_text(rows(*["0.1"] * 28))
     assert settle(make_job(**GOOD, at_least=0.9)).verdict is Verdict.UNKNOWN
     (tmp_path / "runs.csv").write_text(rows(*["0.1"] * 29))
