@@ -11,9 +11,10 @@ from datetime import date
 from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, EvidenceView, MethodInfo, ObligationView, Suggestion
 from avow.assurance.policy import Demand, Policy, costs
+from avow.base.graphs import components
 from avow.base.verdict import Link, Verdict
 from avow.evidence.obligation import Kind
-from avow.evidence.record import Evidence
+from avow.evidence.record import SIGNED_BY, Evidence
 from avow.evidence.status import Status, effective, join, link_rank, weigh
 from avow.isolation.level import Isolation
 from avow.isolation.observed import ISOLATION
@@ -91,13 +92,23 @@ def person(name: str) -> str:
 
 
 def _persons(evidence: Iterable[Evidence], demand: Demand, policy: Policy, today: date) -> set[str]:
-    """Whoever reviewed the claim, in one record or in several that each count; a name is one however it is spelled."""
-    return {
-        person(name)
+    """Whoever reviewed the claim, in one record or in several that each count; a name is one however it is spelled, and
+    a key is one person's whatever names it signs."""
+    reviews = [
+        item
         for item in evidence
         if weigh(item).support is Status.REVIEWED and _disregarded(item, demand, policy, today) is None
+    ]
+    names = {person(name) for item in reviews for name in reviewers(item)}
+    keys = {str(item.details[SIGNED_BY]) for item in reviews if SIGNED_BY in item.details}
+    held = [
+        (person(name), str(item.details[SIGNED_BY]))
+        for item in reviews
+        if SIGNED_BY in item.details
         for name in reviewers(item)
-    }
+    ]
+    arcs = [*held, *((key, name) for name, key in held)]
+    return {min(names & set(one)) for one in components([*names, *keys], arcs) if names & set(one)}
 
 
 def age_days(evidence: Evidence, today: date) -> int | None:

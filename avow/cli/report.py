@@ -8,6 +8,7 @@ import sys
 import click
 
 from avow.cli.options import json_option
+from avow.cli.paths import PathArgument
 
 
 @click.command()
@@ -18,8 +19,9 @@ from avow.cli.options import json_option
     type=click.Path(exists=True, file_okay=False),
     help="Does the report in this folder say what the ledger says?",
 )
+@click.option("--key", type=PathArgument(exists=True, dir_okay=False), help="Sign the attestations (AVOW_KEY).")
 @json_option()
-def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
+def command(systems: tuple[str, ...], folder: str | None, key: object, as_json: bool) -> int:
     """Render the report of each SYSTEM (its name or folder; else all) from its ledger; nothing is verified.
 
     With --check DIR nothing is written: every record that the report in DIR quotes is looked up in the ledger, every
@@ -30,10 +32,12 @@ def command(systems: tuple[str, ...], folder: str | None, as_json: bool) -> int:
     if folder is not None:
         return _check(Path(folder), as_json)
     from avow.base.workspace import require_systems, workspace
+    from avow.pipeline.run_info import sign_with
     from avow.pipeline.tasks import execute
 
     place = workspace()
     systems = require_systems(place, systems)
+    sign_with(key)
     return execute(
         place.root, [f"report:{name}" for name in systems] or ["report"], answer=sys.stdout if as_json else None
     )

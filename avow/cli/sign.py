@@ -31,7 +31,7 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.files import write
     from avow.base.workspace import find_workspace, workspace
-    from avow.evidence.envelope import seal
+    from avow.evidence.envelope import seal_lines
     from avow.evidence.ledger import Ledger
     from avow.report.check import check
     from avow.report.exchange import render_attestation
@@ -68,9 +68,7 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
             private=private,
         )
         if private is not None:
-            attested = map(json.loads, render_attestation(case).splitlines())
-            sealed = "".join(seal(statement, private, indent=None) for statement in attested)
-            write(path.with_suffix(".attestation.jsonl"), sealed)
+            write(path.with_suffix(".attestation.jsonl"), seal_lines(render_attestation(case), private))
     except OSError as error:
         raise Rejected(Diagnostic("SIGN001", f"the signature cannot be written: {error.strerror}")) from None
     if as_json:

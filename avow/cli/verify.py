@@ -10,6 +10,7 @@ import click
 
 from avow.base.diagnostics import Rejected
 from avow.cli.options import json_option, planned_seconds_option
+from avow.cli.paths import PathArgument
 
 if TYPE_CHECKING:
     from avow.pipeline.cluster import Cluster
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 @click.option(
     "--explain", is_flag=True, help="Say what each failing gate lacks, and the cheapest method that would close it."
 )
+@click.option("--key", type=PathArgument(exists=True, dir_okay=False), help="Sign the attestations (AVOW_KEY).")
 @click.option(
     "--sandbox", is_flag=True, help="Run programs under test sealed (bubblewrap): no network, nothing written, or not."
 )
@@ -36,16 +38,18 @@ def command(
     jobs: int | None,
     address: str | None,
     explain: bool,
+    key: object,
     sandbox: bool,
 ) -> int:
     """Verify every system under contracts/, or only each SYSTEM (its name or folder)."""
     from avow.base.workspace import require_systems, workspace
     from avow.isolation.level import SANDBOX
-    from avow.pipeline.run_info import EXPLAIN, FRESH, SECONDS
+    from avow.pipeline.run_info import EXPLAIN, FRESH, SECONDS, sign_with
     from avow.pipeline.tasks import execute
 
     place = workspace()
     systems = require_systems(place, systems)
+    sign_with(key)
     if fresh:
         os.environ[FRESH] = "1"
     if sandbox:

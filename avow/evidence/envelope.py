@@ -25,6 +25,8 @@ class Opened:
 
     statement: dict[str, Any]
     checked: str
+    key: str = ""
+    """The public key that signed it, in hexadecimal; empty: none did."""
 
 
 def seal(statement: dict[str, Any], private: Path | None, *, indent: int | None = 1) -> str:
@@ -42,6 +44,21 @@ def seal(statement: dict[str, Any], private: Path | None, *, indent: int | None 
         "signatures": signatures,
     }
     return json.dumps(body, indent=indent, sort_keys=True) + "\n"
+
+
+def seal_lines(statements: str, private: Path) -> str:
+    """JSON lines as envelopes, one a line. Raises Rejected for a key that cannot be used."""
+    return "".join(seal(json.loads(line), private, indent=None) for line in statements.splitlines())
+
+
+def unseal_lines(text: str, trusted: Sequence[Path] = ()) -> str:
+    """The statements in envelopes, one a line, as `seal_lines` was given them; a line that is no envelope, or whose
+    signature is not true, as what is wrong with it. Raises Rejected for a trusted key that cannot be read."""
+    found = (unseal(line, trusted) for line in text.splitlines())
+    return "".join(
+        f"{one if isinstance(one, str) else json.dumps(one.statement, ensure_ascii=True, sort_keys=True)}\n"
+        for one in found
+    )
 
 
 def unseal(text: str, trusted: Sequence[Path] = ()) -> Opened | str:
@@ -75,7 +92,7 @@ def unseal(text: str, trusted: Sequence[Path] = ()) -> Opened | str:
         except (InvalidSignature, ValueError):
             return "its signature is not of this text"
         told = "a trusted key" if known else "a key that nobody here has named as trusted:"
-        return Opened(statement, f"with {told} {raw.hex()[:16]}…")
+        return Opened(statement, f"with {told} {raw.hex()[:16]}…", raw.hex())
     return "no trusted key has signed it"
 
 

@@ -17,6 +17,7 @@ somebody who writes ledger, index *and* reports anew is only found out by a sign
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 from collections.abc import Iterable
@@ -184,6 +185,8 @@ def stated_heads(path: Path, where: str) -> tuple[Anchor, ...]:
 
 def _heads(data: object) -> Iterable[tuple[str, str]]:
     match data:
+        case {"payload": str(payload), "signatures": [*_]}:  # an envelope: what it says, whoever signed it
+            yield from _heads(json.loads(base64.b64decode(payload)))
         case {"ledger_head": str(head), "system": str(system)}:
             yield system, head
         case {"predicate": {"configuration": [*items]}}:

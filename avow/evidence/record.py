@@ -20,6 +20,9 @@ REMARKS = "remarks"
 """Among the details: what the method's own check remarks of plan and files, a list of ``{code, place, message}``.
 Nothing fails for it, but who reads the answer should know."""
 
+SIGNED_BY = "signed_by"
+"""Among a review's details: the public key, in hexadecimal, that signed its record."""
+
 CASE = "case"
 """Among the details of a refutation: its inputs as data of the backend's own, to be tried first on every later run."""
 

@@ -28,12 +28,13 @@ from avow.evidence.currency import as_of_now
 from avow.evidence.heads import index_path, read_index
 from avow.evidence.ledger import Ledger
 from avow.evidence.record import CASE, RETRY
+from avow.evidence.signing import private_key
 from avow.pipeline import check as checking
 from avow.pipeline.discharge import ledger_of
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
 from avow.pipeline.recheck import counting_now, kernel_run
 from avow.pipeline.results import Result
-from avow.pipeline.run_info import EXPLAIN, Run, asked_seconds
+from avow.pipeline.run_info import EXPLAIN, Run, asked_seconds, signing_key
 from avow.pipeline.state import State
 from avow.pipeline.workload import Survey
 
@@ -87,7 +88,7 @@ def render(assessment: Assessment) -> Result:
 
         case = build(assessment)
         assessment.state.cases[assessment.system] = key, case
-        rendered = render_all(case, assessment.workspace.report(assessment.system))
+        rendered = render_all(case, assessment.workspace.report(assessment.system), signing_key())
         result = _summarise(assessment, case, rendered.left_out)
         files = {assessment.workspace.relative(p): digest_file(p) for p in rendered.written}
         write_note(assessment.stamp, codec.to_json(Rendering(key, files, result)))
@@ -236,6 +237,8 @@ def _key(assessment: Assessment) -> str:
     earlier = zip(ledger.records(), entries, strict=True)
     damage += [f"{old.number} is of an earlier state" for old, now in earlier if old is not now]
     signed = [digest_file(path) for path in _signatures(assessment)]
+    key = signing_key()
+    signed += [private_key(key).public_key().public_bytes_raw().hex()] if key is not None else []
     kernel = kernel_run(entries, root, surveyed.system, assessment.run.id)
     graded = [kernel.parts, dict(kernel.solvers), [(one.obligation, one.solvers) for one in kernel.established]]
     return digest(

@@ -6,6 +6,7 @@ import os
 import time
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 
 EXPLAIN = "AVOW_EXPLAIN"
 """Environment variable that makes gates say what they lack (`avow verify --explain` sets it)."""
@@ -16,6 +17,9 @@ FRESH = "AVOW_FRESH"
 
 SECONDS = "AVOW_SECONDS"
 """Environment variable with the time for one question, in place of the plan's (`avow verify --seconds` sets it)."""
+
+KEY = "AVOW_KEY"
+"""Environment variable with a private key's file: reports' attestations are signed with it (`avow verify --key`)."""
 
 ON = "AVOW_ON"
 """Environment variable with the cluster that works are sent to (`avow verify --on` sets it)."""
@@ -43,6 +47,24 @@ class Run:
     def seconds(self) -> float:
         """Wall-clock seconds since it began."""
         return time.monotonic() - self.begun
+
+
+def signing_key() -> Path | None:
+    """The private key that signs attestations, if there is one."""
+    name = os.environ.get(KEY, "")
+    return Path(name).absolute() if name else None
+
+
+def sign_with(key: object) -> None:
+    """Let this run sign its attestations: with the key given (a path), else with that of the environment. Raises
+    Rejected for one that cannot be used, before anything is done."""
+    from avow.evidence.signing import private_key
+
+    if isinstance(key, Path):
+        os.environ[KEY] = str(key.absolute())
+    found = signing_key()
+    if found is not None:
+        private_key(found)
 
 
 def new_run() -> Run:

@@ -24,9 +24,9 @@ from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
 from avow.isolation.observed import Observed, Seen, from_json, look, to_json
 from avow.pipeline.results import Result
-from avow.pipeline.run_info import EXPLAIN, FRESH, ON, SECONDS
+from avow.pipeline.run_info import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
 
-_ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX, ON, SECONDS)
+_ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX, ON, SECONDS, KEY)
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
 """Avow's own code, wherever it is installed."""
 
@@ -104,6 +104,8 @@ def _sources(workspace: Workspace) -> str:
     environment = [(name, os.environ.get(name)) for name in _ENVIRONMENT]
     today = str(datetime.now().astimezone().date())
     digest.update(json.dumps([environment, today, sys.version, sys.executable, sys.path]).encode())
+    key = signing_key()
+    digest.update(_mark(str(key)).encode() if key is not None else b"")
     signed = (workspace.signed,) if workspace.signed.is_dir() else ()  # most workspaces have none
     _add_files(digest, workspace.contracts, *signed, *_CODE)
     for name in dict.fromkeys([*os.environ.get("PATH", "").split(os.pathsep), *sys.path]):

@@ -16,6 +16,9 @@ from pathlib import Path
 
 from avow.assurance.model import Case
 from avow.base.files import digest, write
+from avow.evidence.envelope import seal_lines
+
+ATTESTATION = "attestation.jsonl"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +29,13 @@ class Rendered:
     left_out: tuple[tuple[str, str], ...] = ()
 
 
-def render_all(case: Case, folder: Path) -> Rendered:
-    """Write every format of one case into `folder`. Raises OSError."""
+def render_all(case: Case, folder: Path, key: Path | None = None) -> Rendered:
+    """Write every format of one case into `folder`; with a private key the attestations are signed, each in an envelope
+    on a line of its own. Raises OSError, and Rejected for a key that cannot be used."""
     written, left_out = [], []
     for name, content in formats(case):
+        if key is not None and name == ATTESTATION and isinstance(content, str):
+            content = seal_lines(content, key)
         if isinstance(content, LeftOut):
             left_out.append((name, content.reason))
             (folder / name).unlink(missing_ok=True)  # an older run's must not stand beside this one's
@@ -67,7 +73,7 @@ def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
     yield "report.sarif", exchange.render_sarif(case)
     yield "findings.sarif", exchange.render_sarif(case, findings_only=True)
     yield "junit.xml", exchange.render_junit(case)
-    yield "attestation.jsonl", exchange.render_attestation(case)
+    yield ATTESTATION, exchange.render_attestation(case)
     yield "gsn.yaml", gsn.render_gsn(case)
     yield "gsn.svg", gsn_svg.draw(case)
     yield "cae.yaml", gsn.render_cae(case)

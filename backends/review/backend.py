@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,15 +10,18 @@ from typing import Any
 
 from avow.backend_kit.given import existing_file, told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
-from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
+from avow.evidence.envelope import Opened
 from avow.evidence.obligation import Obligation
+from avow.evidence.record import SIGNED_BY
 from avow.system.paths import inside
 from avow.system.schema import suggest
 
 from .codes import CODES
 from .freshness import current_meaning, stale_clause, stale_files
 from .record import CONCLUSIONS, Judged, Record, read_record
+from .signature import signature_path, signed
 
 SCHEMA: dict[str, Any] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -25,6 +29,12 @@ SCHEMA: dict[str, Any] = {
     "type": ["object", "string"],
     "properties": {
         "record": {"type": "string", "description": "YAML record of the review, relative to the system's folder"},
+        "key": {
+            "type": ["string", "array"],
+            "items": {"type": "string"},
+            "minItems": 1,
+            "description": "public keys (PEM, in the system's folder), one of which has to have signed the record",
+        },
     },
     "required": ["record"],
     "additionalProperties": False,
@@ -51,22 +61,24 @@ class ReviewBackend(Backend):
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:
-            _read(job)
+            record, path = _read(job)
+            said = signed(path, record, _keys(job))
         except Rejected as error:
             return error.diagnostics
-        return ()
+        if not isinstance(said, str):
+            return ()
+        return (Diagnostic("REV104", f"the review does not count: {said}", record.span, Severity.WARNING),)
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        """The record and everything that was read."""
+        """The record, its signature, the keys that may have signed it, and everything that was read."""
         name = record_name(job)
         path = inside(job.root, name) if name else None
         if path is None:
             return ()
-        try:
-            read = read_record(path).read
-        except Rejected:
-            return (path,)
-        others = (inside(job.root, r.file) for r in read if r.file)
+        others = [inside(job.root, key) for key in _key_names(job)]
+        with contextlib.suppress(Rejected):
+            others += [inside(job.root, r.file) for r in read_record(path).read if r.file]
+        others += [place for place in (signature_path(path),) if place.exists() or _key_names(job)]
         return tuple(dict.fromkeys((path, *(p for p in others if p is not None))))
 
     def export(self, job: Job) -> Mapping[str, str]:
@@ -79,11 +91,12 @@ class ReviewBackend(Backend):
 
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
         try:
-            record = _read(job)
+            record, path = _read(job)
+            said = signed(path, record, _keys(job))
         except Rejected as error:
             why = f"the review cannot be used: {told(job, error.diagnostics)}"
             return Report.alike(job, Verdict.ERROR, why, "avow review", self.version)
-        return Report(tuple(_settle(job, record, o) for o in job.obligations), "avow review", self.version)
+        return Report(tuple(_settle(job, record, said, o) for o in job.obligations), "avow review", self.version)
 
 
 def record_name(job: Job) -> str | None:
@@ -93,8 +106,19 @@ def record_name(job: Job) -> str | None:
     return name if isinstance(name, str) and name else None
 
 
-def _read(job: Job) -> Record:
-    """The record, held against plan and contract. Raises Rejected."""
+def _key_names(job: Job) -> tuple[str, ...]:
+    data = job.method.options.data
+    given = data.get("key", ()) if isinstance(data, Mapping) else ()
+    return tuple(name for name in ([given] if isinstance(given, str) else given) if isinstance(name, str))
+
+
+def _keys(job: Job) -> tuple[Path, ...]:
+    """The public keys that the plan names. Raises Rejected."""
+    return tuple(existing_file(job, "key", name, wrong="REV101", absent="REV102") for name in _key_names(job))
+
+
+def _read(job: Job) -> tuple[Record, Path]:
+    """The record, held against plan and contract, and where it is. Raises Rejected."""
     problems = []
     path = existing_file(job, "record", record_name(job), wrong="REV101", absent="REV102")
     record = read_record(path)
@@ -116,10 +140,10 @@ def _read(job: Job) -> Record:
             )
     if problems:
         raise Rejected(*problems)
-    return record
+    return record, path
 
 
-def _settle(job: Job, record: Record, obligation: Obligation) -> Outcome:
+def _settle(job: Job, record: Record, said: Opened | str | None, obligation: Obligation) -> Outcome:
     judged = next((j for j in record.clauses if j.clause == obligation.name), None)
     # A guarantee's own conclusion can only be worse than the review's: a rejected review accepts nothing.
     own = judged.conclusion if judged and judged.conclusion else record.conclusion
@@ -130,6 +154,9 @@ def _settle(job: Job, record: Record, obligation: Obligation) -> Outcome:
         stale.append(moved)
     details = _details(record, judged)
     who = f"{record.reviewer} ({record.role}), {record.date}"
+    if isinstance(said, Opened):
+        who += f", signed {said.checked}"
+        details[SIGNED_BY] = said.key
     elsewhere = tuple(
         f"'{r.material}' was read and is not kept here: no change in it would be noticed"
         for r in record.read
@@ -144,6 +171,8 @@ def _settle(job: Job, record: Record, obligation: Obligation) -> Outcome:
             summary += " (it had been rejected)"
         details["stale"] = stale
         hypotheses = ()
+    elif isinstance(said, str) and conclusion != "rejected":  # what was found wrong needs nobody's name
+        verdict, summary, hypotheses = Verdict.UNKNOWN, f"the review does not count: {said}", ()
     elif conclusion == "rejected":
         why = (judged.remark if judged else "") or record.remarks or _against(record)
         verdict, summary = Verdict.REFUTED, f"rejected by {who}"

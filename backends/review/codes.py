@@ -19,6 +19,13 @@ CODES = register(
         "Name the record of this node, or correct the names in it.",
     ),
     declare(
+        "REV104",
+        "signature does not count",
+        "The record's signature is of another text, by a key that the plan does not name, or is not there.",
+        "The reviewer reads the record and signs it: `avow review sign`.",
+        warning=True,
+    ),
+    declare(
         "REV111",
         "no record",
         "The record lacks the form of one: wrong format, unknown key, a list or text where the other is wanted.",
@@ -76,5 +83,11 @@ CODES = register(
         "stamp does not read back",
         "With its digests filled in, the record would say something else besides; the file stays as it was.",
         "Write the entry that the message names in the plain form of `docs/backends/review.md`, then stamp again.",
+    ),
+    declare(
+        "REV123",
+        "no signature written",
+        "The signature of a record cannot be written beside it.",
+        "Make the folder writable, or sign a copy elsewhere.",
     ),
 )

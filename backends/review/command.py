@@ -9,7 +9,7 @@ import click
 
 @click.group()
 def command() -> None:
-    """Review records."""
+    """Review records: stamped with digests, signed with a key."""
 
 
 @command.command()
@@ -29,4 +29,31 @@ def stamp(system: str, node: str, method: str | None, as_json: bool, renewed: st
         click.echo(json.dumps({"stamped": list(said)}, indent=1, ensure_ascii=False))
         return 0
     click.echo("\n".join(said) or "nothing to stamp: every digest is as it should be")
+    return 0
+
+
+@command.command()
+@click.argument("system")
+@click.argument("node")
+@click.option("--method", help="The review's id, where the node has several.")
+@click.option("--key", required=True, metavar="FILE", help="A private key (`avow audit --new-key`).")
+def sign(system: str, node: str, method: str | None, key: str) -> int:
+    """Sign the review of NODE in SYSTEM as it is now: RECORD.sig, beside it, vouches for these bytes.
+
+    A record that was changed afterwards, be it by a stamp, has to be read and signed again. With `key: FILE` (a public
+    key) the plan says whose signature counts.
+    """
+    from pathlib import Path
+
+    from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.workspace import system_folder
+
+    from .signature import sign_record
+    from .stamp import record_of
+
+    try:
+        found = sign_record(record_of(system_folder(system), node, method)[0], Path(key))
+    except OSError as error:
+        raise Rejected(Diagnostic("REV123", f"the signature cannot be written: {error.strerror}")) from None
+    click.echo(f"signed: {found}")
     return 0

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import write
 from avow.language.contract import Node
@@ -34,8 +35,12 @@ def stamp(folder: Path, node: str, *, method: str | None = None, renewed: str | 
     `method` tells several reviews of one node apart. `renewed` is the date (ISO) of a renewed review: without it, a
     digest that is there already is never replaced. Raises Rejected.
     """
-    from avow.backend_kit.protocol import Job
+    path, job, guarantees = record_of(folder, node, method)
+    return stamp_record(path, job.root, job.node, guarantees, renewed=renewed)
 
+
+def record_of(folder: Path, node: str, method: str | None) -> tuple[Path, Job, tuple[str, ...]]:
+    """Where the review of a node keeps its record, its job, and the guarantees that it is of. Raises Rejected."""
     system = load_system(folder)
     if node not in [n.name for n in system.contract.nodes]:
         known = ", ".join(n.name for n in system.contract.nodes)
@@ -52,7 +57,7 @@ def stamp(folder: Path, node: str, *, method: str | None = None, renewed: str | 
     if path is None:
         place = chosen.options.span
         raise Rejected(Diagnostic("REV101", "the review names no record in the system's folder", place))
-    return stamp_record(path, job.root, job.node, chosen.guarantees, renewed=renewed)
+    return path, job, chosen.guarantees
 
 
 def stamp_record(

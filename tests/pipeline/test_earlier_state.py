@@ -74,6 +74,38 @@ def test_a_report_of_what_cannot_be_read_is_marked_until_it_can(workspace: Path,
     assert len(page.read_text()) == pytest.approx(len(whole), abs=200)  # run and time differ
 
 
+def test_verify_signs_its_attestations_where_there_is_a_key(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("cryptography")
+    (workspace / "contracts" / "s" / "m.py").write_text("def step(x):\n    return 0\n")
+    methods = "nodes: {n: {methods: [{hypothesis: {subject: 'm.py:step', cases: 5}}]}}\n"
+    (workspace / "contracts" / "s" / "plan.yaml").write_text(f"system: s\npolicy: reproduction\n{methods}")
+    public, place = new_key_pair(workspace / "key"), workspace / "reports" / "s" / "attestation.jsonl"
+    avow(workspace, "verify")
+    plain = place.read_text()
+    assert {"contracts/s/m.py", "contracts/s/n.rcl"} <= {
+        s["name"] for s in json.loads(plain.splitlines()[0])["subject"]
+    }
+    avow(workspace, "verify", "--key", "key")
+    opened = [unseal(line, [public]) for line in place.read_text().splitlines()]
+    assert [o.statement for o in opened if isinstance(o, Opened)] == [json.loads(line) for line in plain.splitlines()]
+    assert avow(workspace, "report", "--check", "reports/s")[0] == 0
+    assert avow(workspace, "audit", "--against", "reports/s/attestation.jsonl")[0] == 0
+    sealed = place.read_text()
+    assert "nothing to do" in avow(workspace, "verify", "--key", "key")[1]
+    monkeypatch.setenv("AVOW_KEY", str(workspace / "key"))
+    assert "nothing to do" in avow(workspace, "verify")[1]
+    place.write_text(plain)  # taken off by hand: written anew
+    avow(workspace, "verify")
+    assert place.read_text() == sealed
+    place.write_text(sealed.replace('"sig": "', '"sig": "AAAA', 1))
+    assert avow(workspace, "report", "--check", "reports/s")[0] == 1
+    monkeypatch.setenv("AVOW_KEY", str(workspace / "dodo.py"))
+    assert avow(workspace, "verify")[0] == 2
+    monkeypatch.delenv("AVOW_KEY")
+    avow(workspace, "verify")
+    assert place.read_text() == plain
+
+
 def test_attestations_are_envelopes_where_a_key_signs(workspace: Path) -> None:
     pytest.importorskip("cryptography")
     public = new_key_pair(workspace / "key")
