@@ -15,7 +15,7 @@ from avow.assurance.policy import costs, profile, profile_names, read_policy, te
 from avow.base.diagnostics import Rejected, Span
 from avow.base.verdict import Link, Verdict
 from avow.evidence.obligation import Kind
-from avow.evidence.record import Evidence
+from avow.evidence.record import SIGNED_BY, Evidence
 from avow.evidence.status import Status
 from avow.system.plan import Finding, Located, Requirement
 
@@ -200,6 +200,15 @@ def test_two_reviewers_are_two_persons_in_one_record_or_in_two() -> None:
     assert passes(review("A. Person"), review("B. Person", method="review-2"))
     assert not passes(review("A. Person"), review("A. Person", method="review-2"))
     assert not passes(review("A. Person", "a person "))
+
+    def signed(by: str, name: str, method: str = "review") -> Evidence:
+        found = review(name, method=method)
+        return replace(found, details={**found.details, SIGNED_BY: by})
+
+    assert passes(signed("k1", "A. Person"), signed("k2", "B. Person", method="review-2"))
+    assert passes(signed("k1", "A. Person"), review("B. Person", method="review-2"))
+    assert not passes(signed("k1", "A. Person"), signed("k1", "B. Person", method="review-2"))
+    assert not passes(signed("k1", "A. Person"), signed("k2", "a person", method="review-2"))
     assert not passes(review("A. Person"), review("B. Person", method="review-2", date="2026-09-01"))
 
 

@@ -74,6 +74,7 @@ def test_a_report_of_what_cannot_be_read_is_marked_until_it_can(workspace: Path,
     assert len(page.read_text()) == pytest.approx(len(whole), abs=200)  # run and time differ
 
 
+@pytest.mark.slow
 def test_verify_signs_its_attestations_where_there_is_a_key(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("cryptography")
     (workspace / "contracts" / "s" / "m.py").write_text("def step(x):\n    return 0\n")
