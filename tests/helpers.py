@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
+
+import pytest
+from _pytest.mark import ParameterSet
 
 
 def edit(path: Path, *pairs: tuple[str, str]) -> None:
@@ -20,3 +25,16 @@ def alive(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
+
+
+def some(cases: Iterable[Any], always: int) -> list[Any]:
+    """Parameters of a test: so many of them, evenly spread, run always, and the others with `-m slow`."""
+    listed = list(cases)
+    chosen = {k * len(listed) // always for k in range(always)}
+    return [case if k in chosen else _slow(case) for k, case in enumerate(listed)]
+
+
+def _slow(case: Any) -> Any:
+    if isinstance(case, ParameterSet):
+        return pytest.param(*case.values, marks=[*case.marks, pytest.mark.slow], id=case.id)
+    return pytest.param(*case if isinstance(case, tuple) else (case,), marks=pytest.mark.slow)

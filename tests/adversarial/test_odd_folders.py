@@ -35,6 +35,7 @@ def place(tmp_path: Path) -> Path:
     return root
 
 
+@pytest.mark.slow
 def test_commands_that_read_load_no_plug_in(place: Path) -> None:
     (place / "evil.py").write_text(EVIL)
     plan = place / "contracts" / "s" / "plan.yaml"
@@ -45,6 +46,7 @@ def test_commands_that_read_load_no_plug_in(place: Path) -> None:
     assert "not loaded" in text or "BACKEND005" in run(place, AVOW, "check", str(plan), "path")[1]
 
 
+@pytest.mark.slow
 def test_no_module_of_the_folder_stands_in_for_another(place: Path) -> None:
     for name in ("z3.py", "json.py", "avow/__init__.py", "hypothesis.py", "lark.py"):
         (place / name).parent.mkdir(exist_ok=True)
@@ -55,9 +57,8 @@ def test_no_module_of_the_folder_stands_in_for_another(place: Path) -> None:
     assert not list(place.glob("**/executed"))
 
 
-@pytest.mark.parametrize(
-    "name", ["artifacts/ledger/s.jsonl", pytest.param("artifacts/ledger/index", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["artifacts/ledger/s.jsonl", "artifacts/ledger/index"])
 def test_a_pipe_where_the_ledger_should_be(place: Path, name: str) -> None:
     (place / "artifacts" / "ledger").mkdir(parents=True)
     os.mkfifo(place / name)

@@ -113,6 +113,7 @@ def terms(draw, depth=4, scope=()):
     return Quantified(draw(st.sampled_from([Quantifier.FORALL, Quantifier.EXISTS])), tuple(names), inner)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(terms(), st.sets(st.integers(0, 2)), st.sets(st.tuples(st.integers(0, 2), st.integers(0, 2))), st.booleans())
 def test_the_normal_form_means_the_same(term, ones, pairs, truth):

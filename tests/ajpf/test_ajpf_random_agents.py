@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from helpers import some
 
 from avow.backend_kit.protocol import Job, Limits
 from avow.backends.ajpf import BACKEND
@@ -93,7 +94,7 @@ def random_job(folder: Path, rng: random.Random, engine: str, further: dict[str,
     return method_job(system, system.contract.node("ag"), system.plan.node("ag").methods[0])
 
 
-@pytest.mark.parametrize("seeds", [range(15), range(15, 30)])
+@pytest.mark.parametrize("seeds", some([range(15), range(15, 30)], 1))
 def test_no_agent_meets_a_claim_and_its_denial(tmp_path: Path, seeds: range) -> None:
     """Under "eventually" for the one and "eventually not" for the other, most agents would meet both."""
     told = Counter()
@@ -112,7 +113,7 @@ def test_no_agent_meets_a_claim_and_its_denial(tmp_path: Path, seeds: range) -> 
 
 
 @pytest.mark.needs_spin
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", some(range(3), 1))
 def test_spin_agrees_on_random_agents(tmp_path: Path, seed: int) -> None:
     rng = random.Random(seed)
     job = random_job(

@@ -7,6 +7,7 @@ from dataclasses import replace
 from datetime import date
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -100,6 +101,7 @@ def test_a_new_supposition_never_improves_the_colour(
     assert after.answers.tone.rank <= before.answers.tone.rank
 
 
+@pytest.mark.slow
 @LAW
 @given(records(), statements())
 def test_what_is_argued_is_never_stronger_than_what_is_derived(listed: list[Evidence], said: list[Statement]) -> None:
@@ -113,6 +115,7 @@ def test_what_is_argued_is_never_stronger_than_what_is_derived(listed: list[Evid
     )
 
 
+@pytest.mark.slow
 @LAW
 @given(records(), statements(), st.booleans())
 def test_the_verdict_counts_what_it_speaks_of_and_follows_from_what_the_case_holds(

@@ -70,6 +70,7 @@ def test_the_repaired_loop_stands_by_its_initial_values(tmp_path: Path) -> None:
     assert answers.goal.root.assumed == ()
 
 
+@pytest.mark.slow
 def test_an_initial_value_that_breaks_the_assumption_is_found(tmp_path: Path) -> None:
     plan = REPAIRED.replace(
         "exists(a, b in REAL | forall(x, y in REAL | out.at(x, y) <=> (x == a and y == b)))",
@@ -96,6 +97,7 @@ def test_waypoints_too_close_are_found_at_the_hair(tmp_path: Path) -> None:
     assert dict(shown.values).keys() >= {"navigation.at", "in.wayP"}
 
 
+@pytest.mark.slow
 def test_requirements(tmp_path: Path) -> None:
     found = outcomes(case_study(tmp_path, "remote_inspection", REPAIRED + SCENARIO))
     assert "REQ1" not in found, "prose is linked, not settled"

@@ -92,10 +92,11 @@ def test_refines(tmp_path: Path) -> None:
     assert json.loads(output)["nodes"][0]["clauses"][0]["counterexample"] == {"out.x": "0"}
 
 
+@pytest.mark.slow
 @pytest.mark.needs_dafny
 @pytest.mark.parametrize(
     "name",
-    ["relational", *(pytest.param(n, marks=pytest.mark.slow) for n in ("steps", "calculus", "r4"))],
+    ["relational", "steps", "calculus", "r4"],
 )
 def test_the_rules_are_proved(tmp_path: Path, name: str) -> None:
     completed = run(["dafny", "/compile:0", str(PROOFS / f"{name}.dfy")], seconds=120)
@@ -163,6 +164,7 @@ def synthetic(count: int) -> str:
     return "".join(parts)
 
 
+@pytest.mark.slow
 def test_a_chain_of_twenty_is_quick(tmp_path: Path) -> None:
     text_ = node("n0", "", "x0 : INTEGER", "G: out.x0 >= 0")
     for k in range(1, 20):

@@ -37,6 +37,7 @@ def test_a_state_that_is_reached_refutes_with_the_run(tmp_path: Path) -> None:
     assert found.details["run"] == 4
 
 
+@pytest.mark.slow
 def test_a_state_that_is_not_shown_to_be_reached_refutes_nothing(tmp_path: Path) -> None:
     """n stays 0; but from 7, which is never reached, it would go on to 8."""
     text = counter("INTEGER", "G: (in.last < 5 -> out.n == 0) and (in.last >= 5 -> out.n == in.last + 1)")

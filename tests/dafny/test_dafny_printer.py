@@ -141,6 +141,7 @@ def hostile_node() -> Node:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.needs_dafny
 def test_hostile_names_still_make_valid_dafny() -> None:
     made = everything(hostile_node())

@@ -179,6 +179,7 @@ def test_dafny_proves_nothing_that_the_oracle_breaks(tmp_path: Path) -> None:
     assert Verdict.ERROR not in found
 
 
+@pytest.mark.slow
 def test_a_wrong_oracle_or_translator_would_be_caught(tmp_path: Path) -> None:
     """A program other than the one that the oracle runs."""
     caught = 0

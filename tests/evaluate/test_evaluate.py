@@ -7,6 +7,7 @@ import random
 from fractions import Fraction
 
 import pytest
+from helpers import some
 
 from avow.evaluation.evaluate import NotEvaluable, compile_term, evaluate
 from avow.evaluation.truth import judge
@@ -450,7 +451,7 @@ def _random_values(rng: random.Random) -> dict[str, Value]:
     }
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", some(range(4), 2))
 def test_agrees_with_z3_on_random_formulas(seed: int) -> None:
     from avow.solving.questions import replay
 

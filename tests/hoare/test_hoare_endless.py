@@ -6,6 +6,7 @@ import random
 from pathlib import Path
 
 import pytest
+from helpers import some
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.hoare import BACKEND
@@ -39,22 +40,28 @@ def settle(folder: Path, program: str, formula: str = "y == 0", assume: str = ""
 
 @pytest.mark.parametrize(
     ("loop", "assume"),
-    [
-        ("WHILE a == 7777 INVARIANT TRUE DO\n  SKIP", ""),  # one input in all
-        ("WHILE a * a == 49 and b > 3 INVARIANT TRUE DO\n  SKIP", ""),
-        ("n := a\nWHILE n != 0 INVARIANT TRUE DO\n  n := n - 1", ""),  # from every negative number on
-        ("n := a\nWHILE n != 0 INVARIANT TRUE DO\n  n := n - 2", "a > 0"),  # from odd ones
-        ("q := x\nWHILE q > 0 INVARIANT TRUE DO\n  q := q / 2", ""),  # no state comes twice
-        ("n := 0\nc := b\nWHILE n < a INVARIANT TRUE DO\n  n := n + 1\n  c := c + 1\n  a := a + 1", ""),
-        ("n := 0\nWHILE n < length(s) INVARIANT TRUE DO\n  IF s(n) != 5 THEN\n    n := n + 1", ""),
-        ("IF mode == on THEN\n  IF b == 12345 THEN\n    WHILE a != b INVARIANT TRUE DO\n      SKIP", ""),
-        ("n := 0\nWHILE m(n) == 1 INVARIANT TRUE DO\n  SKIP", ""),
-        (
-            "n := 0\nk := 0\nWHILE n < 3 INVARIANT TRUE DO\n  k := 0\n  WHILE k < 3 INVARIANT TRUE DO\n    k := k + 1",
-            "",
-        ),
-        ("n := 0\nWHILE n < a INVARIANT TRUE VARIANT a - n DO\n  n := n - 1", ""),  # a variant that does not fall
-    ],
+    some(
+        [
+            ("WHILE a == 7777 INVARIANT TRUE DO\n  SKIP", ""),  # one input in all
+            ("WHILE a * a == 49 and b > 3 INVARIANT TRUE DO\n  SKIP", ""),
+            ("n := a\nWHILE n != 0 INVARIANT TRUE DO\n  n := n - 1", ""),  # from every negative number on
+            ("n := a\nWHILE n != 0 INVARIANT TRUE DO\n  n := n - 2", "a > 0"),  # from odd ones
+            ("q := x\nWHILE q > 0 INVARIANT TRUE DO\n  q := q / 2", ""),  # no state comes twice
+            ("n := 0\nc := b\nWHILE n < a INVARIANT TRUE DO\n  n := n + 1\n  c := c + 1\n  a := a + 1", ""),
+            ("n := 0\nWHILE n < length(s) INVARIANT TRUE DO\n  IF s(n) != 5 THEN\n    n := n + 1", ""),
+            ("IF mode == on THEN\n  IF b == 12345 THEN\n    WHILE a != b INVARIANT TRUE DO\n      SKIP", ""),
+            ("n := 0\nWHILE m(n) == 1 INVARIANT TRUE DO\n  SKIP", ""),
+            (
+                (
+                    "n := 0\nk := 0\nWHILE n < 3 INVARIANT TRUE DO\n  k := 0\n"
+                    "  WHILE k < 3 INVARIANT TRUE DO\n    k := k + 1"
+                ),
+                "",
+            ),
+            ("n := 0\nWHILE n < a INVARIANT TRUE VARIANT a - n DO\n  n := n - 1", ""),  # a variant that does not fall
+        ],
+        5,
+    ),
 )
 def test_a_run_that_never_ends_is_found(tmp_path: Path, loop: str, assume: str) -> None:
     outcome = settle(tmp_path, f"y := 0\n{loop}\n", assume=assume)
@@ -65,12 +72,15 @@ def test_a_run_that_never_ends_is_found(tmp_path: Path, loop: str, assume: str) 
 
 @pytest.mark.parametrize(
     ("loop", "verdict"),
-    [
-        ("n := 0\nWHILE n < a INVARIANT y == 0 DO\n  n := n + 1", Verdict.PARTIAL),
-        ("n := 0\nWHILE n < a INVARIANT y == 0 VARIANT a - n DO\n  n := n + 1", Verdict.PROVED),
-        ("q := 0\nWHILE q < 10000 INVARIANT y == 0 DO\n  q := q + 1", Verdict.PARTIAL),  # long, and it ends
-        ("n := 0\nWHILE n * n < 50000000 INVARIANT y == 0 DO\n  n := n + 1", Verdict.PARTIAL),
-    ],
+    some(
+        [
+            ("n := 0\nWHILE n < a INVARIANT y == 0 DO\n  n := n + 1", Verdict.PARTIAL),
+            ("n := 0\nWHILE n < a INVARIANT y == 0 VARIANT a - n DO\n  n := n + 1", Verdict.PROVED),
+            ("q := 0\nWHILE q < 10000 INVARIANT y == 0 DO\n  q := q + 1", Verdict.PARTIAL),  # long, and it ends
+            ("n := 0\nWHILE n * n < 50000000 INVARIANT y == 0 DO\n  n := n + 1", Verdict.PARTIAL),
+        ],
+        2,
+    ),
 )
 def test_a_loop_that_ends_is_not_called_endless(tmp_path: Path, loop: str, verdict: Verdict) -> None:
     assert settle(tmp_path, f"y := 0\n{loop}\n").verdict is verdict
@@ -155,7 +165,8 @@ def lines(rng: random.Random, depth: int, indent: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 8))])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
 def test_random_loops_against_running_them(tmp_path: Path, seed: int) -> None:
     rng = random.Random(seed)
     seen: list[Verdict] = []

@@ -57,6 +57,7 @@ def test_layout_keeps_everything() -> None:
         assert all(" ".join(comment.split()) in laid_out for comment in comments), text
 
 
+@pytest.mark.slow
 def test_translation_keeps_the_meaning() -> None:
     for text, _, contract in made():
         again = contract_of(FORMATS["rcl"](contract))
@@ -66,6 +67,7 @@ def test_translation_keeps_the_meaning() -> None:
             assert FORMATS[notation](contract)
 
 
+@pytest.mark.slow
 def test_smtlib_is_read_by_z3() -> None:
     import z3
 

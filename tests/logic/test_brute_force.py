@@ -99,7 +99,11 @@ def test_normal_forms_keep_the_meaning(term: Term) -> None:
     assert digest(Not(term)) != digest(term)
 
 
-@pytest.mark.parametrize("outputs", [OUTPUTS, (*OUTPUTS, FUNCTION_OUTPUT)], ids=["scalars", "with a function"])
+@pytest.mark.parametrize(
+    "outputs",
+    [OUTPUTS, pytest.param((*OUTPUTS, FUNCTION_OUTPUT), marks=pytest.mark.slow)],
+    ids=["scalars", "with a function"],
+)
 def test_realizability_is_right(outputs: tuple[Variable, ...]) -> None:
     verdicts: list[Verdict] = []
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from helpers import some
 
 from avow.base.verdict import Verdict
 from avow.language.load import check_text
@@ -22,15 +23,18 @@ def verdicts(outputs: str, guarantee: str, assumption: str = "") -> dict[str, Ve
 
 @pytest.mark.parametrize(
     ("outputs", "guarantee"),
-    [
-        ("y : O, z : O", "y != z"),
-        ("y : O, z : O", "not (y == z)"),
-        ("y : BOOL", "y and exists(a, b in O | a != b)"),
-        ("c : C, d : C, e : C", "c != d and d != e and c != e"),
-        ("s : T, t : T", "s != t"),
-        ("f : F", "f(0) != f(1)"),
-        ("y : BOOL", "y and forall(a, b in O | a == b)"),
-    ],
+    some(
+        [
+            ("y : O, z : O", "y != z"),
+            ("y : O, z : O", "not (y == z)"),
+            ("y : BOOL", "y and exists(a, b in O | a != b)"),
+            ("c : C, d : C, e : C", "c != d and d != e and c != e"),
+            ("s : T, t : T", "s != t"),
+            ("f : F", "f(0) != f(1)"),
+            ("y : BOOL", "y and forall(a, b in O | a == b)"),
+        ],
+        3,
+    ),
 )
 def test_what_hinges_on_the_number_of_elements_fails(outputs: str, guarantee: str) -> None:
     assert set(verdicts(outputs, guarantee).values()) == {Verdict.REFUTED}

@@ -208,6 +208,7 @@ def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
         os.kill(pid, signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_without_a_server_there_is_a_new_python(odd: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SAID", "without")
     monkeypatch.setattr(forks, "FORK_START", 0.0)

@@ -76,12 +76,14 @@ def test_what_was_good_before_the_refutation_is_asked_again(place: Workspace) ->
     assert not open_obligations(place, work(place), RUN), "the case was tried, and refutes no more"
 
 
+@pytest.mark.slow
 def test_a_case_that_is_no_input_any_more_is_left_out(place: Workspace) -> None:
     assert ask(place, "def step(x, k):\n    return x\n") is Verdict.REFUTED
     edit(place.contracts / "s" / "s.rcl", ("x : REAL", "x : {low, high}"))
     assert ask(place, "def step(x, k):\n    return 0\n") is Verdict.TESTED
 
 
+@pytest.mark.slow
 def test_a_method_that_is_taken_out_of_the_plan_takes_no_refutation_with_it(place: Workspace) -> None:
     assert ask(place, "def step(x, k):\n    return x\n") is Verdict.REFUTED
     plan = place.contracts / "s" / "plan.yaml"

@@ -38,6 +38,7 @@ def refuted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
+@pytest.mark.slow
 def test_no_edit_of_what_is_kept_changes_the_verdict(refuted: Path) -> None:
     edited = 0
     files = [f for f in (*refuted.glob("artifacts/**/*"), *refuted.glob("reports/**/*")) if f.is_file()]

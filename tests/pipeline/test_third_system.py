@@ -67,6 +67,7 @@ def settle(work: Work, folder: Path) -> tuple[Outcome, ...]:
     return backend.discharge(job, folder, limits).outcomes
 
 
+@pytest.mark.slow
 def test_each_engine_settles_its_part(tmp_path: Path) -> None:
     system = survey(FERRY)
     assert isinstance(system, Survey)

@@ -113,8 +113,9 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.needs_chromium
-@pytest.mark.parametrize("name", ["rover", pytest.param("large", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["rover", "large"])
 def test_in_a_browser_nothing_is_clipped_and_the_budgets_hold(name: str, tmp_path: Path) -> None:
     text = render_answers(CASES[name]())
     asked = frames_of(text)

@@ -120,6 +120,7 @@ def hunt(place: Path, times: int, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return missed
 
 
+@pytest.mark.slow
 def test_random_edits_are_found(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert hunt(place, 60, monkeypatch) == []
 

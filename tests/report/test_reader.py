@@ -67,6 +67,7 @@ def test_folds_open_and_close_by_keyboard(name: str, key: str, reader: tuple[Dri
     assert tab.value(lost) == 0
 
 
+@pytest.mark.slow
 def test_nothing_is_clipped_in_the_page_of_all_claims(tmp_path: Path) -> None:
     page = render_page(rover_case())
     fault = page.replace("</style>", ".tree{position:relative;left:-60px}</style>")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers import some
 
 from avow.backends.rosmonitoring.serve import answer, serve
 from avow.backends.rosmonitoring.session import session
@@ -77,12 +78,15 @@ def test_faulty_as_json_and_from_standard_input(case_folder: Path, traces: dict[
 
 @pytest.mark.parametrize(
     ("trace", "words"),
-    [
-        ("broken", "broken.jsonl:2:"),
-        ("timeless", "timeless.jsonl:2:"),
-        ("absent", "cannot read"),
-        ("nodes", "did you mean"),
-    ],
+    some(
+        [
+            ("broken", "broken.jsonl:2:"),
+            ("timeless", "timeless.jsonl:2:"),
+            ("absent", "cannot read"),
+            ("nodes", "did you mean"),
+        ],
+        2,
+    ),
 )
 def test_bad_input_is_code_2_with_its_place(case_folder: Path, traces: dict[str, Path], trace: str, words: str) -> None:
     if trace == "nodes":

@@ -17,6 +17,7 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 import pytest
+from helpers import some
 
 from avow.backend_kit.protocol import Limits
 from avow.backend_kit.registry import backend
@@ -96,6 +97,7 @@ class Odd:
     def close(self) -> None: ...
 
 
+@pytest.mark.slow
 def test_the_same_is_recorded_however_works_are_carried_about(
     place: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -307,7 +309,18 @@ def test_what_a_worker_pickles_is_not_read(machines: Machines, tmp_path: Path) -
 
 @pytest.mark.parametrize(
     "text",
-    ["", "dask", "http://a:1", "dask+tcp://a.example:1", "dask+tcp://10.0.0.1:8786", "dask+tls://:1", "dask+tls://a"],
+    some(
+        [
+            "",
+            "dask",
+            "http://a:1",
+            "dask+tcp://a.example:1",
+            "dask+tcp://10.0.0.1:8786",
+            "dask+tls://:1",
+            "dask+tls://a",
+        ],
+        3,
+    ),
 )
 def test_addresses_that_are_refused(text: str) -> None:
     from avow.base.diagnostics import Rejected

@@ -210,6 +210,7 @@ def test_every_step_on_the_grid_is_looked_at() -> None:
         assert "the scenario's values cut runs off" in outcome.summary
 
 
+@pytest.mark.slow
 def test_a_small_mission_on_the_grid(tmp_path: Path) -> None:
     of = compose(copy(tmp_path, SMALL, use="0.08"))
     for name in ("R1_grid", "PLANS_grid"):
@@ -222,6 +223,7 @@ FREE_MOVES = "(in.step(out.planC(k), out.planC(k + 1)) and in.free(out.planC(k))
 SHORTEST = "in.away(out.planC(k), in.charger) + k == out.lengthC"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "faults"),
     [
