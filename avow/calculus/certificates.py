@@ -39,6 +39,8 @@ class Certificates:
     _known: Statements | None = None
     _finders: dict[str, Finder] = field(default_factory=dict)
     _kernels: dict[str, Kernel] = field(default_factory=dict)
+    _places: dict[str, dict[tuple[How, str, str], list[int]]] = field(default_factory=dict)
+    """Scope → the entries for a claim."""
     _named: dict[tuple[Kind, str], Statement] = field(default_factory=dict)
 
     @property
@@ -81,6 +83,42 @@ class Certificates:
         self.made[scope] = pruned(finder.find(), claim)
         return self.established(self.made[scope], claim)
 
+    def existence(self, name: str) -> list[Established] | None:
+        """What an obligation says to be possible (`avow.calculus.existence`), in all its parts."""
+        entries: list[Entry] = []
+        for part in self.parts(name):
+            for claim in part:
+                shown = claim.kind is Kind.IMPOSSIBLE
+                entry = Entry(
+                    How.SHOWN if shown else How.POSSIBLE, "", claim.digest, step=Question() if shown else None
+                )
+                if self.established(Certificate(name, (entry,)), claim) is not None:
+                    entries.append(entry)
+                    break
+        scope = existence_scope(name)
+        self.made[scope] = Certificate(scope, tuple(entries))
+        return self._existing(self.made[scope], name)
+
+    def kept_existence(self, name: str) -> list[Established] | None:
+        """As `existence`, from the certificate of an earlier run."""
+        return self._existing(self.kept.get(existence_scope(name)), name)
+
+    def _existing(self, certificate: Certificate | None, name: str) -> list[Established] | None:
+        found = [
+            next((one for claim in part if (one := self.established(certificate, claim)) is not None), None)
+            for part in self.parts(name)
+        ]
+        established = [one for one in found if one is not None]
+        return established if established and len(established) == len(found) else None
+
+    def parts(self, name: str) -> list[list[Statement]]:
+        """The claims of an obligation that something is possible: of each part, those of which one is enough."""
+        parts: dict[str, list[Statement]] = {}
+        for claim in self.known.every:
+            if claim.kind in (Kind.POSSIBLE, Kind.IMPOSSIBLE) and possible_name(claim) == name:
+                parts.setdefault(claim.name, []).append(claim)
+        return list(parts.values())
+
     def kept_for(self, scope: str, kind: Kind, name: str) -> Established | None:
         """What the kernel says of a claim from the certificate of an earlier run."""
         claim = self.claim(kind, name)
@@ -93,9 +131,13 @@ class Certificates:
         kernel = self._kernels.get(certificate.scope)
         if kernel is None or kernel.certificate is not certificate:
             kernel = self._kernels[certificate.scope] = Kernel(self.known, certificate, self.solvers)
-        for i in kernel.places.get((claim.node, claim.digest), ()):
+            places = self._places[certificate.scope] = {}
+            for i, entry in enumerate(certificate.entries):
+                places.setdefault((entry.how, entry.node, entry.digest), []).append(i)
+        how = How.POSSIBLE if claim.kind is Kind.POSSIBLE else How.SHOWN
+        for i in self._places[certificate.scope].get((how, claim.node, claim.digest), ()):
             try:
-                return kernel.establish(i) if claim.kind is Kind.REQUIREMENT else kernel.side_condition(i)
+                return kernel.establish(i, alone=claim.kind is Kind.ASSUMPTION)
             except Refused:
                 continue
         return None
@@ -103,8 +145,7 @@ class Certificates:
     def claim(self, kind: Kind, name: str) -> Statement | None:
         """The claim of that name as it is now; None where it has no text."""
         if not self._named:
-            for same in self.known.by_digest.values():
-                self._named |= {(s.kind, f"{s.node}.{s.name}" if s.node else s.name): s for s in same}
+            self._named = {(s.kind, s.called): s for s in self.known.every}
         return self._named.get((kind, name))
 
     def _finder(self, goal: Goal, bounds: Bounds) -> Finder:
@@ -146,6 +187,27 @@ def requirement_scope(name: str) -> str:
     return f"requirement {name}"
 
 
+def scope_of(claim: Statement) -> str | None:
+    """The scope of the certificate of a claim about the whole system; None of another."""
+    match claim.kind:
+        case Kind.REQUIREMENT:
+            return requirement_scope(claim.name)
+        case Kind.POSSIBLE | Kind.IMPOSSIBLE:
+            return existence_scope(possible_name(claim))
+        case _:  # a clause or a formula of the plan: its derivation's, or none
+            return None
+
+
+def possible_name(claim: Statement) -> str:
+    """The obligation of which a claim that something is possible is a part."""
+    return claim.name if claim.name.startswith("start.") else claim.name.rpartition(".")[0]
+
+
+def existence_scope(name: str) -> str:
+    """The scope of the certificate of an obligation that something is possible."""
+    return f"existence {name}"
+
+
 def pruned(certificate: Certificate, goal: Statement) -> Certificate:
     """The entries that a claim rests on, and no others."""
     wanted = (How.SHOWN, goal.node, goal.digest)
@@ -154,7 +216,7 @@ def pruned(certificate: Certificate, goal: Statement) -> Certificate:
         return Certificate(certificate.scope, ())
     kept, stack = {at}, [at]
     while stack:
-        for i in _named(certificate.entries[stack.pop()]):
+        for i in certificate.entries[stack.pop()].named():
             if i not in kept:
                 kept.add(i)
                 stack.append(i)
@@ -170,11 +232,6 @@ def pruned(certificate: Certificate, goal: Statement) -> Certificate:
         return Entry(entry.how, entry.node, entry.digest, conds, tuple(map(renumbered, entry.base)), step)
 
     return Certificate(certificate.scope, tuple(moved(certificate.entries[i]) for i in sorted(kept)))
-
-
-def _named(entry: Entry) -> Iterable[int]:
-    questions = (*entry.base, *((entry.step,) if entry.step else ()))
-    return (*entry.conds, *(use.entry for question in questions for use in question.uses))
 
 
 def _hint(settled: Settled) -> Hint | None:

@@ -114,9 +114,8 @@ class Finder:
         """All that may ever be an entry."""
         found: list[Item] = []
         own = set(self.nodes)
-        every = [s for same in self.known.by_digest.values() for s in same]
-        found += [Item(How.ENVIRONMENT, s) for s in every if s.kind is Kind.ENVIRONMENT]
-        for s in every:
+        found += [Item(How.ENVIRONMENT, s) for s in self.known.every if s.kind is Kind.ENVIRONMENT]
+        for s in self.known.every:
             if s.node not in own or s.node not in self.known.assumptions:
                 continue
             if s.kind is Kind.ASSUMPTION:
@@ -332,8 +331,7 @@ class Finder:
 
     def initials(self) -> tuple[Statement, ...]:
         if self._initials is None:
-            every = (s for same in self.known.by_digest.values() for s in same)
-            self._initials = tuple(s for s in every if s.kind is Kind.INITIAL and s.unary)
+            self._initials = tuple(s for s in self.known.initials if s.unary)
         return self._initials
 
     def core(self, item: Item, premises: _Uses, *, initially: int | None = None) -> _Base | None:

@@ -13,13 +13,13 @@ from typing import Protocol
 
 from avow.base.diagnostics import Span
 from avow.base.files import digest as sha256
-from avow.base.graphs import components
 from avow.base.verdict import Outcome
 from avow.calculus import questions
-from avow.calculus.certificates import Certificates, requirement_scope
+from avow.calculus.certificates import Certificates, existence_scope, requirement_scope
 from avow.calculus.composition import Composition, argument, asked, compose
 from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCondition
 from avow.calculus.discharge import Bounds
+from avow.calculus.existence import circles, joined, loops, start_name
 from avow.calculus.hierarchy import innermost
 from avow.calculus.requirements import requirement_question
 from avow.calculus.resting import Resting
@@ -111,21 +111,25 @@ def reestablished(certificates: Certificates, obligation: str) -> Reestablished 
     if kind == Kind.REQUIREMENT:
         scope = requirement_scope(name)
         return _told(certificates.kept_for(scope, Claimed.REQUIREMENT, name), scope)
+    if certificates.parts(name):
+        possible = certificates.kept_existence(name)
+        return _all_told(possible, existence_scope(name)) if possible is not None else None
     for goal in certificates.composition.goals:
         for part in goal.root.walk():
             if part.rule is Rule.R4 and name == _loop_name(certificates.composition, goal, part):
                 about = [innermost(str(c.about)) for c in part.side_conditions]
                 each = [certificates.kept_for(goal.name, Claimed.ASSUMPTION, one) for one in about]
                 there = [one for one in each if one is not None]
-                if len(there) < len(each):
-                    return None
-                solvers = min((one.solvers for one in there), default=1)
-                return Reestablished(questions.loop_key(there), solvers, goal.name)
+                return _all_told(there, goal.name) if len(there) == len(each) else None
         for condition in goal.conditions:
             if name == f"{goal.name}.{condition.about}":
                 found = certificates.kept_for(goal.name, Claimed.ASSUMPTION, innermost(str(condition.about)))
                 return _told(found, goal.name)
     return None
+
+
+def _all_told(found: Sequence[Established], scope: str) -> Reestablished:
+    return Reestablished(questions.common_key(found), min((one.solvers for one in found), default=1), scope)
 
 
 def _told(found: Established | None, scope: str) -> Reestablished | None:
@@ -264,23 +268,20 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
 
 def _start_tasks(composition: Composition) -> Iterator[Task]:
     frame = composition.frame
-    arcs = [(e.source.node, e.target.node) for e in frame.graph.edges]
-    selves = {source for source, target in arcs if source == target}
     everything = frozenset(frame.graph.nodes)
-    for group in components(frame.graph.nodes, arcs):
-        if len(group) > 1 or group[0] in selves:
-            yield Task(
-                _obligation(
-                    frame.system,
-                    f"start.{_joined(group)}",
-                    f"the loop of {', '.join(group)} has a first element",
-                    "",
-                    sha256(f"start\n{composition.meanings.cone(group[0], everything)}"),
-                    (),
-                    frame.node(group[0]).span,
-                ),
-                questions.StartQuestion(group),
-            )
+    for group in loops(frame):
+        yield Task(
+            _obligation(
+                frame.system,
+                start_name(group),
+                f"the loop of {', '.join(group)} has a first element",
+                "",
+                sha256(f"start\n{composition.meanings.cone(group[0], everything)}"),
+                (),
+                frame.node(group[0]).span,
+            ),
+            questions.StartQuestion(group),
+        )
 
 
 def _joint_tasks(composition: Composition) -> Iterator[Task]:
@@ -288,9 +289,7 @@ def _joint_tasks(composition: Composition) -> Iterator[Task]:
     node answers to what it gets, and its own realizability (a sanity obligation) is enough."""
     frame = composition.frame
     arcs = [(e.source.node, e.target.node) for e in frame.graph.edges if not e.delayed]
-    for group in components(frame.graph.nodes, arcs):
-        if len(group) < 2:
-            continue
+    for group in circles(frame):
         meaning = sha256("\n".join([*(composition.meanings.node(name) for name in group), *map(str, sorted(arcs))]))
         for name in group:
             for clause in frame.node(name).guarantees:
@@ -403,12 +402,8 @@ def _implication(frame: Frame, condition: SideCondition, given: Mapping[str, _Gi
 def _loop_name(composition: Composition, goal: Goal, part: Derivation) -> str:
     """What an assumption of a node that is called ``loop`` cannot be called: no name of a node has a hyphen."""
     word = "loop-of" if "loop" in composition.frame_of(goal).graph.nodes else "loop"
-    return f"{goal.name}.{word}.{_joined(part.nodes)}"
+    return f"{goal.name}.{word}.{joined(part.nodes)}"
 
 
 def _listed(names: Sequence[str]) -> str:
     return ", ".join(names) if len(names) <= 12 else f"{len(names)} nodes"
-
-
-def _joined(names: Sequence[str]) -> str:
-    return "-".join(names) if len(names) <= 6 else f"{names[0]}-and-{len(names) - 1}-more"

@@ -12,6 +12,7 @@ from avow.calculus.composition import Composition
 from avow.calculus.derivation import Case, LoopForm, Phase, Settled, SideCondition
 from avow.calculus.discharge import Bounds, would_hold
 from avow.calculus.entailment import implied
+from avow.calculus.existence import start_name
 from avow.calculus.repair import Offer
 from avow.calculus.variables import Frame
 from avow.formulas.formula import negation
@@ -208,9 +209,17 @@ class RuleQuestion:
         return Answer(Verdict.REFUTED, self.message, Counterexample(explanation=self.message))
 
 
-def loop_key(found: Sequence[Established]) -> str:
-    """What a loop's standing depends on: the side conditions of its members."""
+def common_key(found: Sequence[Established]) -> str:
+    """The key of an answer that several claims make up: a loop's, the side conditions of its members."""
     return sha256("".join(one.key for one in found))
+
+
+def made_up(answer: Answer, found: Sequence[Established] | None) -> Answer:
+    """As `certified`, of a proof that several claims make up."""
+    if found is None:
+        return certified(answer, None)
+    told = {"key": common_key(found), "solvers": min((one.solvers for one in found), default=1)}
+    return replace(answer, details=answer.details | {"certificate": told})
 
 
 # -- loops and start-up ------------------------------------------------------------------------------------------------
@@ -235,10 +244,9 @@ class LoopQuestion:
                     c for part in goal.root.walk() if part.nodes == self.members for c in part.side_conditions
                 ]
                 found = [composition.certificates.condition(goal, str(c.about), bounds) for c in conditions]
-                if not all(found):
-                    return certified(Answer(Verdict.PROVED, f"is in order: {loop.note}", details=details), None)
-                details["certificate"] = {"key": loop_key([one for one in found if one is not None]), "solvers": 1}
-                return Answer(Verdict.PROVED, loop.note, details=details)
+                there = [one for one in found if one is not None]
+                complete = there if len(there) == len(found) else None
+                return made_up(Answer(Verdict.PROVED, loop.note, details=details), complete)
             case LoopForm.CIRCULAR:
                 return Answer(Verdict.REFUTED, loop.note, Counterexample(explanation=loop.note), details=details)
             case _ if self.entered:
@@ -270,7 +278,8 @@ class StartQuestion:
         listed = ", ".join(initials)
         match solution.status:
             case "sat":
-                return Answer(Verdict.PROVED, f"delayed edges start it: {listed}", details={"initial": list(initials)})
+                told = Answer(Verdict.PROVED, f"delayed edges start it: {listed}", details={"initial": list(initials)})
+                return made_up(told, composition.certificates.existence(start_name(self.members)))
             case "unsat":
                 summary = f"no values are as the plan says: {', '.join(solution.core)}"
                 return Answer(Verdict.REFUTED, summary, Counterexample(explanation=summary))
@@ -343,7 +352,8 @@ class JointQuestion:
             if answer.verdict is not Verdict.REFUTED:
                 return Answer(Verdict.UNKNOWN, f"the solver gave up: {answer.reason}", details=details)
             shown.append(answer.counterexample.text() if answer.counterexample else "")
-        return Answer(Verdict.PROVED, f"there is room: {'; '.join(shown)}")
+        room = Answer(Verdict.PROVED, f"there is room: {'; '.join(shown)}")
+        return made_up(room, composition.certificates.existence(f"joint.{about}"))
 
 
 # -- hypotheses --------------------------------------------------------------------------------------------------------

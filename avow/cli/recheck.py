@@ -21,34 +21,35 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     Code 1 where a claim is not established from contract and plan as they are, and where a label is not that of
     the claims under it; code 2 where there is nothing to establish.
     """
+    from avow.base.codec import Unreadable
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.workspace import system_folder
-    from avow.calculus.certificates import requirement_scope
+    from avow.calculus.certificates import scope_of
     from avow.calculus.variables import frame
     from avow.calculus.wiring import wiring
-    from avow.kernel.certificate import How, Malformed, from_json
+    from avow.kernel.certificate import How, from_json
     from avow.kernel.check import Kernel, Refused
-    from avow.kernel.solvers import Second, Solvers, versions
-    from avow.kernel.statements import Kind, statements
+    from avow.kernel.statements import statements
+    from avow.solving.apart import Both, versions
     from avow.system.load import load_path
 
+    claims = (How.SHOWN, How.POSSIBLE)
     system = load_path(path if path.is_dir() else system_folder(str(path)))
     known = statements(wiring(frame(system)))
-    names = {(s.node, s.digest): s.name for same in known.by_digest.values() for s in same}
+    names = {(s.node, s.digest): s.name for s in known.every}
     try:
         kept = json.loads(certificates.read_text())
         if "kernel" in kept:
             kept = kept["kernel"]["certificates"]
         found = {scope: from_json(data) for scope, data in kept.items()}
-    except (ValueError, AttributeError, KeyError, TypeError, Malformed) as error:
+    except (ValueError, AttributeError, KeyError, TypeError, Unreadable) as error:
         raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: {error}")) from error
-    if not any(entry.how is How.SHOWN for certificate in found.values() for entry in certificate.entries):
+    if not any(entry.how in claims for certificate in found.values() for entry in certificate.entries):
         raise Rejected(Diagnostic("CLI005", f"{certificates} holds no certificates: no claim is shown in it"))
-    scopes = {
-        mark: {requirement_scope(s.name) for s in same if s.kind is Kind.REQUIREMENT}
-        for mark, same in known.by_digest.items()
-    }
-    solvers = Solvers(second=Second() if "cvc5" in versions() else None)
+    scopes: dict[str, set[str]] = {}
+    for claim in known.every:
+        if (label := scope_of(claim)) is not None:
+            scopes.setdefault(claim.digest, set()).add(label)
     told: list[dict[str, object]] = []
 
     def refuse(scope: str, claim: str, why: str) -> None:
@@ -56,34 +57,31 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
         if not as_json:
             click.echo(f"refused      {scope}: {claim and claim + ': '}{why}")
 
-    try:
+    with Both() as solvers:
         for scope, certificate in found.items():
-            shown = [entry for entry in certificate.entries if entry.how is How.SHOWN and not entry.node]
-            about = {label for entry in shown for label in scopes.get(entry.digest, ())}
-            unlike = certificate.scope != scope or (shown and scope not in about)
-            if unlike or (certificate.entries and not shown and scope.startswith(requirement_scope(""))):
+            shown = [entry for entry in certificate.entries if entry.how in claims and not entry.node]
+            unlike = certificate.scope != scope or any(scope not in scopes.get(e.digest, ()) for e in shown)
+            if unlike or (certificate.entries and not shown and " " in scope):
                 refuse(scope, "", "its label is not that of the claims in it")
             kernel = Kernel(known, certificate, solvers)
             for i, entry in enumerate(certificate.entries):
-                if entry.how is not How.SHOWN:
+                if entry.how not in claims:
                     continue
                 called = ".".join(part for part in (entry.node, names.get((entry.node, entry.digest), "?")) if part)
                 try:
-                    claim = kernel.establish(i)
+                    true = kernel.establish(i)
                 except Refused as why:
                     refuse(scope, called, str(why))
                     continue
-                rests_on = len(claim.hypotheses)
+                rests_on = len(true.hypotheses)
                 told.append(
-                    {"scope": scope, "claim": called, "established": True, "solvers": claim.solvers}
-                    | {"hypotheses": rests_on, "vacuous": claim.vacuous, "key": claim.key}
+                    {"scope": scope, "claim": called, "established": True, "solvers": true.solvers}
+                    | {"hypotheses": rests_on, "vacuous": true.vacuous, "key": true.key}
                 )
                 if as_json:
                     continue
-                rests = f"on {rests_on} hypotheses" + (", vacuous" if claim.vacuous else "")
-                click.echo(f"certified-{claim.solvers}  {scope}: {called}, {rests}, key {claim.key[:12]}")
-    finally:
-        solvers.close()
+                rests = f"on {rests_on} hypotheses" + (", vacuous" if true.vacuous else "")
+                click.echo(f"certified-{true.solvers}  {scope}: {called}, {rests}, key {true.key[:12]}")
     if as_json:
         click.echo(json.dumps({"claims": told, "solvers": dict(versions())}, indent=1, ensure_ascii=False))
     else:

@@ -11,7 +11,7 @@ Engines (`avow.calculus`) only *find*; a wrong hint of theirs can make a claim u
 3. `certificate`: what a certificate is, as data and as JSON.
 4. `text`: a formula as SMT-LIB text. The only translation that a certified claim rests on.
 5. `check`: the theorem's conditions, held against a certificate; hypotheses and key are computed here.
-6. `solvers`: a question put to Z3, and to cvc5 where it is installed.
+6. `solvers`: a question put to Z3, and to a second solver where there is one.
 
 Nothing here imports anything of Avow but the term language and `avow.base`.
 """

@@ -1,4 +1,4 @@
-"""Certificates as data, and as canonical JSON (``avow/certificate/1``).
+"""Certificates as data, and as JSON.
 
 A certificate is a list of entries; an entry's place in it is its rank. It holds no formula and no hypothesis: claims
 are named by digest and looked up in the system as it is now, hypotheses are computed (`avow.kernel.check`).
@@ -6,16 +6,14 @@ are named by digest and looked up in the system as it is now, hypotheses are com
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-FORMAT = "avow/certificate/1"
+from avow.base import codec
 
-
-class Malformed(Exception):  # noqa: N818 - it says what the text is
-    """Text that is no certificate."""
+FORMAT = "avow/certificate/2"
 
 
 class How(StrEnum):
@@ -29,6 +27,8 @@ class How(StrEnum):
     """Of values that no node provides: a person's reason."""
     OPEN = "open"
     """Assumed by the contract that is derived here; never under a requirement."""
+    POSSIBLE = "possible"
+    """By an example: that some values are as it says. No other entry may use it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Use:
     """An entry used as a premise: of the step in question, or `back` steps earlier."""
 
     entry: int
-    back: int = 0
+    back: int = field(default=0, metadata=codec.LATER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +48,8 @@ class Question:
     """
 
     uses: tuple[Use, ...] = ()
-    initials: tuple[str, ...] = ()
-    witness: tuple[int, int] | None = None
+    initials: tuple[str, ...] = field(default=(), metadata=codec.LATER)
+    witness: tuple[int, int] | None = field(default=None, metadata=codec.LATER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +60,18 @@ class Entry:
     how: How
     node: str
     digest: str
-    conds: tuple[int, ...] = ()
-    base: tuple[Question, ...] = ()
-    step: Question | None = None
+    conds: tuple[int, ...] = field(default=(), metadata=codec.LATER)
+    base: tuple[Question, ...] = field(default=(), metadata=codec.LATER)
+    step: Question | None = field(default=None, metadata=codec.LATER)
+
+    @property
+    def questions(self) -> tuple[Question, ...]:
+        return (*self.base, *((self.step,) if self.step is not None else ()))
+
+    def named(self) -> Iterator[int]:
+        """`Named`: the entries that it names, in its conditions and in all of its questions."""
+        yield from self.conds
+        yield from (use.entry for question in self.questions for use in question.uses)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,78 +83,11 @@ class Certificate:
 
 
 def to_json(certificate: Certificate) -> dict[str, Any]:
-    return {
-        "format": FORMAT,
-        "scope": certificate.scope,
-        "entries": [_entry(entry) for entry in certificate.entries],
-    }
-
-
-def canonical(certificate: Certificate) -> str:
-    """The one text of a certificate."""
-    return json.dumps(to_json(certificate), sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return {"format": FORMAT, **codec.to_json(certificate)}
 
 
 def from_json(data: object) -> Certificate:
-    """Strict. Raises Malformed."""
-    match data:
-        case {"format": "avow/certificate/1", "scope": str(scope), "entries": list(entries), **rest} if not rest:
-            return Certificate(scope, tuple(map(_read_entry, entries)))
-    raise Malformed(f"no certificate of format {FORMAT}")
-
-
-def _entry(entry: Entry) -> dict[str, Any]:
-    found: dict[str, Any] = {"how": str(entry.how), "node": entry.node, "digest": entry.digest}
-    if entry.how is How.SHOWN:
-        found["base"] = [_question(question) for question in entry.base]
-        found["step"] = _question(entry.step) if entry.step is not None else None
-    if entry.how is How.GUARANTEE:
-        found["conds"] = list(entry.conds)
-    return found
-
-
-def _question(question: Question) -> dict[str, Any]:
-    found: dict[str, Any] = {"uses": [[use.entry, use.back] for use in question.uses]}
-    if question.initials:
-        found["initials"] = list(question.initials)
-    if question.witness is not None:
-        found["witness"] = list(question.witness)
-    return found
-
-
-def _read_entry(data: object) -> Entry:
-    match data:
-        case {"how": "shown", "node": str(n), "digest": str(d), "base": list(base), "step": step, **rest} if not rest:
-            return Entry(How.SHOWN, n, d, (), tuple(map(_read_question, base)), _read_question(step))
-        case {"how": "guarantee", "node": str(n), "digest": str(d), "conds": list(conds), **rest} if not rest:
-            return Entry(How.GUARANTEE, n, d, tuple(map(_index, conds)))
-        case {"how": "environment" | "open" as how, "node": str(n), "digest": str(d), **rest} if not rest:
-            return Entry(How(how), n, d)
-    raise Malformed("no entry of a certificate")
-
-
-def _read_question(data: object) -> Question:
-    if not isinstance(data, dict) or not {"uses"} <= data.keys() <= {"uses", "initials", "witness"}:
-        raise Malformed("no question of a certificate")
-    uses, initials, witness = data["uses"], data.get("initials", []), data.get("witness")
-    if not (isinstance(uses, list) and isinstance(initials, list) and all(isinstance(i, str) for i in initials)):
-        raise Malformed("no question of a certificate")
-    read = []
-    for use in uses:
-        match use:
-            case [entry, back]:
-                read.append(Use(_index(entry), _index(back)))
-            case _:
-                raise Malformed("a use is an entry and a number of steps")
-    match witness:
-        case None:
-            return Question(tuple(read), tuple(initials))
-        case [use, at]:
-            return Question(tuple(read), tuple(initials), (_index(use), _index(at)))
-    raise Malformed("a witness is a use and a part")
-
-
-def _index(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise Malformed("an index is a number from 0 on")
-    return value
+    """Strict. Raises codec.Unreadable."""
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise codec.Unreadable(f"no certificate of format {FORMAT}")
+    return codec.from_json(Certificate, {key: value for key, value in data.items() if key != "format"})

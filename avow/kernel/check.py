@@ -1,25 +1,25 @@
 """The kernel proper: the theorem's conditions (`Sound` in avow/calculus/proofs/kernel.dfy), held against a certificate.
 
-For a claim, the entries that it rests on are walked to, and the part so found is checked to be closed (`Closed`), well
-formed (`Formed`) and valid (`Valid`): each question that it names is written from the claims as they are now and has no
-counterexample. The given entries of the part are all the claim's hypotheses. Nothing that the certificate says beside
-indices and digests is believed.
+The entries that are well formed (`Formed`) and valid (`Valid`, `Begins`: each question that they name is written from
+the claims as they are now, and has no counterexample), and that rest on no other, are a closed part (`Closed`). Of a
+claim in it, the given entries that it names, directly or through others, are all its hypotheses. Nothing that the
+certificate says beside indices and digests is believed.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
 from avow.base.files import digest as sha256
 from avow.kernel.certificate import FORMAT, Certificate, Entry, How, Question
 from avow.kernel.solvers import LOOK, Said, Solvers
-from avow.kernel.statements import Kind, Place, Statement, Statements
+from avow.kernel.statements import Kind, Statement, Statements
 from avow.kernel.text import Text, Untranslatable, conjunction, symbol
-from avow.language.terms import And, Quantified, Quantifier, Term
+from avow.language.terms import And, Quantified, Quantifier
 
 
 class Refused(Exception):  # noqa: N818 - it says what came of it
@@ -29,14 +29,14 @@ class Refused(Exception):  # noqa: N818 - it says what came of it
 class Given(StrEnum):
     """The kinds of hypotheses."""
 
-    GUARANTEE = "guarantee"
-    ENVIRONMENT = "environment"
-    OPEN = "open"
+    GUARANTEE = How.GUARANTEE
+    ENVIRONMENT = How.ENVIRONMENT
+    OPEN = How.OPEN
     TOGETHER = "together"
     """Values of several nodes are taken as of one step: they persist until used together, one output for each input."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, order=True)
 class Needed:
     """A hypothesis: of a guarantee, `conds` are the assumptions that its evidence may use (digests); of values taken
     together, `conds` are the nodes that put them out."""
@@ -49,10 +49,9 @@ class Needed:
 
 @dataclass(frozen=True, slots=True)
 class Established:
-    """A claim that the kernel has established, up to its hypotheses."""
+    """A claim that the kernel has established, up to its hypotheses. `goal` is its digest."""
 
     goal: str
-    """Its digest."""
     hypotheses: tuple[Needed, ...]
     shown: tuple[tuple[str, str], ...]
     """(node, digest) of the claims shown on the way, itself included."""
@@ -64,6 +63,25 @@ class Established:
     """How many solvers, of different makers, answered each of its questions."""
 
 
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """A question with the answer that is wanted."""
+
+    digest: str
+    solvers: int
+    together: tuple[str, ...] = ()
+    vacuous: bool = False
+
+
+KINDS = {
+    How.SHOWN: (Kind.ASSUMPTION, Kind.REQUIREMENT, Kind.IMPOSSIBLE),
+    How.GUARANTEE: (Kind.GUARANTEE,),
+    How.ENVIRONMENT: (Kind.ENVIRONMENT, Kind.ASSUMPTION),
+    How.OPEN: (Kind.ASSUMPTION,),
+    How.POSSIBLE: (Kind.POSSIBLE,),
+}
+
+
 @dataclass
 class Kernel:
     """Checks the entries of one certificate against the claims of a system; each entry and question once."""
@@ -71,310 +89,178 @@ class Kernel:
     known: Statements
     certificate: Certificate
     solvers: Solvers
-    _found: dict[int, tuple[Answered, ...] | Refused] = field(default_factory=dict)
-    _sound: frozenset[int] | None = None
 
-    @cached_property
-    def places(self) -> Mapping[tuple[str, str], list[int]]:
-        """(node, digest) of a claim → the entries that show it."""
-        found: dict[tuple[str, str], list[int]] = {}
-        for i, entry in enumerate(self.certificate.entries):
-            if entry.how is How.SHOWN:
-                found.setdefault((entry.node, entry.digest), []).append(i)
-        return found
-
-    def establish(self, goal: int) -> Established:
-        """The claim of an entry, with all that it rests on. Raises Refused."""
-        if goal >= len(self.certificate.entries):
-            raise Refused("there is no such entry")
-        part = self._walk(goal)
-        if not self._closed(goal, part):
-            raise Refused("the entries that it rests on are not closed")
-        for i in sorted(part):
-            self._valid(i)
-        found = self._established(goal, part, part)
-        is_open = any(need.kind is Given.OPEN for need in found.hypotheses)
-        if is_open and self._claim(self.certificate.entries[goal]).kind is Kind.REQUIREMENT:
+    def establish(self, goal: int, *, alone: bool = False) -> Established:
+        """The claim of an entry. `alone`: told with what its own questions name, as an implication; else with all that
+        it rests on. Raises Refused."""
+        if goal in self.refused or goal >= len(self.certificate.entries):
+            raise Refused(self.refused.get(goal, "there is no such entry"))
+        entries = self.certificate.entries
+        part, stack = {goal}, [goal]
+        while stack:
+            new = set(entries[stack.pop()].named()) - part
+            part |= new
+            stack += () if alone else new
+        hypotheses = {self._needed(entries[i]) for i in part if entries[i].how not in (How.SHOWN, How.POSSIBLE)}
+        answered = [answer for i in ((goal,) if alone else part) for answer in self._answers.get(i, ())]
+        for nodes in (answer.together for answer in answered if answer.together):
+            hypotheses.add(Needed(Given.TOGETHER, "", sha256("\n".join(nodes)), nodes))
+        is_open = any(need.kind is Given.OPEN for need in hypotheses)
+        if is_open and self._claim(entries[goal]).kind is Kind.REQUIREMENT:
             raise Refused("a requirement rests on what only a derived contract may assume")
-        return found
-
-    def side_condition(self, goal: int) -> Established:
-        """The claim of an entry as an implication: established with all that it rests on, and told with only what its
-        own questions name. Linear for all entries together. Raises Refused."""
-        if self._sound is None:
-            self._sound = self._greatest()
-        if goal not in self._sound:
-            self.establish(goal)  # says why not
-            raise Refused("it rests on what is refused")
-        part = frozenset((goal, *_named(self.certificate.entries[goal])))
-        return self._established(goal, part, frozenset((goal,)))
-
-    def _established(self, goal: int, part: frozenset[int], asked: frozenset[int]) -> Established:
-        entries = [self.certificate.entries[i] for i in sorted(part)]
-        answered = [answer for i in sorted(asked) for answer in self._valid(i)]
-        hypotheses = {need: None for entry in entries if (need := self._needed(entry)) is not None}
-        hypotheses |= {
-            Needed(Given.TOGETHER, "", sha256("\n".join(answer.together)), answer.together): None
-            for answer in answered
-            if answer.together
-        }
-        ordered = tuple(sorted(hypotheses, key=lambda n: (n.kind, n.node, n.digest, n.conds)))
-        mark = self.certificate.entries[goal].digest
-        told = [[n.kind, n.node, n.digest, n.conds] for n in ordered]
+        told = [[n.kind, n.node, n.digest, n.conds] for n in sorted(hypotheses)]
         questions = sorted({answer.digest for answer in answered})
         return Established(
-            goal=mark,
-            hypotheses=ordered,
-            shown=tuple((e.node, e.digest) for e in entries if e.how is How.SHOWN),
-            key=sha256(json.dumps([FORMAT, mark, told, questions])),
+            goal=entries[goal].digest,
+            hypotheses=tuple(sorted(hypotheses)),
+            shown=tuple((entries[i].node, entries[i].digest) for i in sorted(part) if entries[i].how is How.SHOWN),
+            key=sha256(json.dumps([FORMAT, entries[goal].digest, told, questions])),
             vacuous=any(answer.vacuous for answer in answered),
             solvers=min((answer.solvers for answer in answered), default=1),
         )
 
-    # -- the part that a claim rests on --------------------------------------------------------------------------------
-
-    def _walk(self, goal: int) -> frozenset[int]:
-        found, stack = {goal}, [goal]
-        while stack:
-            for i in _named(self.certificate.entries[stack.pop()]):
-                if i >= len(self.certificate.entries):
-                    raise Refused("an entry names one that is not there")
-                if i not in found:
-                    found.add(i)
-                    stack.append(i)
-        return frozenset(found)
-
-    def _greatest(self) -> frozenset[int]:
-        """The entries that are valid, and rest on none that is not: the greatest closed part."""
+    @cached_property
+    def refused(self) -> dict[int, str]:
+        """Entries that are not valid, or rest on one that is not, and why: all others are a closed part."""
+        found: dict[int, str] = {}
         users: dict[int, list[int]] = {}
-        refused: list[int] = []
-        size = len(self.certificate.entries)
         for i, entry in enumerate(self.certificate.entries):
-            for j in _named(entry):
+            for j in entry.named():
                 users.setdefault(j, []).append(i)
             try:
-                self._valid(i)
-            except Refused:
-                refused.append(i)
-        refused += [j for j in users if j >= size]
-        found = set(refused)
-        while refused:
-            for user in users.get(refused.pop(), ()):
+                self._answers[i] = tuple(self._entry(i, entry))
+            except Refused as refused:
+                found[i] = str(refused)
+            except Untranslatable as problem:
+                found[i] = f"no text: {problem}"
+        stack = list(found)
+        while stack:
+            for user in users.get(why := stack.pop(), ()):
                 if user not in found:
-                    found.add(user)
-                    refused.append(user)
-        return frozenset(range(size)) - found
+                    found[user] = found[why]
+                    stack.append(user)
+        return found
 
-    def _closed(self, goal: int, part: frozenset[int]) -> bool:
-        """`Closed`: whatever a member names is a member."""
-        return goal in part and all(j in part for i in part for j in _named(self.certificate.entries[i]))
+    @cached_property
+    def _answers(self) -> dict[int, tuple[Answered, ...]]:
+        return {}
 
     # -- one entry -----------------------------------------------------------------------------------------------------
 
-    def _valid(self, i: int) -> tuple[Answered, ...]:
-        if i not in self._found:
-            try:
-                if any(j >= len(self.certificate.entries) for j in _named(self.certificate.entries[i])):
-                    raise Refused("it names an entry that is not there")
-                self._found[i] = tuple(self._entry(i, self.certificate.entries[i]))
-            except Refused as refused:
-                self._found[i] = refused
-        found = self._found[i]
-        if isinstance(found, Refused):
-            raise found
-        return found
-
     def _entry(self, i: int, entry: Entry) -> Iterator[Answered]:
-        """`Formed` and `Valid`. Raises Refused."""
+        """`Formed`, `Valid` and `Begins`. Raises Refused."""
+        entries, claim = self.certificate.entries, self._claim(entry)
+        if any(not 0 <= j < len(entries) or entries[j].how is How.POSSIBLE for j in entry.named()):
+            raise Refused("it names an entry that is not there, or that is no premise")
         match entry.how:
             case How.GUARANTEE:
-                self._guarantee(i, entry)
-            case How.ENVIRONMENT:
-                if not self._claim(entry).outside_only:
-                    raise Refused(
-                        f"{self._called(entry)} is called the environment's, but a node provides a value in it"
-                    )
-            case How.OPEN:
-                if self._claim(entry).kind is not Kind.ASSUMPTION:
-                    raise Refused(f"{self._called(entry)} is no assumption that a derived contract could make")
+                # it holds while *all* its node's assumptions have held so far: none may be left out
+                conds = frozenset(entries[c].digest for c in entry.conds)
+                if any(c >= i for c in entry.conds) or conds != self.known.assumptions.get(entry.node):
+                    raise Refused(f"{claim.called}: its conditions are not the assumptions of its node, before it")
+            case How.ENVIRONMENT if not claim.outside_only:
+                raise Refused(f"{claim.called} is called the environment's, but a node provides a value in it")
+            case How.SHOWN if entry.step is None or entry.step.initials:
+                raise Refused(f"{claim.called}: no question about every step, or one from initial values")
             case How.SHOWN:
-                if entry.step is None:
-                    raise Refused(f"{self._called(entry)}: no question about every step")
-                for b, question in enumerate(entry.base):
-                    self._formed(i, question, b)
-                    yield self.answered(entry, question, b)
-                    yield from self.begins(question, b)
-                if entry.step.initials:
-                    raise Refused("initial values in a question about every step")
-                self._formed(i, entry.step, len(entry.base))
-                yield self.answered(entry, entry.step, len(entry.base))
-
-    def _guarantee(self, i: int, entry: Entry) -> None:
-        """It holds while *all* its node's assumptions have held so far: none may be left out, each is of lower rank."""
-        if self.known.find(entry.digest, Kind.GUARANTEE, entry.node) is None:
-            raise Refused(f"stale: {entry.node} has no such guarantee")
-        if any(c >= i for c in entry.conds):
-            raise Refused(f"{self._called(entry)}: its assumptions do not come before it")
-        conds = {self.certificate.entries[c].digest for c in entry.conds}
-        if entry.node not in self.known.assumptions or conds != set(self.known.assumptions[entry.node]):
-            raise Refused(f"{self._called(entry)}: its conditions are not the assumptions of its node")
-
-    def _formed(self, i: int, question: Question, furthest: int) -> None:
-        """`Fine`: no further back than there are steps; at the same step only what is of lower rank."""
-        for use in question.uses:
-            if use.back > furthest or (use.back == 0 and use.entry >= i):
-                raise Refused("circular: an entry uses, at its own step, what comes no earlier than itself")
+                for step, question in enumerate(entry.questions):
+                    if any(not 0 <= u.back <= step or (u.back == 0 and u.entry >= i) for u in question.uses):
+                        raise Refused("circular: an entry uses, at its own step, what comes no earlier than itself")
+                    yield self.answered(entry, question, step)
+                    yield from self.begins(question, step)
+            case How.POSSIBLE:
+                text = Text()
+                body = text.formula(claim.term, claim.symbols())
+                yield self._asked(_script(text, [body]), Said.SAT, f"{claim.called}: no values are shown to be so")
 
     def _claim(self, entry: Entry) -> Statement:
         """The claim of an entry as it is now. Raises Refused."""
-        kinds = {
-            How.SHOWN: (Kind.ASSUMPTION, Kind.REQUIREMENT),
-            How.GUARANTEE: (Kind.GUARANTEE,),
-            How.ENVIRONMENT: (Kind.ENVIRONMENT, Kind.ASSUMPTION),
-            How.OPEN: (Kind.ASSUMPTION,),
-        }[entry.how]
-        for kind in kinds:
-            found = self.known.find(entry.digest, kind, entry.node)
-            if found is not None:
+        for kind in KINDS[entry.how]:
+            if (found := self.known.find(entry.digest, kind, entry.node)) is not None:
                 return found
-        raise Refused(f"stale: {entry.node or 'the system'} has no such {' or '.join(kinds)}")
+        raise Refused(f"stale: {entry.node or 'the system'} has no such {' or '.join(KINDS[entry.how])}")
 
-    def _called(self, entry: Entry) -> str:
-        claim = self._claim(entry)
-        return f"{claim.node}.{claim.name}" if claim.node else claim.name
-
-    def _needed(self, entry: Entry) -> Needed | None:
-        match entry.how:
-            case How.GUARANTEE:
-                conds = tuple(sorted(self.certificate.entries[c].digest for c in entry.conds))
-                return Needed(Given.GUARANTEE, entry.node, entry.digest, conds)
-            case How.ENVIRONMENT:
-                return Needed(Given.ENVIRONMENT, entry.node, entry.digest)
-            case How.OPEN:
-                return Needed(Given.OPEN, entry.node, entry.digest)
-            case How.SHOWN:
-                return None
+    def _needed(self, entry: Entry) -> Needed:
+        conds = tuple(sorted(self.certificate.entries[c].digest for c in entry.conds))
+        return Needed(Given(entry.how), entry.node, entry.digest, conds)
 
     # -- one question --------------------------------------------------------------------------------------------------
 
+    def _asked(self, script: str, wanted: Said, otherwise: str) -> Answered:
+        count = self.solvers.ask(script, wanted)
+        if not count:
+            raise Refused(otherwise)
+        return Answered(sha256(script), count)
+
     def answered(self, entry: Entry, question: Question, step: int) -> Answered:
         """`Base_valid` and `Step_valid`: no window of states meets the premises and not the claim. Raises Refused."""
-        script, premises = self.script(entry, question, step)
-        if self.solvers.first(script) is not Said.UNSAT:
-            raise Refused(f"{self._called(entry)} does not follow from what is named")
-        second = self.solvers.second is not None and self.solvers.second.ask(script) is Said.UNSAT
-        vacuous = self.solvers.first(premises, LOOK) is Said.UNSAT
-        return Answered(sha256(script), self._together(entry, question), vacuous, 2 if second else 1)
+        text, claim = Text(), self._claim(entry)
+        premises, goal = self._question(text, claim, question, step)
+        script = _script(text, [*premises, f"(not {goal})"])
+        found = self._asked(script, Said.UNSAT, f"{claim.called} does not follow from what is named")
+        vacuous = self.solvers.first(_script(text, premises), LOOK) is Said.UNSAT
+        return Answered(found.digest, found.solvers, self._together(claim, question), vacuous)
+
+    def _question(self, text: Text, claim: Statement, question: Question, step: int) -> tuple[list[str], str]:
+        """Premises and conclusion. A witness is what a premise says exists, by name: it serves for what the claim says
+        exists, which is thereby shown, and more."""
+        used = [(self._claim(self.certificate.entries[use.entry]), use.back) for use in question.uses]
+        used += [(self._initial(mark), step) for mark in question.initials]
+        premises = [text.formula(claim.term, claim.symbols(back)) for claim, back in used]
+        if question.witness is None:
+            return premises, text.formula(claim.term, claim.symbols())
+        at, which = question.witness
+        source, back = used[at] if at < len(used) else (claim, 0)
+        parts: Sequence[object] = source.term.items if isinstance(source.term, And) else (source.term,)
+        match parts[which] if at < len(used) and which < len(parts) else None, claim.term:
+            case Quantified(Quantifier.EXISTS, given, such), Quantified(Quantifier.EXISTS, wanted, body) if [
+                v.sort for v in given
+            ] == [v.sort for v in wanted]:
+                names = [symbol(f"witness {k}") for k in range(len(given))]
+                for name, variable in zip(names, given, strict=True):
+                    text.declare(name, variable.sort)  # and with that, that it is of its sort
+                premises.append(text.formula(such, source.symbols(back), dict(zip(given, names, strict=True))))
+                return premises, text.formula(body, claim.symbols(), dict(zip(wanted, names, strict=True)))
+        raise Refused("a witness of another type, or where nothing is said to exist")
+
+    def _initial(self, mark: str) -> Statement:
+        found = self.known.find(mark, Kind.INITIAL)
+        if found is None or not found.unary:
+            raise Refused("stale, or no initial condition: it speaks of more than the state before the first step")
+        return found
 
     def begins(self, question: Question, step: int) -> Iterator[Answered]:
-        """That initial conditions that are used say nothing of the environment: whatever its constant values are, as
-        far as the question's environment entries allow, there is a first value of each output. Those of one output are
-        taken together; those of different outputs share nothing but what is constant. Raises Refused."""
+        """`Begins`: initial conditions that are used say nothing of the environment. Whatever its constant values are,
+        as far as the question's environment entries allow, there is a first value of each output. Those of one output
+        are taken together; those of different outputs share nothing but what is constant. Raises Refused."""
         for mark in dict.fromkeys(question.initials):
-            initial = self.known.find(mark, Kind.INITIAL)
-            assert initial is not None
-            together = self._with_same_outputs(initial)
-            if all(place.node is not None for each in together for place in each.places.values()):
-                continue  # where no value satisfies it, the claim is vacuous, and said to be so
-            script = self._beginning(question, step, together)
-            if self.solvers.first(script) is not Said.UNSAT:
-                raise Refused(
-                    f"the initial condition of {initial.node}.{initial.name} is not shown to have a value "
-                    "for every constant input that the environment allows"
-                )
-            second = self.solvers.second is not None and self.solvers.second.ask(script) is Said.UNSAT
-            yield Answered(sha256(script), (), False, 2 if second else 1)
+            together = self._with_same_outputs(self._initial(mark))
+            first = {p.symbol(step): p.sort for each in together for p in each.sources}
+            called = " and ".join(each.called for each in together)
+            constant = any(place.node is None for each in together for place in each.places.values())
+            names = {name: f"begin{k}" for k, name in enumerate(sorted(first))} if constant else {}
+            text, conditions = Text(), []
+            for each in together:
+                bound = {v: names[p.symbol(step)] for v, p in each.places.items() if p.symbol(step) in names}
+                conditions.append(text.formula(each.term, each.symbols(step), bound))
+            if not constant:
+                yield self._asked(_script(text, conditions), Said.SAT, f"no first value of {called} is found")
+                continue
+            begin = text.bound("exists", names.values(), [first[n] for n in names], conjunction(conditions) or "true")
+            used = [(self.certificate.entries[use.entry], use.back) for use in question.uses]
+            given = [(self._claim(entry), back) for entry, back in used if entry.how is How.ENVIRONMENT]
+            allowed = [text.formula(claim.term, claim.symbols(back)) for claim, back in given if claim.outside_only]
+            script = _script(text, [*allowed, f"(not {begin})"])
+            yield self._asked(script, Said.UNSAT, f"{called}: no first value for every constant input that is allowed")
 
     def _with_same_outputs(self, initial: Statement) -> list[Statement]:
         """An initial condition with all others of the system that speak, directly or through others, of its outputs."""
-        found, spoken = [initial], _first_values(initial)
-        others = [s for same in self.known.by_digest.values() for s in same if s.kind is Kind.INITIAL]
-        while more := [s for s in others if s not in found and _first_values(s).keys() & spoken.keys()]:
+        found = [initial]
+        while more := [s for s in self.known.initials if s not in found and any(s.sources & f.sources for f in found)]:
             found += more
-            spoken = {name: place for s in found for name, place in _first_values(s).items()}
-        return found
+        return [self._initial(each.digest) for each in found]
 
-    def _beginning(self, question: Question, step: int, together: list[Statement]) -> str:
-        """The text of: constant values, as the environment entries of a question allow, without first values."""
-        text = Text()
-        used = [(self.certificate.entries[use.entry], use.back) for use in question.uses]
-        first = {name: place for each in together for name, place in _first_values(each).items()}
-        names = {name: f"first{k}" for k, name in enumerate(sorted(first))}
-        try:
-            allowed = [
-                text.formula(claim.term, claim.symbols(back))
-                for entry, back in used
-                if entry.how is How.ENVIRONMENT and (claim := self._claim(entry)).outside_only
-            ]
-            conditions = [text.member(first[name].sort, called) for name, called in names.items()]
-            for each in together:
-                if not each.unary:
-                    raise Refused("an initial condition speaks of more than the state before the first step")
-                bound = {v: names[p.symbol()] for v, p in each.places.items() if p.node is not None}
-                conditions.append(text.formula(each.term, each.symbols(step), bound))
-            binders = text.binders(names.values(), [first[name].sort for name in names])
-            body = conjunction(conditions)
-            begins = f"(exists ({binders}) {body})" if names else body
-            facts = text.facts()
-        except Untranslatable as problem:
-            raise Refused(f"no text: {problem}") from None
-        lines = [f"(assert {premise})" for premise in (*facts, *allowed)]
-        return "\n".join(["(set-logic ALL)", *text.declarations.values(), *lines, f"(assert (not {begins}))", ""])
-
-    def script(self, entry: Entry, question: Question, step: int) -> tuple[str, str]:
-        """The text of a question, and of its premises alone. Raises Refused."""
-        text = Text()
-        try:
-            premises, goal = self._assertions(text, entry, question, step)
-            facts = text.facts()
-        except Untranslatable as problem:
-            raise Refused(f"no text: {problem}") from None
-        head = ["(set-logic ALL)", *text.declarations.values()]
-        lines = [f"(assert {premise})" for premise in (*facts, *premises)]
-        return "\n".join([*head, *lines, f"(assert (not {goal}))", ""]), "\n".join([*head, *lines, ""])
-
-    def _assertions(self, text: Text, entry: Entry, question: Question, step: int) -> tuple[list[str], str]:
-        claim = self._claim(entry)
-        used = [(self._claim(self.certificate.entries[use.entry]), use.back) for use in question.uses]
-        for mark in question.initials:
-            initial = self.known.find(mark, Kind.INITIAL)
-            if initial is None or not initial.unary:
-                raise Refused("stale, or no initial condition: it speaks of more than the state before the first step")
-            used.append((initial, step))
-        premises, named = [], None
-        for k, (statement, back) in enumerate(used):
-            if question.witness is not None and question.witness[0] == k:
-                named = self._opened(text, statement, back, question.witness[1])
-                premises += named[1]
-            premises.append(text.formula(statement.term, statement.symbols(back)))
-        if named is None:
-            return premises, text.formula(claim.term, claim.symbols())
-        match claim.term:
-            case Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=body) if len(variables) == len(
-                named[0]
-            ):
-                if [text.sort(v.sort) for v in variables] != [text.sort(text.free[n]) for n in named[0]]:
-                    raise Refused("a witness of another type")
-                members = [text.member(v.sort, n) for v, n in zip(variables, named[0], strict=True)]
-                goal = text.formula(body, claim.symbols(), dict(zip(variables, named[0], strict=True)))
-                return premises, f"(and {' '.join([*(m for m in members if m), goal])})"
-        raise Refused("a witness for a claim that does not say that something exists")
-
-    def _opened(self, text: Text, used: Statement, back: int, at: int) -> tuple[list[str], list[str]]:
-        """What a premise says exists, by name: new constants, and that they are as it says."""
-        term: Term = used.term
-        parts = term.items if isinstance(term, And) else (term,)
-        if at < len(parts):
-            match parts[at]:
-                case Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=body):
-                    names = [symbol(f"witness {k}") for k in range(len(variables))]
-                    for name, variable in zip(names, variables, strict=True):
-                        text.declare(name, variable.sort)
-                    bound = dict(zip(variables, names, strict=True))
-                    return names, [text.formula(body, used.symbols(back), bound)]
-        raise Refused("a witness where nothing is said to exist")
-
-    def _together(self, entry: Entry, question: Question) -> tuple[str, ...]:
+    def _together(self, claim: Statement, question: Question) -> tuple[str, ...]:
         """The nodes whose values a question takes as of one step, where that is more than the wires say.
 
         Along a chain, where each value is read by one node, the question follows one message on its way, and its steps
@@ -384,33 +270,18 @@ class Kernel:
         readers: dict[str, set[str]] = {}
         nodes: set[str] = set()
         apart = bool(question.initials)
-        for e, back in ((entry, 0), *((self.certificate.entries[u.entry], u.back) for u in question.uses)):
-            claim = self._claim(e)
-            sources = {node for node, _ in claim.sources}
-            others = sources - {claim.node}
+        used = ((self._claim(self.certificate.entries[u.entry]), u.back) for u in question.uses)
+        for each, back in ((claim, 0), *used):
+            sources = {place.node or "" for place in each.sources}
+            others = sources - {each.node}
             nodes |= sources
-            apart = apart or back > 0 or len(others) > 1 or any(ago for _, ago in claim.sources)
+            apart = apart or back > 0 or len(others) > 1 or any(place.back for place in each.sources)
             for source in others:
-                readers.setdefault(source, set()).add(claim.node)
+                readers.setdefault(source, set()).add(each.node)
         apart = apart or any(len(found) > 1 for found in readers.values())
         return tuple(sorted(nodes)) if apart and len(nodes) > 1 else ()
 
 
-@dataclass(frozen=True, slots=True)
-class Answered:
-    digest: str
-    together: tuple[str, ...]
-    vacuous: bool
-    solvers: int
-
-
-def _first_values(initial: Statement) -> dict[str, Place]:
-    """The values before the first step that it speaks of, by their symbol."""
-    return {place.symbol(): place for place in initial.places.values() if place.node is not None}
-
-
-def _named(entry: Entry) -> Iterator[int]:
-    """`Named`: the entries that an entry names, in its conditions and in all of its questions."""
-    yield from entry.conds
-    for question in (*entry.base, *((entry.step,) if entry.step else ())):
-        yield from (use.entry for use in question.uses)
+def _script(text: Text, assertions: Sequence[str]) -> str:
+    lines = [f"(assert {each})" for each in (*text.facts(), *assertions)]
+    return "\n".join(["(set-logic ALL)", *text.declarations.values(), *lines, ""])

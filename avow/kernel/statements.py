@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 
 from avow.base.files import digest as sha256
 from avow.kernel.text import Symbols, Text, Untranslatable, symbol
@@ -38,20 +39,23 @@ class Wiring:
     """(node, input) that nothing feeds → the environment's name of the value (``in.map``): of one name, one value."""
     rigid: frozenset[str]
     """Names of values of the environment that never change."""
-    environment: tuple[tuple[str, str, Term], ...] = ()
-    """(name, node, formula over that node's inputs): what the plan assumes of the environment."""
-    initials: tuple[tuple[str, str, Term], ...] = ()
-    """(node, output, formula over it and the node's inputs): what delayed edges deliver first."""
-    requirements: tuple[tuple[str, Term], ...] = ()
-    """(id, formula over ``node.port``)."""
+    formulas: tuple[tuple[Kind, str, str, Term], ...] = ()
+    """(kind, node, name, formula) of the plan's: over the node's ports, or over ``node.port`` where `node` is empty."""
 
 
 class Kind(StrEnum):
     ASSUMPTION = "assumption"
     GUARANTEE = "guarantee"
     ENVIRONMENT = "environment"
+    """What the plan assumes of the environment."""
     INITIAL = "initial"
+    """What an output is before the first step, where delayed edges deliver it."""
     REQUIREMENT = "requirement"
+    """Of every step of the whole system."""
+    POSSIBLE = "possible"
+    """That some values are so: first values of a loop, a situation that a guarantee is about."""
+    IMPOSSIBLE = "impossible"
+    """That no values are so: a situation that a node's own contract excludes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +70,8 @@ class Place:
 
     def symbol(self, shift: int = 0) -> str:
         """The SMT-LIB variable of the value, where the claim is made of a step `shift` steps ago."""
-        if self.node is None:
-            return symbol(f"?{self.name}" if self.rigid else f"?{self.name}~{self.back + shift}")
-        return symbol(f"{self.name}~{self.back + shift}")
+        when = "" if self.rigid else f"~{self.back + shift}"
+        return symbol(f"{'?' if self.node is None else ''}{self.name}{when}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,96 +97,96 @@ class Statement:
         return called
 
     @property
-    def sources(self) -> frozenset[tuple[str, int]]:
-        """The nodes whose outputs it speaks of, and how many steps ago."""
-        return frozenset((p.node, p.back) for p in self.places.values() if p.node is not None)
+    def called(self) -> str:
+        return f"{self.node}.{self.name}" if self.node else self.name
+
+    @property
+    def sources(self) -> frozenset[Place]:
+        """The nodes' outputs that it speaks of."""
+        return frozenset(place for place in self.places.values() if place.node is not None)
 
     @property
     def outside_only(self) -> bool:
         """Whether it speaks only of values that no node provides."""
-        return all(p.node is None for p in self.places.values())
+        return not self.sources
 
     @property
     def unary(self) -> bool:
         """Whether it speaks of the state before a step alone: the values before it, and those that never change."""
-        return all(p.rigid if p.node is None else p.back == 1 for p in self.places.values())
+        return all(place.rigid if place.node is None else place.back == 1 for place in self.places.values())
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Statements:
-    """All claims of a system as it is now, by what they say."""
+    """All claims of a system as it is now that have a text."""
 
-    by_digest: Mapping[str, tuple[Statement, ...]]
-    assumptions: Mapping[str, tuple[str, ...]]
-    """Node → digests of all its assumptions."""
-    refused: Mapping[tuple[Kind, str, str], str]
-    """Claims that have no text, and why."""
+    every: tuple[Statement, ...]
+    assumptions: Mapping[str, frozenset[str]]
+    """Node → digests of all its assumptions; not of one with an assumption that has no text: nothing may be concluded
+    from its guarantees."""
+
+    @cached_property
+    def by_digest(self) -> Mapping[str, list[Statement]]:
+        found: dict[str, list[Statement]] = {}
+        for statement in self.every:
+            found.setdefault(statement.digest, []).append(statement)
+        return found
+
+    @cached_property
+    def initials(self) -> tuple[Statement, ...]:
+        return tuple(statement for statement in self.every if statement.kind is Kind.INITIAL)
 
     def find(self, digest: str, kind: Kind, node: str | None = None) -> Statement | None:
         """The claim of this kind (and node) that says so, if there is one."""
-        found = self.by_digest.get(digest, ())
-        return next((s for s in found if s.kind is kind and node in (None, s.node)), None)
+        same = self.by_digest.get(digest, ())
+        return next((s for s in same if s.kind is kind and node in (None, s.node)), None)
 
 
 def statements(wiring: Wiring) -> Statements:
     """Every claim of a system."""
-    found: dict[str, list[Statement]] = {}
-    assumptions: dict[str, list[str]] = {node.name: [] for node in wiring.nodes}
-    refused: dict[tuple[Kind, str, str], str] = {}
-    complete = {node.name: True for node in wiring.nodes}
-    for statement in _all(wiring):
-        try:
-            mark = _digest(statement)
-        except Untranslatable as problem:
-            refused[statement.kind, statement.node, statement.name] = str(problem)
-            if statement.kind is Kind.ASSUMPTION:
-                complete[statement.node] = False
-            continue
-        known = Statement(statement.kind, statement.node, statement.name, statement.term, statement.places, mark)
-        found.setdefault(mark, []).append(known)
-        if statement.kind is Kind.ASSUMPTION:
-            assumptions[statement.node].append(mark)
-    # a node with an assumption that has no text: nothing may be concluded from its guarantees
-    usable = {name: tuple(marks) for name, marks in assumptions.items() if complete[name]}
-    return Statements({mark: tuple(same) for mark, same in found.items()}, usable, refused)
-
-
-def _all(wiring: Wiring) -> Iterator[Statement]:
     nodes = {node.name: node for node in wiring.nodes}
-    for node in wiring.nodes:
-        for kind, clauses in ((Kind.ASSUMPTION, node.assumptions), (Kind.GUARANTEE, node.guarantees)):
-            for clause in clauses:
-                yield _stated(wiring, nodes, kind, node.name, clause.name, clause.formula)
-    for name, at, formula in wiring.environment:
-        yield _stated(wiring, nodes, Kind.ENVIRONMENT, at, name, formula)
-    for at, port, formula in wiring.initials:
-        yield _stated(wiring, nodes, Kind.INITIAL, at, port, formula)
-    for name, formula in wiring.requirements:
-        yield _stated(wiring, nodes, Kind.REQUIREMENT, "", name, formula)
-
-
-def _stated(wiring: Wiring, nodes: Mapping[str, Node], kind: Kind, node: str, name: str, term: Term) -> Statement:
-    places: dict[Variable, Place] = {}
-    for variable in _free(term):
-        at, port = (node, variable.name) if node else variable.name.split(".", 1)
-        if at not in nodes:
+    assumptions: dict[str, set[str]] = {name: set() for name in nodes}
+    found: list[Statement] = []
+    for kind, node, name, term in _all(wiring):
+        places = dict(_places(wiring, nodes, kind, node, term))
+        try:
+            text = Text()
+            body = text.formula(term, Statement(kind, node, name, term, places).symbols())
+        except Untranslatable:
+            if kind is Kind.ASSUMPTION:
+                assumptions.pop(node, None)
             continue
-        if variable.role is Role.INPUT:
-            places[variable] = _input(wiring, nodes, at, port)
-        elif variable.role is Role.OUTPUT:
+        # that some values are so is another claim than that all are
+        mark = sha256("\n".join([*text.declarations.values(), *(("possible",) if kind is Kind.POSSIBLE else ()), body]))
+        found.append(Statement(kind, node, name, term, places, mark))
+        if kind is Kind.ASSUMPTION and node in assumptions:
+            assumptions[node].add(mark)
+    return Statements(tuple(found), {name: frozenset(marks) for name, marks in assumptions.items()})
+
+
+def _all(wiring: Wiring) -> Iterator[tuple[Kind, str, str, Term]]:
+    for node in wiring.nodes:
+        yield from ((Kind.ASSUMPTION, node.name, clause.name, clause.formula) for clause in node.assumptions)
+        yield from ((Kind.GUARANTEE, node.name, clause.name, clause.formula) for clause in node.guarantees)
+    yield from wiring.formulas
+
+
+def _places(
+    wiring: Wiring, nodes: Mapping[str, Node], kind: Kind, node: str, term: Term
+) -> Iterator[tuple[Variable, Place]]:
+    """What its inputs and outputs are values of. A name that is no port's has no place, and the claim no text."""
+    for variable in _free(term):
+        at, _, port = (node, "", variable.name) if node else variable.name.partition(".")
+        if variable.role is Role.OUTPUT and at in nodes:
             # an initial condition speaks of the output before the first step
             back = 1 if kind is Kind.INITIAL else 0
-            places[variable] = Place(f"{at}.{port}", at, back, nodes[at].output(port).sort)
-    return Statement(kind, node, name, term, places)
-
-
-def _input(wiring: Wiring, nodes: Mapping[str, Node], node: str, port: str) -> Place:
-    wire = wiring.wires.get((node, port))
-    if wire is None:
-        name = wiring.outside[node, port]
-        return Place(name, None, 0, nodes[node].input(port).sort, name in wiring.rigid)
-    sort = nodes[wire.node].output(wire.port).sort
-    return Place(f"{wire.node}.{wire.port}", wire.node, 1 if wire.delayed else 0, sort)
+            yield variable, Place(f"{at}.{port}", at, back, nodes[at].output(port).sort)
+        elif variable.role is Role.INPUT and (wire := wiring.wires.get((at, port))) is not None:
+            sort = nodes[wire.node].output(wire.port).sort
+            yield variable, Place(f"{wire.node}.{wire.port}", wire.node, int(wire.delayed), sort)
+        elif variable.role is Role.INPUT and at in nodes:
+            name = wiring.outside[at, port]
+            yield variable, Place(name, None, 0, nodes[at].input(port).sort, name in wiring.rigid)
 
 
 def _free(term: Term) -> frozenset[Variable]:
@@ -198,9 +201,3 @@ def _free(term: Term) -> frozenset[Variable]:
             bound = bound | frozenset(current.variables)
         stack.extend((child, bound) for child in current.children)
     return frozenset(found)
-
-
-def _digest(statement: Statement) -> str:
-    text = Text()
-    body = text.formula(statement.term, statement.symbols())
-    return sha256("\n".join([*text.declarations.values(), body]))

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from avow.assurance.certification import KernelRun
 from avow.assurance.certification import Reestablished as Told
+from avow.base.codec import Unreadable
 from avow.base.files import digest
 from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates
@@ -24,17 +25,15 @@ from avow.calculus.obligations import Reestablished, reestablished
 from avow.evidence.currency import as_of_now, stands
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import Evidence
-from avow.kernel.certificate import Certificate, Malformed, from_json, to_json
-from avow.kernel.solvers import Second, Solvers, versions
+from avow.kernel.certificate import Certificate, from_json, to_json
+from avow.kernel.solvers import Solvers
 from avow.pipeline.engine_code import trusted_parts
 from avow.pipeline.work import COMPOSE, texts_digest
+from avow.solving.apart import Apart, Both, versions
 from avow.system.plan import System
 from avow.tuning.running import RECHECK_SECOND
 
 FILE = "certificates.json"
-
-EXISTENCE = ("start", "joint")
-"""What these obligations say is that something is possible: an example shows it, and nothing is derived."""
 
 
 def written(certificates: Certificates) -> str:
@@ -63,7 +62,7 @@ class _Checked:
 
     texts: str
     kernels: dict[str, Certificates] = field(default_factory=dict)
-    solvers: Solvers = field(default_factory=Solvers)
+    solvers: Solvers = field(default_factory=lambda: Solvers(z3=Apart("z3")))
     answers: dict[tuple[str, str, str], Reestablished | None] = field(default_factory=dict)
     runs: dict[str, KernelRun] = field(default_factory=dict)
 
@@ -91,20 +90,17 @@ def kernel_run(entries: Sequence[Entry], root: Path, system: System, run: str) -
 def _twice(
     records: Sequence[Evidence], texts: dict[str, str], system: System, run: str, allowance: float, asked: Solvers
 ) -> KernelRun:
-    solvers = Solvers(asked=asked.asked, second=Second(allowance) if "cvc5" in versions() else None)
     found: dict[str, Told] = {}
     used: dict[str, object] = {}
     composition = compose(system)
-    each = {text: Certificates(composition, _read(text), solvers=solvers) for text in texts.values()}
-    try:
+    with Both(allowance, asked.known) as solvers:
+        each = {text: Certificates(composition, _read(text), solvers=solvers) for text in texts.values()}
         for record in records:
             certificates = each[texts[_kept(record) or ""]]
             one = reestablished(certificates, record.obligation)
             if one is not None and one.key == record.details["certificate"].get("key"):
                 found[record.obligation] = Told(record.obligation, one.solvers, one.key, one.scope)
                 used[one.scope] = to_json(certificates.kept[one.scope])
-    finally:
-        solvers.close()
     version = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     parts = (*trusted_parts(), ("Python", version))
     return KernelRun(run, tuple(found[name] for name in sorted(found)), versions(), used, parts)
@@ -134,9 +130,7 @@ def _kept_text(record: Evidence, root: Path) -> str:
 def _established(record: Evidence, root: Path, system: System) -> bool:
     if record.method != COMPOSE or record.verdict is not Verdict.PROVED:
         return True
-    if not isinstance(record.details.get("certificate"), dict):
-        return record.obligation.split("/", 3)[-1].split(".")[0] in EXISTENCE
-    return _holds(record, root, system) is not None
+    return isinstance(record.details.get("certificate"), dict) and _holds(record, root, system) is not None
 
 
 def _holds(record: Evidence, root: Path, system: System) -> Reestablished | None:
@@ -158,5 +152,5 @@ def _read(text: str) -> dict[str, Certificate]:
     try:
         data = json.loads(text)
         return {str(scope): from_json(found) for scope, found in data.items()}
-    except (ValueError, AttributeError, Malformed):
+    except (ValueError, AttributeError, Unreadable):
         return {}

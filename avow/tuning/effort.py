@@ -30,6 +30,10 @@ ANOTHER_SOLVER_MS = 1_500
 SECOND_OPINION_MS = 1_000
 """How long cvc5 may look for values that Z3 says there are not: where it finds them it mostly does so at once."""
 
+KERNEL_SECOND_MS = 5_000
+"""For the second solver's answer to one question of the kernel: cvc5 counts no steps that mean the same on every
+version."""
+
 CVC5_START_SECONDS = 2.0
 """Seconds that cvc5's process may take beyond the limit of the question: to begin, and to read the script."""
 

@@ -31,7 +31,7 @@ def by_hand(path: Path) -> Established:
     certificates = compose(path).certificates
     claim = certificates.claim(Kind.REQUIREMENT, "R")
     assert claim is not None
-    every = [s for same in certificates.known.by_digest.values() for s in same]
+    every = certificates.known.every
     given = [s for s in every if s.kind is Kind.ENVIRONMENT]
     initials = tuple(s.digest for s in every if s.kind is Kind.INITIAL)
     assert initials
@@ -60,7 +60,7 @@ def test_it_cannot_make_a_claim_of_the_environment_true(
 ) -> None:
     path = system(tmp_path, initial, claim, k, y)
     assert outcomes(path)["R"].verdict is not Verdict.PROVED
-    with pytest.raises(Refused, match="initial condition"):
+    with pytest.raises(Refused, match="first value"):
         by_hand(path)
 
 
@@ -70,10 +70,10 @@ def test_what_the_environment_is_assumed_to_be_makes_room_for_it_and_is_a_hypoth
     certificates = compose(path).certificates
     # the initial condition alone would show it: it may not, without the hypothesis
     claim = certificates.claim(Kind.REQUIREMENT, "R")
-    initial = next(s for same in certificates.known.by_digest.values() for s in same if s.kind is Kind.INITIAL)
+    initial = next(s for s in certificates.known.every if s.kind is Kind.INITIAL)
     assert claim is not None
     entry = Entry(How.SHOWN, "", claim.digest, (), (Question((), (initial.digest,)),), Question((Use(0, 1),)))
-    with pytest.raises(Refused, match="initial condition"):
+    with pytest.raises(Refused, match="first value"):
         Kernel(certificates.known, Certificate("requirement R", (entry,)), certificates.solvers).establish(0)
 
 
@@ -87,12 +87,11 @@ def test_two_of_one_output_are_taken_together(tmp_path: Path) -> None:
     """The plan's reader allows one for each output; the kernel does not rely on that."""
     certificates = compose(system(tmp_path, "out.y == in.k", "n.k == 1", "REAL", "REAL")).certificates
     other = compose(system(tmp_path / "other", "out.y == 1", "n.k == 1", "REAL", "REAL")).certificates.known
-    added = {m: same for m, same in other.by_digest.items() if any(s.kind is Kind.INITIAL for s in same)}
-    known = replace(certificates.known, by_digest=certificates.known.by_digest | added)
+    known = replace(certificates.known, every=(*certificates.known.every, *other.initials))
     claim = certificates.claim(Kind.REQUIREMENT, "R")
     assert claim is not None
-    marks = tuple(s.digest for same in known.by_digest.values() for s in same if s.kind is Kind.INITIAL)
+    marks = tuple(s.digest for s in known.initials)
     assert len(marks) == 2
     entry = Entry(How.SHOWN, "", claim.digest, (), (Question((), marks),), Question((Use(0, 1),)))
-    with pytest.raises(Refused, match="initial condition"):
+    with pytest.raises(Refused, match="first value"):
         Kernel(known, Certificate("requirement R", (entry,)), certificates.solvers).establish(0)

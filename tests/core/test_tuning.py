@@ -28,8 +28,6 @@ NOT_TUNED = {
     ("avow/base/process.py", "_PR_SET_CHILD_SUBREAPER"),
     ("avow/base/rendering.py", "_TAB"),  # columns of a drawing
     ("avow/formulas/ltl.py", "_START"),  # a node that is none
-    ("avow/kernel/text.py", "_MAX_CHARACTER"),  # of the SMT-LIB standard
-    ("avow/kernel/text.py", "_MAX_RANGE"),  # the kernel stands by itself
     ("avow/language/format.py", "WIDTH"),  # the canonical layout
     ("avow/language/format.py", "_STEP"),
     ("avow/report/maps.py", "_SIZE"),  # measures of pictures

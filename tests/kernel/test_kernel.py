@@ -11,13 +11,14 @@ from pathlib import Path
 import pytest
 from calculus.make import make, node
 
+from avow.base.codec import Unreadable, canonical
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.discharge import Bounds
 from avow.calculus.finder import Hint
-from avow.kernel.certificate import Certificate, Entry, How, Malformed, Question, Use, canonical, from_json, to_json
+from avow.kernel.certificate import Certificate, Entry, How, Question, Use, from_json, to_json
 from avow.kernel.check import Established, Given, Kernel, Refused
-from avow.kernel.solvers import Said, Solvers, ask_z3
+from avow.kernel.solvers import BUDGET, Said, Solvers, ask_z3
 from avow.kernel.statements import Kind
 from avow.kernel.text import Text
 from avow.language.load import check_text
@@ -48,10 +49,11 @@ def established(certificates: Certificates, certificate: Certificate) -> Establi
     claim = certificates.claim(Kind.REQUIREMENT, "R")
     assert claim is not None
     kernel = Kernel(certificates.known, certificate, certificates.solvers)
-    places = kernel.places.get(("", claim.digest), ())
-    if not places:
+    wanted = (How.SHOWN, "", claim.digest)
+    at = next((i for i, e in enumerate(certificate.entries) if (e.how, e.node, e.digest) == wanted), None)
+    if at is None:
         raise Refused("no entry")
-    return kernel.establish(places[0])
+    return kernel.establish(at)
 
 
 def test_hypotheses_are_computed(tmp_path: Path) -> None:
@@ -61,7 +63,7 @@ def test_hypotheses_are_computed(tmp_path: Path) -> None:
     assert {(Given.GUARANTEE, "a"), (Given.GUARANTEE, "b"), (Given.GUARANTEE, "c"), (Given.TOGETHER, "")} <= names
     assert any(kind is Given.ENVIRONMENT for kind, _ in names)
     assert not found.vacuous
-    again = from_json(json.loads(canonical(certificate)))
+    again = from_json(json.loads(canonical(to_json(certificate))))
     assert established(certificates, again) == found
 
 
@@ -147,13 +149,13 @@ def test_the_environment_is_what_no_node_provides(tmp_path: Path) -> None:
     "data",
     [
         {},
-        {"format": "avow/certificate/2", "scope": "", "entries": []},
-        {"format": "avow/certificate/1", "scope": "", "entries": [{"how": "shown"}]},
-        {"format": "avow/certificate/1", "scope": "", "entries": [{"how": "open", "node": "a", "digest": "x", "y": 1}]},
+        {"format": "avow/certificate/0", "scope": "", "entries": []},
+        {"format": "avow/certificate/2", "scope": "", "entries": [{"how": "shown"}]},
+        {"format": "avow/certificate/2", "scope": "", "entries": [{"how": "open", "node": "a", "digest": "x", "y": 1}]},
     ],
 )
 def test_what_is_no_certificate_is_refused(data: object) -> None:
-    with pytest.raises(Malformed):
+    with pytest.raises(Unreadable):
         from_json(data)
 
 
@@ -204,5 +206,45 @@ def test_its_text_says_what_the_other_translation_says(formula: str) -> None:
     body = written.formula(term, lambda v: (f"|{v.name}~0|", v.sort))
     facts = [f"(assert {fact})" for fact in written.facts()]
     script = "\n".join([*written.declarations.values(), *facts, f"(assert (not {body}))", ""])
-    mine, theirs = ask_z3(script), entails({}, term, timeout_ms=5_000).verdict
+    mine, theirs = ask_z3(script, BUDGET), entails({}, term, timeout_ms=5_000).verdict
     assert {"proved": Said.UNSAT, "refuted": Said.SAT}.get(theirs, mine) is mine, export([term])
+
+
+CIRCLE = node(
+    "a", "y : INTEGER", "x : INTEGER, m : INTEGER", "A: in.y > 0", "G: in.y > 2 -> out.x > 0", "G up: out.m > 0"
+) + node("b", "m : INTEGER", "y : INTEGER", "A: in.m > 0", "G: out.y > in.m")
+
+
+def test_what_is_possible_has_a_certificate_of_its_own(tmp_path: Path) -> None:
+    """An example is looked for; that all values are so shows nothing of the kind, nor does an example show that."""
+    certificates = compose(make(tmp_path, LOOP, PLAN.replace("'c.z > 1'", "'c.z == 1'"))).certificates
+    found = certificates.existence("start.a-b-c")
+    assert found is not None
+    (entry,) = certificates.made["existence start.a-b-c"].entries
+    assert entry.how is How.POSSIBLE
+    requirement = certificates.claim(Kind.REQUIREMENT, "R")
+    assert requirement is not None
+    assert requirement.digest != entry.digest, "c.z == 1, before the first step and at every one"
+    for how, digest in ((How.SHOWN, entry.digest), (How.POSSIBLE, requirement.digest)):
+        wrong = Certificate("R", (Entry(how, "", digest, step=Question()),))
+        with pytest.raises(Refused, match="stale"):
+            Kernel(certificates.known, wrong, Solvers()).establish(0)
+    used = (entry, Entry(How.SHOWN, "", requirement.digest, step=Question((Use(0),))))
+    with pytest.raises(Refused, match="no premise"):
+        Kernel(certificates.known, Certificate("R", used), Solvers()).establish(1)
+
+
+def test_no_first_value_is_no_beginning(tmp_path: Path) -> None:
+    plan = PLAN.replace("'1'", "'out.z > 1 and out.z < 2'")
+    certificates = compose(make(tmp_path, LOOP, plan)).certificates
+    assert certificates.existence("start.a-b-c") is None
+    assert certificates.requirement("R", Hint(()), Bounds()) is None
+
+
+def test_room_in_a_circle(tmp_path: Path) -> None:
+    certificates = compose(make(tmp_path / "room", CIRCLE)).certificates
+    assert certificates.existence("joint.a.G1") is not None
+    crowded = CIRCLE.replace("out.y > in.m", "out.y == 1 and in.m > 0")
+    assert compose(make(tmp_path / "none", crowded)).certificates.existence("joint.a.G1") is None
+    own = CIRCLE.replace("G: in.y > 2", "G: in.y < 0").replace("in.y > 2 ->", "in.y < 0 ->")
+    assert compose(make(tmp_path / "own", own)).certificates.existence("joint.a.G1") is not None
