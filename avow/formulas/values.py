@@ -69,6 +69,24 @@ class FunctionValue:
         return "{" + ", ".join([*points, f"else: {show(self.default)}"]) + "}"
 
 
+class Binary(Fraction):
+    """A number as a float32 or float64 holds it, exact; shown by the shortest digits that mean it there."""
+
+    __slots__ = ("_hash", "digits")
+    digits: str
+    _hash: int
+
+    @classmethod
+    def held(cls, value: Fraction, digits: str) -> Binary:
+        found = cls(value)
+        found.digits = digits
+        found._hash = Fraction.__hash__(found)
+        return found
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return self._hash
+
+
 Value = bool | int | Fraction | str | Element | Data | Sequence | Opaque | FunctionValue | tuple["Value", ...]
 
 
@@ -77,6 +95,8 @@ def show(value: Value) -> str:
     match value:
         case bool():
             return "TRUE" if value else "FALSE"
+        case Binary(digits=digits):
+            return digits
         case Fraction():
             return _decimal(value)
         case str():

@@ -25,7 +25,7 @@ from avow.language.contract import Contract, Node
 from avow.language.sorts import DataSort, EnumSort, Sort, components
 from avow.language.terms import Term
 from avow.system.graph import dataflow
-from avow.system.plan import Method, System
+from avow.system.plan import Method, Ros, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,10 @@ def _ports(node: Node) -> list[list[str]]:
 def _wiring(system: System, node: Node, backend: str) -> list[Any]:
     """The node's topics, and for each edge that feeds it: the first value, the source's topics, and what the same
     backend is told of the source."""
+    ros = system.plan.ros
     found: list[Any] = [_topics(node)]
+    if ros != Ros():
+        found.append([ros.distro, repr(ros.names)])
     try:
         edges = dataflow(system).feeding(node.name)
     except Rejected as rejected:  # told elsewhere

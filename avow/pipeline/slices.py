@@ -21,7 +21,7 @@ from avow.language.terms import TRUE, Variable
 from avow.pipeline.evidence_keys import Named, method_options
 from avow.pipeline.work import is_portable
 from avow.system.graph import Edge, dataflow
-from avow.system.plan import Connection, Located, NodePlan, Plan, System
+from avow.system.plan import Connection, Located, NodePlan, Plan, Ros, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +103,8 @@ def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodS
             *(_told(plan.node(name), tool.name) for name in sorted(sources)),
         ),
         connections=tuple(_connection(edge) for edge in edges),
+        messages=plan.messages if tool.uses_wiring else (),
+        ros=plan.ros if tool.uses_wiring else Ros(),
         scenario=plan.scenario if tool.uses_scenario else None,
         plugins=() if is_portable(tool) else plan.plugins,
     )

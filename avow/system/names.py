@@ -23,6 +23,7 @@ def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic
         *_goals(plan, root, nodes),
         *_nodes(plan, root, nodes),
         *_model(root, nodes),
+        *_ros(root, nodes),
         *_scenario(plan, root, contract, nodes),
         *_findings(root, nodes),
         *_suppositions(plan, root),
@@ -144,6 +145,13 @@ def _model(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
         for name in (piece.entries or {}) if piece else ():
             if name not in nodes:
                 yield _unknown(f"model.{key}: node", name, nodes, piece.key_span(name) if piece else root.span)
+
+
+def _ros(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
+    piece = root.at("ros", "nodes")
+    for name in (piece.entries or {}) if piece else ():
+        if name not in nodes:
+            yield _unknown("ros.nodes: node", name, nodes, piece.key_span(name) if piece else root.span)
 
 
 def _scenario(plan: Plan, root: Piece, contract: Contract, nodes: dict[str, Node]) -> Iterator[Diagnostic]:

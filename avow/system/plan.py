@@ -14,6 +14,7 @@ from typing import Any
 from avow.base.diagnostics import Span
 from avow.base.files import digest
 from avow.language.contract import Contract
+from avow.ros.names import Resolver
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,6 +267,14 @@ class Picture:
 
 
 @dataclass(frozen=True, slots=True)
+class Ros:
+    """What the plan says of ROS: the distribution whose message types hold, and how the nodes and topics are called."""
+
+    distro: str | None = None
+    names: Resolver = field(default_factory=Resolver)
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """A whole plan.yaml, checked against its schema and against the contract's names."""
 
@@ -291,6 +300,7 @@ class Plan:
     pictures: tuple[Picture, ...] = ()
     subsystems: tuple[Subsystem, ...] = ()
     statements: tuple[Statement, ...] = ()
+    ros: Ros = Ros()
     included: tuple[Path, ...] = ()
     """Files of other systems that were taken in as subsystems: what is said here depends on them too."""
 

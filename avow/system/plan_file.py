@@ -29,12 +29,14 @@ from avow.system.plan import (
     Picture,
     Plan,
     Requirement,
+    Ros,
     Scenario,
     Statement,
     Subsystem,
     Table,
     is_wild,
 )
+from avow.system.ros_plan import read_ros
 from avow.system.schema import check_shape
 from avow.system.statements import read_statements
 from avow.system.strict_yaml import Piece, read_yaml
@@ -129,7 +131,13 @@ class _PlanReader:
             pictures=tuple(self.pictures(scenario)),
             subsystems=tuple(self.subsystems()),
             statements=self.statements(),
+            ros=self.ros(),
         )
+
+    def ros(self) -> Ros:
+        found, faults = read_ros(self.root)
+        self.faults += faults
+        return found
 
     def statements(self) -> tuple[Statement, ...]:
         found, faults = read_statements(self.root)

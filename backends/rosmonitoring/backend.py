@@ -12,6 +12,7 @@ from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Translated
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
+from avow.ros.sources import message_files
 from avow.system.paths import inside
 
 from .codes import CODES
@@ -32,7 +33,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "2"
+    version = "3"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     uses_steps = False
@@ -46,9 +47,10 @@ class RosMonitoringBackend(Backend):
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .options import setup
+        from .told import readings, unholdable
 
         found, faults = setup(job.system, job.node, job.method.options)
-        problems = list(faults)
+        problems = [*faults, *readings(found, job.method.options.at("mapping"))]
         for at, name in enumerate(_traces(job)):
             path = inside(job.root, name)
             if path is None or not path.exists():
@@ -56,6 +58,7 @@ class RosMonitoringBackend(Backend):
                 problems.append(Diagnostic("MON102", f"traces: there is no file {name!r} in the system's folder", span))
         for obligation in job.obligations:
             clause = job.clause(obligation)
+            problems += unholdable(found, clause)
             for variable, reason in found.hidden.items():
                 if _mentions(clause.formula, variable) and not faults:
                     message = f"{clause.name} cannot be monitored: {reason}"
@@ -72,6 +75,7 @@ class RosMonitoringBackend(Backend):
                 found += sorted(p for p in path.rglob("*") if p.is_file())
             elif path is not None:
                 found.append(path)
+        found += message_files(job.system.plan.messages)
         scenario = job.system.plan.scenario
         found += [t.path for t in scenario.tables if t.path is not None] if scenario else []
         return tuple(found)
@@ -188,6 +192,7 @@ class _Run:
 
 def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
     from .engine import Fault
+    from .options import origin, readable
     from .traces import digest_trace, read_trace
 
     run = _Run(name, monitor)
@@ -197,7 +202,10 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
         return run
     try:
         run.digest = digest_trace(path)
-        for recorded in read_trace(path):
+        where = origin(job.system)
+        if wrong := readable(monitor.setup, path, where):
+            raise Rejected(*wrong)
+        for recorded in read_trace(path, where, monitor.listens):
             for violation in monitor.step(recorded.event):
                 run.mapping_faults += violation.fault is Fault.MAPPING
                 run.first.setdefault(f"{violation.fault.name}/{violation.clause}", violation)

@@ -30,6 +30,19 @@ CODES = register(
         "The guarantee has no RML equivalent, or the plan does not say how its variables are read from messages.",
         "Map the variables that the message names (`docs/backends/rosmonitoring.md`); Avow's own engine judges more.",
     ),
+    declare(
+        "MON106",
+        "number that the wire cannot hold",
+        "A clause asks whether a message's number equals one that its type has no room for: it never does.",
+        "Ask for a range, or for a number that the type can hold.",
+        warning=True,
+    ),
+    declare(
+        "MON107",
+        "what is read",
+        "From which field of the topic's messages a variable is read, as the definition or the plan decides.",
+        "Nothing is to be done where it is the field that is meant; otherwise name another under `mapping`.",
+    ),
     declare("MON104", "no such node", "The system has no node of that name.", "Use the name from the hint."),
     declare("MON201", "unreadable trace", "The trace's file cannot be read.", "Correct the path."),
     declare(
@@ -46,6 +59,12 @@ CODES = register(
         "wrong event",
         "A line of the trace is too long, not UTF-8, no JSON object, or without a `time` in seconds from 0.",
         "Correct the line; none is left out silently.",
+    ),
+    declare(
+        "MON205",
+        "other messages",
+        "A bag's topic is of another type than the contract says, or its type is made otherwise than it is known.",
+        "Correct the topic's type in the contract, or the definition that the plan names.",
     ),
     declare(
         "MON301",

@@ -54,10 +54,10 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
     from .session import session, violation_json
     from .traces import digest_trace
 
-    running = session(system, nodes)
+    running = session(system, nodes, None if trace == "-" else Path(trace))
     shown: list[dict[str, Any]] = []
     count = 0
-    for recorded in _events(trace):
+    for recorded in _events(trace, running):
         for violation in running.step(recorded.event):
             count += 1
             if not show_all and count > VIOLATIONS_SHOWN:
@@ -77,13 +77,14 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
     return 0 if running.clean and _anything_judged(running) else 1
 
 
-def _events(trace: str) -> Iterator[Recorded]:
+def _events(trace: str, running: Session) -> Iterator[Recorded]:
     from avow.base.diagnostics import Diagnostic, Rejected
 
+    from .options import origin
     from .traces import read_lines, read_trace
 
     if trace != "-":
-        return read_trace(Path(trace))
+        return read_trace(Path(trace), origin(running.system), running.listens)
 
     def lines() -> Iterator[str]:
         try:

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from .options import Setup, same_topic
-from .rules import Choice, Fields, InOrder
+from .rules import Choice, Fields
 
 _ESCAPE = re.compile(r"[^A-Za-z0-9_]|_(?=x[0-9a-f]+_)")
 
@@ -31,20 +31,17 @@ def dotted_type(ros_type: str) -> str:
     return f"{parts[0]}.msg.{parts[-1]}"
 
 
-def topic_types(setup: Setup, mapping: Mapping[str, Any]) -> dict[str, str]:
+def topic_types(setup: Setup) -> dict[str, str]:
     """Topic → dotted type, each once: the contract's topics, then those that only the plan names."""
     found: dict[str, str] = {}
     seen: set[str] = set()
-    for topic in setup.node.topics:
-        if same_topic(topic.name) not in seen:
-            seen.add(same_topic(topic.name))
-            found[topic.name] = dotted_type(topic.ros_type)
-    for name, rule in setup.rules.items():
-        entry = mapping.get(name)
-        given = entry.get("type") if isinstance(entry, Mapping) else None
-        if isinstance(rule, Fields | InOrder | Choice) and given and same_topic(rule.topic) not in seen:
-            seen.add(same_topic(rule.topic))
-            found[rule.topic] = dotted_type(str(given))
+    rules = [
+        (rule.topic, rule.kind) for rule in setup.rules.values() if isinstance(rule, Fields | Choice) and rule.kind
+    ]
+    for name, kind in [*((topic.name, topic.ros_type) for topic in setup.node.topics), *rules]:
+        if same_topic(name) not in seen:
+            seen.add(same_topic(name))
+            found[name] = dotted_type(kind)
     return found
 
 
@@ -65,8 +62,7 @@ def configuration(setup: Setup, options: Mapping[str, Any]) -> str:
             "action": str(oracle.get("action", "nothing")),
             "timeout": float(oracle.get("timeout", 2.0)),
         }
-    mapping = options.get("mapping")
-    types = topic_types(setup, mapping if isinstance(mapping, Mapping) else {})
+    types = topic_types(setup)
     monitor["topics"] = [{"name": name, "type": kind, "action": "log"} for name, kind in types.items()]
     whole: dict[str, Any] = {}
     if "ros_version" in options:

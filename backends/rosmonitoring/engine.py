@@ -23,8 +23,9 @@ from avow.tuning.effort import JUDGE_MS
 
 from .numbers import Decimal, NotANumber, exact
 from .options import Setup, same_topic
-from .reading import MappingError, Reader, reader
-from .rules import Choice, Constant, Fields, Hold, InOrder, Previous
+from .reading import Reader, reader
+from .rules import Choice, Constant, Fields, Hold, Previous
+from .wires import MappingError
 
 
 class Fault(StrEnum):
@@ -128,12 +129,16 @@ class Monitor:
                 case Previous(source=source, initial=initial):
                     self._previous.append((name, source))
                     self._start(name, initial)
-                case Fields() | InOrder() | Choice():
+                case Fields() | Choice():
                     self._readers.setdefault(same_topic(rule.topic), []).append((name, reader(rule)))
                     self._start(name, rule.initial)
         for name, source in self._previous:
             if name not in self.values and source in self.values:
                 self.values[name] = self.values[source]
+
+    def listens(self, topic: str) -> bool:
+        """Whether a topic's messages say anything of the node."""
+        return same_topic(topic) in self._readers
 
     def step(self, event: Mapping[str, Any]) -> list[Violation]:
         """Judge one event. Never raises for what the event holds."""
@@ -238,7 +243,7 @@ class Monitor:
 
     def _triggers(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """The variables whose publication makes a clause judged."""
-        direct = tuple(n for n in names if isinstance(self.setup.rules[n], Fields | InOrder | Choice))
+        direct = tuple(n for n in names if isinstance(self.setup.rules[n], Fields | Choice))
         outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
         sources = tuple(rule.source for n in names if isinstance(rule := self.setup.rules[n], Previous))
         if outputs and self.setup.when != "every":

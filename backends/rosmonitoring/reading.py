@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import functools
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from avow.formulas.values import Data, Element, FunctionValue, Sequence, Value
+from avow.formulas.values import Data, FunctionValue, Sequence, Value
 from avow.language.sorts import (
     BOOL,
     BoolSort,
@@ -22,27 +23,22 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+from avow.ros.definitions import Array, Wire
 
 from .numbers import Decimal, NotANumber, exact, whole
-from .rules import Argument, Choice, Fields, Hold, InOrder, Lookup, Path
+from .rules import NOTHING_KNOWN, Argument, Choice, Fields, Hold, Lookup, Path
+from .wires import Convert, MappingError, NoReading, converter, element, fits, of_type, show, taken
 
 Message = Mapping[str, Any]
 Reader = Callable[[Message, Value | None], Value]
 """(the message, the variable's value so far) → its new value. Raises MappingError."""
 
-META = frozenset({"topic", "time", "service", "request", "response"})
-"""Keys that ROSMonitoring adds to a message."""
 
-
-class MappingError(Exception):
-    """A message that does not fit its rule; the text says how, for people."""
-
-
-def reader(rule: Fields | InOrder | Choice) -> Reader:
+def reader(rule: Fields | Choice) -> Reader:
     match rule:
         case Choice():
             return _choice(rule)
-        case Fields() | InOrder():
+        case Fields():
             sort = rule.variable.sort
             if isinstance(sort, FunctionSort):
                 return _function(rule, sort)
@@ -53,15 +49,23 @@ def at(message: Any, path: Path) -> Any:
     """The part of a message that a path leads to. Raises MappingError."""
     place = message
     for depth, name in enumerate(path):
-        if isinstance(place, Mapping) and name in place:
+        if isinstance(name, int):
+            place = place[name] if isinstance(place, list) and -len(place) <= name < len(place) else _MISSING
+        elif isinstance(place, Mapping) and name in place:
             place = place[name]
         elif depth == 0 and isinstance(place, Mapping) and isinstance(place.get("data"), Mapping):
             place = place["data"].get(name, _MISSING)
         else:
             place = _MISSING
         if place is _MISSING:
-            raise MappingError(f"the message has no field {'.'.join(path)}")
+            raise MappingError(f"the message has no field {shown(path)}")
     return place
+
+
+def shown(path: Path) -> str:
+    """``pose.position.x``, ``ranges[0]``."""
+    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+    return text.removeprefix(".")
 
 
 _MISSING = object()
@@ -76,30 +80,30 @@ def convert(raw: Any, sort: Sort, names: Mapping[str, str]) -> Value:
         case IntegerSort() | NaturalSort():
             number = _number(raw)
             if number.denominator != 1:
-                raise MappingError(f"{_show(raw)} is not a whole number")
+                raise MappingError(f"{show(raw)} is not a whole number")
             if isinstance(sort, NaturalSort) and number < 0:
-                raise MappingError(f"{_show(raw)} is negative, where a natural number is wanted")
+                raise MappingError(f"{show(raw)} is negative, where a natural number is wanted")
             return int(number)
         case BoolSort():
             if isinstance(raw, bool):
                 return raw
-            raise MappingError(f"{_show(raw)} is not a truth value")
+            raise MappingError(f"{show(raw)} is not a truth value")
         case StringSort():
             if isinstance(raw, str):
                 return names.get(raw, raw)
-            raise MappingError(f"{_show(raw)} is not a string")
+            raise MappingError(f"{show(raw)} is not a string")
         case EnumSort():
-            return _element(raw, sort, names)
+            return element(raw, sort, names)
         case DataSort():
             return _data(raw, sort, names)
         case TupleSort(items=items):
             if isinstance(raw, list) and len(raw) == len(items):
                 return tuple(convert(part, item, names) for part, item in zip(raw, items, strict=True))
-            raise MappingError(f"{_show(raw)} is not a list of {len(items)}")
+            raise MappingError(f"{show(raw)} is not a list of {len(items)}")
         case SequenceSort(item=item):
             if isinstance(raw, list):
                 return Sequence(tuple(convert(part, item, names) for part in raw))
-            raise MappingError(f"{_show(raw)} is not a list")
+            raise MappingError(f"{show(raw)} is not a list")
         case FunctionSort():
             return _relation_literal(raw, sort, names)
         case OpaqueSort(name=name):
@@ -114,16 +118,7 @@ def _number(raw: Any) -> Fraction | int:
             return exact(raw)
         except NotANumber:
             pass
-    raise MappingError(f"{_show(raw)} is not a number")
-
-
-def _element(raw: Any, sort: EnumSort, names: Mapping[str, str]) -> Element:
-    word = raw if isinstance(raw, str) else str(raw) if raw.__class__ is int else None
-    if word is not None:
-        word = names.get(word, word)
-        if word in sort.members:
-            return Element(word)
-    raise MappingError(f"{_show(raw)} is outside {{{', '.join(sort.members)}}}")
+    raise MappingError(f"{show(raw)} is not a number")
 
 
 def _data(raw: Any, sort: DataSort, names: Mapping[str, str]) -> Data:
@@ -139,7 +134,7 @@ def _data(raw: Any, sort: DataSort, names: Mapping[str, str]) -> Data:
                     pairs = zip(arguments, constructor.parameters, strict=True)
                     return Data(word, tuple(convert(part, p, {}) for part, p in pairs))
                 raise MappingError(f"{word} takes {len(constructor.parameters)} arguments, not {len(arguments)}")
-    raise MappingError(f"{_show(raw)} is no value of {sort.name}")
+    raise MappingError(f"{show(raw)} is no value of {sort.name}")
 
 
 def _relation_literal(raw: Any, sort: FunctionSort, names: Mapping[str, str]) -> FunctionValue:
@@ -150,67 +145,66 @@ def _relation_literal(raw: Any, sort: FunctionSort, names: Mapping[str, str]) ->
     for row in raw:
         parts = row if isinstance(row, list) else [row]
         if len(parts) != len(sort.parameters):
-            raise MappingError(f"{_show(row)} is not a list of {len(sort.parameters)}")
+            raise MappingError(f"{show(row)} is not a list of {len(sort.parameters)}")
         table[tuple(convert(p, s, names) for p, s in zip(parts, sort.parameters, strict=True))] = True
     return FunctionValue(table, False)
 
 
-def _show(raw: Any) -> str:
-    try:
-        text = repr(raw)
-    except RecursionError:
-        return "something nested deeply"
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _scalar(rule: Fields | InOrder, sort: Sort) -> Reader:
-    names = rule.names
-    if isinstance(rule, Fields):
-        path, items = rule.paths[0], sort.items if isinstance(sort, TupleSort) else ()
-        if len(rule.paths) > 1:
-            pairs = tuple(zip(rule.paths, items, strict=True))
-            return lambda message, old: tuple([convert(at(message, p), s, names) for p, s in pairs])
-        return lambda message, old: convert(at(message, path), sort, names)
-    topic = rule.topic
-
-    def first_that_fits(message: Message, old: Value | None) -> Value:
-        trouble: MappingError | None = None
-        for raw in _in_order(message, topic):
-            try:
-                return convert(raw, sort, names)
-            except MappingError as error:
-                trouble = trouble or error
-        raise trouble or MappingError("the message has no fields")
-
-    return first_that_fits
-
-
-def _in_order(message: Message, topic: str) -> Iterator[Any]:
-    """The fields of a message in its order. What is wrapped in ``data``, or under the topic's own name, counts as the
-    message."""
-    short = topic.rsplit("/", 1)[-1]
-    for wrapper in (short, "data"):
-        if isinstance(message.get(wrapper), Mapping):
-            yield from _leaves(message[wrapper])
-            return
-    yield from _leaves({k: v for k, v in message.items() if k not in META})
-
-
-def _leaves(message: Any) -> Iterator[Any]:
-    stack = [message]
-    while stack:
-        part = stack.pop()
-        if isinstance(part, Mapping):
-            stack.extend(reversed(list(part.values())))
+def _converters(rule: Fields, sorts: tuple[Sort, ...]) -> tuple[Convert, ...]:
+    """How what each of the rule's paths leads to becomes a value."""
+    found: list[Convert] = []
+    for place, sort in enumerate(sorts):
+        wire = rule.wire(place)
+        if rule.take is not None and isinstance(wire, Array):
+            found.append(taken(rule.take, sort, wire, rule.known, rule.gaps))
+        elif wire is None or not fits(sort, wire, rule.known):
+            found.append(functools.partial(convert, sort=sort, names=rule.names))
         else:
-            yield part
+            found.append(converter(sort, wire, rule.names, rule.known, rule.gaps))
+    return tuple(found)
 
 
-def _function(rule: Fields | InOrder, sort: FunctionSort) -> Reader:
+def _scalar(rule: Fields, sort: Sort) -> Reader:
+    items = sort.items if isinstance(sort, TupleSort) and len(rule.paths) > 1 else (sort,)
+    made = _converters(rule, items)
+    if isinstance(sort, TupleSort) and len(rule.paths) > 1:
+        pairs = tuple(zip(rule.paths, made, strict=True))
+        return _with_default(rule, lambda message, old: tuple([read(at(message, p)) for p, read in pairs]))
+    path, read = rule.paths[0], made[0]
+    if len(path) == 1 and isinstance(path[0], str):
+        return _with_default(rule, _one_field(path, path[0], read))
+    return _with_default(rule, lambda message, old: read(at(message, path)))
+
+
+def _one_field(path: Path, name: str, read: Convert) -> Reader:
+    """The most frequent reader of all."""
+
+    def of_field(message: Message, old: Value | None) -> Value:
+        return read(message[name] if name in message else at(message, path))
+
+    return of_field
+
+
+def _with_default(rule: Fields, read: Reader) -> Reader:
+    """Where there is no reading, the value that the plan gives."""
+    elsewhere = rule.elsewhere
+    if elsewhere is None:
+        return read
+
+    def otherwise(message: Message, old: Value | None) -> Value:
+        try:
+            return read(message, old)
+        except NoReading:
+            return elsewhere
+
+    return otherwise
+
+
+def _function(rule: Fields, sort: FunctionSort) -> Reader:
     relation = sort.result == BOOL
     sorts = sort.parameters if relation else (*sort.parameters, sort.result)
-    names, seen = rule.names, rule.hold is Hold.SEEN
-    points = _named(rule, sorts) if isinstance(rule, Fields) else _fitting(rule.topic, sorts, names, relation)
+    seen = rule.hold is Hold.SEEN
+    points = _points(rule, sorts)
     if not relation and rule.elsewhere is None:
         raise ValueError("the options demand `elsewhere` of a function with a result")
     elsewhere: Value = False if relation or rule.elsewhere is None else rule.elsewhere
@@ -226,59 +220,37 @@ def _function(rule: Fields | InOrder, sort: FunctionSort) -> Reader:
     return read
 
 
-def _named(rule: Fields, sorts: tuple[Sort, ...]) -> Callable[[Message], list[tuple[Value, ...]]]:
-    paths, names, each = rule.paths, rule.names, rule.each
+def _points(rule: Fields, sorts: tuple[Sort, ...]) -> Callable[[Message], list[tuple[Value, ...]]]:
+    """The tuples that a message brings; a tuple with no reading among its parts is not brought."""
+    each, pairs = rule.each, tuple(zip(rule.paths, _converters(rule, sorts), strict=True))
 
-    def one(message: Message) -> tuple[Value, ...]:
-        return tuple([convert(at(message, p), s, names) for p, s in zip(paths, sorts, strict=True)])
+    def one(message: Message) -> tuple[Value, ...] | None:
+        try:
+            return tuple([read(at(message, p)) for p, read in pairs])
+        except NoReading:
+            return None
 
     if each is None:
-        return lambda message: [one(message)]
+        return lambda message: [point] if (point := one(message)) is not None else []
     way = each
 
     def several(message: Message) -> list[tuple[Value, ...]]:
         items = at(message, way)
         if not isinstance(items, list):
-            raise MappingError(f"the field {'.'.join(way)} is not a list")
-        return [one(item) for item in items]
+            raise MappingError(f"the field {shown(way)} is not a list")
+        return [point for item in items if (point := one(item)) is not None]
 
     return several
-
-
-def _fitting(
-    topic: str, sorts: tuple[Sort, ...], names: Mapping[str, str], relation: bool
-) -> Callable[[Message], list[tuple[Value, ...]]]:
-    """Fields fill the parameters in order; the result is the last field that fits."""
-    parameters = sorts if relation else sorts[:-1]
-
-    def read(message: Message) -> list[tuple[Value, ...]]:
-        leaves = list(_in_order(message, topic))
-        values: list[Value] = []
-        while leaves and len(values) < len(parameters):
-            raw = leaves.pop(0)
-            try:
-                values.append(convert(raw, parameters[len(values)], names))
-            except MappingError:
-                continue
-        if len(values) < len(parameters):
-            raise MappingError(f"the message fills {len(values)} of {len(parameters)} parameters")
-        if relation:
-            return [tuple(values)]
-        for raw in reversed(leaves):
-            try:
-                return [(*values, convert(raw, sorts[-1], names))]
-            except MappingError:
-                continue
-        raise MappingError("the message has no field for the function's result")
-
-    return read
 
 
 def _choice(rule: Choice) -> Reader:
     sort = rule.variable.sort
     assert isinstance(sort, DataSort)
     shapes = {
-        name: tuple(zip(arguments, sort.constructor(name).parameters, strict=True))
+        name: tuple(
+            _argument(where, part, rule)
+            for where, part in zip(arguments, sort.constructor(name).parameters, strict=True)
+        )
         for name, arguments in rule.arguments.items()
     }
     tag, names = rule.tag, rule.names
@@ -288,26 +260,35 @@ def _choice(rule: Choice) -> Reader:
         word = names.get(raw, raw) if isinstance(raw, str) else str(raw) if raw.__class__ is int else None
         word = names.get(word, word) if word is not None else None
         if word not in shapes:
-            raise MappingError(f"{_show(raw)} is none of the constructors {', '.join(shapes)}")
-        return Data(word, tuple([_argument(message, where, part) for where, part in shapes[word]]))
+            raise MappingError(f"{show(raw)} is none of the constructors {', '.join(shapes)}")
+        return Data(word, tuple([argument(message) for argument in shapes[word]]))
 
     return read
 
 
-def _argument(message: Message, where: Argument, sort: Sort) -> Value:
-    if not isinstance(where, Lookup):
-        return convert(at(message, where), sort, {})
+def _argument(where: Argument, sort: Sort, rule: Choice) -> Callable[[Message], Value]:
+    if isinstance(where, Lookup):
+        return functools.partial(_looked_up, where=where, sort=sort)
+    wire = rule.wires.get(where)
+    if wire is None:
+        return lambda message: convert(at(message, where), sort, {})
+    read = converter(sort, wire, {}, NOTHING_KNOWN, frozenset())
+    return lambda message: read(at(message, where))
+
+
+def _looked_up(message: Message, where: Lookup, sort: Sort) -> Value:
     key = at(message, where.key)
     cell = where.rows.get(str(key.text if isinstance(key, Decimal) else key))
     if cell is None:
-        raise MappingError(f"{_show(key)} is in no row of {where.table}")
-    return from_text(cell, sort)
+        raise MappingError(f"{show(key)} is in no row of {where.table}")
+    return from_text(cell, sort, where.held)
 
 
-def from_text(cell: str, sort: Sort) -> Value:
-    """A table's cell as a value. Raises MappingError."""
+def from_text(cell: str, sort: Sort, held: Wire | None = None) -> Value:
+    """A table's cell as a value; `held`: the type in which a node holds it. Raises MappingError."""
     if isinstance(sort, RealSort | IntegerSort | NaturalSort):
-        return convert(Decimal(cell.strip()), sort, {})
+        value = convert(Decimal(cell.strip()), sort, {})
+        return of_type(value, held) if isinstance(value, Fraction) else value
     if isinstance(sort, BoolSort):
         return convert({"TRUE": True, "FALSE": False}.get(cell.strip().upper(), cell), sort, {})
     return convert(cell, sort, {})

@@ -58,6 +58,7 @@ from .symbols import (
     code,
     components,
     constant,
+    no_pattern,
 )
 from .tuning import CASES
 
@@ -219,8 +220,6 @@ class _Machine:
                 wanted.append(rule.source)
         for at, name in enumerate(wanted, start=1):
             rule = self.setup.rules[name]
-            if not isinstance(rule, Fields | Choice | Previous | Constant):
-                raise NotRml(f"the plan names no fields for {name}")
             if isinstance(rule.variable.sort, StringSort):
                 raise NotRml(f"{name} is a string, and RML's conditions compare only numbers")
             self.rules[name] = rule
@@ -309,6 +308,8 @@ class _Machine:
         rule = self.rules[name]
         match rule:
             case Fields(variable=variable, paths=paths, names=names):
+                if why := no_pattern(rule):
+                    raise NotRml(f"{name} is {why}")
                 sort = variable.sort
                 relation = isinstance(sort, FunctionSort)
                 sorts = sort.parameters if isinstance(sort, FunctionSort) else (sort,)
@@ -430,14 +431,15 @@ def _pattern(topic: str, fields: Sequence[tuple[Path, str]], inside: bool) -> st
         if not path:
             raise NotRml("a rule takes the whole message as one value")
         place = tree
-        for step in path[:-1]:
+        steps = [str(step) for step in path]
+        for step in steps[:-1]:
             below = place.setdefault(key(step), {})
             if not isinstance(below, dict):
                 raise NotRml(f"the field {step} is used both as a value and as a message")
             place = below
-        if key(path[-1]) in place:
-            raise NotRml(f"the field {path[-1]} is used twice")
-        place[key(path[-1])] = text
+        if key(steps[-1]) in place:
+            raise NotRml(f"the field {steps[-1]} is used twice")
+        place[key(steps[-1])] = text
     body = {"topic": string(topic)}
     whole: dict[str, object] = {**body, "data": tree} if inside else {**body, **tree}
     return _object(whole)

@@ -13,9 +13,12 @@ from enum import StrEnum
 
 from avow.formulas.values import Value
 from avow.language.terms import Variable
+from avow.ros.definitions import Definitions, Wire
 
-Path = tuple[str, ...]
-"""``("pose", "x")``: a field, and the fields within it."""
+Path = tuple[str | int, ...]
+"""``("pose", "x")``: a field, and the fields within it; ``("ranges", 0)``: an item of an array."""
+
+NOTHING_KNOWN = Definitions({})
 
 
 class Hold(StrEnum):
@@ -27,6 +30,21 @@ class Hold(StrEnum):
     """Every tuple that a message has brought so far: what has been inspected."""
 
 
+class Take(StrEnum):
+    """What of an array's items is meant."""
+
+    MIN = "min"
+    MAX = "max"
+    COUNT = "count"
+
+
+class Gap(StrEnum):
+    """Numbers that stand for *no reading*, where the plan says so."""
+
+    NAN = "nan"
+    INF = "inf"
+
+
 @dataclass(frozen=True, slots=True)
 class Lookup:
     """The cell of a table in the row that a field names: the coordinates of the place with this id."""
@@ -35,6 +53,8 @@ class Lookup:
     key: Path
     rows: Mapping[str, str] = field(hash=False)
     """Text of the key → text of the cell."""
+    held: Wire | None = None
+    """The type in which the node holds the cell."""
 
 
 Argument = Path | Lookup
@@ -42,9 +62,9 @@ Argument = Path | Lookup
 
 @dataclass(frozen=True, slots=True)
 class Fields:
-    """Scalar, Collection and Function rules with the fields named. For a function with a result, the last path is the
-    result's, and `elsewhere` its value where no message has said. `each` leads to a list of tuples in one message.
-    `names` turns a message's word into the contract's."""
+    """Scalar, Collection and Function rules. For a function with a result, the last path is the result's, and
+    `elsewhere` its value where no message has said. `each` leads to a list of tuples in one message. `names` turns a
+    message's word or number into the contract's."""
 
     variable: Variable
     topic: str
@@ -53,19 +73,20 @@ class Fields:
     hold: Hold = Hold.LATEST
     each: Path | None = None
     elsewhere: Value | None = None
+    """Of any other variable: its value where there is no reading."""
     initial: Value | None = None
+    wires: tuple[Wire | None, ...] = ()
+    """What each path leads to; None where nothing defines the message: then its digits mean what they say."""
+    known: Definitions = field(default=NOTHING_KNOWN, hash=False, repr=False)
+    """For messages within the message."""
+    take: Take | None = None
+    gaps: frozenset[Gap] = frozenset()
+    kind: str = ""
+    """The topic's type, where it is said."""
 
-
-@dataclass(frozen=True, slots=True)
-class InOrder:
-    """The same where no fields are named: they are taken in the message's order, those that do not fit are skipped."""
-
-    variable: Variable
-    topic: str
-    names: Mapping[str, str] = field(default_factory=dict, hash=False)
-    hold: Hold = Hold.LATEST
-    elsewhere: Value | None = None
-    initial: Value | None = None
+    def wire(self, at: int) -> Wire | None:
+        """The type of what a path leads to."""
+        return self.wires[at] if at < len(self.wires) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +101,9 @@ class Choice:
     names: Mapping[str, str] = field(default_factory=dict, hash=False)
     """The message's word → constructor."""
     initial: Value | None = None
+    wires: Mapping[Path, Wire] = field(default_factory=dict, hash=False)
+    """Of the fields whose types are known."""
+    kind: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,4 +124,4 @@ class Previous:
     initial: Value | None = None
 
 
-Rule = Fields | InOrder | Choice | Constant | Previous
+Rule = Fields | Choice | Constant | Previous

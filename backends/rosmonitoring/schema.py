@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-_PATH = {"type": "string", "description": "a field of the message; dots lead into nested messages: pose.position.x"}
+_PATH = {"type": "string", "description": "a field of the message: pose.position.x, ranges[0]"}
 _ARGUMENT = {
     "oneOf": [
         _PATH,
@@ -17,6 +17,7 @@ _ARGUMENT = {
                 "key": {"type": "string", "description": "the message's field that names the row"},
                 "by": {"type": "string", "description": "the table's column that the key is looked up in"},
                 "column": {"type": "string", "description": "the column of the value"},
+                "as": {"type": "string", "description": "the type in which the node holds the value: float64"},
             },
         },
     ]
@@ -79,7 +80,13 @@ SCHEMA: dict[str, Any] = {
                                 "additionalProperties": {"type": "string"},
                                 "description": "a message's word: the contract's name",
                             },
-                            "elsewhere": {"description": "a function's value where no message has given one"},
+                            "elsewhere": {
+                                "description": "a function's value where no message has given one; of anything else, "
+                                "the value where there is no reading"
+                            },
+                            "take": {"enum": ["min", "max", "count"], "description": "of the items of an array"},
+                            "nan": {"const": "none", "description": "a NaN is no reading"},
+                            "inf": {"const": "none", "description": "an infinity is no reading"},
                             "initial": {"description": "the value before the first message"},
                             "scenario": {"const": True, "description": "the plan's interpretation, at all times"},
                             "previous": {"type": "string", "description": "an output's value of the step before"},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
@@ -12,7 +13,7 @@ from avow.system.plan import System
 from avow.system.schema import suggest
 
 from .engine import Fault, Monitor, Tally, Violation
-from .options import NAME, same_topic, setup
+from .options import NAME, known_types, origin, readable, same_topic, setup
 
 
 @dataclass(slots=True)
@@ -25,6 +26,9 @@ class Session:
     counts: dict[Fault, int] = field(default_factory=dict)
     unheard: dict[str, int] = field(default_factory=dict)
     """Topics of the trace that no monitor listens to, and their events."""
+
+    def listens(self, topic: str) -> bool:
+        return any(monitor.listens(topic) for monitor in self.monitors)
 
     def step(self, event: Mapping[str, Any]) -> Iterator[Violation]:
         self.events += 1
@@ -81,17 +85,20 @@ class Session:
         }
 
 
-def session(system: System, nodes: Sequence[str] = ()) -> Session:
-    """Monitors for the named nodes, by default all, with the plan's mappings. Raises Rejected."""
+def session(system: System, nodes: Sequence[str] = (), trace: Path | None = None) -> Session:
+    """Monitors for the named nodes, by default all, with the plan's mappings; where `trace` is a bag, also by what it
+    says of its messages. Raises Rejected."""
     known = {node.name: node for node in system.contract.nodes}
-    faults: list[Diagnostic] = []
+    types, wrong = known_types(system, () if trace is None else (trace,))
+    faults: list[Diagnostic] = list(wrong)
     monitors: list[Monitor] = []
     for name in nodes or known:
         if name not in known:
             raise Rejected(Diagnostic("MON104", f"there is no node '{name}'", hint=suggest(name, known)))
         methods = [m for m in system.plan.node(name).methods if m.backend == NAME]
-        found, problems = setup(system, known[name], methods[0].options if methods else None)
+        found, problems = setup(system, known[name], methods[0].options if methods else None, types)
         faults += problems
+        faults += readable(found, trace, origin(system)) if trace is not None and not problems else ()
         if not problems:
             monitors.append(Monitor(found))
     if faults:

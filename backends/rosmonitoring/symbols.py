@@ -22,6 +22,7 @@ from avow.language.sorts import (
     RealSort,
     Sort,
 )
+from avow.ros import definitions as wires
 
 from .rml import (
     TRUE,
@@ -35,7 +36,7 @@ from .rml import (
     every,
     some,
 )
-from .rules import Constant, Fields, Hold, InOrder, Previous, Rule
+from .rules import Constant, Fields, Hold, Previous, Rule
 from .tuning import TRACKED_TUPLES
 
 
@@ -138,7 +139,7 @@ def carried(rule: Rule, rules: dict[str, Rule], prefix: str) -> Symbol:
     if isinstance(sort, FunctionSort):
         if isinstance(rule, Fields) and rule.hold is Hold.SEEN and rule.each is None and sort.result == BOOL:
             return Tracked(prefix)
-        if isinstance(source, Fields | InOrder) and (source.hold is Hold.SEEN or getattr(source, "each", None)):
+        if isinstance(source, Fields) and (source.hold is Hold.SEEN or getattr(source, "each", None)):
             raise NotRml(f"{name} holds of any number of tuples, and an RML equation carries a fixed number of values")
         if sort.result != BOOL:
             raise NotRml(f"{name} is a function with a result")
@@ -162,6 +163,19 @@ def _named(sort: Sort, prefix: str, name: str) -> Symbol:
             return Variant(Name(f"{prefix}_t"), tuple(arguments))
         case _:
             raise NotRml(f"{name} is of a sort that RML's equations cannot carry")
+
+
+def no_pattern(rule: Fields) -> str:
+    """Why no pattern of RML reads what the rule reads; empty where one does."""
+    if rule.take is not None:
+        return "calculated from the items of an array"
+    if rule.gaps or (rule.elsewhere is not None and not isinstance(rule.variable.sort, FunctionSort)):
+        return "no reading where the message holds NaN or an infinity"
+    if any(isinstance(step, int) for path in rule.paths for step in path):
+        return "an item of an array"
+    if any(isinstance(wire, wires.Scalar) and wire.name in ("time", "duration") for wire in rule.wires):
+        return "a time of seconds and nanoseconds"
+    return ""
 
 
 def equal(left: Symbol, right: Symbol) -> Condition:

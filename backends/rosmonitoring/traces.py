@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 
+from .bags import NOWHERE, Event, Origin, is_bag, messages
 from .numbers import Decimal, NotANumber, exact
 from .tuning import EVENT_CHARACTERS
-
-Event = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +72,14 @@ def read_lines(lines: Iterable[str], name: str) -> Iterator[Recorded]:
             raise Rejected(_fault(name, number, 1, str(error))) from None
 
 
-def read_trace(path: Path) -> Iterator[Recorded]:
-    """The events of a file (JSON lines, ROS 1 bag) or folder (ROS 2 bag). Raises Rejected."""
-    if path.is_dir() or path.suffix in (".bag", ".db3", ".mcap"):
-        yield from _bag(path)
+def read_trace(
+    path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
+) -> Iterator[Recorded]:
+    """The events of a file (JSON lines, ROS 1 bag) or folder (ROS 2 bag). `wanted`: the topics whose messages of a bag
+    are of interest. Raises Rejected."""
+    if is_bag(path):
+        for index, event in enumerate(messages(path, origin, wanted), start=1):
+            yield Recorded(index, 0, event)
         return
     try:
         with path.open(encoding="utf-8-sig", errors="strict", newline="\n") as file:
@@ -100,46 +102,6 @@ def digest_trace(path: Path) -> str:
                 return hashlib.file_digest(stream, "sha256").hexdigest()
             whole.update(hashlib.file_digest(stream, "sha256").digest())
     return whole.hexdigest()
-
-
-def _bag(path: Path) -> Iterator[Recorded]:
-    try:
-        from rosbags.highlevel import AnyReader, AnyReaderError
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        hint = "pip install 'avow[bags]'"
-        raise Rejected(Diagnostic("MON202", "reading bags needs the package rosbags", hint=hint)) from None
-    try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
-            messages = reader.messages()
-            for index, (connection, time, raw) in enumerate(messages, start=1):
-                message = reader.deserialize(raw, connection.msgtype)
-                fields = _plain(message)
-                event = {**fields, "topic": connection.topic, "time": time / 1e9}
-                yield Recorded(index, 0, event)
-    except AnyReaderError as error:
-        raise Rejected(Diagnostic("MON203", f"{path} is no bag that can be read: {error}")) from None
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
-        raise Rejected(Diagnostic("MON203", f"{path} cannot be read as a bag: {error}")) from None
-
-
-def _plain(message: Any) -> Any:
-    """A deserialised message as the JSON that ROSMonitoring would write of it."""
-    fields = getattr(message, "__dataclass_fields__", None)
-    if fields is not None:
-        return {name: _plain(getattr(message, name)) for name in fields if not name.startswith("__")}
-    if hasattr(message, "tolist"):
-        # The shortest text of a float32 is what was meant by it; as a float64 it has digits that nobody wrote.
-        return _floats(message) if getattr(message.dtype, "kind", "") == "f" else message.tolist()
-    if isinstance(message, list | tuple):
-        return [_plain(item) for item in message]
-    return message
-
-
-def _floats(array: Any) -> Any:
-    if getattr(array, "ndim", 1) == 0:
-        return Decimal(str(array))
-    return [Decimal(str(item)) if item == item else float("nan") for item in array.ravel()]
 
 
 def _fault(name: str, line: int, column: int, message: str) -> Diagnostic:

@@ -24,7 +24,7 @@ MAPPINGS: dict[str, dict[str, Any]] = {
     "localisation": {"out.position": ["posX", "posY"]},
     "navigation": {"in.position": ["posX", "posY"], "out.at": ["posX", "posY"]},
     "agent": {
-        "in.wayP": {"scenario": True},
+        "in.wayP": {"scenario": True, "fields": ["posX", "posY", "id"]},
         "out.command": {"constructor": "command", "move": ["posX", "posY"], "inspect": ["id"]},
         "out.phase": {"topic": "phase", "type": "gazebo_radiation_plugins/Snapshot", "field": "phase"},
     },
@@ -72,13 +72,20 @@ def nominal() -> list[dict[str, Any]]:
 
 @pytest.fixture
 def make_system(tmp_path: Path) -> Callable[..., System]:
-    """``make_system(rcl, mapping={...}, **options)``: a system with one node and its monitor."""
+    """``make_system(rcl, mapping={...}, messages={"a/N": "int32 count"}, **options)``: one node and its monitor."""
 
     def make(rcl: str, mapping: dict[str, Any] | None = None, **more: Any) -> System:
         folder = tmp_path / f"system{len(list(tmp_path.iterdir()))}"
         folder.mkdir()
         (folder / "system.rcl").write_text(rcl, encoding="utf-8")
         plan_parts = more.pop("plan", {})
+        messages: dict[str, str] = more.pop("messages", {})
+        for kind, text in messages.items():
+            package, _, kind_name = kind.partition("/")
+            (folder / "msgs" / package / "msg").mkdir(parents=True, exist_ok=True)
+            (folder / "msgs" / package / "msg" / f"{kind_name}.msg").write_text(text, encoding="utf-8")
+        if messages:
+            plan_parts = {"messages": ["msgs"], **plan_parts}
         name = rcl.split("node", 1)[1].split("{", 1)[0].strip()
         options = {**more, "mapping": mapping or {}}
         plan = {"contract": "system.rcl", "nodes": {name: {"methods": [{"rosmonitoring": options}]}}, **plan_parts}

@@ -218,12 +218,21 @@ def test_a_guarantee_is_excused_while_an_assumption_is_broken(make_system: Calla
     assert found == [(3, Fault.ASSUMPTION), (4, Fault.EXCUSED), (6, Fault.GUARANTEE)]
 
 
-def test_decimals_mean_their_digits(make_system: Callable[..., System]) -> None:
+def test_decimals_mean_their_digits_where_nothing_defines_the_message(make_system: Callable[..., System]) -> None:
     """0.1 + 0.1 is 0.2, also where floating point says otherwise (0.1 + 0.2 is not 0.3)."""
-    rcl = ASSUMING.replace("in.r + in.r", "in.r + 0.2")
+    rcl = ASSUMING.replace("in.r + in.r", "in.r + 0.2").replace("std_msgs/Float64", "a/Decimal")
     system = make_system(rcl, {"in.r": "data", "out.s": "data"})
     assert run(system, [{"topic": "r", "data": 0.1}, {"topic": "s", "data": 0.3}]) == []
     assert run(system, [{"topic": "r", "data": 0.1}, {"topic": "s", "data": 0.30000000000000004}]) != []
+
+
+def test_a_float64_is_its_binary_number(make_system: Callable[..., System]) -> None:
+    """The node reads 0.1 as the nearest number that a double holds, which is more; and so does the monitor."""
+    rcl = ASSUMING.replace("out.s == in.r + in.r", "in.r > 0.1 and out.s >= 0.5")
+    system = make_system(rcl)
+    assert run(system, [{"topic": "r", "data": 0.1}, {"topic": "s", "data": 0.5}]) == []
+    (found,) = run(system, [{"topic": "r", "data": 0.1}, {"topic": "s", "data": 0.3}])
+    assert found.values == (("in.r", "0.1"), ("out.s", "0.3"))
 
 
 def test_mapping_errors_are_their_own_kind_and_make_the_value_unknown(case: System, nominal: list[Event]) -> None:

@@ -128,7 +128,6 @@ node n {{
 @pytest.mark.parametrize(
     ("formula", "mapping", "words"),
     [
-        ("out.o == in.r", {}, "names no fields"),
         ("out.o == in.r + 1", {"in.r": "data", "out.o": "data"}, "calculates with REAL"),
         ('out.o > 0 or in.s == "x"', {"in.s": "data", "out.o": "data"}, "is a string"),
         ("exists(x in REAL | x > in.r and x < out.o)", {"in.r": "data", "out.o": "data"}, "nothing fixes x"),

@@ -1,0 +1,260 @@
+"""Message definitions: what fields a message has, of which types. `.msg`, `.srv` and `.action` texts are read here.
+
+A type is called ``package/Type``, in ROS 1 and ROS 2 alike. Source of the form: http://wiki.ros.org/msg and
+https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+INTEGERS: Mapping[str, tuple[int, int]] = {
+    **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
+    **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
+}
+"""The whole numbers of the wire: the least and the greatest value of each."""
+FLOATS = ("float32", "float64")
+SCALARS = frozenset((*INTEGERS, *FLOATS, "bool", "string", "wstring", "time", "duration"))
+
+OTHER_NAMES = {"byte": "uint8", "char": "uint8", "float": "float32", "double": "float64", "octet": "uint8"}
+"""Names of built-in types that ROS or IDL also uses."""
+TIMES = {
+    "builtin_interfaces/Time": "time",
+    "builtin_interfaces/Duration": "duration",
+}
+HEADER = "std_msgs/Header"
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A value of one of `SCALARS`."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True, slots=True)
+class Nested:
+    """A message within a message."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True, slots=True)
+class Array:
+    """`length` items, or any number of them."""
+
+    item: Scalar | Nested
+    length: int | None = None
+
+    def __str__(self) -> str:
+        return f"{self.item}[{'' if self.length is None else self.length}]"
+
+
+Wire = Scalar | Nested | Array
+"""The type of a field, as a message carries it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    name: str
+    wire: Wire
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message type. `source` says where its definition was found."""
+
+    name: str
+    fields: tuple[Field, ...]
+    constants: tuple[tuple[str, str, str], ...] = ()
+    """(name, type, value as text)."""
+    source: str = field(default="", compare=False)
+
+    def field(self, name: str) -> Field | None:
+        return next((f for f in self.fields if f.name == name), None)
+
+
+class WrongDefinition(Exception):  # noqa: N818 - it is what was found wrong
+    """A text that defines no message; `line` counts from 1."""
+
+    def __init__(self, message: str, line: int) -> None:
+        super().__init__(message)
+        self.line = line
+
+
+class NoField(Exception):  # noqa: N818 - it is what was found wrong
+    """A path that leads nowhere in a definition; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Definitions:
+    """The message types that are known, by name."""
+
+    messages: Mapping[str, Message]
+
+    def get(self, name: str) -> Message | None:
+        """The type of that name, as ROS 1 or ROS 2 writes it, or a built-in's message (``float64``)."""
+        return self.messages.get(canonical(name))
+
+    def missing(self, message: Message) -> tuple[str, ...]:
+        """The types that a message is made of and that nothing defines."""
+        found: dict[str, None] = {}
+        stack, seen = [message], {message.name}
+        while stack:
+            for inner in stack.pop().fields:
+                wire = inner.wire.item if isinstance(inner.wire, Array) else inner.wire
+                if not isinstance(wire, Nested) or wire.name in seen:
+                    continue
+                seen.add(wire.name)
+                nested = self.messages.get(wire.name)
+                if nested is None:
+                    found[wire.name] = None
+                else:
+                    stack.append(nested)
+        return tuple(found)
+
+    def leaves(self, message: Message) -> Iterator[tuple[tuple[str, ...], Wire, Message]]:
+        """The fields that may carry a value, by their paths, in the message's order: numbers, words, times and arrays.
+        Headers are left out: they say when and where, never what. With each the message that it stands in."""
+        for inner in message.fields:
+            wire = inner.wire
+            if not isinstance(wire, Nested):
+                yield (inner.name,), wire, message
+            elif wire.name != HEADER and (nested := self.messages.get(wire.name)) is not None:
+                for path, leaf, holder in self.leaves(nested):
+                    yield (inner.name, *path), leaf, holder
+
+    def at(self, message: Message, path: tuple[str | int, ...]) -> tuple[Wire, Message]:
+        """The type of what a path leads to, and the message that it stands in. Raises NoField."""
+        wire: Wire = Nested(message.name)
+        holder = message
+        for depth, step in enumerate(path):
+            before = ".".join(map(str, path[:depth])) or holder.name
+            if isinstance(step, int):
+                if not isinstance(wire, Array):
+                    raise NoField(f"{before} is no array")
+                if wire.length is not None and not -wire.length <= step < wire.length:
+                    raise NoField(f"{before} has {wire.length} items")
+                wire = wire.item
+                continue
+            if not isinstance(wire, Nested) or (inner := self.messages.get(wire.name)) is None:
+                raise NoField(f"{before} ({wire}) has no fields")
+            holder = inner
+            found = inner.field(step)
+            if found is None:
+                names = ", ".join(f.name for f in inner.fields)
+                raise NoField(f"{inner.name} has no field {step!r}; it has {names or 'none'}")
+            wire = found.wire
+        return wire, holder
+
+
+def canonical(name: str) -> str:
+    """``package/msg/Type`` and ``package.msg.Type`` as ``package/Type``; a built-in as the message that carries it."""
+    parts = name.replace(".", "/").split("/")
+    if len(parts) == 1:
+        return f"std_msgs/{_STANDARD_NAMES.get(parts[0], parts[0])}"
+    return f"{parts[0]}/{'/'.join(p for p in parts[1:] if p not in ('msg', 'srv', 'action'))}"
+
+
+_STANDARD_NAMES = {
+    "bool": "Bool",
+    "string": "String",
+    "time": "Time",
+    "duration": "Duration",
+    "byte": "Byte",
+    "char": "Char",
+    "float32": "Float32",
+    "float64": "Float64",
+    **{name: name.capitalize().replace("Uint", "UInt") for name in INTEGERS},
+}
+
+STANDARD: Mapping[str, Message] = {
+    f"std_msgs/{name}": Message(
+        f"std_msgs/{name}", (Field("data", Scalar(OTHER_NAMES.get(base, base))),), source="std_msgs"
+    )
+    for base, name in _STANDARD_NAMES.items()
+}
+"""What carries one built-in value: the same in every ROS there has been."""
+
+_FIELD = re.compile(
+    r"(?P<type>[A-Za-z][A-Za-z0-9_/]*)(?:<=(?P<bound>\d+))?(?P<array>\[(?P<size>(?:<=)?\d*)\])?\s+"
+    r"(?P<name>[A-Za-z][A-Za-z0-9_]*)\s*(?P<rest>.*)\Z"
+)
+
+
+def parse_message(text: str, name: str, source: str = "") -> Message:
+    """One ``.msg`` text; `name` is ``package/Type``. Raises WrongDefinition."""
+    package = name.split("/")[0]
+    fields: dict[str, Field] = {}
+    constants: list[tuple[str, str, str]] = []
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = raw.split("#")[0].strip()
+        if not line:
+            continue
+        found = _FIELD.match(line)
+        if found is None:
+            raise WrongDefinition(f"{line[:60]!r} is neither `type name` nor `type NAME=value`", number)
+        scalar = _scalar(found["type"], package)
+        rest = found["rest"]
+        if rest.startswith("="):
+            if not isinstance(scalar, Scalar) or found["array"]:
+                raise WrongDefinition(f"the constant {found['name']} has no built-in type", number)
+            # a string's value is the rest of the line, with what looks like a comment (ROS 1)
+            value = raw.split("=", 1)[1].strip() if scalar.name == "string" else rest[1:].strip()
+            constants.append((found["name"], scalar.name, value.strip("\"'") if scalar.name == "string" else value))
+            continue
+        if found["name"] in fields:
+            raise WrongDefinition(f"the field {found['name']} is listed twice", number)
+        wire: Wire = scalar
+        if found["array"]:
+            size = found["size"]
+            wire = Array(scalar, int(size) if size.isdigit() else None)
+        fields[found["name"]] = Field(found["name"], wire)
+    return Message(name, tuple(fields.values()), tuple(constants), source)
+
+
+def _scalar(name: str, package: str) -> Scalar | Nested:
+    plain = OTHER_NAMES.get(name, name)
+    if plain in SCALARS:
+        return Scalar(plain)
+    if name == "Header":
+        return Nested(HEADER)
+    full = canonical(name) if "/" in name else f"{package}/{name}"
+    return Scalar(TIMES[full]) if full in TIMES else Nested(full)
+
+
+_PARTS = {"srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}
+
+
+def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Message, ...]:
+    """A ``.srv`` (``package/Type_Request``, ``…_Response``) or ``.action`` text (``…_Goal``, ``…_Result``,
+    ``…_Feedback``). Raises WrongDefinition."""
+    parts: list[list[str]] = [[]]
+    lines = text.splitlines()
+    for line in lines:
+        if line.strip() == "---":
+            parts.append([])
+        else:
+            parts[-1].append(line)
+    wanted = _PARTS[kind]
+    if len(parts) != len(wanted):
+        raise WrongDefinition(
+            f"a .{kind} has {len(wanted)} parts, set apart by ---; this has {len(parts)}", len(lines) or 1
+        )
+    found: list[Message] = []
+    before = 0
+    for part, suffix in zip(parts, wanted, strict=True):
+        try:
+            found.append(parse_message("\n".join(part), f"{name}_{suffix}", source))
+        except WrongDefinition as wrong:
+            raise WrongDefinition(str(wrong), wrong.line + before) from None
+        before += len(part) + 1
+    return tuple(found)

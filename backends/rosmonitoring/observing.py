@@ -1,0 +1,330 @@
+"""One entry of the plan's `mapping`, and the definition of the topic's messages, as a rule for a variable."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from avow.formulas.values import FunctionValue, Value
+from avow.language.contract import Port
+from avow.language.sorts import (
+    BOOL,
+    DataSort,
+    EnumSort,
+    FunctionSort,
+    IntegerSort,
+    NaturalSort,
+    OpaqueSort,
+    RealSort,
+    SequenceSort,
+    Sort,
+    StringSort,
+    TupleSort,
+    components,
+)
+from avow.language.terms import Variable
+from avow.ros.definitions import INTEGERS, SCALARS, Array, Definitions, Message, Nested, NoField, Scalar, Wire
+from avow.system.plan import Plan, Table
+from avow.system.schema import suggest
+
+from .fitting import SOURCES, Undecided, decide, parts_of, words
+from .reading import convert, shown
+from .rules import NOTHING_KNOWN, Argument, Choice, Fields, Gap, Hold, Lookup, Path, Rule, Take
+from .wires import MappingError, fits
+
+
+class Wrong(Exception):  # noqa: N818 - it is what was found wrong
+    """A fault of the plan; `path` leads from the variable's entry to its place."""
+
+    def __init__(self, message: str, *path: str | int, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.path = path
+        self.hint = hint
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """A port that a topic's messages carry."""
+
+    plan: Plan
+    port: Port
+    topic: str
+    message: Message | str
+    """Its definition; the type's name where nothing defines it."""
+    known: Definitions
+
+    @property
+    def variable(self) -> Variable:
+        return self.port.variable
+
+
+def kind_of(at: Observed) -> str:
+    """The type of the topic's messages, as far as it is said."""
+    return at.message if isinstance(at.message, str) else at.message.name
+
+
+def observe(at: Observed, entry: Mapping[str, Any]) -> Rule | str:
+    """The rule, or why the variable cannot be observed. Raises Wrong, and Undecided where fields have to be named."""
+    sort, variable = at.port.sort, at.variable
+    if isinstance(sort, OpaqueSort):
+        return f"{variable.qualified} is of an unspecified sort"
+    initial = literal(entry["initial"], sort, "initial") if entry.get("initial") is not None else None
+    if isinstance(sort, DataSort) and "constructor" in entry:
+        return _choice(at, sort, entry, initial)
+    named = "field" in entry or "fields" in entry
+    if isinstance(sort, DataSort) and not named:
+        constructors = ", ".join(c.name for c in sort.constructors)
+        return f"the plan does not say how a message names one of {constructors}"
+    result = sort.result if isinstance(sort, FunctionSort) and sort.result != BOOL else None
+    if result is not None and "elsewhere" not in entry:
+        return f"{variable.qualified} is a total function, and the plan does not say its value `elsewhere`"
+    elsewhere = entry.get("elsewhere")
+    default = None if elsewhere is None else literal(elsewhere, result or sort, "elsewhere")
+    hold = Hold(entry.get("hold", "latest"))
+    if hold is Hold.SEEN and initial is None and isinstance(sort, FunctionSort) and sort.result == BOOL:
+        initial = FunctionValue({}, False)
+    take = Take(entry["take"]) if "take" in entry else None
+    gaps = frozenset(gap for gap in Gap if entry.get(gap.value) == "none")
+    paths = _paths(entry, sort) if named else _decided(at, entry)
+    each = path(entry["each"]) if "each" in entry else None
+    wires, names = _wires(at, paths, each, entry, take)
+    rule = Fields(
+        variable, at.topic, paths, names, hold, each, default, initial, wires, at.known if wires else NOTHING_KNOWN,
+        take, gaps, kind_of(at),
+    )  # fmt: skip
+    _check_gaps(rule)
+    return rule
+
+
+def _paths(entry: Mapping[str, Any], sort: Sort) -> tuple[Path, ...]:
+    """The fields that the plan names. Raises Wrong."""
+    key = "field" if "field" in entry else "fields"
+    paths = tuple(map(path, [entry["field"]] if key == "field" else entry["fields"]))
+    wanted = len(parts_of(sort))
+    if isinstance(sort, TupleSort) and len(paths) > 1:  # a field for each part; one field holds them all
+        wanted = len(sort.items)
+    if len(paths) != wanted:
+        raise Wrong(f"{wanted} field{'s are' if wanted > 1 else ' is'} wanted, not {len(paths)}", "fields")
+    return paths
+
+
+def _decided(at: Observed, entry: Mapping[str, Any]) -> tuple[Path, ...]:
+    if isinstance(at.message, str):
+        about = f"nothing defines the messages {at.message}" if at.message else "the topic's type is not said"
+        raise Undecided(f"{about} of the topic {at.topic}, and the plan does not name the field", SOURCES)
+    if "each" in entry or "take" in entry:
+        raise Undecided("`each` and `take` want the fields named")
+    return decide(at.port.sort, at.message, at.known, entry.get("values", {}))
+
+
+def _wires(
+    at: Observed, paths: tuple[Path, ...], each: Path | None, entry: Mapping[str, Any], take: Take | None
+) -> tuple[tuple[Wire | None, ...], Mapping[str, str]]:
+    """What each field is, by the definition, and what the message's words and numbers mean. Raises Wrong."""
+    names: dict[str, str] = dict(entry.get("values", {}))
+    message = at.message
+    if isinstance(message, str):
+        return (), names
+    if missing := at.known.missing(message):
+        raise Undecided(f"nothing defines {', '.join(missing)}, of which {message.name} is made", SOURCES)
+    try:
+        if each is not None:
+            wire, _ = at.known.at(message, each)
+            if not isinstance(wire, Array) or not isinstance(wire.item, Nested):
+                raise Wrong(f"{shown(each)} is {wire}, and no array of messages", "each")
+            message = at.known.messages[wire.item.name]
+        found = [at.known.at(message, way) for way in paths]
+    except NoField as error:
+        raise Wrong(str(error), "field" if "field" in entry else "fields") from None
+    sort = at.port.sort
+    sorts = sort.items if isinstance(sort, TupleSort) and len(paths) > 1 else parts_of(sort)
+    for way, (wire, holder), part in zip(paths, found, sorts, strict=True):
+        if take is not None:
+            _check_take(way, wire, part, take, at.known)
+            continue
+        if not fits(part, wire, at.known) and not isinstance(part, DataSort):
+            raise Wrong(f"{shown(way) or 'the message'} is {wire}, which cannot be read as {_said(part)}", "field")
+        if isinstance(part, EnumSort) and isinstance(wire, Scalar):
+            names = words(part, wire, holder, entry.get("values", {}))
+            _check_words(way, wire, part, holder, names, bool(entry.get("values")))
+    return tuple(wire for wire, _ in found), names
+
+
+def _check_words(
+    way: Path, wire: Scalar, sort: EnumSort, holder: Message, names: Mapping[str, str], said: bool
+) -> None:
+    if wire.name not in INTEGERS:
+        return
+    for number in names:
+        if not number.removeprefix("-").isdigit():
+            constants = [name for name, kind, _ in holder.constants if kind == wire.name]
+            hint = suggest(number, constants)
+            raise Wrong(f"{number!r} is neither a number nor a constant of {holder.name}", "values", number, hint=hint)
+    left = [member for member in sort.members if member not in names.values()]
+    if left and not said:
+        raise Wrong(
+            f"{shown(way)} is {wire}, and nothing says which number is {', '.join(left)}",
+            "values",
+            hint=f"values: {{0: {left[0]}, …}}, or the names of {holder.name}'s constants",
+        )
+
+
+def _check_take(way: Path, wire: Wire, sort: Sort, take: Take, known: Definitions) -> None:
+    if not isinstance(wire, Array):
+        raise Wrong(f"{shown(way)} is {wire}, and no array", "take")
+    if take is Take.COUNT:
+        if not isinstance(sort, RealSort | IntegerSort | NaturalSort):
+            raise Wrong(f"`count` is a number, and not {_said(sort)}", "take")
+    elif not isinstance(sort, RealSort | IntegerSort | NaturalSort) or not fits(sort, wire.item, known):
+        raise Wrong(f"the items of {shown(way)} are {wire.item}, which cannot be read as {_said(sort)}", "take")
+
+
+def _check_gaps(rule: Fields) -> None:
+    """*No reading* has to be something that the contract can speak of. Raises Wrong."""
+    sort = rule.variable.sort
+    if (rule.gaps or rule.take in (Take.MIN, Take.MAX)) and rule.wires == ():
+        key = "take" if rule.take else next(iter(rule.gaps)).value
+        raise Wrong("the message's type has to be known for that", key, hint=SOURCES)
+    silent = rule.gaps and not isinstance(sort, FunctionSort) and rule.elsewhere is None and rule.take is not Take.COUNT
+    if silent:
+        key = sorted(rule.gaps)[0].value
+        message = f"{_said(sort)} has a value always: `none` wants a relation, or the value `elsewhere`"
+        raise Wrong(message, key)
+    if isinstance(sort, SequenceSort) and rule.gaps:
+        raise Wrong("a sequence has no place for a missing reading", sorted(rule.gaps)[0].value)
+
+
+def _said(sort: Sort) -> str:
+    match sort:
+        case EnumSort(members=members):
+            return f"one of {{{', '.join(members)}}}"
+        case DataSort(name=name):
+            return name
+        case SequenceSort(item=item):
+            return f"<{_said(item)}>"
+        case TupleSort(items=items):
+            return f"({', '.join(map(_said, items))})"
+        case _:  # BOOL, REAL, …
+            return type(sort).__name__.removesuffix("Sort").upper()
+
+
+def _choice(at: Observed, sort: DataSort, entry: Mapping[str, Any], initial: Value | None) -> Rule:
+    known = {c.name: c for c in sort.constructors}
+    given = {**{k: v for k, v in entry.items() if k in known}, **entry.get("arguments", {})}
+    for key in (*entry, *entry.get("arguments", {})):
+        if key not in known and key not in _CHOICE_KEYS:
+            raise Wrong(f"{sort.name} has no constructor {key!r}", key, hint=suggest(key, known))
+    arguments: dict[str, tuple[Argument, ...]] = {}
+    wires: dict[Path, Wire] = {}
+    tag = path(entry["constructor"])
+    _field(at, tag, sort, "constructor")
+    for name, constructor in known.items():
+        places = given.get(name, [] if not constructor.parameters else None)
+        if places is None:
+            continue
+        if not isinstance(places, list) or len(places) != len(constructor.parameters):
+            raise Wrong(f"{name} takes {len(constructor.parameters)} arguments", name)
+        arguments[name] = tuple(_argument(at.plan, place, name, k) for k, place in enumerate(places))
+        for k, (place, part) in enumerate(zip(arguments[name], constructor.parameters, strict=True)):
+            if not isinstance(place, Lookup) and (wire := _field(at, place, part, name, k)) is not None:
+                wires[place] = wire
+    names = entry.get("values", {})
+    for word in names.values():
+        if word not in known:
+            raise Wrong(f"{sort.name} has no constructor {word!r}", "values", hint=suggest(word, known))
+    return Choice(at.variable, at.topic, tag, arguments, names, initial, wires, kind_of(at))
+
+
+def _field(at: Observed, way: Path, sort: Sort, *place: str | int) -> Wire | None:
+    """The type of a field that is to be read as a value of the sort. Raises Wrong."""
+    if isinstance(at.message, str):
+        return None
+    try:
+        wire, _ = at.known.at(at.message, way)
+    except NoField as error:
+        raise Wrong(str(error), *place) from None
+    if isinstance(sort, DataSort):  # a word or a number that names the constructor
+        usable = isinstance(wire, Scalar) and (wire.name in INTEGERS or wire.name in ("string", "wstring"))
+    else:
+        usable = fits(sort, wire, at.known)
+    if not usable:
+        raise Wrong(f"{shown(way)} is {wire}, which cannot be read as {_said(sort)}", *place)
+    return wire
+
+
+def _argument(plan: Plan, place: Any, constructor: str, at: int) -> Argument:
+    if isinstance(place, str):
+        return path(place)
+    if not isinstance(place, Mapping) or not {"table", "key", "by", "column"} <= place.keys():
+        raise Wrong("a field, or {table, key, by, column}, is wanted", constructor, at)
+    table = table_of(plan, place["table"], constructor, at)
+    for column in (place["by"], place["column"]):
+        if column not in table.columns:
+            hint = suggest(column, table.columns)
+            raise Wrong(f"the table {table.name} has no column {column!r}", constructor, at, hint=hint)
+    rows = dict(zip(table.column(place["by"]), table.column(place["column"]), strict=True))
+    held = place.get("as")
+    if held is not None and held not in SCALARS:
+        raise Wrong(f"{held!r} is no type of ROS", constructor, at, hint=suggest(str(held), sorted(SCALARS)))
+    return Lookup(table.name, path(place["key"]), rows, Scalar(held) if held is not None else None)
+
+
+def table_of(plan: Plan, name: str, *place: str | int) -> Table:
+    """A table of the scenario. Raises Wrong."""
+    scenario = plan.scenario
+    known = [t.name for t in scenario.tables] if scenario else []
+    if scenario is None or name not in known:
+        raise Wrong(f"the scenario has no table {name!r}", *place, hint=suggest(name, known))
+    return scenario.table(name)
+
+
+_CHOICE_KEYS = frozenset(("topic", "type", "constructor", "arguments", "values", "initial"))
+_FIELD_KEYS = (
+    "topic", "type", "field", "fields", "each", "hold", "values", "elsewhere", "initial", "take", "nan", "inf",
+)  # fmt: skip
+_FUNCTION_KEYS = ("each", "hold")
+
+
+def check_keys(entry: Mapping[str, Any], sort: Sort) -> None:
+    """Refuses what would be passed over in silence. Raises Wrong."""
+    for key in entry:
+        if key not in _FIELD_KEYS:
+            raise Wrong(f"there is no {key!r} here", key, hint=suggest(key, _FIELD_KEYS))
+        if key in _FUNCTION_KEYS and not isinstance(sort, FunctionSort):
+            raise Wrong(f"{key!r} is for functions and relations", key)
+    if "field" in entry and "fields" in entry:
+        raise Wrong("either 'field' or 'fields'", "fields")
+    gaps = entry.keys() & {"nan", "inf"}
+    if "elsewhere" in entry and not isinstance(sort, FunctionSort) and not gaps and "take" not in entry:
+        raise Wrong("'elsewhere' is for functions, and for what may have no reading (`nan: none`, `take`)", "elsewhere")
+    parts = tuple(components(sort))
+    members = sorted({m for part in parts if isinstance(part, EnumSort) for m in part.members})
+    if members and not any(isinstance(part, StringSort | DataSort) for part in parts):
+        for name, word in entry.get("values", {}).items():
+            if word not in members:
+                hint = suggest(word, members)
+                raise Wrong(f"{word!r} is no element that could be meant", "values", name, hint=hint)
+
+
+_INDEX = re.compile(r"\[(-?\d{1,6})\]")
+
+
+def path(text: str) -> Path:
+    """``pose.x`` and ``ranges[0]`` as paths; an empty text is the whole message (or list item)."""
+    found: list[str | int] = []
+    for step in text.split(".") if text else ():
+        indices = _INDEX.findall(step)
+        name = _INDEX.sub("", step)
+        found += [name] if name or not indices else []
+        found += map(int, indices)
+    return tuple(found)
+
+
+def literal(raw: Any, sort: Sort, key: str) -> Value:
+    """A value that the plan gives. Raises Wrong."""
+    try:
+        return convert(raw, sort, {})
+    except MappingError as error:
+        raise Wrong(str(error), key) from None
