@@ -153,24 +153,6 @@ PLAN_CODES: dict[str, Code] = {
             "The ROS graph and the plan's account of it do not agree.",
             remedy="Correct the plan's `model`, or record the graph again.",
         ),
-        Code(
-            "ROS101",
-            "no message definition",
-            "A file under `messages` defines no message type.",
-            remedy="Write it as ROS does: a `type name` a line; parts of services and actions are set apart by `---`.",
-        ),
-        Code(
-            "ROS102",
-            "defined twice",
-            "Two files under `messages` define one message type, each otherwise.",
-            remedy="Name one of the two.",
-        ),
-        Code(
-            "ROS103",
-            "message types not installed",
-            "The common message types of a distribution, and .idl files, are read by a package that is not installed.",
-            remedy="`pip install 'avow[bags]'`, or name the .msg files under `messages`.",
-        ),
     )
 }
 """Every code of plans and systems, in order."""

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 
 from avow.base.codes import CODES, Code, declare, register
 from avow.base.codes_plan import PLAN_CODES
+from avow.base.codes_ros import ROS_CODES
 
 WORKSPACE_CODES = register(
     declare(
@@ -219,7 +220,9 @@ WORKSPACE_CODES = register(
     declare("CLI010", "language server not installed", "`avow lsp` needs pygls.", "`pip install 'avow[lsp]'`."),
 )
 
-CORE_CODES: Mapping[str, Code] = register(*CODES.values(), *PLAN_CODES.values(), *WORKSPACE_CODES.values())
+CORE_CODES: Mapping[str, Code] = register(
+    *CODES.values(), *PLAN_CODES.values(), *ROS_CODES.values(), *WORKSPACE_CODES.values()
+)
 """Every code of the core: a backend's own are in its attribute `codes`."""
 
 

@@ -17,6 +17,7 @@ _ROOMS = (
     "tuning/sizes.py",
     "base",
     "isolation",
+    "ros",
     "language",
     "system",
     "formulas",
@@ -45,7 +46,7 @@ def backend_digest(tool: Backend) -> str:
 
 TRUSTED = {
     "parser and type checker (avow/language)": ("language",),
-    "dataflow graph and plan (avow/system)": ("system",),
+    "dataflow graph and plan (avow/system, avow/ros)": ("system", "ros"),
     "wiring of a system as the kernel is told it (avow/calculus)": ("calculus/wiring.py", "calculus/variables.py"),
     "kernel (avow/kernel)": ("kernel",),
     "theorem (kernel.dfy)": ("calculus/proofs/kernel.dfy",),

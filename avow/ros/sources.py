@@ -24,6 +24,7 @@ from avow.ros.definitions import (
     parse_message,
     parse_parts,
 )
+from avow.tuning.sizes import DEFINITION_BYTES
 
 SUFFIXES = (".msg", ".srv", ".action", ".idl")
 
@@ -35,9 +36,6 @@ DISTRIBUTIONS = {
     },
 }
 """ROS distributions whose common packages are known, as plans name them; and as `rosbags` does."""
-
-MAX_BYTES = 2_000_000
-"""Of one definition file."""
 
 
 def message_files(paths: Iterable[Path]) -> tuple[Path, ...]:
@@ -121,8 +119,8 @@ def _of_file(path: Path, faults: list[Diagnostic]) -> tuple[Message, ...]:
     name = f"{package}/{path.stem}"
     kind = path.suffix.removeprefix(".")
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise ValueError(f"it has more than {MAX_BYTES} bytes")
+        if path.stat().st_size > DEFINITION_BYTES:
+            raise ValueError(f"it has more than {DEFINITION_BYTES} bytes")
         text = path.read_text(encoding="utf-8")
         if kind == "idl":
             return _of_idl(text, str(path))

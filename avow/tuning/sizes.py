@@ -58,6 +58,9 @@ SYSTEMS_WITHIN = 30
 ROS_GRAPH_BYTES = 5_000_000
 """A larger file is no graph of one robot."""
 
+DEFINITION_BYTES = 2_000_000
+"""Of one file that defines message types: the largest package's definitions together are a tenth of it."""
+
 STATEMENT_WORDS = 14
 """Words of a supposition's `says`: so many fit in a line of a report's first screen."""
 

@@ -13,10 +13,8 @@ from avow.language.sorts import BOOL, EnumSort, FunctionSort, Sort
 from avow.ros.definitions import INTEGERS, Definitions, Message, Nested, Scalar, Wire
 
 from .rules import Path
+from .tuning import CANDIDATES_SHOWN
 from .wires import fits
-
-SHOWN = 12
-"""Candidates that an error names."""
 
 
 class Undecided(Exception):  # noqa: N818 - it is what was found wrong
@@ -51,11 +49,11 @@ def decide(sort: Sort, message: Message, known: Definitions, values: Mapping[str
         if any(row[at] for row in fitting)
     ]
     if ways == 0:
-        every = ", ".join(f"{'.'.join(map(str, p))} : {w}" for p, w, _ in places[:SHOWN] if p) or "none"
+        every = ", ".join(f"{'.'.join(map(str, p))} : {w}" for p, w, _ in places[:CANDIDATES_SHOWN] if p) or "none"
         raise Undecided(f"no field of {message.name} can be read as it; its fields are {every}")
-    more = f" and {len(told) - SHOWN} more" if len(told) > SHOWN else ""
+    more = f" and {len(told) - CANDIDATES_SHOWN} more" if len(told) > CANDIDATES_SHOWN else ""
     what = "field" if len(wanted) == 1 else f"{len(wanted)} fields"
-    raise Undecided(f"which {what} of {message.name} it means is not said: {', '.join(told[:SHOWN])}{more}")
+    raise Undecided(f"which {what} of {message.name} it means is not said: {', '.join(told[:CANDIDATES_SHOWN])}{more}")
 
 
 SOURCES = "name its file under `messages:`, or the distribution: `ros: {distro: noetic}`"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from decimal import Decimal
 from fractions import Fraction
 
 from avow.formulas.flattening import flattened
@@ -195,16 +196,27 @@ def comment(text: str) -> str:
 
 
 def number(value: Fraction) -> str:
-    """A non-negative decimal. Raises NotRml where no finite decimal is the number."""
+    """A non-negative decimal: of at most fifteen digits, or the shortest that means a number which a double holds.
+    Raises NotRml where there is none."""
     if value.denominator == 1:
         return str(value.numerator)
     digits = 0
     while (value * 10**digits).denominator != 1:
         digits += 1
         if digits > 15:
-            raise NotRml(f"{value} is no decimal of fifteen digits")
+            return _of_double(value)
     whole = f"{(value * 10**digits).numerator:0{digits + 1}d}"
     return f"{whole[:-digits]}.{whole[-digits:]}"
+
+
+def _of_double(value: Fraction) -> str:
+    try:
+        near = float(value)
+    except OverflowError:
+        near = 0.0
+    if Fraction(near) != value:
+        raise NotRml(f"{value} is no decimal of fifteen digits")
+    return f"{Decimal(repr(near)):f}"
 
 
 def numeric(value: Numeric) -> str:

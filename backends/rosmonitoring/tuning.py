@@ -20,3 +20,6 @@ TRACKED_TUPLES = 48
 
 EVENT_CHARACTERS = 8_000_000
 """Characters of one event; a longer line is not an event."""
+
+CANDIDATES_SHOWN = 12
+"""Fields that an error names as what may be meant; a message with more is looked up anyway."""

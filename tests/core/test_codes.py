@@ -13,6 +13,7 @@ import pytest
 from avow.backend_kit.registry import backend, names
 from avow.base.codes import CODES, Code, declare, register
 from avow.base.codes_plan import PLAN_CODES
+from avow.base.codes_ros import ROS_CODES
 from avow.base.codes_workspace import CORE_CODES, WORKSPACE_CODES, page_rows
 
 ROOT = Path(__file__).parents[2]
@@ -140,6 +141,7 @@ def test_the_page_is_in_step() -> None:
     sections = {
         "The language": CODES,
         "Plans and systems": PLAN_CODES,
+        "ROS": ROS_CODES,
         "Backends, policies, requirements, ledgers, commands": WORKSPACE_CODES,
         **{f"The backend {name}": codes for name, codes in backends().items()},
     }

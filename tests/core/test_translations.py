@@ -79,7 +79,7 @@ def test_a_wrong_mapping_stays_an_error(place: Path, capsys: pytest.CaptureFixtu
 def test_rml_without_a_plan_says_what_it_lacks(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, text, said = run("translate --to rml s/system.rcl", capsys)
     assert (code, text) == (2, "")
-    assert "the plan names no fields for" in said
+    assert "nothing defines the messages p/A" in said
 
 
 def test_files_go_into_a_folder(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
