@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from avow.assurance.answers import How
 from avow.assurance.model import Case, Currency, EvidenceView, ObligationView, RequirementView
 from avow.assurance.naming import requirement_claim, short
+from avow.base.verdict import said
 from avow.evidence.ledger import Entry
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, effective, roll_up
@@ -79,19 +80,19 @@ class Change:
     def text(self) -> str:
         match self.kind:
             case "added":
-                return f"new: {self.subject} ({self.after})"
+                return f"new: {self.subject} ({said(self.after)})"
             case "removed":
-                return f"gone: {self.subject} (was {self.before})"
+                return f"gone: {self.subject} (was {said(self.before)})"
             case "meaning":
-                return f"changed meaning: {self.subject} ({self.before} → {self.after})"
+                return f"changed meaning: {self.subject} ({said(self.before)} → {said(self.after)})"
             case "supposition":
                 return f"supposed now: {self.after}" + (f" (was: {self.before})" if self.before else "")
             case "gate":
                 return f"gate {self.subject}: {self.before} → {self.after}"
             case "rerun":
-                return f"asked again: {self.subject} (still {self.after})"
+                return f"asked again: {self.subject} (still {said(self.after)})"
             case _:  # worse, better, gate: all are told the same way
-                return f"{self.kind}: {self.subject}: {self.before} → {self.after}"
+                return f"{self.kind}: {self.subject}: {said(self.before)} → {said(self.after)}"
 
 
 def of_case(case: Case) -> Snapshot:

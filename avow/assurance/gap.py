@@ -10,7 +10,7 @@ from datetime import date
 
 from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, EvidenceView, MethodInfo, ObligationView, Suggestion
-from avow.assurance.policy import Demand, Policy, costs
+from avow.assurance.policy import Demand, Policy, asked_of, costs
 from avow.base.graphs import components
 from avow.base.verdict import Link, Verdict
 from avow.evidence.obligation import Kind
@@ -41,7 +41,7 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
     if kept == [] and dropped:
         return f"nothing counts{because}"
     if status not in demand.one_of:
-        return f"{status}, but {' or '.join(demand.one_of)} is asked{because}"
+        return f"{status.word}, but {asked_of(demand)} is asked{because}"
     speaking = [item for item in kept if weigh(item).support is not None]
     number = independent(speaking) if demand.independent else len({item.method for item in speaking})
     if number < demand.methods:
@@ -142,7 +142,7 @@ def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) ->
         if strangers:
             return f"{', '.join(sorted(strangers))} may not review under this policy"
     elif demand.links and support is not Status.JUSTIFIED and item.link not in demand.links:
-        return f"the link is {item.link}, {' or '.join(demand.links)} is asked"
+        return f"the tie is {item.link}, {' or '.join(demand.links)} is asked"
     if demand.unconditional and item.hypotheses:
         return "rests on hypotheses"
     kept = item.details.get(ISOLATION)
@@ -282,9 +282,7 @@ def _new_method(view: ObligationView, demand: Demand, used: Mapping[str, str], f
         (info for info in facts.methods if fits(info)), key=lambda i: (dear(i), -link_rank(i.link), i.name)
     )
     if not fitting:
-        wanted = (
-            "a second, independent method" if strong_enough else f"a method that can give {' or '.join(demand.one_of)}"
-        )
+        wanted = "a second, independent method" if strong_enough else f"a method that can give {asked_of(demand)}"
         return Suggestion(f"add {wanted} under nodes.{node}.methods", cost=60)
     best = fitting[0]
     install = "" if best.available else f" (first: {best.install})"

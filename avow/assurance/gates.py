@@ -36,7 +36,7 @@ def gates(
         _nothing_wrong(facts, obligations, excused),
         _kind(facts, obligations, excused, Kind.WELL_FORMED, "Contracts parse and are well-typed", (Status.PROVED,)),
         _kind(facts, obligations, excused, Kind.SANITY, "Contracts are worth verifying", facts.policy.sanity),
-        _kind(facts, obligations, excused, Kind.COMPOSITION, "The composition is justified", facts.policy.composition),
+        _kind(facts, obligations, excused, Kind.COMPOSITION, "The composition holds", facts.policy.composition),
         *_guarantees(facts, obligations, excused),
         _derivations(facts, derivations, views, excused),
         _requirements(facts, requirements, derivations, views, excused),
@@ -141,14 +141,18 @@ def _kind(
         excused,
         lambda view: _short_of(view.status, good),
         _holding([v.status.supports for v in of_kind], asked=bool(good)),
-        " or ".join(good),
+        _in_words(good),
         idle=not good,
     )
 
 
+def _in_words(good: Sequence[Status]) -> str:
+    return " or ".join(status.word for status in good)
+
+
 def _short_of(status: Status, good: Sequence[Status]) -> str:
-    """``justified, but proved or checked is asked``; of what supports nothing the bare word."""
-    return f"{status}, but {' or '.join(good)} is asked" if status.supports else status.value
+    """``supposed, but proved or checked is asked``; of what supports nothing the bare word."""
+    return f"{status.word}, but {_in_words(good)} is asked" if status.supports else status.value
 
 
 def _guarantees(facts: Facts, obligations: Sequence[ObligationView], excused: set[str]) -> Iterable[Gate]:
@@ -186,7 +190,7 @@ def _derivations(
     bad = [d for d in failing if not _all_excused(d.below, excused)]
     names = tuple(derivation_claim(d.derivation.name) for d in bad)
     let_off = tuple(derivation_claim(d.derivation.name) for d in failing if d not in bad)
-    reason = "; ".join(f"{d.derivation.name} is {d.status}: {_because(d.below)}" for d in bad[:5])
+    reason = "; ".join(f"{d.derivation.name} is {d.status.word}: {_because(d.below)}" for d in bad[:5])
     return Gate(
         "derivations",
         "Derivations rest on what is shown",
@@ -223,7 +227,7 @@ def _requirements(
         found.append(Suggestion("read the sentence again and confirm it: `avow check` prints what to write", cost=5))
     if any(not (r.formula or r.temporal or r.below or causes[r.id] or r.suspect) for r in bad):
         found.append(
-            Suggestion("state the requirement as a `formula` or a `temporal` one: prose is linked by a person", cost=20)
+            Suggestion("state the requirement as a `formula` or a `temporal` one: prose is argued by a person", cost=20)
         )
     suggestions = {s.text: s for s in sorted(found, key=lambda s: (s.cost, s.text))}
     return Gate(
@@ -243,7 +247,7 @@ def _requirements(
 def _standing(requirement: RequirementView, good: Sequence[Status]) -> str:
     """Why it does not count; one that would hold by its own evidence may still rest on what has failed or expired."""
     if requirement.suspect:
-        return "suspect: its sentence, or what is linked to it, was changed since it was confirmed"
+        return "suspect: its sentence, or what supports it, was changed since it was confirmed"
     if requirement.status not in good:
         return _short_of(requirement.status, good)
     return "open" if requirement.failing else "open: a supposition has expired"

@@ -24,7 +24,7 @@ from typing import Any
 import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.verdict import Link
+from avow.base.verdict import Link, said, unsaid
 from avow.evidence.status import Status
 from avow.isolation.level import Isolation
 from avow.system.plan import Located
@@ -58,18 +58,18 @@ class Demand:
         """The demand as a phrase: ``proved or checked, by 2 independent methods``."""
         if not self.one_of:
             return "nothing is asked"
-        parts = [" or ".join(self.one_of)]
+        parts = [asked_of(self)]
         if self.methods > 1:
             parts.append(f"by {self.methods} {'independent ' if self.independent else ''}methods")
         if self.links:
-            parts.append(f"link {' or '.join(self.links)}")
+            parts.append(f"tie {' or '.join(self.links)}")
         if self.unconditional:
             parts.append("without hypotheses")
         if self.isolation is not Isolation.NONE:
             parts.append(f"isolation {self.isolation} or better")
         if self.reviewers > 1:
             parts.append(f"reviews by {self.reviewers} persons")
-        parts += [f"{word} not older than {days} days" for word, days in self.max_age_days]
+        parts += [f"{said(word)} not older than {days} days" for word, days in self.max_age_days]
         return ", ".join(parts)
 
 
@@ -148,7 +148,7 @@ def _profile(name: str, span: Span) -> tuple[Policy, list[Diagnostic]]:
 
 
 _KEYS = ("profile", "guarantees", "sanity", "composition", "requirements", "reviewers", "certified", "proved")
-_DEMAND_KEYS = ("one_of", "methods", "independent", "max_age_days", "reviewers", "links", "unconditional", "isolation")
+_DEMAND_KEYS = ("one_of", "methods", "independent", "max_age_days", "reviewers", "ties", "unconditional", "isolation")
 
 
 def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
@@ -218,7 +218,7 @@ class _PolicyReader:
             independent=self.flag(data.get("independent", False), (*path, "independent")),
             max_age_days=self.ages(data.get("max_age_days", {}), (*path, "max_age_days")),
             reviewers=self.count(data.get("reviewers", 1), (*path, "reviewers")),
-            links=tuple(Link(word) for word in self.words(data.get("links", ()), tuple(Link), (*path, "links"))),
+            links=tuple(Link(word) for word in self.words(data.get("ties", ()), tuple(Link), (*path, "ties"))),
             unconditional=self.flag(data.get("unconditional", False), (*path, "unconditional")),
             isolation=self.level(data.get("isolation", Isolation.NONE.value), (*path, "isolation")),
         )
@@ -232,7 +232,8 @@ class _PolicyReader:
         return Isolation.NONE
 
     def statuses(self, data: object, path: tuple[str | int, ...]) -> tuple[Status, ...]:
-        return tuple(Status(word) for word in self.words(data, _GIVEN, path))
+        given = [unsaid(w) if isinstance(w, str) else w for w in data] if isinstance(data, list) else data
+        return tuple(Status(word) for word in self.words(given, _GIVEN, path))
 
     def words(self, data: object, allowed: tuple[str, ...], path: tuple[str | int, ...]) -> tuple[str, ...]:
         good = []
@@ -265,8 +266,13 @@ class _PolicyReader:
     def ages(self, data: object, path: tuple[str | int, ...]) -> tuple[tuple[str, int], ...]:
         if not isinstance(data, Mapping):
             return (("all", self.count(data, path)),)
-        self.faults += _unknown(data, (*_GIVEN, "all"), self.located, path)
-        return tuple((str(word), self.count(days, (*path, word))) for word, days in data.items())
+        self.faults += _unknown(data, (*_GIVEN, *map(said, _GIVEN), "all"), self.located, path)
+        return tuple((unsaid(str(word)), self.count(days, (*path, word))) for word, days in data.items())
+
+
+def asked_of(demand: Demand) -> str:
+    """The statuses that are good enough, in words."""
+    return " or ".join(status.word for status in demand.one_of)
 
 
 def _unknown(
@@ -312,7 +318,7 @@ def _data() -> tuple[dict[str, Policy], dict[str, int], tuple[Technique, ...]]:
         raise Rejected(*faults)
     levels = ("sil1", "sil2", "sil3", "sil4")
     table = tuple(
-        Technique(row["name"], row["verdict"], tuple((level, row[level]) for level in levels))
+        Technique(row["name"], unsaid(row["verdict"]), tuple((level, row[level]) for level in levels))
         for row in data["techniques"]
     )
-    return policies, data["cost"], table
+    return policies, {unsaid(word): cost for word, cost in data["cost"].items()}, table

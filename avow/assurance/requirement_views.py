@@ -79,6 +79,10 @@ def held(
     )
 
 
+def _word(status: Status | None) -> str:
+    return status.word if status else "not shown"
+
+
 def _answer(
     requirement: Requirement,
     standing: Standing,
@@ -90,24 +94,22 @@ def _answer(
         return f"Not shown: {', '.join(unknown)} under supported_by stands for nothing."
     if requirement.suspect and requirement.confirmed:
         said = f"{requirement.confirmed.who} confirmed it on {requirement.confirmed.on}"
-        return (
-            f"Suspect: the sentence, or what is linked to it, was changed since {said}; nobody has confirmed it anew."
-        )
+        return f"Suspect: the sentence, or what supports it, was changed since {said}; nobody has confirmed it anew."
     if standing.circle:
         return f"Refused: it would support itself ({' → '.join(short(name) for name in standing.circle)})."
     if standing.status.supports:
         name, status = standing.weakest
-        how = "Linked in prose" if standing.status is Status.LINKED else standing.status.value.capitalize()
+        how = standing.status.word.capitalize()
         hypotheses = len(standing.hypotheses)
         rest = f", on {hypotheses} hypothes{'is' if hypotheses == 1 else 'es'}" if hypotheses else ""
-        return f"{how}{rest}; the weakest claim under it is {short(name)}, {status}."
+        return f"{how}{rest}; the weakest claim under it is {short(name)}, {status.word}."
     if standing.direct and standing.status is not Status.MISSING:
         own = [name for name in own_obligations if name in standing.below]
         where = ", ".join(short(name) for name in own or standing.below) or "its evidence"
         return f"{standing.status.value.capitalize()}: see {where}."
     if standing.below:
         below = worst_first(standing.below, statuses)
-        causes = [f"{short(name)} is {statuses.get(name, 'not shown')}" for name in below]
+        causes = [f"{short(name)} is {_word(statuses.get(name))}" for name in below]
         more = f" and {len(causes) - 3} more" if len(causes) > 3 else ""
         return f"Not shown: {', '.join(causes[:3])}{more}."
     if not standing.direct:

@@ -46,7 +46,7 @@ def open_items(
     items += [item for view in views if view.status.supports for item in _given_up(view)]
     for d in derivations:
         if not d.status.supports and not d.below:
-            text = f"the derivation is {d.status}: a premise or a side condition stands for nothing"
+            text = f"the derivation is {d.status.word}: a premise or a side condition stands for nothing"
             items.append(OpenItem(d.status.value, derivation_claim(d.derivation.name), text))
     for r in requirements:
         if not r.status.supports and not r.below:
@@ -94,7 +94,7 @@ def _failed_attempts(views: Sequence[ObligationView]) -> Iterable[OpenItem]:
                     told.setdefault((record.method, record.summary), []).append(view)
     for (method, summary), failed in told.items():
         first, *others = failed
-        stands = f"{short(first.id)} is {first.status} by other evidence alone"
+        stands = f"{short(first.id)} is {first.status.word} by other evidence alone"
         same = f"; the same for {_list([short(view.id) for view in others])}" if others else ""
         title = f"{method} gives no answer: {first.obligation.claim}"
         yield OpenItem(Status.ERROR.value, first.id, f"{method}: {summary} ({stands}{same})", title=title)

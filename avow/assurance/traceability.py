@@ -124,7 +124,7 @@ def _rows(view: ObligationView, requirement: str, derivation: str, remark: str =
         yield replace(start, remark=f"{remark}; {missing}" if remark else missing)
     for item in view.counting:
         record = item.entry.evidence
-        tool = f"{record.tool} {record.tool_version}".strip()
+        tool = record.tool_told
         yield replace(
             start,
             method=record.method,

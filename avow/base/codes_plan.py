@@ -105,7 +105,7 @@ PLAN_CODES: dict[str, Code] = {
         Code(
             "PLAN129",
             "suspect",
-            "A requirement's sentence, or what is linked to it, is another than the named person confirmed.",
+            "A requirement's sentence, or what supports it, is another than the named person confirmed.",
             severity=Severity.WARNING,
             remedy="Read both; if they still go together, write your name, the day and the digest under `confirmed`.",
         ),

@@ -54,6 +54,19 @@ _SUPPORTING = frozenset(
 )
 
 
+_SAID = {"monitored": "observed", "justified": "supposed", "linked": "argued"}
+
+
+def said(value: str) -> str:
+    """What people read for a verdict or status of that value: their word where they have another, else itself."""
+    return _SAID.get(value, value)
+
+
+def unsaid(word: str) -> str:
+    """The value that people call so, as a plan may have it; any other word as it stands."""
+    return next((value for value, other in _SAID.items() if other == word), word)
+
+
 class Link(StrEnum):
     """How the thing that was verified hangs together with the contract's formula."""
 

@@ -285,8 +285,8 @@ def _start_tasks(composition: Composition) -> Iterator[Task]:
 
 
 def _joint_tasks(composition: Composition) -> Iterator[Task]:
-    """Guarantees linked at one instant in a circle may leave each other no room; where values flow one way only, each
-    node answers to what it gets, and its own realizability (a sanity obligation) is enough."""
+    """Guarantees that feed one another at one instant may leave each other no room. Where values flow one way only,
+    each node answers to what it gets, and its own realizability (a sanity obligation) is enough."""
     frame = composition.frame
     arcs = [(e.source.node, e.target.node) for e in frame.graph.edges if not e.delayed]
     for group in circles(frame):

@@ -89,7 +89,7 @@ def audit(
 def _redirected(ledger: Ledger) -> Iterable[Discrepancy]:
     for path in (ledger.path, ledger.path.with_name(ledger.path.name + ".head")):
         if path.is_symlink():
-            yield Discrepancy(Fault.REDIRECTED, path.name, f"{path.name} is a link that leads elsewhere")
+            yield Discrepancy(Fault.REDIRECTED, path.name, f"{path.name} is a symbolic link that leads elsewhere")
 
 
 def _misplaced(
@@ -215,7 +215,7 @@ def _files(
 def _compare(root: Path, path: str, mark: str, entry: Entry, *, made: bool, serious: bool) -> Iterable[Discrepancy]:
     behind = f"{path} (record {entry.number + 1}: {entry.evidence.obligation}, {entry.evidence.method})"
     if made and ((root / path).is_symlink() or ".." in Path(path).parts):
-        text = f"{behind} is a link, or a path, that leads elsewhere"
+        text = f"{behind} is a symbolic link, or a path, that leads elsewhere"
         yield Discrepancy(Fault.REDIRECTED, path, text, serious)
     try:
         now = digest_file(root / path)

@@ -65,3 +65,9 @@ class Evidence:
     """Id of the run that produced it."""
     rests_on: tuple[Hypothesis, ...] = field(default=(), metadata=LATER)
     """What the answer rests on: claims of the case, and suppositions that a person has to accept."""
+
+    @property
+    def tool_told(self) -> str:
+        """The tool and its version, the name once."""
+        named = self.tool_version.casefold().startswith(self.tool.casefold())
+        return self.tool_version if named and self.tool else f"{self.tool} {self.tool_version}".strip()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import reduce
 
-from avow.base.verdict import Hypothesis, Link, Verdict
+from avow.base.verdict import Hypothesis, Link, Verdict, said
 from avow.evidence.record import Evidence
 
 
@@ -52,8 +52,13 @@ class Status(StrEnum):
         return self in _SUPPORTING
 
     @property
+    def word(self) -> str:
+        """What people read for it. JSON, SARIF and ledger have the value."""
+        return said(self.value)
+
+    @property
     def rank(self) -> int:
-        """Greater is better; a total order, used for "weakest link" and for nothing that needs commensurability."""
+        """Greater is better; a total order, used to find the weakest and for nothing that needs commensurability."""
         return _RANK[self]
 
 

@@ -72,7 +72,7 @@ def _suite(case: Case, node: str, views: Iterable[ObligationView]) -> tuple[str,
     rows = []
     counts = [0, 0, 0, 0]
     for view in views:
-        message = f"{view.standing}: {headline(view)}"
+        message = f"{view.standing.word}: {headline(view)}"
         text = escape(clean(message))
         inside = ""
         if tone(view.status) == "bad" and not view.handled and not view.advice:
@@ -165,7 +165,7 @@ def _result(view: ObligationView, case: Case, rules: list[str]) -> dict[str, Any
         "ruleIndex": rules.index(_rule(view)),
         "kind": kind,
         "level": level,
-        "message": {"text": f"{short(o.id)} is {view.standing}. {o.claim.rstrip('.')}. {headline(view)}"},
+        "message": {"text": f"{short(o.id)} is {view.standing.word}. {o.claim.rstrip('.')}. {headline(view)}"},
         "partialFingerprints": {"avowObligation/v1": digest(o.id)},
         "properties": {
             "obligation": o.id,

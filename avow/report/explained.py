@@ -48,7 +48,7 @@ def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
             yield f"weakening {w.key}: {w.count} {w.words}", [w.why, some([short(claim) for claim in w.claims], 20)]
     for d in case.derivations:
         if d.derivation.name == name:
-            lines = [*d.derivation.text.splitlines(), f"{d.status}: {d.derivation.conclusion}"]
+            lines = [*d.derivation.text.splitlines(), f"{d.status.word}: {d.derivation.conclusion}"]
             yield f"derivation {name} (rule {d.derivation.rule})", lines
     for word, meaning in WORDS:
         if name.casefold() in word.split(", "):

@@ -113,7 +113,7 @@ def _latex_source(source: SourceView) -> Iterable[str]:
 
 def _latex_derivation(view: DerivationView) -> Iterable[str]:
     d = view.derivation
-    yield rf"\subsection*{{{latex(d.name)} (rule {latex(d.rule)}): {view.status}}}"
+    yield rf"\subsection*{{{latex(d.name)} (rule {latex(d.rule)}): {view.status.word}}}"
     if d.latex and not _DANGEROUS.search(d.latex):
         start = d.latex.find(r"\[")  # the calculus sets its displays itself, under a title that stands above already
         shown = d.latex[start + 2 :].replace(r"\[", r"\fitted{").replace(r"\]", "}") if start >= 0 else d.latex + "}"
@@ -128,12 +128,12 @@ def _latex_derivation(view: DerivationView) -> Iterable[str]:
 
 def _latex_obligation(view: ObligationView) -> Iterable[str]:
     o = view.obligation
-    yield rf"\paragraph{{{latex(short(o.id))}}} \textit{{{view.standing}}}. {latex(o.claim.rstrip('.'))}."
+    yield rf"\paragraph{{{latex(short(o.id))}}} \textit{{{view.standing.word}}}. {latex(o.claim.rstrip('.'))}."
     if o.formula:
         yield r"\begin{quote}" + latex(o.formula) + r"\end{quote}"
     for item in view.counting:
         record = item.entry.evidence
-        tool = latex(f"{record.tool} {record.tool_version}")
+        tool = latex(record.tool_told)
         yield rf"{latex(record.method)}: \textit{{{worth(record)}}}, {tool}. {latex(record.summary)}."
         if record.counterexample:
             yield rf"Counterexample: {latex(record.counterexample.text())}."

@@ -113,14 +113,14 @@ def _guarantees(case: Case) -> list[ObligationView]:
 
 def _row(view: ObligationView) -> tuple[str, ...]:
     methods = ", ".join(_answer(item.entry.evidence) for item in view.counting)
-    return _md(short(view.id)), _md(view.criticality), view.standing.value, _md(methods), _md(where(view))
+    return _md(short(view.id)), _md(view.criticality), view.standing.word, _md(methods), _md(where(view))
 
 
 def _answer(evidence: Evidence) -> str:
     status = worth(evidence)
     bound = bound_text(evidence.bound) if status in _BOUNDED else ""
     remarks = "; ".join(part for part in (bound, mutation(evidence)) if part)
-    return f"{evidence.method} {status}{f' ({remarks})' if remarks else ''}"
+    return f"{evidence.method} {status.word}{f' ({remarks})' if remarks else ''}"
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -19,6 +19,7 @@ from avow.assurance.naming import short
 from avow.assurance.policy import techniques
 from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
+from avow.base.verdict import said
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.report import example, source, wording
@@ -48,6 +49,7 @@ def environment() -> Environment:
         "MARKS": wording.MARKS,
         "MEANINGS": wording.MEANINGS,
         "Status": Status,
+        "said": said,
         "anchor": wording.anchor,
         "ticks": _ticks,
         "banner_tone": wording.banner_tone,
@@ -230,7 +232,7 @@ def _brief(view: ObligationView, places: Mapping[str, tuple[int, int]]) -> Marku
     """An obligation in a few lines; built by hand, as there may be ten thousand of them."""
     o = view.obligation
     status = view.standing
-    chip = f'<span class="chip {wording.tone(status)}">{wording.MARKS[status]} {status}</span>'
+    chip = f'<span class="chip {wording.tone(status)}">{wording.MARKS[status]} {status.word}</span>'
     methods = escape(" ".join(method for method, _ in view.planned))
     marks = f'data-node="{escape(o.node)}" data-kind="{o.kind}" data-status="{status}" data-methods="{methods}"'
     said = "".join(

@@ -213,7 +213,7 @@ def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
             {
                 "status": _chip(worth(e)),
                 "method": e.method,
-                "tool": f"{e.tool} {e.tool_version}",
+                "tool": e.tool_told,
                 "summary": f"{e.summary}. How it was measured: {protocol(e)}" if protocol(e) else e.summary,
                 "bound": bound_text(e.bound),
                 "counter": _counter(case, e.counterexample) if e.counterexample else None,
@@ -254,7 +254,7 @@ def _row(view: ObligationView) -> dict[str, Any]:
 
 
 def _chip(status: Status) -> dict[str, str]:
-    return {"word": str(status), "tone": tone(status)}
+    return {"word": status.word, "tone": tone(status)}
 
 
 def _word(kind: str) -> dict[str, str]:

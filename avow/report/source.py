@@ -96,7 +96,7 @@ def _mark(view: ObligationView) -> str:
 def _note(claim: str, status: Status, name: str) -> str:
     return (
         f'<a class="came {tone(status)}" href="#{anchor(claim)}"><span aria-hidden="true">{MARKS[status]}</span> '
-        f"{escape(clean(name))} {status}</a>"
+        f"{escape(clean(name))} {status.word}</a>"
     )
 
 

@@ -48,7 +48,7 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
     for item in view.counting:
         e = item.entry.evidence
         vacuous = " (vacuous: supports nothing)" if e.vacuous else ""
-        tool = escape(f"({e.tool} {e.tool_version}, link {e.link})")
+        tool = escape(f"({e.tool_told}, tie {e.link})")
         out.print(f"\n{_status(Status(e.verdict))}{vacuous} by [bold]{escape(e.method)}[/] {tool}")
         out.print(f"  {escape(e.summary)}")
         if mutation(e):
@@ -74,7 +74,7 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
         out.print(f"\n[dim]{len(old)} older record(s), which no longer count:[/]")
         for item in old[:10]:
             e = item.entry.evidence
-            out.print(f"[dim]  {e.started[:16]} {escape(e.method)}: {e.verdict} ({item.currency})[/]")
+            out.print(f"[dim]  {e.started[:16]} {escape(e.method)}: {Status(e.verdict).word} ({item.currency})[/]")
     if view.suggestion:
         out.print(f"\nnext: {escape(view.suggestion.text)}")
     needed_by = [r.id for r in case.requirements if view.id in r.rests_on or view.id in r.below]
@@ -96,7 +96,7 @@ def _show_changes(example: Counterexample, out: Console) -> None:
 
 
 def _status(status: Status) -> str:
-    return f"[{_COLOURS[tone(status)]}]{MARKS[status]} {status}[/]"
+    return f"[{_COLOURS[tone(status)]}]{MARKS[status]} {status.word}[/]"
 
 
 def _show_counterexample(example: Counterexample, out: Console) -> None:

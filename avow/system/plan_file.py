@@ -15,6 +15,7 @@ from pathlib import Path
 from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import digest
+from avow.base.verdict import unsaid
 from avow.system.paths import inside
 from avow.system.plan import (
     ComposeGoal,
@@ -206,7 +207,9 @@ class _PlanReader:
         found = tuple(sorted(self.path.resolve().parent.glob("*.rcl")))
         for path in found:
             if inside(self.path.parent, path.name) is None:
-                self.fault("PLAN108", f"{path.name} is a link that leads out of the system's folder", self.root.span)
+                self.fault(
+                    "PLAN108", f"{path.name} is a symbolic link that leads out of the system's folder", self.root.span
+                )
         if not found:
             self.fault("PLAN107", f"no contract: there is no .rcl file in {self.path.parent}", self.root.span)
         return found
@@ -426,7 +429,7 @@ class _PlanReader:
                 self.fault("PLAN110", message, matched.span, hint="leave  matched  out")
             yield Finding(
                 texts["obligation"],
-                texts["verdict"],
+                unsaid(texts["verdict"]),
                 texts.get("reason"),
                 texts.get("who"),
                 texts.get("date"),

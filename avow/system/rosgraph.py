@@ -124,7 +124,7 @@ def _flows(
         if one and other and one != other and (one, other) not in linked:
             found.setdefault((one, other), {})[topic] = None
     for (one, other), topics in found.items():
-        message = f"ROS sends {', '.join(topics)} from {one} to {other}; the contracts link nothing there"
+        message = f"ROS sends {', '.join(topics)} from {one} to {other}; the contracts connect nothing there"
         yield Diagnostic("PLAN127", message, span, Severity.NOTE)
 
 

@@ -34,13 +34,13 @@ def without_words(system: System) -> Iterator[Diagnostic]:
 
 
 def unconfirmed(system: System) -> Iterator[Diagnostic]:
-    """A warning for each requirement whose sentence, or what is linked to it, is another than a person confirmed."""
+    """A warning for each requirement whose sentence, or what supports it, is another than a person confirmed."""
     for requirement in system.plan.requirements:
         confirmed = requirement.confirmed
         if confirmed is not None and requirement.suspect:
             yield Diagnostic(
                 "PLAN129",
-                f"requirements.{requirement.id}: {confirmed.who} confirmed another sentence, or other links, on "
+                f"requirements.{requirement.id}: {confirmed.who} confirmed another sentence, or other support, on "
                 f"{confirmed.on}: it counts for nothing until a person has read it again",
                 requirement.span,
                 Severity.WARNING,

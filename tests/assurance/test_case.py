@@ -130,12 +130,12 @@ def requirement_case(*supports: str, formula: str | None = None, own: Verdict | 
     return case(subject, obligations, records, **others)
 
 
-def test_prose_is_linked() -> None:
+def test_prose_is_argued() -> None:
     for supports in (("n.g",), ("n",), ("n/guarantee/g",)):
         r = requirement_case(*supports).requirements[0]
         assert r.status is Status.LINKED
         assert r.weakest_status is Status.PROVED
-        assert "Linked in prose" in r.answer
+        assert "Argued" in r.answer
 
 
 def test_a_formula_is_as_good_as_its_own_evidence_and_what_it_rests_on() -> None:

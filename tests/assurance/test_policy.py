@@ -55,7 +55,7 @@ def test_rules_replace_what_they_name() -> None:
         located(
             {
                 "profile": "sil2",
-                "guarantees": {"low": {"one_of": ["justified"], "max_age_days": 30, "links": ["generated"]}},
+                "guarantees": {"low": {"one_of": ["justified"], "max_age_days": 30, "ties": ["generated"]}},
                 "reviewers": ["A. Person"],
                 "certified": True,
                 "sanity": [],
@@ -163,9 +163,9 @@ def test_age_reviewers_links_hypotheses() -> None:
     assert "reviewed by 1" in gate(the_case(low, replace(REVIEW, details={"reviewer": "A", "date": "2026-11-01"})))[1]
     named = {**low, "reviewers": ["A"]}
     assert "B may not review" in gate(the_case(named, REVIEW))[1]
-    strict = {"guarantees": {"high": {"one_of": ["proved"], "links": ["generated"], "unconditional": True}}}
+    strict = {"guarantees": {"high": {"one_of": ["proved"], "ties": ["generated"], "unconditional": True}}}
     assert gate(the_case(strict, PROOF))[0]
-    assert "link is mapped" in gate(the_case(strict, replace(PROOF, link=Link.MAPPED)))[1]
+    assert "tie is mapped" in gate(the_case(strict, replace(PROOF, link=Link.MAPPED)))[1]
     assert "rests on hypotheses" in gate(the_case(strict, replace(PROOF, hypotheses=("h",))))[1]
     assert TODAY.isoformat() == "2026-11-21"
 
@@ -272,7 +272,7 @@ def test_what_is_weaker_than_asked_is_told_with_what_is_asked() -> None:
     found = environment()
     passed, reason = gate(found, "composition")
     assert not passed
-    assert "justified, but proved or checked or reviewed is asked" in reason
+    assert "supposed, but proved or checked or reviewed is asked" in reason
     told = next(g for g in found.gates if g.id == "composition").suggestions
     assert "accepted" in told[0].text
 
@@ -290,7 +290,7 @@ def test_a_risk_that_is_taken_excuses_what_rests_on_it_until_its_day() -> None:
     assert gate(environment(risk(), policy=strict, formal=True), "requirements")[0]
     passed, reason = gate(environment(risk(expires="2026-11-20"), policy=strict, formal=True), "requirements")
     assert not passed
-    assert "R is justified, but proved is asked: it rests on what is supposed of n.r" in reason
+    assert "R is supposed, but proved is asked: it rests on what is supposed of n.r" in reason
     assert environment(risk(expires="2026-11-21")).exit_code == environment(risk()).exit_code  # its last day counts
 
 
@@ -298,7 +298,7 @@ def test_a_requirement_in_prose_is_excused_by_no_risk() -> None:
     found = environment(risk(), policy={"requirements": ["proved"], "composition": ["proved"]})
     passed, reason = gate(found, "requirements")
     assert not passed
-    assert "linked, but proved is asked" in reason
+    assert "argued, but proved is asked" in reason
     assert "formula" in next(g for g in found.gates if g.id == "requirements").suggestions[0].text
 
 

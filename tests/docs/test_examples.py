@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -51,6 +52,39 @@ def test_the_examples_verify(tmp_path: Path) -> None:
     for name, verdict in VERDICTS.items():
         case = json.loads((place / "reports" / name / "report.json").read_text())
         assert case["answers"]["verdict"] == verdict, name
+
+
+@pytest.mark.parametrize("template", some(["plain", "ros1", "ros2"], 1))
+def test_what_init_makes_has_nothing_to_remark(template: str, tmp_path: Path) -> None:
+    assert avow("init", "robot", "--template", template, cwd=tmp_path).returncode == 0
+    place = tmp_path / "robot"
+    found = avow("check", "thermostat", "--json", cwd=place)
+    assert (found.returncode, json.loads(found.stdout)["diagnostics"]) == (0, [])
+    assert avow("simulate", "thermostat", cwd=place).returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("template", ["plain", "ros1", "ros2"])
+def test_what_init_makes_verifies_and_warns_of_nothing(template: str, tmp_path: Path) -> None:
+    assert avow("init", "robot", "--template", template, cwd=tmp_path).returncode == 0
+    done = avow("verify", cwd=tmp_path / "robot")
+    assert (done.returncode, "warning" in done.stdout + done.stderr) == (0, False), done.stdout + done.stderr
+    (command,) = tool_commands(tmp_path / "robot", "thermometer", "hypothesis")
+    environment = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    again = subprocess.run(
+        ["bash", "-c", command], cwd=tmp_path / "robot", env=environment, capture_output=True, text=True, check=False
+    )
+    assert again.returncode == 0, again.stdout + again.stderr
+
+
+def tool_commands(place: Path, node: str, method: str) -> set[str]:
+    """The commands that the report prints for asking a tool again."""
+    from avow.assurance.codec import read_case
+    from avow.report.wording import tool_command
+
+    case = read_case(place / "reports/thermostat")
+    entries = [item.entry for view in case.obligations if view.obligation.node == node for item in view.evidence]
+    return {tool_command(entry.evidence) for entry in entries if entry.evidence.method == method} - {""}
 
 
 @pytest.mark.parametrize("template", some(["ros1", "ros2"], 1))

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
-from assurance.sample import evidence, guarantee, rover_case
+from assurance.sample import case as make_case
+from assurance.sample import evidence, guarantee, node_plan, rover_case, system
 
 from avow.assurance.model import Gate
 from avow.assurance.naming import short
-from avow.base.verdict import Verdict
+from avow.base.verdict import Verdict, said, unsaid
+from avow.evidence.status import Status
+from avow.report import formats
 from avow.report.markdown import render_markdown
 from avow.report.page import render_page
 from avow.report.wording import bound_text, gate_line, tool_command
 from avow.sanity.claims import Property
+from avow.system.plan import Requirement
 
 
 @pytest.mark.parametrize("about", Property)
@@ -64,3 +69,35 @@ def test_a_gates_reason_is_a_line_and_all_of_it_a_fold() -> None:
     assert page.count("<summary>all of it</summary>") == 1
     assert page.count(parts[0]) == 2
     assert page.count(parts[4]) == 1
+
+
+GONE = {"link", "linked", "linking", "justified", "monitored"}
+"""Words of the ledger, or of several senses, that people do not read: tie, argued, connection, supposed, observed."""
+_TAGS = re.compile(r"<(style|script)\b.*?</\1>|<[^>]*>", re.DOTALL)
+
+
+def _read(text: str) -> set[str]:
+    return set(re.findall(r"[a-z]+", _TAGS.sub(" ", text).lower()))
+
+
+def test_one_word_for_one_meaning_in_every_format_for_people() -> None:
+    record = evidence(guarantee("agent", "g1"), Verdict.MONITORED, "rosmonitoring", summary="it held")
+    lasting = evidence(guarantee("agent", "g2", line=12), Verdict.JUSTIFIED, "review", summary="it is so")
+    subject = system(
+        {"agent": ["g1", "g2"]},
+        plans=[node_plan("agent", "low", "rosmonitoring", "review")],
+        requirements=[Requirement("R", "It is safe.", None, None, ("agent.g1", "agent.g2"))],
+    )
+    found = make_case(subject, [guarantee("agent", "g1"), guarantee("agent", "g2", line=12)], [record, lasting])
+    made = {name: text for name, text in formats(found) if isinstance(text, str)}
+    for name in ("index.html", "claims.html", "traceability.html", "report.md", "report.tex", "gsn.svg", "comment.md"):
+        assert _read(made[name]) & GONE == set(), name
+    assert {"observed", "supposed"} <= _read(made["claims.html"])
+    assert '"monitored"' in made["report.json"]
+    assert "monitored" in made["report.sarif"]
+    assert GONE & set(map(said, Status)) == set()
+
+
+def test_a_plan_may_use_either_word() -> None:
+    for status in Status:
+        assert unsaid(status.word) == status.value

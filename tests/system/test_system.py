@@ -363,7 +363,7 @@ def test_every_ros_node_is_accounted_for(tmp_path: Path) -> None:
     )
     told = account(unlinked, dataflow(unlinked))
     assert told is not None
-    assert "ROS sends /chatter from a to b; the contracts link nothing there" in [f.message for f in told.findings]
+    assert "ROS sends /chatter from a to b; the contracts connect nothing there" in [f.message for f in told.findings]
 
 
 def test_a_sentence_that_was_changed_is_a_warning_with_what_to_write(tmp_path: Path) -> None:
