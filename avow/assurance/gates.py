@@ -238,7 +238,7 @@ def _requirements(
         tuple(requirement_claim(r.id) for r in bad),
         tuple(suggestions.values())[:10],
         let_off,
-        " or ".join(good),
+        _in_words(good),
         bool(bad) and all(_tool_only(r.below, views) for r in bad),
         idle=not good,
     )

@@ -9,6 +9,7 @@ from avow.assurance.answers import How
 from avow.assurance.model import Case
 from avow.assurance.modules import node_modules, requirement_modules
 from avow.assurance.relied import word
+from avow.base.verdict import said
 from avow.evidence.status import weigh
 from avow.report.layout import yaml_text
 
@@ -21,7 +22,7 @@ def render_gsn(case: Case) -> str:
     suppositions = {s.number: f"A{at}" for at, s in enumerate(case.suppositions, 1)}
     goal_of_node = {node.name: f"G{at}" for at, node in enumerate(case.nodes, 1 + len(case.requirements) + 1)}
     whole: _Elements = {
-        "module": {"name": case.system, "brief": case.title},
+        "module": {"name": f"system-{case.system}", "brief": case.title},
         "G1": {"text": f"{case.title}\n{case.answers.verdict}"},
         "C1": {"text": f"Policy {case.policy.name}: {case.policy.title}"},
     }
@@ -33,7 +34,7 @@ def render_gsn(case: Case) -> str:
         r = module.requirement
         goal, strategy = f"G{at}", counter.next("S")
         names[r.id] = goal
-        elements: _Elements = {"module": {"name": r.id, "brief": r.text or r.formula or r.temporal}}
+        elements: _Elements = {"module": {"name": f"requirement-{r.id}", "brief": r.text or r.formula or r.temporal}}
         elements[goal] = {"text": f"{r.id} [{r.how}]\n{r.text or r.formula or r.temporal}"}
         away = [goal_of_node[node] for node, _, _ in module.away]
         if away:
@@ -70,7 +71,7 @@ def render_gsn(case: Case) -> str:
                 record = item.entry.evidence
                 solution = counter.next("Sn")
                 solutions.append(solution)
-                elements[solution] = {"text": f"{record.method} [{weigh(record).status}]\n{record.summary}"}
+                elements[solution] = {"text": f"{record.method} [{weigh(record).status.word}]\n{record.summary}"}
             elements[one] |= {"supportedBy": solutions} if solutions else {"undeveloped": True}
         if below:
             elements[goal]["supportedBy"] = below
@@ -103,7 +104,7 @@ def cae_rows(case: Case) -> Iterator[tuple[int, str, str, str, str]]:
             yield depth, name, "see", text, ""
             continue
         seen.add(name)
-        notes = [str(body["verdict"])] if "verdict" in body else []
+        notes = [said(str(body["verdict"]))] if "verdict" in body else []
         notes += [f"side-warrant: {body['side_warrant']}"] if "side_warrant" in body else []
         notes += [f"supposes {', '.join(body['supposes'])}"] if "supposes" in body else []
         notes += ["open"] if "open" in body else []
@@ -114,25 +115,26 @@ def cae_rows(case: Case) -> Iterator[tuple[int, str, str, str, str]]:
 
 def cae(case: Case) -> _Elements:
     """Claims, arguments, evidence. What a tool derived is a decomposition, what a person says a substitution, a record
-    is incorporated as evidence; conditions of the composition are the side-warrant."""
+    is incorporated as evidence; conditions of the composition are the side-warrant. An element's name begins with its
+    kind and with what it is of, so that no requirement and no node can be called as another element."""
     found: _Elements = {
         "claim-system": {"text": case.title, "verdict": case.answers.verdict, "argued_by": ["argument-system"]},
         "argument-system": {
             "kind": "decomposition",
             "supports": ["claim-system"],
-            "from": [f"claim-{r.id}" for r in case.requirements],
+            "from": [f"claim-requirement-{r.id}" for r in case.requirements],
         },
     }
     for module in requirement_modules(case):
         r = module.requirement
-        found[f"claim-{r.id}"] = {
+        found[f"claim-requirement-{r.id}"] = {
             "text": r.text or r.formula or r.temporal,
             "verdict": r.how.value,
-            "argued_by": [f"argument-{r.id}"],
+            "argued_by": [f"argument-requirement-{r.id}"],
         }
-        found[f"argument-{r.id}"] = {
+        found[f"argument-requirement-{r.id}"] = {
             "kind": "decomposition" if (r.formula or r.temporal) else "substitution",
-            "supports": [f"claim-{r.id}"],
+            "supports": [f"claim-requirement-{r.id}"],
             "from": [f"claim-node-{node}" for node, _, _ in module.away],
             **({"side_warrant": module.conditions} if module.conditions else {}),
             **({"supposes": list(module.supposes)} if module.supposes else {}),
@@ -140,7 +142,7 @@ def cae(case: Case) -> _Elements:
         }
     for node in node_modules(case):
         name = node.node.name
-        clauses = [f"claim-{name}.{view.obligation.name}" for view in node.guarantees]
+        clauses = [f"claim-guarantee-{name}.{view.obligation.name}" for view in node.guarantees]
         found[f"claim-node-{name}"] = {
             "text": f"What {node.node.title} guarantees",
             "argued_by": [f"argument-node-{name}"],
@@ -153,7 +155,7 @@ def cae(case: Case) -> _Elements:
         for view, claim in zip(node.guarantees, clauses, strict=True):
             records = [f"evidence-{name}.{view.obligation.name}-{item.entry.evidence.method}" for item in view.counting]
             records = list(dict.fromkeys(records))
-            argument = f"argument-{name}.{view.obligation.name}"
+            argument = f"argument-guarantee-{name}.{view.obligation.name}"
             found[claim] = {
                 "text": view.obligation.claim,
                 "verdict": view.standing.value,

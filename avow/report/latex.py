@@ -134,7 +134,7 @@ def _latex_obligation(view: ObligationView) -> Iterable[str]:
     for item in view.counting:
         record = item.entry.evidence
         tool = latex(record.tool_told)
-        yield rf"{latex(record.method)}: \textit{{{worth(record)}}}, {tool}. {latex(record.summary)}."
+        yield rf"{latex(record.method)}: \textit{{{worth(record).word}}}, {tool}. {latex(record.summary)}."
         if record.counterexample:
             yield rf"Counterexample: {latex(record.counterexample.text())}."
     if not view.counting:

@@ -24,8 +24,9 @@ from avow.assurance.trend import trend
 from avow.base.verdict import Verdict
 from avow.evidence.status import Status
 from avow.report import LeftOut, formats, render_all, wording, write_index
-from avow.report.gsn import cae_rows
+from avow.report.gsn import cae, cae_rows, render_gsn
 from avow.report.latex import latex
+from avow.system.plan import Requirement
 from report.hostile import hostile_case
 from report.test_page import Page
 
@@ -142,11 +143,13 @@ def test_cae_is_the_same_tree(rendered: tuple[Case, dict[str, Any]]) -> None:
             assert other in every, (name, other)
     for r in found.requirements:
         argued = not (r.formula or r.temporal)
-        assert every[wording.clean(f"argument-{r.id}")]["kind"] == ("substitution" if argued else "decomposition")
+        assert every[wording.clean(f"argument-requirement-{r.id}")]["kind"] == (
+            "substitution" if argued else "decomposition"
+        )
     read = list(cae_rows(found))
     told = [name for _, name, kind, _, _ in read if kind != "see"]
     assert len(set(told)) == len(told)
-    assert {f"claim-{r.id}" for r in found.requirements} <= set(told)
+    assert {f"claim-requirement-{r.id}" for r in found.requirements} <= set(told)
     assert all(name in told[:at] for at, (_, name, kind, _, _) in enumerate(read) if kind == "see")
     assert {name for name in every if name.startswith("evidence-")} >= {
         wording.clean(name) for name in told if name.startswith("evidence-")
@@ -155,6 +158,19 @@ def test_cae_is_the_same_tree(rendered: tuple[Case, dict[str, Any]]) -> None:
     assert sum(name.startswith(wording.anchor("cae:")) for name in ids) == sum(n.startswith("claim-") for n in told)
     records = sum(name.startswith("evidence-") for name in every)
     assert records <= sum(len(v.counting) for v in found.obligations)
+
+
+def test_no_requirement_and_no_node_is_called_as_another_element() -> None:
+    odd = ("system", "node-agent", "agent", "agent.g1", "guarantee-agent.g1", "requirement-system", "node-node")
+    names = {"agent": ["g1"], "node": ["g1"], "system": ["g1"], "guarantee": ["g1"]}
+    asked = [Requirement(name, "It is safe.", None, None, ("agent.g1",)) for name in odd]
+    claims = [guarantee(node, "g1") for node in names]
+    found = case(system(names, requirements=asked), claims, [evidence(claim) for claim in claims])
+    every = cae(found)
+    assert sum(name.startswith("claim-") for name in every) == 1 + len(odd) + len(names) + len(claims)
+    assert sum(name.startswith("evidence-") for name in every) == len(claims)
+    modules = [m["module"]["name"] for m in yaml.safe_load_all(render_gsn(found))]
+    assert len(set(modules)) == 1 + len(odd) + len(names)
 
 
 def test_svg_is_xml_without_scripts(rendered: tuple[Case, dict[str, Any]]) -> None:
