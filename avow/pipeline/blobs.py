@@ -25,12 +25,13 @@ from avow.calculus import providers
 from avow.formulas import finite, values
 from avow.language import contract, sorts, terms
 from avow.pipeline import slices
+from avow.ros import names
 from avow.sanity import claims
 from avow.system import plan
 
 _NOWHERE = Span("", 1, 1, 1, 1)
 _MODULES: tuple[ModuleType, ...] = (
-    *(sorts, terms, contract, plan, values, finite, claims, providers, slices),
+    *(sorts, terms, contract, plan, names, values, finite, claims, providers, slices),
     *(diagnostics, verdict),
 )
 
