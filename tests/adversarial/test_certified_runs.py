@@ -158,4 +158,4 @@ def test_nothing_proved_is_false(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_nothing_proved_is_false_at_length(tmp_path: Path) -> None:
-    assert sum(judged(tmp_path, seed) for seed in range(100, 900)) > 60
+    assert sum(judged(tmp_path, seed) for seed in range(100, 280)) > 12

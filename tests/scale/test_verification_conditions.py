@@ -34,7 +34,7 @@ def test_a_condition_takes_three_checks_and_little_more_than_z3_alone(
 ) -> None:
     """Beside Z3's time: the program's parsing, the triples, two questions whether a triple says anything at all."""
     monkeypatch.setattr("avow.backends.hoare.backend.contradicted", lambda *_, **__: False)  # cvc5 is another time
-    found = jobs(programs(tmp_path, 5, 20))
+    found = jobs(programs(tmp_path, 3, 12))
     backend = method_backend(found[0].system, found[0].method)
     asked: list[object] = []
     check = z3.Solver.check
