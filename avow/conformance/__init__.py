@@ -8,15 +8,28 @@ A test file names the backend and seeds it with contracts whose verdicts are kno
         backend = BACKEND
         seeded = (Seeded("heads", CONTRACT, {"heads": True}, {"same": Verdict.TESTED}), …)
 
-`avow.conformance.suite` says what is tested, `avow.conformance.seeded` what a seeded case is. See
-`docs/adding-a-backend.md`.
+`avow.conformance.suite` says what is tested, `avow.conformance.seeded` what a seeded case is, and
+`avow.conformance.plugin` is what pytest loads. See `docs/adding-a-backend.md`.
 """
 
-import pytest
+from __future__ import annotations
 
-pytest.register_assert_rewrite("avow.conformance.seeded", "avow.conformance.suite")
+from typing import TYPE_CHECKING, Any
 
-from avow.conformance.seeded import Seeded  # noqa: E402 - pytest is to see their assertions first
-from avow.conformance.suite import Conformance  # noqa: E402
+if TYPE_CHECKING:
+    from avow.conformance.seeded import Seeded
+    from avow.conformance.suite import Conformance
 
 __all__ = ["Conformance", "Seeded"]
+
+
+def __getattr__(name: str) -> Any:
+    """The two names are imported when asked for: pytest loads the plugin in every environment that has Avow."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import pytest
+
+    pytest.register_assert_rewrite("avow.conformance.seeded", "avow.conformance.suite")
+    from avow.conformance import seeded, suite
+
+    return {"Conformance": suite.Conformance, "Seeded": seeded.Seeded}[name]

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
+import tomllib
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
 
+PLUGIN = "avow.conformance.plugin"
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 
 def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    if not any(point.value == PLUGIN for point in entry_points(group="pytest11")):  # a checkout installed before it was
+        command += ["-p", PLUGIN]
+    environment = {**os.environ, "PYTHONPATH": str(folder / "site")}
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
 
 
 @pytest.fixture
@@ -59,3 +68,25 @@ def test_a_seeded_fault_is_told(place: Path, old: str, new: str, told: str) -> N
     path.write_text(text.replace(old, new))
     done = run(place, "-k", told)
     assert done.returncode == 1, done.stdout[-3000:]
+
+
+def test_pytest_loads_the_plugin() -> None:
+    declared = tomllib.loads((EXAMPLES.parents[1] / "pyproject.toml").read_text())["project"]["entry-points"]
+    assert declared["pytest11"] == {"avow": PLUGIN}
+
+
+def test_by_name_in_an_environment_where_it_is_installed(place: Path) -> None:
+    """The backend as an installed package of its own; its suite, and no other test, runs."""
+    made = place / "site" / "rows_backend-1.dist-info"
+    made.mkdir(parents=True)
+    (place / "rows_backend.py").rename(place / "site" / "rows_backend.py")
+    (made / "METADATA").write_text("Metadata-Version: 2.1\nName: rows-backend\nVersion: 1\n")
+    (made / "entry_points.txt").write_text("[avow.backends]\nrows = rows_backend:BACKEND\n")
+    (place / "test_other.py").write_text("def test_nothing():\n    assert False\n")
+    done = run(place, "--avow-backend", "rows", "-v")
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert "avow backend rows: rows_backend:BACKEND" in done.stdout
+    assert "1 deselected" in done.stdout
+    done = run(place, "--avow-backend", "coin")
+    assert done.returncode == 4
+    assert "no conformance suite here for coin" in done.stderr + done.stdout
