@@ -22,12 +22,12 @@ from .printer import program_text
 def files(setup: Setup, properties: Sequence[Property]) -> Mapping[str, str]:
     """What AJPF needs of one agent, under names that it can read whatever the plan's are called."""
     made = {
-        "agent.gwen": program_text(setup.program),
+        "agent.gwen": program_text(setup.programs),
         "agent.psl": psl_file(properties),
         "agent.ail": ail_file(setup, "agent.gwen"),
     }
     if not setup.environment_class:
-        made[f"{CLASS}.java"] = environment_class(setup.environment)
+        made[f"{CLASS}.java"] = environment_class(setup.environment, agents=len(setup.programs))
     return made
 
 

@@ -8,6 +8,7 @@ from itertools import count
 
 from .builtin import compare
 from .syntax import (
+    SENT,
     Bindings,
     Condition,
     Goal,
@@ -84,7 +85,8 @@ class Reasoner:
         """Every way to bind the term's variables so that it is believed or derivable. Raises TooDeep."""
         goal = apply(term, bindings)
         if isinstance(goal, Var):  # anything that is believed
-            for belief in sorted((b for group in beliefs.index.values() for b in group), key=plain):
+            known = (b for group in beliefs.index.values() for b in group if b.functor != SENT)
+            for belief in sorted(known, key=plain):
                 yield {**bindings, goal.name: apart(belief, f"'{next(self.fresh)}")}
             return
         key = (goal.functor, len(goal.args))

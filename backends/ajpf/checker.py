@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from avow.base.graphs import strong_components
 
 from .automaton import Automaton, build, compiled
-from .explore import Graph
+from .explore import Graph, System
 from .intentions import Frame
 from .interpreter import Agent, State
 from .mind import NONE
@@ -75,7 +76,7 @@ class Checker:
         }
         self.atoms = tuple(found)
         self.places = {atom: at for at, atom in enumerate(self.atoms)}
-        self.labels = label_states(self.graph.agent, self.graph.states, self.atoms)
+        self.labels = label_states(self.graph.system, self.graph.states, self.atoms)
         self.reduced = reduce(self.whole(self.labels))
         while len(smaller := reduce(self.reduced)) < 0.95 * len(self.reduced):
             self.reduced = smaller
@@ -117,7 +118,7 @@ class Checker:
             return graph.targets[graph.offsets[state] : graph.offsets[state + 1]]
 
         def acted(state: int, target: int) -> bool:
-            return states[target].last != states[state].last
+            return bool(states[target].last != states[state].last)
 
         def waiting(state: int) -> list[int]:
             return [t for t in targets(state) if not acted(state, t) and not states[t].drawn]
@@ -156,67 +157,90 @@ class Checker:
                     bits |= 1 << at
             new[label] = bits
         fair = [
-            Fair(1 << (low + 2 * at), 1 << (low + 2 * at + 1)) for at in range(len(self.graph.agent.environment.fair))
+            Fair(1 << (low + 2 * at), 1 << (low + 2 * at + 1)) for at in range(len(self.graph.system.environment.fair))
         ]
         return automaton, fair, [new[label] for label in labels]
 
 
-def label_states(agent: Agent, states: Iterable[State], wanted: Sequence[Atom]) -> list[int]:
+def label_states(system: System, states: Iterable[Any], wanted: Sequence[Atom]) -> list[int]:
     """For each state the bits of the atoms that hold in it, above them two bits for each fairness assumption."""
-    by_beliefs: dict[int, int] = {}
-    by_last: dict[int, int] = {NONE: 0}
-    by_goals: dict[int, int] = {}
-    by_intention: dict[int, int] = {NONE: 0}
     numbered = [(1 << at, atom) for at, atom in enumerate(wanted)]
-    believed = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.BELIEVES]
-    done = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.DID]
+    names = {agent.program.name: place for place, agent in enumerate(system.agents)}
+    labels = [
+        _Labels(agent, [(bit, atom) for bit, atom in numbered if atom.agent == name])
+        for name, agent in zip(names, system.agents, strict=True)
+    ]
+    done = [(bit, names[a.agent], _own(a.term)) for bit, a in numbered if a.modality is Modality.DID]
     perceived = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.PERCEPT]
-    wanted_goals = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.WANTS]
-    mental = (Modality.INTENDS, Modality.INTENDS_TO_DO)
-    intended = [(bit, a.modality, _own(a.term)) for bit, a in numbered if a.modality in mental]
-    fair = [(1 << (len(wanted) + 2 * at), f.percept) for at, f in enumerate(agent.environment.fair)]
-
-    def of_beliefs(number: int) -> int:
-        beliefs = agent.beliefs.items[number]
-        return sum(bit for bit, term in believed if next(agent.reasoner.believes(beliefs, term, {}), None) is not None)
-
-    def of_last(number: int) -> int:
-        return sum(bit for bit, term in done if unify(term, agent.actions.items[number], {}) is not None)
-
-    def of_offer(offered: tuple[Struct, ...]) -> int:
-        return sum(bit for bit, term in perceived if any(unify(term, p, {}) is not None for p in offered))
-
-    def of_goals(number: int) -> int:
-        goals = agent.goals.items[number]
-        return sum(bit for bit, term in wanted_goals if any(unify(term, g.term, {}) is not None for g in goals))
-
-    def of_draw(number: int) -> int:
-        offered = agent.environment.percepts(agent.choices.items[number])
-        return sum(bit | (bit << 1 if percept in offered else 0) for bit, percept in fair)
-
+    fair = [(1 << (len(wanted) + 2 * at), f.percept) for at, f in enumerate(system.environment.fair)]
+    by_last: dict[int, int] = {}
     by_draw: dict[int, int] = {}
     result = []
     for state in states:
-        bits = _memo(by_beliefs, state.beliefs, of_beliefs)
+        bits = 0
+        for own, mind in zip(labels, system.minds(state), strict=True):
+            bits |= own.of(mind)
         if done:
-            bits |= _memo(by_last, state.last, of_last)
-        if wanted_goals:
-            bits |= _memo(by_goals, state.goals, of_goals)
+            bits |= _memo(by_last, state.last, lambda _: _of_last(system.did(state), done))  # noqa: B023 - called at once
         if perceived:
-            bits |= of_offer(agent.sees(state))
+            offered = system.sees(state)
+            bits |= sum(bit for bit, term in perceived if any(unify(term, p, {}) is not None for p in offered))
         if fair and state.drawn:
-            bits |= _memo(by_draw, state.choice, of_draw)
-        if intended:
-            for number in (*state.queue, state.current):
-                bits |= _memo(by_intention, number, lambda n: _mental(agent.intentions.items[n].frames, intended))
+            bits |= _memo(by_draw, state.choice, lambda choice: _of_draw(system.world.offers(choice), fair))
         result.append(bits)
     return result
 
 
-def _memo(known: dict[int, int], key: int, compute: object) -> int:
+def _of_last(did: tuple[int, Struct] | None, done: Sequence[tuple[int, int, Term]]) -> int:
+    if did is None:
+        return 0
+    return sum(bit for bit, place, term in done if place == did[0] and unify(term, did[1], {}) is not None)
+
+
+def _of_draw(offered: Sequence[Struct], fair: Sequence[tuple[int, Struct]]) -> int:
+    return sum(bit | (bit << 1 if percept in offered else 0) for bit, percept in fair)
+
+
+class _Labels:
+    """What one agent believes and wants."""
+
+    def __init__(self, agent: Agent, numbered: Sequence[tuple[int, Atom]]) -> None:
+        self.agent = agent
+        mental = (Modality.INTENDS, Modality.INTENDS_TO_DO)
+        self.believed = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.BELIEVES]
+        self.wanted = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.WANTS]
+        self.intended = [(bit, a.modality, _own(a.term)) for bit, a in numbered if a.modality in mental]
+        self.by_beliefs: dict[int, int] = {}
+        self.by_goals: dict[int, int] = {}
+        self.by_intention: dict[int, int] = {NONE: 0}
+
+    def of(self, mind: State) -> int:
+        bits = _memo(self.by_beliefs, mind.beliefs, self._of_beliefs) if self.believed else 0
+        if self.wanted:
+            bits |= _memo(self.by_goals, mind.goals, self._of_goals)
+        if self.intended:
+            for number in (*mind.queue, mind.current):
+                bits |= _memo(self.by_intention, number, self._of_intention)
+        return bits
+
+    def _of_beliefs(self, number: int) -> int:
+        agent = self.agent
+        beliefs = agent.beliefs.items[number]
+        holds = ((bit, next(agent.reasoner.believes(beliefs, term, {}), None)) for bit, term in self.believed)
+        return sum(bit for bit, found in holds if found is not None)
+
+    def _of_goals(self, number: int) -> int:
+        goals = self.agent.goals.items[number]
+        return sum(bit for bit, term in self.wanted if any(unify(term, g.term, {}) is not None for g in goals))
+
+    def _of_intention(self, number: int) -> int:
+        return _mental(self.agent.intentions.items[number].frames, self.intended)
+
+
+def _memo(known: dict[int, int], key: int, compute: Callable[[int], int]) -> int:
     found = known.get(key)
     if found is None:
-        found = known[key] = compute(key)  # type: ignore[operator]
+        found = known[key] = compute(key)
     return found
 
 

@@ -33,9 +33,15 @@ CODES = register(
     declare(
         "AJPF105",
         "not run",
-        "The program is Gwendolen, and has something that the checker does not run: several agents in one system, "
-        "plans for any goal or belief at all.",
+        "The program is Gwendolen, and has something that the checker does not run: a plan for any goal or belief "
+        "at all.",
         "Leave it out, or check that agent by other means.",
+    ),
+    declare(
+        "AJPF106",
+        "two agents of one name",
+        "Two agents of the system have the same name.",
+        "Give each agent a name of its own.",
     ),
     declare(
         "AJPF110",

@@ -27,7 +27,7 @@ def command() -> None:
 @click.option("--steps", type=click.IntRange(1, 100_000), default=200, show_default=True, help="At most so many.")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one JSON object a step (JSON lines).")
 def run(file: Path, environment: Path | None, semantics: str, seed: int, steps: int, as_json: bool) -> int:
-    """One run of the agent in FILE, told step by step, by the interpreter whose every run the method `ajpf` checks.
+    """One run of the agents in FILE, told step by step, by the interpreter whose every run the method `ajpf` checks.
 
     Code 1 where the agent ends with an error of its own; code 2 if the program or the environment cannot be read.
     """
@@ -36,17 +36,18 @@ def run(file: Path, environment: Path | None, semantics: str, seed: int, steps: 
     from .beliefs import TooDeep
     from .builtin import Crash
     from .environment import Environment, read_environment
-    from .interpreter import Agent, Semantics
+    from .interpreter import Semantics
     from .narrate import run as told
-    from .parser import read_program
+    from .parser import read_system
+    from .society import system
 
-    program = read_program(file)
+    programs = read_system(file)
     draws = (
         Environment((), {}, {}, frozenset(), True, "once", ()) if environment is None else read_environment(environment)
     )
-    agent = Agent(program, draws, Semantics(semantics))
+    agents = system(programs, draws, Semantics(semantics))
     try:
-        for number, step in enumerate(told(agent, seed, steps), start=1):
+        for number, step in enumerate(told(agents, seed, steps), start=1):
             if as_json:
                 click.echo(json.dumps({"step": number, **asdict(step)}, ensure_ascii=False))
                 continue

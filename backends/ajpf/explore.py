@@ -7,19 +7,41 @@ import time
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 from .beliefs import TooDeep
 from .builtin import Crash
-from .interpreter import Agent, State
+from .environment import Environment
+from .interpreter import Agent, Semantics, State
+from .syntax import Struct
 from .tuning import INTENTIONS, STATES
+from .world import World
+
+
+class System(Protocol):
+    """One agent (`interpreter.Agent`) or several (`society.Society`): a transition system over states of its own, which
+    tell whether the environment has just drawn (`drawn`), what is on offer (`choice`) and whether the run is over."""
+
+    world: World
+    environment: Environment
+    semantics: Semantics
+    probed: bool
+
+    @property
+    def agents(self) -> tuple[Agent, ...]: ...
+    def start(self) -> tuple[Any, ...]: ...
+    def successors(self, state: Any, /) -> tuple[Any, ...]: ...
+    def minds(self, state: Any, /) -> tuple[State, ...]: ...
+    def did(self, state: Any, /) -> tuple[int, Struct] | None: ...
+    def sees(self, state: Any, /) -> tuple[Struct, ...]: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Graph:
     """States by their numbers. The successors of s are ``targets[offsets[s]:offsets[s + 1]]``."""
 
-    agent: Agent
-    states: tuple[State, ...]
+    system: System
+    states: tuple[Any, ...]
     initial: tuple[int, ...]
     offsets: array[int]
     targets: array[int]
@@ -37,8 +59,8 @@ class Graph:
         return len(self.targets)
 
 
-def _backlog(newest: Sequence[State]) -> str:
-    most = max(len(state.queue) for state in newest)
+def _backlog(system: System, newest: Sequence[Any]) -> str:
+    most = max(len(mind.queue) for state in newest for mind in system.minds(state))
     if most < INTENTIONS:
         return ""
     return (
@@ -48,25 +70,25 @@ def _backlog(newest: Sequence[State]) -> str:
     )
 
 
-def explore(agent: Agent, *, states: int = STATES, seconds: float = 60.0, megabytes: int = 4096) -> Graph:
+def explore(system: System, *, states: int = STATES, seconds: float = 60.0, megabytes: int = 4096) -> Graph:
     """Every reachable state, breadth first, as far as the bounds let it (`Graph.unfinished`)."""
     deadline = time.monotonic() + seconds
     memory = _memory() + megabytes
-    numbers: dict[State, int] = {}
-    found: list[State] = []
+    numbers: dict[Any, int] = {}
+    found: list[Any] = []
     offsets, targets = array("q", [0]), array("q")
 
-    def number(state: State) -> int:
+    def number(state: Any) -> int:
         known = numbers.get(state)
         if known is None:
             known = numbers[state] = len(found)
             found.append(state)
         return known
 
-    initial = tuple(dict.fromkeys(number(state) for state in agent.start()))
+    initial = tuple(dict.fromkeys(number(state) for state in system.start()))
     at = 0
     unfinished = None
-    successors = agent.successors
+    successors = system.successors
     while at < len(found):
         if len(found) > states:
             unfinished = f"more than {states} states"
@@ -75,7 +97,7 @@ def explore(agent: Agent, *, states: int = STATES, seconds: float = 60.0, megaby
         elif at & 1023 == 0 and _memory() > memory:
             unfinished = f"{len(found)} states fill {megabytes} MB"
         if unfinished is not None:
-            unfinished += _backlog(found[-1_000:])
+            unfinished += _backlog(system, found[-1_000:])
             break
         try:
             reached = successors(found[at])
@@ -90,7 +112,7 @@ def explore(agent: Agent, *, states: int = STATES, seconds: float = 60.0, megaby
         offsets.append(len(targets))
         at += 1
     offsets.extend([len(targets)] * (len(found) - at))
-    return Graph(agent, tuple(found), initial, offsets, targets, unfinished)
+    return Graph(system, tuple(found), initial, offsets, targets, unfinished)
 
 
 def _memory() -> float:

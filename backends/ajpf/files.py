@@ -21,12 +21,12 @@ BUILDER = "gwendolen.GwendolenMASBuilder"
 
 def export_files(job: Job, setup: Setup, made: Instantiation) -> Mapping[str, str]:
     """Relative path → text."""
-    name = setup.program.name
+    name = setup.agent
     files = {
         f"{name}.psl": psl_file(made.properties),
-        f"{name}.gwen": program_text(setup.program),
+        f"{name}.gwen": program_text(setup.programs),
         f"{name}.ail": ail_file(setup, f"{name}.gwen"),
-        f"{CLASS}.java": environment_class(setup.environment),
+        f"{CLASS}.java": environment_class(setup.environment, agents=len(setup.programs)),
         "claims.json": _claims(job, setup, made),
     }
     for p in made.properties:
@@ -58,7 +58,8 @@ def _claims(job: Job, setup: Setup, made: Instantiation) -> str:
         return {"instance": p.about, "property": psl.show(p.formula)}
 
     data = {
-        "agent": setup.program.name,
+        "agent": setup.agent,
+        **({"agents": [p.name for p in setup.programs]} if len(setup.programs) > 1 else {}),
         "percept_semantics": str(setup.semantics),
         "environment": list(setup.environment.describe()),
         "table": {row.text: psl.show_template(row.formula) for row in setup.rows},

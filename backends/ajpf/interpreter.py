@@ -11,16 +11,16 @@ without a plan stands still under an event `-!g`; an initial goal enters the goa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from enum import StrEnum
 from functools import cache
 from typing import NamedTuple
 
-from .environment import Choice, Environment
+from .environment import Environment
 from .intentions import PERCEPTION, START, achieve, of_deed, of_event, perform
-from .mind import NONE, Done, Mind, Table
+from .mind import NONE, Done, Mind
 from .syntax import Deed, DeedKind, Event, Goal, GoalKind, Program, Sign, Struct, Term, plain, unify
+from .world import World
 
 
 class Semantics(StrEnum):
@@ -72,37 +72,51 @@ class Agent(Mind):
     """A program in its environment. `start` and `successors` span the state graph."""
 
     def __init__(
-        self, program: Program, environment: Environment, semantics: Semantics, *, probed: bool = False
+        self, program: Program, environment: Environment | World, semantics: Semantics, *, probed: bool = False
     ) -> None:
         """`probed`: the properties ask for percepts. AJPF then looks at the environment before the agent does, so that
         the first percepts are drawn by its look, and the agent perceives them once, not twice."""
         super().__init__(program)
-        self.environment = environment
+        self.world = environment if isinstance(environment, World) else World(environment)
+        self.environment = self.world.environment
         self.semantics = semantics
         self.probed = probed
-        self.choices: Table[Choice] = Table()
         self._deeds: dict[tuple[int, int, int], Done] = {}
         self._plans: dict[tuple[int, int, int], tuple[int, int]] = {}
-        self._draws = cache(self._draws_after)
-        self._offers = cache(self._offered)
+        self._draws, self._offers = self.world.after, self.world.offers
         self._percepts = cache(self._perceptions)
         self._direct = cache(self._changes)
 
     # The state graph
 
+    @property
+    def agents(self) -> tuple[Agent, ...]:
+        return (self,)
+
+    def minds(self, state: State) -> tuple[State, ...]:
+        """The state of each of `agents`."""
+        return (state,)
+
+    def did(self, state: State) -> tuple[int, Struct] | None:
+        """Which of `agents` acted last, and its action."""
+        return None if state.last == NONE else (0, self.actions.items[state.last])
+
     def start(self) -> tuple[State, ...]:
+        return (self.first(),)
+
+    def first(self) -> State:
         goals = [
             self.intentions.number(of_deed(START, Deed(DeedKind.ADD_GOAL, goal.term, goal.kind)))
             for goal in self.program.goals
         ]
-        state = State(
+        return State(
             beliefs=self.base(frozenset(self.program.beliefs), frozenset()),
             goals=self.goals.number(frozenset()),
             current=goals[0] if goals else self.empty,
             queue=tuple(goals[1:]),
             planned=False,
             last=NONE,
-            choice=self.choices.number(self.environment.before),
+            choice=self.world.before,
             new=True,
             begun=not self.environment.at_start,
             asleep=False,
@@ -110,7 +124,6 @@ class Agent(Mind):
             over=False,
             drawn=False,
         )
-        return (state,)
 
     def successors(self, state: State) -> tuple[State, ...]:
         """Never empty: a run that has ended stays where it is."""
@@ -121,9 +134,8 @@ class Agent(Mind):
         if state.asleep:
             return self._idle(state)
         if not state.begun:
-            draws = self._draws_of(self.environment.before, self.environment.start)
-            return tuple(self._cycle(state, draw, again=not self.probed) for draw in draws)
-        return (self._cycle(state._replace(drawn=False)),)
+            return tuple(self.cycle(state, draw, again=not self.probed) for draw in self.world.first())
+        return (self.cycle(state._replace(drawn=False)),)
 
     def sees(self, state: State) -> tuple[Struct, ...]:
         """The percepts on offer that AJPF's P speaks of: those of an action, until the agent has perceived them."""
@@ -140,18 +152,20 @@ class Agent(Mind):
         for draw in self._draws(state.choice, ""):
             offer = self._offers(draw)
             new = state.new or bool(offer) or bool(self._offers(state.choice))
-            after = self._cycle(state._replace(new=new, waited=when == "once"), draw)
+            after = self.cycle(state._replace(new=new, waited=when == "once"), draw)
             # Only a percept wakes the agent: without one it has this half of a cycle, and the run is over.
             result.append(after if offer or when == "repeatedly" else after._replace(over=True))
         return tuple(result)
 
-    def _cycle(self, state: State, draw: int = NONE, *, again: bool = False) -> State:
-        """`draw` is what the environment has just drawn; `again`: it is perceived once more in the next cycle."""
+    def cycle(self, state: State, draw: int = NONE, *, again: bool = False, letters: tuple[int, ...] = ()) -> State:
+        """`draw` is what the environment has just drawn; `again`: it is perceived once more in the next cycle;
+        `letters` are the intentions that messages make."""
         if draw != NONE:
             state = state._replace(choice=draw, begun=True, drawn=True, asleep=False)
         beliefs, current, queue = state.beliefs, state.current, state.queue
         if state.new:
             beliefs, current, queue = self._perceive(state)
+        queue += letters
         state = state._replace(beliefs=beliefs, new=again)
         current, queue, asleep = self._select(current, queue)
         if current == NONE or asleep:
@@ -221,29 +235,14 @@ class Agent(Mind):
     # The second half: one deed
 
     def _deed(self, state: State) -> tuple[State, ...]:
-        key = (state.beliefs, state.goals, state.current)
-        done = self._deeds.get(key)
-        if done is None:
-            done = self._deeds[key] = self.effect(*key)
-        intention = self.intentions.items[state.current]
-        top = intention.frames[-1]
-        if top.deeds and top.deeds[0].kind in (DeedKind.DROP_GOAL, DeedKind.ADD_GOAL):
-            done, queue = self._goal_deed(state, top.deeds[0], done)
-        else:
-            queue = state.queue
-        queue = self._wake(done.beliefs, queue, done.changed) + done.posted
-        new = state._replace(
-            beliefs=done.beliefs, goals=done.goals, current=done.intention, queue=queue, planned=False, drawn=False
-        )
-        if done.suspended:
-            return (self._suspend(new),)
-        if done.action == NONE:
+        new, action = self.act(state)
+        if action == NONE:
             return (new,)
-        name = self.actions.items[done.action].functor
+        name = self.actions.items[action].functor
         new = new._replace(waited=False)
         if name == PRINT:
             return (new,)
-        new = new._replace(last=done.action)
+        new = new._replace(last=action)
         if name in self.environment.quiet:
             return (new,)
         had = state.new or bool(self._offers(state.choice))
@@ -251,6 +250,29 @@ class Agent(Mind):
             new._replace(choice=draw, new=had or bool(self._offers(draw)), drawn=True)
             for draw in self._draws(state.choice, name)
         )
+
+    def act(self, state: State) -> tuple[State, int]:
+        """The next deed of the current intention done, and the action that it was; what the world makes of that is not
+        yet in the state."""
+        key = (state.beliefs, state.goals, state.current)
+        done = self._deeds.get(key)
+        if done is None:
+            done = self._deeds[key] = self.effect(*key)
+        deed = self.next_deed(state)
+        if deed is not None and deed.kind in (DeedKind.DROP_GOAL, DeedKind.ADD_GOAL):
+            done, queue = self._goal_deed(state, deed, done)
+        else:
+            queue = state.queue
+        queue = self._wake(done.beliefs, queue, done.changed) + done.posted
+        new = state._replace(
+            beliefs=done.beliefs, goals=done.goals, current=done.intention, queue=queue, planned=False, drawn=False
+        )
+        return (self._suspend(new) if done.suspended else new), done.action
+
+    def next_deed(self, state: State) -> Deed | None:
+        """The deed that the next job does, if it does one."""
+        deeds = self.intentions.items[state.current].frames[-1].deeds if state.planned else None
+        return deeds[0] if deeds else None
 
     def _goal_deed(self, state: State, deed: Deed, done: Done) -> tuple[Done, tuple[int, ...]]:
         """Goals are added to, and dropped from, what all intentions are at. The answer has the queue in it."""
@@ -314,13 +336,3 @@ class Agent(Mind):
         deeds = intention.frames[-1].deeds
         derivable = next(self.reasoner.believes(self.beliefs.items[base], intention.waiting, {}), None) is not None
         return derivable is not (deeds is not None and deeds[0].kind is DeedKind.WAIT_NOT)
-
-    def _draws_of(self, choice: Choice, narrowed: Mapping[str, tuple[int, ...]]) -> tuple[int, ...]:
-        return tuple(self.choices.number(d) for d in self.environment.draws(choice, narrowed))
-
-    def _draws_after(self, choice: int, action: str) -> tuple[int, ...]:
-        return self._draws_of(self.choices.items[choice], self.environment.after.get(action, {}))
-
-    def _offered(self, choice: int) -> tuple[Struct, ...]:
-        """Percepts in the order in which they are taken up: that of their texts."""
-        return tuple(sorted(set(self.environment.percepts(self.choices.items[choice])), key=plain))

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import time
 from array import array
+from typing import Any
 
 from .automaton import Automaton, build, compiled
 from .builtin import Crash
 from .checker import Property, label_states
-from .explore import Graph
-from .interpreter import Agent, State
+from .explore import Graph, System
 from .psl import Formula, Not, atoms
 from .tuning import TAIL
 
@@ -18,13 +18,13 @@ from .tuning import TAIL
 class _Part:
     """States by their numbers, with what was found of their successors."""
 
-    def __init__(self, agent: Agent) -> None:
-        self.agent = agent
-        self.numbers: dict[State, int] = {}
-        self.states: list[State] = []
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.numbers: dict[Any, int] = {}
+        self.states: list[Any] = []
         self.successors: dict[int, tuple[int, ...]] = {}
 
-    def number(self, state: State) -> int:
+    def number(self, state: Any) -> int:
         known = self.numbers.get(state)
         if known is None:
             known = self.numbers[state] = len(self.states)
@@ -34,7 +34,7 @@ class _Part:
     def after(self, number: int) -> tuple[int, ...]:
         found = self.successors.get(number)
         if found is None:
-            reached = self.agent.successors(self.states[number])
+            reached = self.system.successors(self.states[number])
             found = self.successors[number] = tuple(dict.fromkeys(map(self.number, reached)))
         return found
 
@@ -44,20 +44,20 @@ class _Part:
             targets.extend(self.successors.get(number, ()))
             offsets.append(len(targets))
         why = "only as far as the property is open"
-        return Graph(self.agent, tuple(self.states), initial, offsets, targets, why, settles=True)
+        return Graph(self.system, tuple(self.states), initial, offsets, targets, why, settles=True)
 
 
-def open_part(agent: Agent, wanted: Property, states: int, seconds: float) -> Graph | None:
+def open_part(system: System, wanted: Property, states: int, seconds: float) -> Graph | None:
     """The states in which the property is neither kept nor broken for good, and those next to them: enough to decide
     it. None where the bounds do not let it be found. Raises automaton.TooLarge, TooDeep."""
-    if agent.environment.fair:
+    if system.environment.fair:
         return None
     deadline = time.monotonic() + seconds
     automaton = build(Not(wanted.formula))
     places = {atom: at for at, atom in enumerate(dict.fromkeys(atoms(wanted.formula)))}
     tests = [compiled(leaf, places) for leaf in automaton.leaves]
     useful, lost = _useful(automaton), _lost(automaton)
-    part = _Part(agent)
+    part = _Part(system)
     labels: list[int] = []
 
     def fits(node: int, number: int) -> bool:
@@ -65,11 +65,11 @@ def open_part(agent: Agent, wanted: Property, states: int, seconds: float) -> Gr
         return labels[number] & yes == yes and not labels[number] & no
 
     def label_new() -> None:
-        for label in label_states(agent, part.states[len(labels) :], tuple(places)):
+        for label in label_states(system, part.states[len(labels) :], tuple(places)):
             labels.append(sum(1 << at for at, test in enumerate(tests) if test(label)))
 
     try:
-        initial = tuple(dict.fromkeys(map(part.number, agent.start())))
+        initial = tuple(dict.fromkeys(map(part.number, system.start())))
         label_new()
         level = {(s, n) for s in initial for n in automaton.initial if n in useful and fits(n, s)}
         seen = set(level)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from .beliefs import Beliefs, Reasoner, apart, renamed_condition
 from .builtin import COMPUTING, Crash, compute
@@ -70,6 +70,11 @@ class Done(NamedTuple):
     suspended: bool = False
 
 
+class Thinking(Protocol):
+    @property
+    def beliefs(self) -> int: ...
+
+
 class Mind:
     """Belief bases, goal bases, intentions and actions by their numbers; and the steps between them."""
 
@@ -130,7 +135,8 @@ class Mind:
                 sent = Struct(SENT, (to, Struct(self.program.name), force, content))
                 action = self.actions.number(Struct("send", (content, to)))
                 base = self.base(beliefs.own | {sent}, beliefs.perceived)
-                return self.after(base, goals, intention, {}, action=action)
+                event = self.intentions.number(of_event(Event(Sign.ADD, sent)))
+                return self.after(base, goals, intention, {}, (event,), action=action)
             case DeedKind.ACTION:
                 action = self.actions.number(_named(term))
                 bindings = compute(self.actions.items[action]) if _functor(term) in COMPUTING else {}
@@ -219,6 +225,11 @@ class Mind:
         return Done(base, goals, self.number(left)), queue
 
     # Parts
+
+    def believed(self, mind: Thinking) -> frozenset[Struct]:
+        """All that is believed, without what the agent remembers of its own messages."""
+        beliefs = self.beliefs.items[mind.beliefs]
+        return frozenset(b for b in beliefs.own | beliefs.perceived if b.functor != SENT)
 
     def number(self, intention: Intention) -> int:
         if not intention.frames:

@@ -6,7 +6,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from random import Random
+from typing import Any
 
+from .explore import System
 from .interpreter import Agent, State
 from .mind import NONE
 from .syntax import NULL, DeedKind, show, show_deed, show_event
@@ -16,6 +18,8 @@ from .syntax import NULL, DeedKind, show, show_deed, show_event
 class Told:
     """One step of a run. `what` is a sentence; the others are texts of terms."""
 
+    agent: str
+    """Whose step it is; empty where there is one agent only."""
     what: str
     offered: tuple[str, ...] | None = None
     """What the environment has just drawn; None where it did not draw."""
@@ -26,7 +30,8 @@ class Told:
     """How many other intentions there are."""
 
     def lines(self) -> Iterator[str]:
-        yield re.sub(r"\^\d+", "", self.what)  # the interpreter numbers the variables of nested plans
+        who = f"{self.agent}: " if self.agent else ""
+        yield who + re.sub(r"\^\d+", "", self.what)  # the interpreter numbers the variables of nested plans
         if self.believed:
             yield f"  believes {', '.join(self.believed)}"
         if self.believed_no_more:
@@ -35,28 +40,31 @@ class Told:
             yield f"  there is to perceive: {', '.join(self.offered) or 'nothing'}"
 
 
-def run(agent: Agent, seed: int, steps: int) -> Iterator[Told]:
+def run(system: System, seed: int, steps: int) -> Iterator[Told]:
     """At most so many steps of one run; where the environment has a choice, the seed decides. Raises Crash, TooDeep."""
     rng = Random(seed)
-    state = agent.start()[0]
+    state = system.start()[0]
     for _ in range(steps):
-        after = rng.choice(agent.successors(state))
+        after = rng.choice(system.successors(state))
         if after.over:
-            yield Told("has nothing to do: the run is over")
+            yield Told("", "there is nothing to do: the run is over")
             return
-        yield _told(agent, state, after)
+        yield _told(system, state, after)
         state = after
 
 
-def _told(agent: Agent, before: State, after: State) -> Told:
-    old, new = agent.beliefs.items[before.beliefs], agent.beliefs.items[after.beliefs]
-    had, has = old.own | old.perceived, new.own | new.perceived
+def _told(system: System, state: Any, following: Any) -> Told:
+    place = following.turn if len(system.agents) > 1 else 0
+    agent, before, after = system.agents[place], system.minds(state)[place], system.minds(following)[place]
+    had, has = agent.believed(before), agent.believed(after)
     action = None
-    if before.planned and after.last != NONE and _deed(agent, before).startswith("does "):
-        action = show(agent.actions.items[after.last])
+    did = system.did(following)
+    if did is not None and before.planned and _deed(agent, before).startswith("does "):
+        action = show(did[1])
     return Told(
+        agent.program.name if len(system.agents) > 1 else "",
         _deed(agent, before) if before.planned else _choice(agent, before, after),
-        tuple(map(show, agent.environment.percepts(agent.choices.items[after.choice]))) if after.drawn else None,
+        tuple(map(show, system.world.drawn(following.choice))) if following.drawn else None,
         tuple(sorted(map(show, has - had))),
         tuple(sorted(map(show, had - has))),
         action,
@@ -81,7 +89,7 @@ def _deed(agent: Agent, state: State) -> str:
 
 
 def _choice(agent: Agent, before: State, after: State) -> str:
-    if after.asleep:
+    if after.current == NONE:
         return "has nothing to do"
     if not after.planned:
         gone = [n for n in (before.current, *before.queue) if n not in (NONE, agent.empty, *after.queue)]

@@ -23,7 +23,7 @@ from avow.system.paths import inside
 from .environment import Environment, read_environment
 from .interpreter import Semantics
 from .mapping import Row
-from .parser import read_program
+from .parser import read_system
 from .psl import AGENT_NAME, KEYWORDS, Formula, Modality, atoms
 from .psl_parser import Malformed, index_names, instantiate, parse_psl
 from .scenario import domain_of
@@ -58,7 +58,10 @@ class Extra:
 class Setup:
     """The options, usable."""
 
-    program: Program
+    programs: tuple[Program, ...]
+    """The agents of the system."""
+    agent: str
+    """The node's."""
     program_path: Path
     program_text: str
     environment: Environment
@@ -100,19 +103,20 @@ class _OptionsReader:
         self.faults.append(Diagnostic(code, message, self.job.method.options.at(*path), hint=hint))
 
     def setup(self) -> Setup | None:
-        program, program_path = self.file("program", read_program)
+        programs, program_path = self.file("program", read_system)
         environment, environment_path = self.file("environment", read_environment)
-        if program is not None:
-            self.agent(program)
+        if programs is not None:
+            self.agents(programs)
         if self.options.get("engine") == "ajpf":
             self.engine()
         instances = self.instances()
-        rows = self.rows(program)
-        extras = self.extras(program, instances)
-        if program is None or environment is None or program_path is None or environment_path is None:
+        rows = self.rows(programs)
+        extras = self.extras(programs, instances)
+        if programs is None or environment is None or program_path is None or environment_path is None:
             return None
         return Setup(
-            program,
+            programs,
+            self.options.get("agent", programs[0].name),
             program_path,
             program_path.read_text(encoding="utf-8-sig"),
             environment,
@@ -144,18 +148,20 @@ class _OptionsReader:
             self.faults.extend(error.diagnostics)
             return None, path
 
-    def agent(self, program: Program) -> None:
-        if program.name in KEYWORDS or not AGENT_NAME.match(program.name):
-            why = (
-                "is a word of AJPF's property language"
-                if program.name in KEYWORDS
-                else "must start with a small letter"
-            )
-            message = f"an agent cannot be called '{program.name}': the name {why}"
-            self.faults.append(Diagnostic("AJPF104", message, program.name_span))
-        wanted = self.options.get("agent", program.name)
-        if wanted != program.name:
-            self.fault("AJPF121", f"agent: the program's agent is called '{program.name}', not {wanted!r}", "agent")
+    def agents(self, programs: Sequence[Program]) -> None:
+        for program in programs:
+            if program.name in KEYWORDS or not AGENT_NAME.match(program.name):
+                why = (
+                    "is a word of AJPF's property language"
+                    if program.name in KEYWORDS
+                    else "must start with a small letter"
+                )
+                message = f"an agent cannot be called '{program.name}': the name {why}"
+                self.faults.append(Diagnostic("AJPF104", message, program.name_span))
+        names = [program.name for program in programs]
+        wanted = self.options.get("agent", names[0])
+        if wanted not in names:
+            self.fault("AJPF121", f"agent: {_called(names)}, not {wanted!r}", "agent")
 
     def engine(self) -> None:
         if self.options.get("semantics", "mcapl") != "mcapl":
@@ -221,13 +227,13 @@ class _OptionsReader:
         variables = (Variable(Role.BOUND, name, sort) for name, sort in self.sorts().items() if is_index(sort))
         return {v.name: tuple(found) for v in variables if (found := domain_of(v, scenario))}
 
-    def rows(self, program: Program | None) -> tuple[Row, ...]:
+    def rows(self, programs: Sequence[Program] | None) -> tuple[Row, ...]:
         sorts = self.sorts()
         rows = []
         for text, target in self.options.get("predicates", {}).items():
             span = self.job.method.options.at("predicates", text)
             pattern = self.pattern(text, sorts, "predicates", text)
-            formula = self.psl(target, program, "predicates", text)
+            formula = self.psl(target, programs, "predicates", text)
             if pattern is None or formula is None:
                 continue
             made, names = pattern
@@ -253,7 +259,7 @@ class _OptionsReader:
             return None
         return term, bound_names(term)
 
-    def psl(self, text: str, program: Program | None, *path: str) -> Formula | None:
+    def psl(self, text: str, programs: Sequence[Program] | None, *path: str) -> Formula | None:
         try:
             formula = parse_psl(text)
         except Malformed as error:
@@ -262,18 +268,19 @@ class _OptionsReader:
             hint = f"at the mark: {shown}" if error.offset else None
             self.faults.append(Diagnostic("AJPF124", f"{path[-1]}: {error.reason}", span, hint=hint))
             return None
+        names = [program.name for program in programs or ()]
         for atom in atoms(formula):
-            if program is not None and atom.modality is not Modality.PERCEPT and atom.agent != program.name:
-                message = f"there is no agent '{atom.agent}'; the program's is '{program.name}'"
+            if programs is not None and atom.modality is not Modality.PERCEPT and atom.agent not in names:
+                message = f"there is no agent '{atom.agent}'; {_called(names)}"
                 self.fault("AJPF121", message, *path)
                 return None
         return formula
 
-    def extras(self, program: Program | None, instances: Mapping[str, tuple[int, ...]]) -> tuple[Extra, ...]:
+    def extras(self, programs: Sequence[Program] | None, instances: Mapping[str, tuple[int, ...]]) -> tuple[Extra, ...]:
         found = []
         for name, entry in self.options.get("properties", {}).items():
             text = entry if isinstance(entry, str) else entry["psl"]
-            formula = self.psl(text, program, "properties", name)
+            formula = self.psl(text, programs, "properties", name)
             if formula is None:
                 continue
             guarantee = None if isinstance(entry, str) else entry.get("guarantee")
@@ -304,6 +311,12 @@ class _OptionsReader:
                 forbids = pattern[0].body if isinstance(pattern[0], Not) else pattern[0]
             found.append(Extra(name, formula, guarantee, counts, data.get("because", ""), indices, span, forbids))
         return tuple(found)
+
+
+def _called(names: Sequence[str]) -> str:
+    if len(names) == 1:
+        return f"the program's agent is called '{names[0]}'"
+    return f"the program's agents are called {', '.join(map(repr, names))}"
 
 
 def _sort(name: str) -> Sort:

@@ -48,8 +48,8 @@ _SAID = {
 }
 
 
-def read_program(path: Path, shown: str | None = None) -> Program:
-    """The program in a file; `shown` is how messages call the file. Raises Rejected."""
+def read_system(path: Path, shown: str | None = None) -> tuple[Program, ...]:
+    """The agents of a file; `shown` is how messages call the file. Raises Rejected."""
     name = shown or str(path)
     try:
         data = path.read_bytes()
@@ -62,7 +62,7 @@ def read_program(path: Path, shown: str | None = None) -> Program:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise Rejected(Diagnostic("AJPF101", "not UTF-8 text", _at(name, line, 1))) from None
-    return parse_program(text, name)
+    return parse_system(text, name)
 
 
 def parse_fact(text: str) -> Struct | None:
@@ -75,18 +75,8 @@ def parse_fact(text: str) -> Struct | None:
     return made if isinstance(made, Struct) and is_ground(made) else None
 
 
-def parse_program(text: str, file: str) -> Program:
-    """One agent. Raises Rejected with the place of the first thing that does not belong, or that cannot be run."""
-    first, *others = parse_system(text, file)
-    if others:
-        names = ", ".join(agent.name for agent in (first, *others))
-        message = f"a system of several agents ({names}): the checker runs one agent at a time"
-        raise Rejected(Diagnostic("AJPF105", message, others[0].name_span, hint="put each agent in a file of its own"))
-    return first
-
-
 def parse_system(text: str, file: str) -> tuple[Program, ...]:
-    """All agents of a file. Raises Rejected."""
+    """All agents of a file. Raises Rejected with the place of what does not belong, or cannot be run."""
     builder = _Builder(file)
     try:
         tree = _grammar().parse(text, start="start")
@@ -101,6 +91,10 @@ def parse_system(text: str, file: str) -> tuple[Program, ...]:
         if isinstance(error.orig_exc, RecursionError):
             raise Rejected(Diagnostic("AJPF102", "nested too deeply", _at(file, 1, 1))) from None
         raise
+    for at, agent in enumerate(agents):
+        if agent.name in [other.name for other in agents[:at]]:
+            message = f"there are two agents called '{agent.name}'"
+            builder.problems.append(Diagnostic("AJPF106", message, agent.name_span))
     if builder.problems:
         raise Rejected(*builder.problems)
     return agents
@@ -248,7 +242,7 @@ class _Builder(Transformer):  # type: ignore[misc]
         return Condition(None, is_cut=True)
 
     def sent(self, parts: list[Any]) -> Condition:
-        """Without a sender: the agent itself, which is the only one there is."""
+        """Without a sender: the agent itself; it remembers nobody else's messages."""
         to, sender, force, content = parts
         return Condition(Struct(SENT, (to, sender or self.anonymous([]), _force(force), content)))
 
@@ -309,7 +303,8 @@ class _Builder(Transformer):  # type: ignore[misc]
         return self.trigger(Event(Sign.DROP, parts[1], parts[2], is_goal=True), meta)
 
     def received(self, parts: list[Any]) -> Event:
-        return Event(Sign.ADD, Struct(RECEIVED, (_force(parts[1]), parts[2])))
+        """AIL calls the sender `From` and the receiver `To`: a plan may use these variables."""
+        return Event(Sign.ADD, Struct(RECEIVED, (Var("From"), Var("To"), _force(parts[1]), parts[2])))
 
     def believed(self, parts: list[Any]) -> Condition:
         return Condition(parts[0])

@@ -11,14 +11,19 @@ from .syntax import SENT, Condition, DeedKind, Event, GoalKind, Plan, Program, R
 _KINDS = (GoalKind.PERFORM, GoalKind.ACHIEVE)
 
 
-def program_text(program: Program) -> str:
-    lines = ["GWENDOLEN", "", f":name: {program.name}", "", ":Initial Beliefs:", ""]
+def program_text(programs: Iterable[Program]) -> str:
+    """The agents of a system."""
+    return "\n".join(["GWENDOLEN", *(line for program in programs for line in _agent(program))]) + "\n"
+
+
+def _agent(program: Program) -> list[str]:
+    lines = ["", f":name: {program.name}", "", ":Initial Beliefs:", ""]
     lines += [show(belief) for belief in program.beliefs]
     if program.rules:
         lines += ["", ":Reasoning Rules:", "", *map(_rule, program.rules)]
     lines += ["", ":Initial Goals:", "", *(f"{show(goal.term)} [{goal.kind}]" for goal in program.goals)]
     lines += ["", ":Plans:", "", *(_plan(kinded) for plan in program.plans for kinded in _kinded(plan))]
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def _kinded(plan: Plan) -> Iterator[Plan]:

@@ -11,15 +11,14 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from avow.base.process import ToolMissing, run
 
 from .ajpf_tool import Installation, prepare
-from .environment import Choice
-from .explore import Graph
-from .interpreter import PRINT, Agent, State
-from .java import CLASS, MARK, environment_class
-from .mind import NONE
+from .explore import Graph, System
+from .interpreter import PRINT
+from .java import CLASS, MARK, Script, environment_class
 from .options import Setup
 from .printer import program_text
 from .structure import Lasso
@@ -40,48 +39,61 @@ class Moment:
         return _VARIABLE.sub("_", f"{self.why}\t{'; '.join(self.beliefs)}")
 
 
-def expected(graph: Graph, lasso: Lasso) -> tuple[tuple[Moment, ...], tuple[Choice, ...]]:
-    """What the run tells, its loop gone through twice, and what the environment draws on it."""
-    agent = graph.agent
+def expected(graph: Graph, lasso: Lasso) -> tuple[tuple[Moment, ...], Script]:
+    """What the run tells, its loop gone through twice, and what the environment and the scheduler choose on it."""
+    system = graph.system
     path = [*lasso.path, *lasso.path[lasso.loop :], lasso.path[lasso.loop]]
-    moments, draws = [], []
+    moments, draws, turns = [], [], []
     for at in range(len(path) - 1):
         before, after = graph.states[path[at]], graph.states[path[at + 1]]
-        moment = _moment(agent, before, after)
+        if before.over or (after.over and not after.drawn):
+            break
+        if len(system.agents) > 1 and (before.changed or not any(before.awake)):
+            turns.append(system.agents[after.turn].program.name)
+        moment = _moment(system, before, after)
         if moment is not None:
             moments.append(moment)
             if after.drawn:
-                draws.append(agent.choices.items[after.choice])
-    return tuple(moments), tuple(draws)
+                draws.append(system.world.choices.items[after.choice])
+    return tuple(moments), Script(tuple(draws), tuple(turns))
 
 
-def _moment(agent: Agent, before: State, after: State) -> Moment | None:
+def _moment(system: System, before: Any, after: Any) -> Moment | None:
     if before.over or after.over:
         return None
-    if not before.planned:
-        return _told(agent, before, "idle" if before.asleep else "start") if after.drawn else None
-    top = agent.intentions.items[before.current].frames[-1]
-    if not top.deeds or top.deeds[0].kind not in (DeedKind.ACTION, DeedKind.SEND) or after.last == NONE:
+    place = after.turn if len(system.agents) > 1 else 0
+    agent, mind = system.agents[place], system.minds(before)[place]
+    if not mind.planned:
+        asleep = before.asleep if len(system.agents) == 1 else not any(before.awake)
+        return _told(system, before, "idle" if asleep else "start") if after.drawn else None
+    deed = agent.next_deed(mind)
+    did = system.did(after)
+    if deed is None or deed.kind not in (DeedKind.ACTION, DeedKind.SEND) or did is None:
         return None
-    deed = top.deeds[0].term
-    if plain(deed).partition("(")[0] == PRINT:
+    if plain(deed.term).partition("(")[0] == PRINT:
         return None
-    return _told(agent, before, plain(agent.actions.items[after.last]))
+    return _told(system, before, _named(system, place) + plain(did[1]))
 
 
-def _told(agent: Agent, state: State, why: str) -> Moment:
-    beliefs = agent.beliefs.items[state.beliefs]
-    texts = (plain(b) for b in beliefs.own | beliefs.perceived if not b.functor.startswith("."))
+def _named(system: System, place: int) -> str:
+    return f"{system.agents[place].program.name}: " if len(system.agents) > 1 else ""
+
+
+def _told(system: System, state: Any, why: str) -> Moment:
+    minds = zip(system.agents, system.minds(state), strict=True)
+    texts = [_named(system, at) + plain(b) for at, (agent, mind) in enumerate(minds) for b in agent.believed(mind)]
     return Moment(why, tuple(sorted(texts)))
 
 
 def replay(installation: Installation, setup: Setup, graph: Graph, lasso: Lasso) -> tuple[str | None, str]:
     """How AIL's run differs from ours, None where it does not; and AIL's output. Raises Unable."""
-    moments, draws = expected(graph, lasso)
+    moments, script = expected(graph, lasso)
     files = {
-        "agent.gwen": program_text(setup.program),
+        "agent.gwen": program_text(setup.programs),
         "agent.ail": f"env = {CLASS}\nmas.file = agent.gwen\nmas.builder = gwendolen.GwendolenMASBuilder\n",
-        f"{CLASS}.java": environment_class(setup.environment, script=draws, probed=graph.agent.probed),
+        f"{CLASS}.java": environment_class(
+            setup.environment, agents=len(setup.programs), script=script, probed=graph.system.probed
+        ),
     }
     with tempfile.TemporaryDirectory(prefix="avow-ail-") as temporary:
         folder = Path(temporary)

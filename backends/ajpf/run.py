@@ -20,13 +20,13 @@ from .asking import ask
 from .automaton import TooLarge
 from .beliefs import TooDeep
 from .checker import Checker, OutOfTime, Property, asks_for_percepts
-from .explore import explore
+from .explore import System, explore
 from .instances import Instantiation, instances
-from .interpreter import Agent
 from .lazy import open_part
 from .options import Setup, read
 from .replay import Unable, replay
 from .settle import Frame, Settled, outcome
+from .society import system
 from .structure import Lasso
 from .tuning import GRACE, LAZY_SHARE, LAZY_STATES, PART_STATES, SPIN_SECONDS, SPIN_SHARE
 from .words import Wording, explain
@@ -109,16 +109,16 @@ class _Run:
 
     def explored(self, properties: Sequence[Property], probed: bool) -> Checker | None:
         setup = self.setup
-        agent = Agent(setup.program, setup.environment, setup.semantics, probed=probed)
+        agents = system(setup.programs, setup.environment, setup.semantics, probed=probed)
         graph = explore(
-            agent, states=min(LAZY_STATES, setup.states), seconds=self.left(), megabytes=self.limits.megabytes
+            agents, states=min(LAZY_STATES, setup.states), seconds=self.left(), megabytes=self.limits.megabytes
         )
         if graph.unfinished is not None:
-            properties = [p for p in properties if not self.settled_early(agent, p)]
+            properties = [p for p in properties if not self.settled_early(agents, p)]
             if not properties:
                 return None
             if len(graph) > LAZY_STATES:
-                graph = explore(agent, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
+                graph = explore(agents, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
         self.bound["states"] += len(graph)
         self.bound["transitions"] += graph.transitions
         if graph.unfinished is not None:
@@ -135,10 +135,10 @@ class _Run:
             self.checkers[p.key] = checker
         return checker
 
-    def settled_early(self, agent: Agent, p: Property) -> bool:
+    def settled_early(self, agents: System, p: Property) -> bool:
         """Whether the property was decided on the part of the state space that it needs (`lazy.open_part`)."""
         try:
-            part = open_part(agent, p, min(PART_STATES, self.setup.states), self.left() * LAZY_SHARE)
+            part = open_part(agents, p, min(PART_STATES, self.setup.states), self.left() * LAZY_SHARE)
         except (TooDeep, TooLarge, RecursionError):
             return False
         if part is None:

@@ -55,7 +55,7 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
         *_left_to_a_person(claim, attached),
         "the plan's table says truly which agent formulas stand for which contract formulas",
         *frame.setup.environment.describe(),
-        *_no_messages(frame.setup.program),
+        *_no_messages(frame.setup.programs),
         f"percepts become events as in '{frame.setup.semantics}' percept semantics, in the order of their groups",
     )
     details: dict[str, object] = {"engine": frame.engine, "percept_semantics": str(frame.setup.semantics)}
@@ -97,9 +97,12 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
     )
 
 
-def _no_messages(program: Program) -> Iterator[str]:
-    if any(isinstance(p.event.term, Struct) and p.event.term.functor == RECEIVED for p in program.plans):
-        yield "no message ever comes to the agent"
+def _no_messages(programs: Sequence[Program]) -> Iterator[str]:
+    plans = (plan for program in programs for plan in program.plans)
+    if any(isinstance(p.event.term, Struct) and p.event.term.functor == RECEIVED for p in plans):
+        yield "no message ever comes to the agent" if len(programs) == 1 else "no message comes from outside the system"
+    if len(programs) > 1:
+        yield "agents take turns as AJPF's ActionScheduler has it, in every way; all of them perceive the same"
 
 
 def _left_to_a_person(claim: Claim, attached: Sequence[tuple[Extra, Sequence[Property]]]) -> Iterator[str]:

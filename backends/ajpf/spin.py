@@ -92,7 +92,10 @@ def _asked(
 
 
 def _translated(checker: Checker, properties: Sequence[Property]) -> dict[str, str]:
-    agent = checker.graph.agent
+    system = checker.graph.system
+    if len(system.agents) > 1:
+        raise promela.NotTranslated("several agents")
+    (agent,) = system.agents
     if agent.semantics is not Semantics.MCAPL:
         raise promela.NotTranslated(f"'{agent.semantics}' percepts")
     if agent.environment.fair:
@@ -130,7 +133,7 @@ def _model(checker: Checker, properties: Sequence[Property]) -> str:
     most = max([*degrees, len(checker.graph.initial)])
     lines = ['c_decl {\n\\#include "graph.h"\n}', "int s = 0;", ""]
     atoms = len(checker.atoms)
-    fair = len(checker.graph.agent.environment.fair)
+    fair = len(checker.graph.system.environment.fair)
     for bit in range(atoms + 2 * fair):
         lines.append(f"#define a{bit} (c_expr {{ (label[now.s * WORDS + {bit // 32}] >> {bit % 32}) & 1 }})")
     lines += ["", "active proctype agent() {", "end: do"]
@@ -152,7 +155,7 @@ def _tables(checker: Checker) -> str:
     first = {checker.labels[s] for s in graph.initial}
     if len(first) != 1:
         raise NoOpinion("the initial states differ in what the properties look at")
-    words = max(1, (len(checker.atoms) + 2 * len(graph.agent.environment.fair) + 31) // 32)
+    words = max(1, (len(checker.atoms) + 2 * len(graph.system.environment.fair) + 31) // 32)
     labels = [next(iter(first)), *checker.labels]
     cells = [label >> (32 * w) & 0xFFFFFFFF for label in labels for w in range(words)]
     offsets = [0, *(o + len(graph.initial) for o in graph.offsets)]

@@ -176,12 +176,14 @@ def plain(term: Term) -> str:
 
 
 RECEIVED, SENT = ".received", ".sent"
-"""Names of the event of a message received, and of what an agent remembers of those that it sent."""
+"""Names of the event of a message received, ``.received(From, To, tell, content)``, and of what an agent remembers of
+those that it sent, ``.sent(to, from, tell, content)``."""
 
 
 def show_event(event: Event) -> str:
-    if isinstance(event.term, Struct) and event.term.functor == RECEIVED:
-        return f"+.received(:{show(event.term.args[0])}, {show(event.term.args[1])})"
+    if isinstance(event.term, Struct) and event.term.functor in (RECEIVED, SENT):
+        _, _, force, content = event.term.args
+        return f"+{event.term.functor}(:{show(force)}, {show(content)})"
     return f"{event.sign}{'!' if event.is_goal else ''}{show(event.term)}{f' [{event.goal}]' if event.goal else ''}"
 
 

@@ -42,16 +42,21 @@ def unknown_words(job: Job, setup: Setup) -> Iterator[Diagnostic]:
 
 
 def _vocabulary(setup: Setup) -> dict[str, set[_Word]]:
-    program = setup.program
-    deeds = [deed for plan in program.plans for deed in plan.deeds]
+    programs = setup.programs
+    deeds = [deed for program in programs for plan in program.plans for deed in plan.deeds]
 
     def done(*kinds: DeedKind) -> Iterable[Term]:
         return (deed.term for deed in deeds if deed.kind in kinds)
 
     percepts = _words(fact for _, group in setup.environment.groups for fact in group if fact is not None)
-    beliefs = _words((*program.beliefs, *(rule.head for rule in program.rules), *done(DeedKind.ADD_BELIEF)))
-    goals = _words((*(goal.term for goal in program.goals), *done(DeedKind.ADD_GOAL)))
-    return {"belief": beliefs | percepts, "goal": goals, "action": _words(done(DeedKind.ACTION)), "percept": percepts}
+    told = _words(deed.term.args[2] for deed in deeds if deed.kind is DeedKind.SEND and isinstance(deed.term, Struct))
+    told = told if len(programs) > 1 else set()  # what it is told, an agent may come to believe or want
+    sent = {("send", 2)} if any(deed.kind is DeedKind.SEND for deed in deeds) else set()
+    heads = (rule.head for program in programs for rule in program.rules)
+    beliefs = _words((*(b for program in programs for b in program.beliefs), *heads, *done(DeedKind.ADD_BELIEF)))
+    goals = _words((*(goal.term for program in programs for goal in program.goals), *done(DeedKind.ADD_GOAL)))
+    actions = _words(done(DeedKind.ACTION)) | sent
+    return {"belief": beliefs | percepts | told, "goal": goals | told, "action": actions, "percept": percepts}
 
 
 def _words(terms: Iterable[Term]) -> set[_Word]:

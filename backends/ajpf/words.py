@@ -10,16 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import Any
 
 from avow.base.verdict import Counterexample
 
 from . import psl
 from .automaton import compiled
 from .checker import Property, label_states
-from .explore import Graph
-from .interpreter import State
+from .explore import Graph, System
 from .mapping import Row
-from .mind import NONE
 from .psl import Formula
 from .psl_parser import Malformed, index_names, instantiate
 from .structure import Lasso
@@ -78,12 +77,11 @@ def explain(graph: Graph, lasso: Lasso, refuted: Property, wording: Wording) -> 
     """The run on which a property fails: step by step what the contract speaks of, then what the agent believes."""
     visited = [graph.states[number] for number in lasso.path]
     rows = _contract_cells(graph, visited, wording)
-    always = frozenset(graph.agent.program.beliefs)
     trace: list[Step] = []
     places: list[int] = []
     loop: int | None = None
     for at, state in enumerate(visited):
-        shown = (*rows[at], *_agent_cells(graph, state, always))
+        shown = (*rows[at], *_agent_cells(graph.system, state))
         if at == lasso.loop:
             loop = len(trace)
         elif trace and trace[-1] == shown and (loop is None or loop < len(trace)):
@@ -96,7 +94,7 @@ def explain(graph: Graph, lasso: Lasso, refuted: Property, wording: Wording) -> 
     return Counterexample(tuple(values.items()), _because(graph, visited, places, refuted, wording), tuple(trace), loop)
 
 
-def _because(graph: Graph, visited: Sequence[State], places: Sequence[int], refuted: Property, wording: Wording) -> str:
+def _because(graph: Graph, visited: Sequence[Any], places: Sequence[int], refuted: Property, wording: Wording) -> str:
     trigger, goal = refuted.trigger, refuted.goal
     if trigger is None:
         return "the property fails on this run"
@@ -112,13 +110,11 @@ def _because(graph: Graph, visited: Sequence[State], places: Sequence[int], refu
     return f"in step {step}: {wording.say(trigger)}; what must follow never does: {wording.say(goal)}"
 
 
-def _first(
-    graph: Graph, visited: Sequence[State], places: Sequence[int], trigger: Formula, goal: Formula | None
-) -> str:
+def _first(graph: Graph, visited: Sequence[Any], places: Sequence[int], trigger: Formula, goal: Formula | None) -> str:
     """The first step in which the trigger holds and after which the goal never does."""
     atoms = tuple(dict.fromkeys(a for f in (trigger, goal) if f is not None for a in psl.atoms(f)))
     numbers = {atom: at for at, atom in enumerate(atoms)}
-    labels = label_states(graph.agent, visited, atoms)
+    labels = label_states(graph.system, visited, atoms)
     meant = compiled(trigger, numbers)
     reached = compiled(goal, numbers) if goal is not None else None
     last = max((at for at, label in enumerate(labels) if reached is not None and reached(label)), default=-1)
@@ -127,19 +123,19 @@ def _first(
 
 
 def _banned(
-    graph: Graph, visited: Sequence[State], places: Sequence[int], trigger: Formula, forbidden: Formula
+    graph: Graph, visited: Sequence[Any], places: Sequence[int], trigger: Formula, forbidden: Formula
 ) -> tuple[str, str]:
     """The first step in which the trigger holds, and the first from there on in which what is forbidden comes."""
     atoms = tuple(dict.fromkeys((*psl.atoms(trigger), *psl.atoms(forbidden))))
     numbers = {atom: at for at, atom in enumerate(atoms)}
-    labels = label_states(graph.agent, visited, atoms)
+    labels = label_states(graph.system, visited, atoms)
     meant, banned = compiled(trigger, numbers), compiled(forbidden, numbers)
     first = next((at for at, label in enumerate(labels) if meant(label)), None)
     came = next((at for at, label in enumerate(labels) if first is not None and at >= first and banned(label)), None)
     return ("?" if first is None else str(places[first])), ("?" if came is None else str(places[came]))
 
 
-def _contract_cells(graph: Graph, visited: Sequence[State], wording: Wording) -> list[Step]:
+def _contract_cells(graph: Graph, visited: Sequence[Any], wording: Wording) -> list[Step]:
     """For each state and each row that ever holds: ``i = 1, 2``, or ``yes`` where the row has no index.
     Of two rows that say the opposite of each other all along, the first is enough."""
     numbers = _numbers(graph, visited)
@@ -151,7 +147,7 @@ def _contract_cells(graph: Graph, visited: Sequence[State], wording: Wording) ->
     tests = [(row, values, compiled(formula, places)) for row, values, formula in tried]
     cells: dict[str, list[str]] = {}
     opposites: set[tuple[str, ...]] = set()
-    labels = label_states(graph.agent, visited, atoms)
+    labels = label_states(graph.system, visited, atoms)
     for row in wording.rows:
         mine = [(values, test) for of, values, test in tests if of is row]
         column = [_cell([values for values, test in mine if test(label)]) for label in labels]
@@ -203,14 +199,16 @@ def _instances(
             continue
 
 
-def _numbers(graph: Graph, visited: Sequence[State]) -> list[int]:
+def _numbers(graph: Graph, visited: Sequence[Any]) -> list[int]:
     """The whole numbers of which the agent speaks on its way."""
-    agent = graph.agent
+    system = graph.system
     found: set[int] = set()
     stack: list[Term] = []
     for state in visited:
-        stack += agent.beliefs.items[state.beliefs].own | agent.beliefs.items[state.beliefs].perceived
-        stack += [] if state.last == NONE else [agent.actions.items[state.last]]
+        for agent, mind in zip(system.agents, system.minds(state), strict=True):
+            stack += agent.believed(mind)
+        did = system.did(state)
+        stack += [] if did is None else [did[1]]
     seen: set[Term] = set()
     while stack:
         term = stack.pop()
@@ -222,19 +220,19 @@ def _numbers(graph: Graph, visited: Sequence[State]) -> list[int]:
     return sorted(found) if len(found) <= INDICES_TRIED else []
 
 
-def _agent_cells(graph: Graph, state: State, always: frozenset[Struct]) -> Step:
-    """What the agent did last, what it believes beyond its first beliefs, what is new to perceive."""
-    agent = graph.agent
-    beliefs = agent.beliefs.items[state.beliefs]
-    believed = sorted(show(b) for b in (beliefs.own | beliefs.perceived) - always)
-    words = [
-        ("(last action)", "none" if state.last == NONE else show(agent.actions.items[state.last])),
-        ("(believes)", ", ".join(believed) or "nothing new"),
-    ]
-    missing = sorted(show(b) for b in always if b not in beliefs)
-    if missing:
-        words.append(("(no longer believes)", ", ".join(missing)))
+def _agent_cells(system: System, state: Any) -> Step:
+    """What was done last, what each agent believes beyond its first beliefs, what is new to perceive."""
+    names = [f"{agent.program.name} " if len(system.agents) > 1 else "" for agent in system.agents]
+    did = system.did(state)
+    words = [("(last action)", "none" if did is None else f"{names[did[0]]}{show(did[1])}")]
+    for name, agent, mind in zip(names, system.agents, system.minds(state), strict=True):
+        believed = agent.believed(mind)
+        always = frozenset(agent.program.beliefs)
+        words.append((f"({name}believes)", ", ".join(sorted(map(show, believed - always))) or "nothing new"))
+        missing = sorted(map(show, always - believed))
+        if missing:
+            words.append((f"({name}no longer believes)", ", ".join(missing)))
     if state.drawn:
-        offered = agent.environment.percepts(agent.choices.items[state.choice])
+        offered = system.world.drawn(state.choice)
         words.append(("(is about to perceive)", ", ".join(map(show, offered)) or "nothing"))
     return tuple(words)

@@ -12,11 +12,12 @@ from small_agents import case
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import Environment, read_environment
 from avow.backends.ajpf.explore import explore
-from avow.backends.ajpf.interpreter import Agent, Semantics
+from avow.backends.ajpf.interpreter import Semantics
 from avow.backends.ajpf.mind import NONE
-from avow.backends.ajpf.parser import parse_fact, parse_program
+from avow.backends.ajpf.parser import parse_fact, parse_system
 from avow.backends.ajpf.printer import program_text
 from avow.backends.ajpf.psl_parser import Malformed, parse_psl
+from avow.backends.ajpf.society import system
 from avow.backends.ajpf.syntax import show, show_deed, show_event
 from avow.base.diagnostics import Rejected
 
@@ -24,7 +25,7 @@ from avow.base.diagnostics import Rejected
 def program(plans: str, beliefs: str = "", rules: str = "", goals: str = ""):
     rules = f":Reasoning Rules:\n{rules}\n" if rules else ""
     text = f"GWENDOLEN\n:name: ag\n:Initial Beliefs:\n{beliefs}\n{rules}:Initial Goals:\n{goals}\n:Plans:\n{plans}\n"
-    return parse_program(text, "ag.gwen")
+    return parse_system(text, "ag.gwen")
 
 
 def environment(*groups, at_quiescence="never", at_start=True):
@@ -36,7 +37,7 @@ def environment(*groups, at_quiescence="never", at_start=True):
 
 def run(plans, *groups, semantics=Semantics.MCAPL, at_quiescence="never", **sections):
     """The states of the only run, as (beliefs, last action), without repetitions."""
-    agent = Agent(program(plans, **sections), environment(*groups, at_quiescence=at_quiescence), semantics)
+    agent = system(program(plans, **sections), environment(*groups, at_quiescence=at_quiescence), semantics)
     graph = explore(agent, states=1000)
     assert graph.unfinished is None
     state, seen, said = graph.initial[0], set(), []
@@ -107,11 +108,11 @@ go(1) [perform]
 
 def test_what_is_read_is_printed_as_it_was():
     """But for the order of a guard that starts with a denial: it is printed as it is tried."""
-    printed = program_text(parse_program(EVERYTHING, "ag.gwen"))
+    printed = program_text(parse_system(EVERYTHING, "ag.gwen"))
     assert printed == EVERYTHING.replace("{ ~N < 3, B full,", "{ B full, ~N < 3,")
     for seed in range(40):
-        once = program_text(parse_program(case(seed).program, "ag.gwen"))
-        assert program_text(parse_program(once, "ag.gwen")) == once
+        once = program_text(parse_system(case(seed).program, "ag.gwen"))
+        assert program_text(parse_system(once, "ag.gwen")) == once
 
 
 @pytest.mark.parametrize(
@@ -140,13 +141,13 @@ def test_what_was_sent_is_remembered():
 
 def test_what_is_not_run_is_refused_with_the_reason():
     head = "GWENDOLEN\n:name: a\n:Initial Beliefs:\n:Initial Goals:\n:Plans:\n"
-    for text, reason in (
-        (f"{head}+p : {{ True }};\n{head}", "several agents (a, a)"),
-        (f"{head}+!G [perform] : {{ True }};", "any goal at all"),
+    for text, code, reason in (
+        (f"{head}+p : {{ True }};\n{head}", "AJPF106", "two agents called 'a'"),
+        (f"{head}+!G [perform] : {{ True }};", "AJPF105", "any goal at all"),
     ):
         with pytest.raises(Rejected) as caught:
-            parse_program(text, "a.gwen")
-        assert caught.value.diagnostics[0].code == "AJPF105"
+            parse_system(text, "a.gwen")
+        assert caught.value.diagnostics[0].code == code
         assert reason in caught.value.diagnostics[0].message
 
 
@@ -164,7 +165,7 @@ def test_what_is_not_run_is_refused_with_the_reason():
 )
 def test_bad_programs_are_located(text, line, column):
     with pytest.raises(Rejected) as caught:
-        parse_program(text, "bad.gwen")
+        parse_system(text, "bad.gwen")
     span = caught.value.diagnostics[0].span
     assert (span.file, span.line, span.column) == ("bad.gwen", line, column)
 
@@ -174,7 +175,7 @@ def test_bad_programs_are_located(text, line, column):
 def test_any_text_is_a_program_or_rejected(text):
     for whole in (text, f"GWENDOLEN\n:name: ag\n:Initial Beliefs:\n{text}\n:Initial Goals:\n:Plans:\n{text}"):
         try:
-            parse_program(whole, "f")
+            parse_system(whole, "f")
         except Rejected as error:
             located = error.diagnostics[0].span is not None
         else:
@@ -279,7 +280,7 @@ def test_print_is_no_action_and_draws_nothing():
 
 
 def test_draws_branch_and_quiescence():
-    agent = Agent(program("+p : { True } <- act;"), environment(["p", None], at_quiescence="once"), Semantics.MCAPL)
+    agent = system(program("+p : { True } <- act;"), environment(["p", None], at_quiescence="once"), Semantics.MCAPL)
     graph = explore(agent)
     assert len(graph.initial) == 1
     assert max(graph.offsets[s + 1] - graph.offsets[s] for s in range(len(graph))) == 2
@@ -287,7 +288,7 @@ def test_draws_branch_and_quiescence():
 
 
 def test_percepts_are_believed_no_longer_than_they_are_drawn():
-    agent = Agent(program("+p : { True } <- act;"), environment(["p", None]), Semantics.EDGE)
+    agent = system(program("+p : { True } <- act;"), environment(["p", None]), Semantics.EDGE)
     graph = explore(agent)
     for state in graph.states:
         beliefs = agent.beliefs.items[state.beliefs]
@@ -298,7 +299,7 @@ def test_percepts_are_believed_no_longer_than_they_are_drawn():
 def holds(plans, formula, *groups, **sections):
     graph_program = program(plans, **sections)
     wanted = Property("p", parse_psl(formula))
-    agent = Agent(graph_program, environment(*groups), Semantics.MCAPL, probed=asks_for_percepts(wanted))
+    agent = system(graph_program, environment(*groups), Semantics.MCAPL, probed=asks_for_percepts(wanted))
     return Checker(explore(agent), [wanted]).check(wanted).holds
 
 
@@ -337,10 +338,10 @@ def test_an_agent_that_falls_behind_its_percepts_is_told():
     """Each draw brings an event, each answer to it an action, and each action a draw: intentions pile up."""
     plans = "+p(X) : { True } <- go(X), rest(X), turn(X);"
     draws = environment(("p(0)", "p(1)"), at_quiescence="repeatedly")
-    hasty = explore(Agent(program(plans), draws, Semantics.MCAPL), states=2_000)
+    hasty = explore(system(program(plans), draws, Semantics.MCAPL), states=2_000)
     assert "intentions at once" in hasty.unfinished
     assert "keep" in hasty.unfinished
-    counting = explore(Agent(program("+p(X) : { True } <- +seen(X);"), draws, Semantics.MCAPL), states=2)
+    counting = explore(system(program("+p(X) : { True } <- +seen(X);"), draws, Semantics.MCAPL), states=2)
     assert counting.unfinished == "more than 2 states"
 
 
@@ -360,12 +361,12 @@ def test_the_small_agent_of_the_documentation_does_what_is_said(root, tmp_path):
     text = page.partition("```gwendolen\n")[2].partition("```")[0]
     drawn = page.partition("```yaml environment\n")[2].partition("```")[0]
     (tmp_path / "e.yaml").write_text(drawn)
-    program, draws = parse_program(text, "warden.gwen"), read_environment(tmp_path / "e.yaml")
-    graph = explore(Agent(program, draws, Semantics.EDGE), states=20_000)
+    program, draws = parse_system(text, "warden.gwen"), read_environment(tmp_path / "e.yaml")
+    graph = explore(system(program, draws, Semantics.EDGE), states=20_000)
     assert graph.unfinished is None
     parks = Property("p", parse_psl("[] (B(warden, outside) -> (<> D(warden, park)))"))
     sprays = Property("s", parse_psl("[] (B(warden, outside) -> (<> D(warden, spray)))"))
     checker = Checker(graph, (parks, sprays))
     assert checker.check(parks).holds
     assert not checker.check(sprays).holds
-    assert explore(Agent(program, draws, Semantics.MCAPL), states=20_000).unfinished is None
+    assert explore(system(program, draws, Semantics.MCAPL), states=20_000).unfinished is None

@@ -10,10 +10,11 @@ from small_agents import case, formula
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
-from avow.backends.ajpf.interpreter import Agent, Semantics
+from avow.backends.ajpf.interpreter import Semantics
 from avow.backends.ajpf.lazy import open_part
-from avow.backends.ajpf.parser import parse_program
+from avow.backends.ajpf.parser import parse_system
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
+from avow.backends.ajpf.society import system
 
 ENDLESS = """\
 GWENDOLEN
@@ -31,11 +32,11 @@ def test_the_part_decides_as_the_whole_does(tmp_path, seeds):
     for seed in seeds:
         made = case(seed)
         (tmp_path / "e.yaml").write_text(made.environment)
-        program, draws = parse_program(made.program, "ag.gwen"), read_environment(tmp_path / "e.yaml")
+        program, draws = parse_system(made.program, "ag.gwen"), read_environment(tmp_path / "e.yaml")
         rng = Random(seed)
         for text in (*made.formulas, formula(rng, 1), formula(rng, 2)):
             wanted = Property("f", instantiate(parse_psl(text), {}))
-            agent = Agent(program, draws, Semantics.MCAPL, probed=asks_for_percepts(wanted))
+            agent = system(program, draws, Semantics.MCAPL, probed=asks_for_percepts(wanted))
             whole = explore(agent, states=2_000)
             if whole.unfinished is not None:
                 continue
@@ -58,7 +59,7 @@ def test_the_part_decides_as_the_whole_does(tmp_path, seeds):
 )
 def test_an_agent_without_bounds_has_its_answer(tmp_path, text, holds):
     (tmp_path / "e.yaml").write_text('draws: {at_quiescence: repeatedly}\npercepts: {p: ["p(0)", "p(1)"]}\n')
-    agent = Agent(parse_program(ENDLESS, "ag.gwen"), read_environment(tmp_path / "e.yaml"), Semantics.MCAPL)
+    agent = system(parse_system(ENDLESS, "ag.gwen"), read_environment(tmp_path / "e.yaml"), Semantics.MCAPL)
     assert explore(agent, states=2_000).unfinished is not None
     wanted = Property("f", instantiate(parse_psl(text), {}))
     part = open_part(agent, wanted, 5_000, 60.0)

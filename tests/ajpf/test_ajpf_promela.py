@@ -11,9 +11,10 @@ from avow.backends.ajpf import promela, spin
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
-from avow.backends.ajpf.interpreter import Agent, Semantics
-from avow.backends.ajpf.parser import read_program
+from avow.backends.ajpf.interpreter import Semantics
+from avow.backends.ajpf.parser import read_system
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
+from avow.backends.ajpf.society import system
 
 GOLDEN = Path(__file__).parent / "golden" / "verdicts"
 with (GOLDEN / "verdicts.csv").open(newline="") as table:
@@ -21,7 +22,7 @@ with (GOLDEN / "verdicts.csv").open(newline="") as table:
 
 
 def checkers(name: str):
-    program, draws = read_program(GOLDEN / f"{name}.gwen"), read_environment(GOLDEN / f"{name}.yaml")
+    program, draws = read_system(GOLDEN / f"{name}.gwen"), read_environment(GOLDEN / f"{name}.yaml")
     for probed in (False, True):
         rows = [
             (Property(r["property"], instantiate(parse_psl(r["formula"]), {})), r["ajpf"])
@@ -31,7 +32,7 @@ def checkers(name: str):
         said = {p.key: answer == "holds" for p, answer in rows if asks_for_percepts(p) is probed}
         wanted = [p for p, _ in rows if p.key in said]
         if wanted:
-            agent = Agent(program, draws, Semantics.MCAPL, probed=probed)
+            agent = system(program, draws, Semantics.MCAPL, probed=probed)
             yield Checker(explore(agent, states=20_000), wanted), wanted, said
 
 
@@ -49,6 +50,6 @@ def test_spin_says_of_the_program_what_ajpf_says(tmp_path, name):
 def test_what_is_not_translated_is_told():
     for name, reason in (("e1", "compute"),):
         ((checker, _, _),) = checkers(name)
-        agent = checker.graph.agent
+        agent = checker.graph.system
         with pytest.raises(promela.NotTranslated, match=reason):
             promela.header(agent.program, agent.environment, checker.atoms, probed=False)

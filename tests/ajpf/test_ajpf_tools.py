@@ -17,12 +17,13 @@ from avow.backends.ajpf.asking import ask
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
-from avow.backends.ajpf.interpreter import Agent, Semantics
+from avow.backends.ajpf.interpreter import Semantics
 from avow.backends.ajpf.java import environment_class
 from avow.backends.ajpf.options import Setup
-from avow.backends.ajpf.parser import parse_program
+from avow.backends.ajpf.parser import parse_system
 from avow.backends.ajpf.printer import program_text
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
+from avow.backends.ajpf.society import system
 from avow.base.process import Completed
 from avow.base.verdict import Verdict
 
@@ -174,7 +175,7 @@ def test_ajpf_agrees_on_small_agents(tmp_path, seed):
     """Programs printed anew, environments generated: AJPF runs them, and says what we say."""
     made = case(seed)
     (tmp_path / "e.yaml").write_text(made.environment)
-    program, draws = parse_program(made.program, "ag.gwen"), read_environment(tmp_path / "e.yaml")
+    program, draws = parse_system(made.program, "ag.gwen"), read_environment(tmp_path / "e.yaml")
     wanted = [Property(f"f{n}", instantiate(parse_psl(text), {})) for n, text in enumerate(made.formulas)]
     setup = Setup(
         program, tmp_path, "", draws, tmp_path, (), {}, (), Semantics.MCAPL, "ajpf", 5_000, environment_class=None
@@ -183,7 +184,7 @@ def test_ajpf_agrees_on_small_agents(tmp_path, seed):
     assert installation is not None
     answers = ask(installation, setup, wanted, seconds=240, megabytes=2_000)
     for p in wanted:
-        graph = explore(Agent(program, draws, Semantics.MCAPL, probed=asks_for_percepts(p)), states=5_000)
+        graph = explore(system(program, draws, Semantics.MCAPL, probed=asks_for_percepts(p)), states=5_000)
         assert graph.unfinished is None
         expected = Said.HOLDS if Checker(graph, (p,)).check(p).holds else Said.VIOLATED
         assert answers[p.key].said is expected, answers[p.key].log
@@ -204,7 +205,9 @@ def test_a_run_that_refutes_is_done_again_by_ail(lift, tmp_path, monkeypatch):
 def test_a_run_that_ail_does_not_do_is_no_refutation(lift, tmp_path, monkeypatch):
     """A seeded fault: our interpreter takes initial beliefs for granted that AIL does not have."""
     monkeypatch.setattr(spin, "version", lambda: None)
-    monkeypatch.setattr(replay, "program_text", lambda program: program_text(replace(program, beliefs=())))
+    monkeypatch.setattr(
+        replay, "program_text", lambda agents: program_text([replace(agent, beliefs=()) for agent in agents])
+    )
     report = BACKEND.discharge(lift({"engine": "auto", "semantics": "mcapl"}), tmp_path, Limits(seconds=120))
     (answers,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
     assert answers.verdict is Verdict.ERROR
@@ -216,18 +219,18 @@ def test_what_a_run_tells(tmp_path):
     """The moments of a lasso, its loop gone through twice; and the class that repeats its draws compiles from them."""
     (tmp_path / "e.yaml").write_text("draws: {at_quiescence: repeatedly}\npercepts: {w: [warn, nothing]}\n")
     draws = read_environment(tmp_path / "e.yaml")
-    program = parse_program(
+    program = parse_system(
         "GWENDOLEN\n:name: ag\n:Initial Beliefs:\nb\n:Initial Goals:\n:Plans:\n+warn : { True } <- shout;\n", "ag.gwen"
     )
     wanted = Property("f", instantiate(parse_psl("[] (~D(ag, shout))"), {}))
-    checker = Checker(explore(Agent(program, draws, Semantics.MCAPL)), (wanted,))
+    checker = Checker(explore(system(program, draws, Semantics.MCAPL)), (wanted,))
     lasso = checker.lasso(wanted)
     assert lasso is not None
     moments, script = replay.expected(checker.graph, lasso)
     assert moments[0].text() == "start\tb"
     assert any(moment.text().startswith("shout\tb; warn") for moment in moments)
-    assert len(script) >= len(moments) - 1
+    assert len(script.draws) >= len(moments) - 1
     source = environment_class(draws, script=script, probed=True)
-    assert f"SCRIPT = {{{{{script[0][0]}}}" in source
+    assert f"SCRIPT = {{{{{script.draws[0][0]}}}" in source
     assert "public void begin()" in source
     assert "SCRIPT" not in environment_class(draws)

@@ -17,9 +17,10 @@ import pytest
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
-from avow.backends.ajpf.interpreter import Agent, Semantics
-from avow.backends.ajpf.parser import read_program
+from avow.backends.ajpf.interpreter import Semantics
+from avow.backends.ajpf.parser import read_system
 from avow.backends.ajpf.psl_parser import instantiate, parse_psl
+from avow.backends.ajpf.society import system
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -35,13 +36,13 @@ PROGRAMS = [(folder, name) for folder, rows in ROWS.items() for name in dict.fro
 
 @pytest.mark.parametrize(("folder", "name"), PROGRAMS)
 def test_our_verdicts_are_ajpfs(folder, name):
-    program = read_program(GOLDEN / folder / f"{name}.gwen")
+    program = read_system(GOLDEN / folder / f"{name}.gwen")
     draws = read_environment(GOLDEN / folder / f"{name}.yaml")
     for row in ROWS[folder]:
         if row["program"] != name:
             continue
         p = Property(row["property"], instantiate(parse_psl(row["formula"]), {}))
-        graph = explore(Agent(program, draws, Semantics.MCAPL, probed=asks_for_percepts(p)), states=20_000)
+        graph = explore(system(program, draws, Semantics.MCAPL, probed=asks_for_percepts(p)), states=20_000)
         assert graph.unfinished is None
         agrees = Checker(graph, (p,)).check(p).holds is (row["ajpf"] == "holds")
         assert agrees is not bool(row.get("remark")), row

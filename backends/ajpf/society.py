@@ -1,0 +1,230 @@
+"""Several agents in one environment, as AJPF schedules them: what one does, all may perceive, and they send messages.
+
+The scheduler is AIL's `ActionScheduler`: an agent goes on till something has changed for anybody (an action or a draw
+that brought percepts, a message, an agent that fell asleep or woke); then any agent that is awake may be next, in
+every way. Percepts wake all agents, a message the one that it is for. One agent's jobs are the interpreter's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, TypeVar
+
+from .beliefs import apart
+from .environment import Environment
+from .intentions import of_event
+from .interpreter import PRINT, Agent, Semantics, State
+from .mind import NONE, Table
+from .syntax import RECEIVED, DeedKind, Event, Program, Sign, Struct, plain
+from .world import World
+
+T = TypeVar("T")
+
+
+class Common(NamedTuple):
+    """What there is after a job. Minds, actions and draws by their numbers, agents by their places."""
+
+    minds: tuple[int, ...]
+    mail: tuple[tuple[int, ...], ...]
+    """For each agent the messages that it has yet to read, as intentions, in the order in which it will."""
+    awake: tuple[bool, ...]
+    turn: int
+    """Whose job was the last."""
+    changed: bool
+    """Another agent may be next."""
+    last: int
+    """The last action and whose it was, or NONE."""
+    choice: int
+    begun: bool
+    waited: bool
+    over: bool
+    drawn: bool
+
+
+class Society:
+    """The agents of a system. `start` and `successors` span the state graph."""
+
+    def __init__(
+        self, programs: Sequence[Program], environment: Environment, semantics: Semantics, *, probed: bool = False
+    ) -> None:
+        self.world = World(environment)
+        self.environment = environment
+        self.semantics = semantics
+        self.probed = probed
+        self.agents = tuple(Agent(program, self.world, semantics, probed=probed) for program in programs)
+        self._places = {program.name: place for place, program in enumerate(programs)}
+        self._minds: tuple[Table[State], ...] = tuple(Table() for _ in programs)
+        self._actions: Table[tuple[int, Struct]] = Table()
+        self._cycles: dict[tuple[int, int, int, tuple[int, ...], bool], tuple[int, bool]] = {}
+        self._deeds: dict[tuple[int, int], tuple[int, bool, int]] = {}
+
+    def minds(self, state: Common) -> tuple[State, ...]:
+        """The state of each of `agents`."""
+        return tuple(table.items[number] for table, number in zip(self._minds, state.minds, strict=True))
+
+    def did(self, state: Common) -> tuple[int, Struct] | None:
+        """Which of `agents` acted last, and its action."""
+        return None if state.last == NONE else self._actions.items[state.last]
+
+    def sees(self, state: Common) -> tuple[Struct, ...]:
+        """The percepts on offer that AJPF's P speaks of: until every agent has perceived them."""
+        if not state.begun or state.over or not any(mind.new for mind in self.minds(state)):
+            return ()
+        return self.world.offers(state.choice)
+
+    def start(self) -> tuple[Common, ...]:
+        everybody = range(len(self.agents))
+        return (
+            Common(
+                minds=tuple(self._keep(place, self.agents[place].first()) for place in everybody),
+                mail=((),) * len(self.agents),
+                awake=(True,) * len(self.agents),
+                turn=0,
+                changed=True,
+                last=NONE,
+                choice=self.world.before,
+                begun=not self.environment.at_start,
+                waited=False,
+                over=False,
+                drawn=False,
+            ),
+        )
+
+    def successors(self, state: Common) -> tuple[Common, ...]:
+        """Never empty: a run that has ended stays where it is."""
+        if state.over:
+            return (state,)
+        if not any(state.awake):
+            return tuple(dict.fromkeys(self._idle(state._replace(drawn=False))))
+        turns = [place for place, up in enumerate(state.awake) if up] if state.changed else [state.turn]
+        now = state._replace(changed=False, drawn=False)
+        return tuple(dict.fromkeys(after for turn in turns for after in self._job(now._replace(turn=turn))))
+
+    # Jobs of the agent whose turn it is
+
+    def _job(self, state: Common) -> Iterator[Common]:
+        if self._minds[state.turn].items[state.minds[state.turn]].planned:
+            yield from self._deed(state)
+        elif state.begun:
+            yield self._cycle(state)
+        else:
+            for draw in self.world.first():
+                drawn = state._replace(choice=draw, begun=True, drawn=True)
+                after = self._cycle(drawn, again=not self.probed)
+                yield after._replace(changed=after.changed or (not self.probed and bool(self.world.offers(draw))))
+
+    def _cycle(self, state: Common, *, again: bool = False) -> Common:
+        """Perceive, read messages, select an intention, choose a plan."""
+        place = state.turn
+        mind = self._minds[place].items[state.minds[place]]
+        letters = state.mail[place]
+        key = (place, state.minds[place], state.choice if mind.new else NONE, letters, again)
+        found = self._cycles.get(key)
+        if found is None:
+            after = self.agents[place].cycle(mind._replace(choice=state.choice), again=again, letters=letters)
+            found = self._cycles[key] = self._keep(place, after), after.asleep
+        if letters:
+            state = state._replace(mail=_put(state.mail, place, ()))
+        return self._done(state, *found)
+
+    def _deed(self, state: Common) -> Iterator[Common]:
+        place, agent = state.turn, self.agents[state.turn]
+        number = state.minds[place]
+        found = self._deeds.get((place, number))
+        if found is None:
+            after, action = agent.act(self._minds[place].items[number])
+            found = self._deeds[place, number] = self._keep(place, after), after.asleep, action
+        kept, asleep, action = found
+        deed = agent.next_deed(self._minds[place].items[number])
+        state = self._done(state, kept, asleep)
+        if action == NONE or deed is None:
+            yield state
+            return
+        done = agent.actions.items[action]
+        state = state._replace(waited=False)
+        if done.functor == PRINT:
+            yield state
+            return
+        state = state._replace(last=self._actions.number((place, done)))
+        if done.functor not in self.environment.quiet:
+            states = [self._offered(state, draw) for draw in self.world.after(state.choice, done.functor)]
+        else:
+            states = [state]
+        for drawn in states:
+            yield self._delivered(drawn, place, deed.term) if deed.kind is DeedKind.SEND else drawn
+
+    def _idle(self, state: Common) -> Iterator[Common]:
+        """All agents sleep: the environment moves on, or the run is over."""
+        when = self.environment.at_quiescence
+        if when == "never" or state.waited:
+            yield state._replace(over=True)
+            return
+        for draw in self.world.after(state.choice, ""):
+            after = self._offered(state._replace(waited=when == "once"), draw)
+            if when == "repeatedly":
+                after = after._replace(awake=(True,) * len(self.agents))
+            if any(after.awake):
+                for turn in range(len(self.agents)):
+                    yield self._cycle(after._replace(turn=turn, changed=False))
+            else:  # the agent that slept last has this half of a cycle, and the run is over
+                yield self._cycle(after)._replace(over=True)
+
+    # Parts
+
+    def _keep(self, place: int, mind: State) -> int:
+        """What is an agent's own of its state."""
+        own = mind._replace(last=NONE, choice=NONE, begun=True, asleep=False, waited=False, over=False, drawn=False)
+        return self._minds[place].number(own)
+
+    def _done(self, state: Common, mind: int, asleep: bool) -> Common:
+        state = state._replace(minds=_put(state.minds, state.turn, mind))
+        if asleep:
+            state = state._replace(awake=_put(state.awake, state.turn, False), changed=True)
+        return state
+
+    def _offered(self, state: Common, draw: int) -> Common:
+        """A draw was made. All agents look again, if there was or is anything to see; what there is wakes them."""
+        now = self.world.offers(draw)
+        if now or self.world.offers(state.choice):
+            seen = [self._keep(place, mind._replace(new=True)) for place, mind in enumerate(self.minds(state))]
+            state = state._replace(minds=tuple(seen))
+        state = state._replace(choice=draw, drawn=True)
+        return state._replace(awake=(True,) * len(self.agents), changed=True) if now else state
+
+    def _delivered(self, state: Common, sender: int, message: object) -> Common:
+        """The message is with its receiver, if there is such an agent. The same message is there only once."""
+        assert isinstance(message, Struct)
+        to, force, content = message.args
+        state = state._replace(changed=True)
+        place = self._places.get(to.functor.strip("\"'")) if isinstance(to, Struct) and not to.args else None
+        if place is None:
+            return state
+        agent = self.agents[place]
+        names = (Struct(self.agents[sender].program.name), Struct(agent.program.name))
+        term = Struct(RECEIVED, (*names, force, content))
+        letter = agent.intentions.number(of_event(Event(Sign.ADD, apart(term, "''"))))
+        mail = sorted({*state.mail[place], letter}, key=lambda n: _text(agent.intentions.items[n].frames[0].event.term))
+        return state._replace(mail=_put(state.mail, place, tuple(mail)), awake=_put(state.awake, place, True))
+
+
+def system(
+    programs: Sequence[Program], environment: Environment, semantics: Semantics, *, probed: bool = False
+) -> Agent | Society:
+    """The agents of one system. What an agent alone sends goes nowhere, not even to itself."""
+    if len(programs) == 1:
+        return Agent(programs[0], environment, semantics, probed=probed)
+    return Society(programs, environment, semantics, probed=probed)
+
+
+_FORCES = {"tell": "1", "perform": "2", "achieve": "3"}
+
+
+def _text(message: object) -> str:
+    """A message as AIL writes it: by these texts it sorts."""
+    assert isinstance(message, Struct)
+    sender, to, force, content = message.args
+    return f"{plain(sender)},{plain(to)},{_FORCES[plain(force)]},{plain(content)})"
+
+
+def _put(items: tuple[T, ...], place: int, item: T) -> tuple[T, ...]:
+    return (*items[:place], item, *items[place + 1 :])
