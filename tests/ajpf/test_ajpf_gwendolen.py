@@ -62,7 +62,7 @@ def actions(said):
 
 
 def test_it_reads_the_subset():
-    made = program(
+    (made,) = program(
         '+!go(X) [perform] : { B p, ~G q(_) [achieve], True } <- +b(X, -2.50), *w, -!g(X) [achieve], act("a, b"); //\n'
         "-p : { True };",
         beliefs="p f(a, 1.0), /* c */ q(f(-3))",
@@ -293,7 +293,7 @@ def test_percepts_are_believed_no_longer_than_they_are_drawn():
     for state in graph.states:
         beliefs = agent.beliefs.items[state.beliefs]
         if not state.drawn:
-            assert set(agent.environment.percepts(agent.choices.items[state.choice])) == set(beliefs.perceived)
+            assert set(agent.world.drawn(state.choice)) == set(beliefs.perceived)
 
 
 def holds(plans, formula, *groups, **sections):
