@@ -76,7 +76,7 @@ def recorded(events: Iterable[tuple[str, str]]) -> tuple[Observed, ...]:
 
 
 def _kind(event: str, path: str) -> Seen | None:
-    if event == "outside":
+    if event in ("outside", "program"):
         return Seen.OUTSIDE
     if _of_python(path):
         return None
@@ -95,7 +95,7 @@ def _kind(event: str, path: str) -> Seen | None:
     return None if path in _EMPTY else Seen.OUTSIDE
 
 
-_EMPTY = ("/dev/null", "/dev/zero", "/dev/full", "/dev/urandom", "/dev/random")
+_EMPTY = ("/dev/null", "/dev/zero", "/dev/full")
 
 _PYTHON = tuple(dict.fromkeys(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")))
 _INSTALLED = tuple(dict.fromkeys(sysconfig.get_path(name) for name in ("purelib", "platlib")))

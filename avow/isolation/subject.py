@@ -17,6 +17,7 @@ from typing import Any
 from avow.base import process
 from avow.isolation.level import Isolation, available, sealed
 from avow.isolation.observed import Observed, interpreter, recorded
+from avow.isolation.tracing import Trace, traces
 
 _SCRATCH = "/tmp/avow-scratch"
 """Where a sealed subject may write."""
@@ -42,6 +43,9 @@ class Subject:
         self.fault = ""
         self.process: subprocess.Popen[bytes] | None = None
         self._events: dict[tuple[str, str], None] = {}
+        self._trace: Trace | None = None
+        self._untraced = False
+        """Whether something ran that no trace tells of."""
         self._to = self._from = -1
         self._buffer = b""
         self._scratch: tempfile.TemporaryDirectory[str] | None = None
@@ -65,17 +69,20 @@ class Subject:
         return [self._reply(reply) for reply in replies]
 
     def observed(self) -> tuple[Observed, ...]:
-        """What it has looked at so far, the interpreter first."""
-        return (interpreter(), *recorded(self._events))
+        """What it has looked at so far, the interpreter first. A program that it started is told by what the trace
+        tells of it, where there is one of all that ran."""
+        events = [e for e in self._events if self._untraced or e[0] != "program"]
+        return (interpreter(), *recorded(events))
 
     def close(self) -> str:
         """End it, with all that it started; what it did that no subject may do, in words."""
         if self.process is not None:
             os.close(self._to)
             self._to = -1
-            with contextlib.suppress(SubjectFailed):
+            with contextlib.suppress(SubjectFailed, subprocess.TimeoutExpired):
                 self.patience = min(self.patience, 2.0)
                 self._message()  # its last: what it looked at, and whether something is left
+                self.process.wait(2.0)
         self._stop()
         return self.fault
 
@@ -129,16 +136,29 @@ class Subject:
             if left and self.isolation is not Isolation.SEALED and not self.fault:
                 self.fault = "the subject left processes behind"
             self.process, self._buffer = None, b""
+            self._read_trace()
         if self._scratch is not None:
             self._scratch.cleanup()
             self._scratch = None
+
+    def _read_trace(self) -> None:
+        traced = self._trace.read(self.root, self._writes) if self._trace is not None else None
+        if traced is None:
+            self._untraced = True
+        else:
+            self._events.update((event, None) for event in traced.events)
+            if traced.faults and not self.fault:
+                self.fault = f"the subject {traced.faults[0]}"
+        self._trace = None
 
     def _start(self) -> None:
         there, self._to = os.pipe()
         self._from, back = os.pipe()
         host = Path(__file__).with_name("host.py").resolve()
         command = [sys.executable, "-P", "-B", str(host), str(self.path), self.function, str(self.root)]
-        command += [self.isolation.value, str(there), str(back)]
+        self._trace = Trace() if traces() else None
+        mark = self._trace.mark if self._trace is not None else ""
+        command += [self.isolation.value, str(there), str(back), mark]
         environment = {
             "PATH": os.environ.get("PATH", os.defpath),
             "PYTHONPATH": process.python_path(),
@@ -152,7 +172,9 @@ class Subject:
         else:
             self._scratch = tempfile.TemporaryDirectory(prefix="avow-subject-")
             environment["TMPDIR"] = os.path.realpath(self._scratch.name)
-        environment["HOME"] = environment["TMPDIR"]
+        environment["HOME"] = self._writes = environment["TMPDIR"]
+        if self._trace is not None:
+            command = self._trace.around(command)
         self.process = subprocess.Popen(
             command,
             cwd=self.root,
@@ -167,6 +189,8 @@ class Subject:
         os.close(there)
         os.close(back)
         ready = self._message()
+        if self._trace is not None:
+            self._trace.hide()
         if not ready.get("ready"):
             why = ready.get("error", "no reason given")
             raise self._end(f"the subject cannot be loaded: {why}")

@@ -127,6 +127,10 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Ou
         return replace(outcome, verdict=Verdict.ERROR, summary=str(why), counterexample=shown)
     if answer["fault"]:
         return replace(outcome, verdict=Verdict.ERROR, summary=str(answer["fault"]))
+    if answer["unsteady"] is not None:
+        case = ", ".join(f"{name} = {value}" for name, value in answer["unsteady"])
+        why = f"undeclared input: asked the same again from its start, another process answers otherwise ({case})"
+        return replace(outcome, summary=why)
     why = _doubt(answer, own, valid, rejected, wanted)
     if why:
         return replace(outcome, summary=why)

@@ -34,7 +34,7 @@ from .export import KEPT
 from .generate import Failing, Generator, Impossible, Inputs, Source
 from .judging import Trigger, blamed, guarantee, judged
 from .pools import constants, parse_cell, pools
-from .tuning import BATCH, CASE_BYTES, SHRINKING_SECONDS
+from .tuning import ASKED_AGAIN, BATCH, CASE_BYTES, SHRINKING_SECONDS
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
 # and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
@@ -72,6 +72,8 @@ class Bench:
         self.valid = self.edges = self.rejected = self.undecided = 0
         self.crash: tuple[Inputs, str] | None = None
         self.end: float | None = None
+        self._said: list[tuple[Inputs, Any]] = []
+        self.unsteady: Inputs | None = None
 
     @classmethod
     def load(cls, path: Path) -> Bench:
@@ -132,6 +134,8 @@ class Bench:
             smaller = {name: self._shrunk(name) for name, g in self.guarantees.items() if g.failure is not None}
             if self.crash is not None and not self.subject.fault:
                 self.crash = self._shrunk_crash()
+            elif not self.subject.fault:
+                self.unsteady = self._asked_again()
         finally:
             fault = self.subject.close()
         judge.say(channel, {**self._report(stopped, smaller), "fault": fault})
@@ -212,6 +216,8 @@ class Bench:
     def _try(self, cases: list[Inputs], edge: bool = False) -> None:
         """Ask the subject, and judge each guarantee of each answer."""
         for inputs, reply in zip(cases, self.subject.ask_all([*map(_sent, cases)]), strict=False):
+            if len(self._said) < ASKED_AGAIN:
+                self._said.append((inputs, reply))
             self._in_time()
             try:
                 found = self._outputs(reply)
@@ -223,6 +229,31 @@ class Bench:
             self._judge(inputs, found, edge)
             if all(g.failure is not None for g in self.guarantees.values()):
                 raise _Enough
+
+    def _asked_again(self) -> Inputs | None:
+        """The first inputs to which another process, asked the same from its start, gives another answer: what comes of
+        clock, chance or place in memory is no function of what was recorded. The first cases only."""
+        twin = Subject(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
+        try:
+            for at in range(0, len(self._said), BATCH):
+                if self.end is not None and time.monotonic() > self.end:
+                    break
+                before = self._said[at : at + BATCH]
+                again = twin.ask_all([_sent(inputs) for inputs, _ in before])
+                for (inputs, reply), other in zip(before, again, strict=False):
+                    if other != reply and self._differ(reply, other):
+                        return inputs
+                if len(again) < len(before):
+                    return before[len(again)][0]
+        finally:
+            twin.close()
+        return None
+
+    def _differ(self, one: Any, other: Any) -> bool:
+        try:
+            return self._outputs(one) != self._outputs(other)
+        except SubjectFailed:
+            return True
 
     def _in_time(self) -> None:
         if self.end is not None and time.monotonic() > self.end:
@@ -304,6 +335,7 @@ class Bench:
             "stopped": stopped,
             "observed": to_json(self.subject.observed()),
             "isolation": self.subject.isolation.value,
+            "unsteady": _pairs(self.unsteady, {}) if self.unsteady is not None else None,
             "crash": [_pairs(self.crash[0], {}), self.crash[1]] if self.crash else None,
             "guarantees": {
                 name: {

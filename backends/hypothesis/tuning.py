@@ -12,6 +12,9 @@ SHRINKING_SECONDS = 4.0
 BATCH = 50
 """Cases that are put to the subject at a time: so that the time to hand them over is shared."""
 
+ASKED_AGAIN = 200
+"""The first questions, which are put to a second process too: most thresholds, at a fraction of the time."""
+
 ATTEMPTS = 6
 """Times that the inputs to blame for an unmet assumption are drawn again; a case that stays unmet is rejected and
 counted."""

@@ -219,6 +219,22 @@ def free(
     return settle(job(tmp_path, subject, rcl, "n", **more))["g"]
 
 
+@pytest.mark.parametrize(
+    ("text", "verdict"),
+    [
+        ("def f(x):\n    return id(object()) // 16 % 997 / 1000\n", Verdict.UNKNOWN),
+        ("import _random\nr = _random.Random()\ndef f(x):\n    return r.random()\n", Verdict.UNKNOWN),
+        ("n = 0\ndef f(x):\n    global n\n    n += 1\n    return 1 / n\n", Verdict.TESTED),
+        ("def f(x):\n    return {object() for _ in 'ab'} and 1\n", Verdict.TESTED),
+    ],
+)
+def test_what_comes_of_chance_is_not_green(tmp_path: Path, text: str, verdict: Verdict) -> None:
+    rcl = "node n { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee g ( out.y <= 1 ) }"
+    (found,) = settle(job(tmp_path, text, rcl, "n", subject="s.py:f")).values()
+    assert found.verdict is verdict
+    assert ("undeclared input" in found.summary) is (verdict is Verdict.UNKNOWN)
+
+
 def test_an_antecedent_that_is_never_met_is_not_green(tmp_path: Path) -> None:
     found = free(tmp_path, "in.a * in.a == 2 -> out.y == 5", "def step(a): return 0")
     assert (found.verdict, found.vacuous) == (Verdict.UNKNOWN, True)

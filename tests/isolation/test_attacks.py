@@ -50,8 +50,6 @@ ATTACKS = {
     "daemonises": f"FORGERY = {FORGERY!r}\n{DAEMON}\ndef step(**inputs):\n    " + WRONG,
     "leaves a child": "import subprocess\nsubprocess.Popen(['sleep', '30'], start_new_session=True)\n"
     "def step(**inputs):\n    " + WRONG,
-    "starts one by hand": "import _posixsubprocess, os, subprocess\nsubprocess.Popen(['true']).wait()\n"
-    "def step(**inputs):\n    " + WRONG,
     "kills its judge": "import os, signal\ndef step(**inputs):\n    os.kill(os.getppid(), signal.SIGKILL)\n    "
     + WRONG,
     "kills all": "import os, signal\ndef step(**inputs):\n    os.kill(-1, 0)\n    " + WRONG,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import py_compile
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -11,7 +12,10 @@ from helpers import some
 
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
-from avow.isolation.level import SANDBOX
+from avow.isolation.level import SANDBOX, seals
+from avow.isolation.observed import Seen
+from avow.isolation.subject import Subject
+from avow.isolation.tracing import traces
 from avow.pipeline.discharge import discharge, ledger_of, open_obligations
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work
@@ -161,8 +165,68 @@ def test_a_sandbox_asked_for_later_asks_again(settled: tuple[Workspace, Work], m
     assert open_obligations(workspace, work, Run("third", False))
 
 
+PROGRAM = "import subprocess\ntop = 10 if b'10' in subprocess.run(['cat', 'top.txt'], stdout=-1).stdout else 1000\n"
+
+
+@pytest.fixture
+def started(tmp_path: Path) -> Path:
+    """A system whose subject asks a program that reads a file."""
+    folder = tmp_path / "contracts" / "robot"
+    (folder / "models").mkdir(parents=True)
+    (folder / "robot.rcl").write_text(RCL)
+    (folder / "plan.yaml").write_text(PLAN)
+    (folder / "top.txt").write_text("10")
+    (folder / "models" / "limiter.py").write_text(PROGRAM + "def step(wish): return min(wish, top)\n")
+    return folder
+
+
+@pytest.mark.skipif(not traces(), reason="strace does not run here")
+@pytest.mark.parametrize("sandbox", ["off", "required"])
+def test_what_a_started_program_reads_is_an_input(
+    started: Path, tmp_path: Path, sandbox: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if sandbox == "required" and not seals():
+        pytest.skip("bubblewrap does not run here")
+    monkeypatch.setenv(SANDBOX, sandbox)
+    workspace = Workspace(tmp_path)
+    outcomes = discharge(workspace, method(started), Run("first", False))
+    assert [o.verdict for o in outcomes] == [Verdict.TESTED], outcomes
+    record = ledger_of(workspace.ledger("robot")).records()[-1].evidence
+    seen = {path for kind, path, _ in record.details["observed"] if kind == "read"}
+    assert "contracts/robot/top.txt" in seen
+    assert any(path.endswith("/cat") for path in seen)
+    assert not open_obligations(workspace, method(started), Run("second", False))
+    (started / "top.txt").write_text("1000")
+    assert open_obligations(workspace, method(started), Run("third", False))
+
+
+def test_a_started_program_is_undeclared_where_nothing_traces_it(
+    started: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    for name in ("cat", "bwrap"):
+        found = shutil.which(name)
+        if found is not None:
+            (programs / name).symlink_to(found)
+    monkeypatch.setenv("PATH", str(programs))
+    outcomes = discharge(Workspace(tmp_path), method(started), Run("first", False))
+    assert [o.verdict for o in outcomes] == [Verdict.UNKNOWN]
+    assert "undeclared input" in outcomes[0].summary
+
+
 UNRECORDABLE = {
-    "another program": "import subprocess\ntop = 10 if subprocess.run(['true']) else 1000\n",
+    "the clock": "import time\ntop = 10 if time.time() < 4e9 else 1000\n",
+    "the clock by name": "from time import perf_counter as c\ntop = 10 if c() > 0 else 1000\n",
+    "the day": "import datetime\ntop = 10 if datetime.date.today().year < 2999 else 1000\n",
+    "the hour": "from datetime import datetime\ntop = 10 if datetime.now().year < 2999 else 1000\n",
+    "the time as text": "import time\ntop = 10 if time.strftime('%Y') < '2999' else 1000\n",
+    "chance": "import random\ntop = 10 if random.random() < 2 else 1000\n",
+    "chance that is seeded too late": "import random\ntop = 10 if random.random() < 2 else 1000\nrandom.seed(1)\n",
+    "chance of one's own": "import random\ntop = 10 if random.Random().random() < 2 else 1000\n",
+    "chance of the system": "import os, secrets\ntop = 10 if secrets.randbelow(5) < 9 else 1000\n",
+    "chance in a name": "import uuid\ntop = 10 if uuid.uuid4() else 1000\n",
+    "a device of chance": "top = 10 if open('/dev/urandom', 'rb').read(1) else 1000\n",
     "the network": "import socket\nsocket.socket(socket.AF_UNIX).close()\ntop = 10\n",
     "a library": "import ctypes\nctypes.CDLL(None).getpid()\ntop = 10\n",
     "a device": "open('/dev/full', 'rb').close()\nopen('/proc/self/stat').close()\ntop = 10\n",
@@ -170,18 +234,49 @@ UNRECORDABLE = {
 }
 
 
-@pytest.mark.parametrize("name", some(UNRECORDABLE, 1))
-def test_what_cannot_be_recorded_is_not_green(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize("name", some(UNRECORDABLE, 4))
+def test_what_cannot_be_recorded_is_told(tmp_path: Path, name: str) -> None:
+    if name == "a pipe":
+        subprocess.run(["mkfifo", str(tmp_path / "pipe")], check=True)
+    assert outside(tmp_path, UNRECORDABLE[name])
+
+
+def test_what_cannot_be_recorded_is_not_green(tmp_path: Path) -> None:
     folder = tmp_path / "contracts" / "robot"
     (folder / "models").mkdir(parents=True)
     (folder / "robot.rcl").write_text(RCL)
     (folder / "plan.yaml").write_text(PLAN)
-    if name == "a pipe":
-        subprocess.run(["mkfifo", str(folder / "pipe")], check=True)
-    (folder / "models" / "limiter.py").write_text(UNRECORDABLE[name] + "def step(wish): return min(wish, top)\n")
+    text = UNRECORDABLE["the clock"] + "def step(wish): return min(wish, top)\n"
+    (folder / "models" / "limiter.py").write_text(text)
     outcomes = discharge(Workspace(tmp_path), method(folder), Run("first", False))
     assert [o.verdict for o in outcomes] == [Verdict.UNKNOWN]
     assert "undeclared input" in outcomes[0].summary
+
+
+SEEN_THROUGH = {
+    "a seed": "import random\nrandom.seed(7)\ntop = 10 if random.random() < 2 else 1000\n",
+    "a generator with a seed": "import random\ntop = 10 if random.Random(7).random() < 2 else 1000\n",
+    "times that are given": "import time\ntop = 10 if time.strftime('%Y', time.gmtime(0)) == '1970' else 1000\n",
+    "days that are given": "import datetime\nd = datetime.datetime(2020, 1, 1)\n"
+    "assert isinstance(d, datetime.datetime)\nassert isinstance(d + datetime.timedelta(1), datetime.date)\ntop = 10\n",
+    "what the library does for itself": "import logging, tempfile, threading, queue, uuid, random\n"
+    "logging.getLogger().warning('x')\ntempfile.TemporaryFile().close()\n"
+    "t = threading.Thread(target=queue.Queue().put, args=(1,))\nt.start()\nt.join(5)\ntop = 10\n",
+}
+
+
+@pytest.mark.parametrize("name", some(SEEN_THROUGH, 2))
+def test_what_is_the_same_at_every_run_is_no_undeclared_input(tmp_path: Path, name: str) -> None:
+    assert not outside(tmp_path, SEEN_THROUGH[name])
+
+
+def outside(folder: Path, text: str) -> list[str]:
+    """What a subject whose module begins with a text uses that cannot be recorded."""
+    (folder / "m.py").write_text(text + "def step(): return top\n")
+    subject = Subject(folder / "m.py", "step", 10.0)
+    assert subject.ask({}) == {"q": ["10", "1"], "w": True}
+    assert not subject.close()
+    return [o.path for o in subject.observed() if o.kind is Seen.OUTSIDE]
 
 
 def test_a_compiled_file_never_stands_for_its_source(tmp_path: Path) -> None:

@@ -1,0 +1,178 @@
+"""What a subject's processes ask the system for, seen from outside by strace where it is installed.
+
+The audit hook sees what Python does. Whatever else runs (an extension module, a program that was started) opens its
+files unseen by it; a trace of the system calls tells. Without strace such a program is an undeclared input.
+"""
+
+from __future__ import annotations
+
+import codecs
+import functools
+import os
+import re
+import secrets
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+_SIGNALS = frozenset({"kill", "tkill", "pidfd_send_signal", "rt_sigqueueinfo"})
+_PROBES = frozenset({"ptrace", "process_vm_readv", "process_vm_writev"})
+_NETWORK = frozenset({"socket", "connect"})
+_OPENS = frozenset({"open", "openat", "openat2", "creat", "execve", "execveat"})
+_LOOKS = frozenset(
+    {"stat", "lstat", "newfstatat", "statx", "access", "faccessat", "faccessat2", "readlink", "readlinkat"}
+)
+_CHANGES = frozenset(
+    {"unlink", "unlinkat", "rename", "renameat", "renameat2", "mkdir", "mkdirat", "rmdir", "link", "linkat", "symlink"}
+    | {"symlinkat", "truncate", "chmod", "fchmodat", "chown", "lchown", "fchownat", "utimensat", "mknod", "mknodat"}
+    | {"setxattr", "lsetxattr", "removexattr", "lremovexattr"}
+)
+_WRITES = re.compile(rb"\bO_(?:WRONLY|RDWR|CREAT|TRUNC|APPEND)\b")
+
+_MACHINE = tuple(
+    f"{place}/"
+    for place in (
+        *(f"/proc/{name}" for name in ("cpuinfo", "meminfo", "filesystems", "mounts", "stat", "version", "sys")),
+        *(f"/proc/self/{name}" for name in ("maps", "status", "cgroup", "mountinfo", "mounts", "auxv", "fd")),
+        *("/sys/devices/system", "/sys/fs/cgroup", "/sys/kernel", "/etc/ld.so.cache", "/dev/tty"),
+    )
+)
+"""What libraries ask about the machine as they start; and the loader's index, since what it finds there is told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Traced:
+    """What a trace tells: (event, path) pairs as the audit hook's, and what no subject may do."""
+
+    events: tuple[tuple[str, str], ...]
+    faults: tuple[str, ...]
+
+
+@functools.cache
+def traces() -> bool:
+    """Whether strace works here: found out by running it, as a container may forbid it."""
+    if sys.platform != "linux" or shutil.which("strace") is None:
+        return False
+    try:
+        command = [*_strace(os.devnull), "true"]
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=20, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0 and not done.stderr
+
+
+def _strace(place: str) -> list[str]:
+    calls = ",".join(["%file", *sorted(_SIGNALS | _PROBES | _NETWORK)])
+    program = shutil.which("strace") or "strace"
+    return [program, "-f", "--seccomp-bpf", "-y", "-qq", "-e", "signal=none", "-e", f"trace={calls}", "-o", place]
+
+
+class Trace:
+    """The trace of one process and all that it starts. Its file is nobody's to open once the process runs."""
+
+    def __init__(self) -> None:
+        handle, self._place = tempfile.mkstemp(prefix="avow-trace-")
+        self._file = os.fdopen(handle, "rb")
+        self.mark = f"/avow-{secrets.token_hex(8)}"
+        """The process looks at ``<mark>-begin`` and ``<mark>-end``: what it asks for in between is its subject's."""
+
+    def around(self, command: Sequence[str]) -> list[str]:
+        return [*_strace(self._place), *command]
+
+    def hide(self) -> None:
+        """The process runs: strace holds the file open, and so do we."""
+        Path(self._place).unlink(missing_ok=True)
+
+    def read(self, folder: Path, scratch: str) -> Traced | None:
+        """What was asked for by a process that began in `folder`; None where the trace has no end: then nobody knows.
+        Said once. What lies in `scratch` is the subject's own."""
+        self.hide()
+        with self._file as file:
+            lines = _whole(file.read().split(b"\n"))
+        return _read(lines, self.mark, str(folder), scratch)
+
+
+def _whole(lines: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
+    """(process, call), calls that were interrupted by others' joined again, in the order in which they ended."""
+    open_: dict[int, bytes] = {}
+    for line in lines:
+        number, _, rest = line.partition(b" ")
+        if not number.isdigit():
+            continue
+        process, rest = int(number), rest.lstrip()
+        if rest.endswith(b"<unfinished ...>"):
+            open_[process] = rest.removesuffix(b"<unfinished ...>")
+        elif rest.startswith(b"<... "):
+            yield process, open_.pop(process, b"") + rest.partition(b"resumed>")[2]
+        else:
+            yield process, rest
+    yield from open_.items()
+
+
+_STRING = rb'"((?:[^"\\]|\\.)*)"(?:\.\.\.)?'
+_CALL = re.compile(rb"(\w+)\((?:(?:AT_FDCWD|-?\d+)(?:<((?:[^>\\]|\\.)*)>)?, )?(?:" + _STRING + rb")?(.*)", re.DOTALL)
+
+
+def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: str) -> Traced | None:
+    events: dict[tuple[str, str], None] = {}
+    faults: dict[str, None] = {}
+    places: dict[int, str] = {}
+    host: int | None = None
+    ended = False
+    for process, line in lines:
+        found = _CALL.match(line)
+        if found is None:
+            continue
+        call, base, text, rest = found[1].decode(), found[2], found[3], found[4]
+        if text is not None and _text(text) == f"{mark}-begin" and host is None:
+            host = process
+            continue
+        if host is None:
+            continue
+        if text is not None and _text(text) == f"{mark}-end":
+            ended = ended or process == host
+        if ended and process == host:
+            continue  # it looks whether something is left
+        if call in _SIGNALS:
+            faults["sends signals"] = None
+        elif call in _PROBES:
+            faults["looks at another process"] = None
+        elif call in _NETWORK:
+            if (call == "socket" and b"AF_UNIX" not in line) or (call == "connect" and rest.rstrip().endswith(b"= 0")):
+                events["outside", "the network"] = None
+        elif text is not None:
+            at = _text(base) if base is not None else places.get(process, folder)
+            path = os.path.normpath(os.path.join(at, _text(text)))  # noqa: PTH118
+            if path == scratch or path.startswith(scratch + os.sep):
+                continue
+            if call == "chdir":
+                places[process] = path
+            elif call in _CHANGES or (call in _OPENS and _WRITES.search(rest)):
+                if not path.startswith(("/dev/null", "/dev/tty")):
+                    faults[f"writes {path}"] = None
+            elif text and not f"{path}/".startswith(_MACHINE):
+                if call in _OPENS:
+                    events["read", path] = None
+                elif call in _LOOKS and process != host:  # the host's own: the audit hook
+                    events["state", path] = None
+    return Traced((*events, *_interpreters(events)), tuple(faults)) if ended else None
+
+
+def _interpreters(events: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    """The programs that the kernel starts for scripts: no call tells of them."""
+    for event, path in events:
+        if event == "read" and os.access(path, os.X_OK) and Path(path).is_file():
+            with open(path, "rb") as file:  # noqa: PTH123
+                first = file.readline(200)
+            if first.startswith(b"#!"):
+                yield "read", os.fsdecode(first[2:].split()[0]) if first[2:].split() else path
+
+
+def _text(quoted: bytes) -> str:
+    """A string as strace writes it, as Python writes it."""
+    raw, _ = codecs.escape_decode(quoted)
+    return os.fsdecode(raw)
