@@ -120,8 +120,8 @@ class Finder:
                 continue
             if s.kind is Kind.ASSUMPTION:
                 name = f"{s.node}.{s.name}"
-                if name in self.open or (s.outside_only and s.places and name not in self.hints):
-                    found.append(Item(How.ENVIRONMENT if s.outside_only else How.OPEN, s))
+                if name in self.open or (not s.nodes and s.places and name not in self.hints):
+                    found.append(Item(How.ENVIRONMENT if not s.nodes else How.OPEN, s))
                 else:
                     found.append(Item(How.SHOWN, s))
             elif s.kind is Kind.GUARANTEE:
@@ -331,7 +331,7 @@ class Finder:
 
     def initials(self) -> tuple[Statement, ...]:
         if self._initials is None:
-            self._initials = tuple(s for s in self.known.initials if s.unary)
+            self._initials = tuple(s for s in self.known.every if s.kind is Kind.INITIAL and s.unary)
         return self._initials
 
     def core(self, item: Item, premises: _Uses, *, initially: int | None = None) -> _Base | None:
@@ -342,7 +342,7 @@ class Finder:
             written = [text.formula(i.claim.term, i.claim.symbols(back)) for i, back in premises]
             written += [text.formula(s.term, s.symbols(initially or 0)) for s in initials]
             goal = text.formula(item.claim.term, item.claim.symbols())
-            facts = text.facts()
+            facts = [fact for name, sort in text.free.items() if (fact := text.member(sort, name)) is not None]
         except Untranslatable:
             return None
         lines = [*text.declarations.values(), *(f"(assert {fact})" for fact in facts)]

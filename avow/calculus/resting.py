@@ -11,7 +11,8 @@ from avow.calculus.composition import Composition, argument
 from avow.calculus.questions import Answer
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import node_digest
-from avow.kernel.check import Given, Needed
+from avow.kernel.certificate import How
+from avow.kernel.check import Needed
 from avow.kernel.statements import Kind as Claimed
 
 
@@ -29,7 +30,7 @@ class Resting:
             found |= dict.fromkeys(self.everything())
         if answer.established is not None:
             for need in answer.established.hypotheses:
-                if goal is None or need.kind in (Given.ENVIRONMENT, Given.TOGETHER):
+                if goal is None or need.kind in (How.ENVIRONMENT, How.TOGETHER):
                     found |= dict.fromkeys(self.needed(need, goal))
             if goal is None:
                 shown = (self.named(Claimed.ASSUMPTION, mark, node) for node, mark in answer.established.shown if node)
@@ -47,18 +48,18 @@ class Resting:
 
     def needed(self, need: Needed, goal: str | None) -> Iterable[Hypothesis]:
         match need.kind:
-            case Given.GUARANTEE:
+            case How.GUARANTEE:
                 name = self.named(Claimed.GUARANTEE, need.digest, need.node)
                 return (self.guarantee(*name.split(".")),)
-            case Given.ENVIRONMENT:
+            case How.ENVIRONMENT:
                 assumed = self.composition.certificates.known.find(need.digest, Claimed.ENVIRONMENT, need.node)
                 if assumed is not None:
                     return (self.composed(f"environment.{assumed.name}"),)
                 name = self.named(Claimed.ASSUMPTION, need.digest, need.node)
                 return (self.discharging(*name.split(".")),)
-            case Given.TOGETHER:
+            case How.TOGETHER:
                 return self.together(need.conds, goal)
-            case Given.OPEN:
+            case How.OPEN | How.SHOWN | How.POSSIBLE:
                 return ()
 
     def named(self, kind: Claimed, digest: str, node: str) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from avow.calculus.existence import beginning, circles, loops, situations, start_name
 from avow.calculus.variables import Frame
-from avow.kernel.statements import Kind, Wire, Wiring
-from avow.language.terms import Term
+from avow.kernel.statements import Kind, Place, Wiring
+from avow.language.terms import Role, Term
 from avow.system.formulas import initial_condition
 from avow.system.temporal import parse_state
 
@@ -31,13 +33,21 @@ def wiring(frame: Frame) -> Wiring:
             for found in situations(frame, group, node, clause):
                 plan.append((Kind.POSSIBLE, "", found.name, found.possible))
                 plan.append((Kind.IMPOSSIBLE, "", found.name, found.excluded))
-    return Wiring(
-        nodes=system.contract.nodes,
-        wires={
-            (target.node, target.port): Wire(edge.source.node, edge.source.port, edge.delayed)
-            for target, edge in graph.by_target.items()
-        },
-        outside={(at.node, at.port): frame.entry(at.node, at.port) for at in graph.environment},
-        rigid=frame.constants,
-        formulas=tuple(plan),
-    )
+    return Wiring(system.contract.nodes, _ports(frame), tuple(plan))
+
+
+def _ports(frame: Frame) -> dict[tuple[Role, str, str], Place]:
+    """What each port is: the value of an output, now or (over a delayed edge) a step before, or of the environment."""
+    outputs = {
+        (node.name, port.name): Place(f"{node.name}.{port.name}", node.name, 0, port.sort)
+        for node in frame.system.contract.nodes
+        for port in node.outputs
+    }
+    found = {(Role.OUTPUT, *at): place for at, place in outputs.items()}
+    for target, edge in frame.graph.by_target.items():
+        source = outputs[edge.source.node, edge.source.port]
+        found[Role.INPUT, target.node, target.port] = replace(source, back=int(edge.delayed))
+    for at in frame.graph.environment:
+        name, sort = frame.entry(at.node, at.port), frame.node(at.node).input(at.port).sort
+        found[Role.INPUT, at.node, at.port] = Place(name, None, 0, sort, name in frame.constants)
+    return found

@@ -24,10 +24,11 @@ def command(path: Path, certificates: Path, as_json: bool) -> int:
     from avow.base.codec import Unreadable
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.workspace import system_folder
+    from avow.calculus.certificate_json import from_json
     from avow.calculus.certificates import scope_of
     from avow.calculus.variables import frame
     from avow.calculus.wiring import wiring
-    from avow.kernel.certificate import How, from_json
+    from avow.kernel.certificate import How
     from avow.kernel.check import Kernel, Refused
     from avow.kernel.statements import statements
     from avow.solving.apart import Both, versions

@@ -1,7 +1,7 @@
-"""Certificates as data, and as JSON.
+"""Certificates as data (`avow.calculus.certificate_json` reads and writes them).
 
-A certificate is a list of entries; an entry's place in it is its rank. It holds no formula and no hypothesis: claims
-are named by digest and looked up in the system as it is now, hypotheses are computed (`avow.kernel.check`).
+An entry's place is its rank. There is no formula and no hypothesis in it: claims are named by digest and looked up in
+the system as it is now, hypotheses are computed (`avow.kernel.check`).
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
 
 from avow.base import codec
 
@@ -17,18 +16,17 @@ FORMAT = "avow/certificate/2"
 
 
 class How(StrEnum):
-    """How an entry is known."""
+    """How an entry is known: by its questions `base` and `step`; by a node's own evidence, as long as all of its
+    assumptions (`conds`) have held; by a person, of values that no node provides; not at all (open: assumed by the
+    contract that is derived, never under a requirement); by an example (that some values are so: never a premise).
+    Together is no entry, but a hypothesis that the kernel adds (`avow.kernel.check.Needed`)."""
 
     SHOWN = "shown"
-    """By the questions `base` and `step`."""
     GUARANTEE = "guarantee"
-    """A node's own evidence, as long as all of its assumptions (`conds`) have held."""
     ENVIRONMENT = "environment"
-    """Of values that no node provides: a person's reason."""
     OPEN = "open"
-    """Assumed by the contract that is derived here; never under a requirement."""
     POSSIBLE = "possible"
-    """By an example: that some values are as it says. No other entry may use it."""
+    TOGETHER = "together"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +40,7 @@ class Use:
 @dataclass(frozen=True, slots=True)
 class Question:
     """Premises from which an entry's claim has to follow: entries, and (in a base question) initial conditions.
-
-    `witness`: the premise (of the uses, then of the initials) and the part of its conjunction that says that something
-    exists; that thing is to serve for what the claim says exists.
-    """
+    `witness`: the premise of all these, and the part of its conjunction, that names what the claim says exists."""
 
     uses: tuple[Use, ...] = ()
     initials: tuple[str, ...] = field(default=(), metadata=codec.LATER)
@@ -80,14 +75,3 @@ class Certificate:
 
     scope: str
     entries: tuple[Entry, ...]
-
-
-def to_json(certificate: Certificate) -> dict[str, Any]:
-    return {"format": FORMAT, **codec.to_json(certificate)}
-
-
-def from_json(data: object) -> Certificate:
-    """Strict. Raises codec.Unreadable."""
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise codec.Unreadable(f"no certificate of format {FORMAT}")
-    return codec.from_json(Certificate, {key: value for key, value in data.items() if key != "format"})

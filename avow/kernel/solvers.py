@@ -1,8 +1,5 @@
 """A question put to Z3 within a budget that does not depend on the machine, and to a second solver where there is one.
-
-Z3 counts its own steps (`rlimit`): the same question gets the same answer on a slow machine. Wall-clock time is only a
-net for where it does not count. Each question has a context of its own, so that none can see another's declarations.
-"""
+Each question has a context of its own, so that none can see another's declarations."""
 
 from __future__ import annotations
 
@@ -27,13 +24,12 @@ class Said(StrEnum):
 
 
 def ask_z3(script: str, budget: int) -> Said:
-    """What Z3 says of a script; a text that it does not read, or a crash that it tells of, is `unknown`."""
+    """What Z3 says of a script within so many of its own steps; `unknown` of what it cannot read."""
     import z3
 
     try:
         solver = z3.Solver(ctx=z3.Context())
-        solver.set("rlimit", budget)
-        solver.set("timeout", NET_MS)
+        solver.set(rlimit=budget, timeout=NET_MS)
         solver.set("smt.arith.nl.grobner", False)  # of non-linear integer terms: they cannot be interrupted
         solver.from_string(script)
         return Said(str(solver.check()))
@@ -43,7 +39,7 @@ def ask_z3(script: str, budget: int) -> Said:
 
 @dataclass(slots=True)
 class Solvers:
-    """Each question is asked once. `z3` may be another process (`avow.solving.apart`), and so is the second solver."""
+    """Each question is asked once. Both solvers may be other processes (`avow.solving.apart`)."""
 
     budget: int = BUDGET
     z3: Callable[[str, int], Said] = ask_z3

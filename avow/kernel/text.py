@@ -1,9 +1,8 @@
-"""A formula as SMT-LIB 2.6 text: the one translation that a certified claim rests on.
+"""A formula as SMT-LIB 2.6 text: the one translation that a certified claim rests on. Nothing is simplified.
 
 NATURAL is Int, with membership said wherever a natural can stand: of free and bound variables, of functions' results,
 of parts of data; an element beyond a sequence's end is some value of its type. Division by zero is some value.
-Functions that are free are uninterpreted functions; functions under a quantifier are arrays, one argument after the
-other. Nothing is simplified: the text says what the formula says.
+Free functions are uninterpreted functions; functions under a quantifier are arrays, one argument after the other.
 """
 
 from __future__ import annotations
@@ -15,24 +14,19 @@ from functools import reduce
 from avow.language import sorts as s
 from avow.language import terms as t
 
+# forms that are one SMT-LIB function of their parts; comparisons and arithmetic are written as in RCL
 FORMS: dict[type, str] = {t.Not: "not", t.And: "and", t.Or: "or", t.Implies: "=>", t.Iff: "=", t.Conditional: "ite"}
 FORMS |= {t.Negative: "-", t.Widen: "to_real", t.Length: "seq.len"}
-"""Forms that are one SMT-LIB function of their parts. Comparisons and arithmetic are written there as in RCL."""
-
+SORTS: dict[s.Sort, str] = {s.BOOL: "Bool", s.REAL: "Real", s.INTEGER: "Int", s.NATURAL: "Int", s.STRING: "String"}
 BUILTINS: dict[t.Builtin, Callable[..., str]] = {
     t.Builtin.ABS: lambda a: f"(ite (< {a} 0) (- {a}) {a})",
     t.Builtin.MIN: lambda *all_: reduce(lambda a, b: f"(ite (< {b} {a}) {b} {a})", all_),
     t.Builtin.MAX: lambda *all_: reduce(lambda a, b: f"(ite (> {b} {a}) {b} {a})", all_),
-    t.Builtin.XOR: lambda a, b: f"(xor {a} {b})",
-    t.Builtin.MOD: lambda a, b: f"(mod {a} {b})",  # the divisor is positive and written down
-    t.Builtin.DIV: lambda a, b: f"(div {a} {b})",
 }
 
+# what a free variable is called, with its sort (an INTEGER input may read a NATURAL output); what a bound one is
 Symbols = Callable[[t.Variable], tuple[str, s.Sort]]
-"""What a free variable is called, and its sort (an INTEGER input may read a NATURAL output)."""
-
 Bound = Mapping[t.Variable, str]
-"""What variables under a quantifier are called."""
 
 
 class Untranslatable(Exception):  # noqa: N818 - it names what happened
@@ -43,9 +37,7 @@ class Text:
     """The text of one question or claim. `declarations` (name → command) grow as sorts and free variables are used."""
 
     def __init__(self) -> None:
-        self.declarations: dict[str, str] = {}
-        self.free: dict[str, s.Sort] = {}
-        self._sorts: dict[str, s.Sort] = {}
+        self.declarations, self.free, self._sorts = dict[str, str](), dict[str, s.Sort](), dict[str, s.Sort]()
         self._bound = 0
 
     def formula(self, term: t.Term, symbols: Symbols, bound: Bound | None = None) -> str:
@@ -56,75 +48,62 @@ class Text:
         except RecursionError:
             raise Untranslatable("a formula that is too deep") from None
 
-    def facts(self) -> list[str]:
-        """What is true of the free variables by their types."""
-        return [fact for name, sort in self.free.items() if (fact := self.member(sort, name)) is not None]
+    def script(self, assertions: Iterable[str]) -> str:
+        """A question to a solver: can these hold, of values of their types?"""
+        facts = [self.member(sort, name) for name, sort in self.free.items()]
+        lines = [f"(assert {each})" for each in (*facts, *assertions) if each is not None]
+        return "\n".join(["(set-logic ALL)", *self.declarations.values(), *lines, ""])
 
     def declare(self, name: str, sort: s.Sort) -> None:
         """A free variable."""
         if self.free.setdefault(name, sort) != sort:
             raise Untranslatable(f"{name} has two types")
-        if name not in self.declarations:
-            parameters, result = (sort.parameters, sort.result) if isinstance(sort, s.FunctionSort) else ((), sort)
-            signature = f"({' '.join(map(self.sort, parameters))}) {self.sort(result)}"
-            self.declarations[name] = f"(declare-fun {name} {signature})"
+        parameters, result = (sort.parameters, sort.result) if isinstance(sort, s.FunctionSort) else ((), sort)
+        signature = f"({' '.join(map(self.sort, parameters))}) {self.sort(result)}"
+        self.declarations.setdefault(name, f"(declare-fun {name} {signature})")
 
     def fresh(self, count: int) -> list[str]:
-        """Names for bound variables."""
         self._bound += count
         return [f"b{k}" for k in range(self._bound - count + 1, self._bound + 1)]
-
-    # -- sorts ---------------------------------------------------------------------------------------------------------
 
     def sort(self, sort: s.Sort) -> str:
         """The name of a sort, declared with those that it is made of."""
         match sort:
-            case s.BoolSort():
-                return "Bool"
-            case s.RealSort():
-                return "Real"
-            case s.IntegerSort() | s.NaturalSort():
-                return "Int"
-            case s.StringSort():
-                return "String"
+            case s.BoolSort() | s.RealSort() | s.IntegerSort() | s.NaturalSort() | s.StringSort():
+                return SORTS[sort]
             case s.SequenceSort(item=item):
                 return f"(Seq {self.sort(item)})"
             case s.OpaqueSort(name=own):
-                name = self._named(own, sort)
-                self.declarations.setdefault(name, f"(declare-sort {name} 0)")
+                self.declarations.setdefault(name := self._named(own, sort), f"(declare-sort {name} 0)")
+                return name
             case s.EnumSort(name=own, members=members):
-                name = self._named(own, sort)
-                self._datatype(name, [(member, ()) for member in members])
+                return self._datatype(self._named(own, sort), [(member, ()) for member in members])
             case s.DataSort(name=own, constructors=made):
-                name = self._named(own, sort)
-                self._datatype(name, [(c.name, c.parameters) for c in made])
+                return self._datatype(self._named(own, sort), [(c.name, c.parameters) for c in made])
             case s.TupleSort(items=items):
-                name = symbol(f"({','.join(bare(self.sort(item)) for item in items)})")
-                self._datatype(name, [("of", items)])
+                name = f"|({','.join(self.sort(item) for item in items).replace('|', '')})|"
+                return self._datatype(name, [("of", items)])
             case s.FunctionSort() | s.SetSort():
-                raise Untranslatable(
-                    "a function as part of another value, or a set outside the right-hand side of `in`"
-                )
-        return name
+                raise Untranslatable("a function or a set as part of another value")
 
     def array(self, sort: s.Sort) -> str:
-        """The name of a sort under a quantifier, where functions are arrays."""
-        if not isinstance(sort, s.FunctionSort):
-            return self.sort(sort)
-        return reduce(lambda to, p: f"(Array {self.sort(p)} {to})", reversed(sort.parameters), self.sort(sort.result))
+        """As `sort`, under a quantifier, where functions are arrays."""
+        of, to = (sort.parameters, sort.result) if isinstance(sort, s.FunctionSort) else ((), sort)
+        return reduce(lambda found, p: f"(Array {self.sort(p)} {found})", reversed(of), self.sort(to))
 
     def _named(self, own: str, sort: s.Sort) -> str:
         """The name of a declared type; two types of one name are told apart by a prime, in the order of their use."""
         name = symbol(f"type {own}")
         while self._sorts.setdefault(name, sort) != sort:
-            name = symbol(bare(name) + "'")
+            name = f"{name[:-1]}'|"
         return name
 
-    def _datatype(self, name: str, constructors: list[tuple[str, tuple[s.Sort, ...]]]) -> None:
+    def _datatype(self, name: str, constructors: list[tuple[str, tuple[s.Sort, ...]]]) -> str:
         if name not in self.declarations:
             made = [(field(name, own), [self.sort(p) for p in parameters]) for own, parameters in constructors]
             told = (f"({c}{''.join(f' ({field(c, k)} {p})' for k, p in enumerate(parts))})" for c, parts in made)
             self.declarations[name] = f"(declare-datatypes (({name} 0)) (({' '.join(told)})))"
+        return name
 
     def member(self, sort: s.Sort, value: str) -> str | None:
         """That a value is one of its sort: its naturals are not negative. None where every one is."""
@@ -139,15 +118,13 @@ class Text:
                 return conjunction(f"(=> ((_ is {name}) {value}) {own})" for name, own in inside if own is not None)
             case s.SequenceSort(item=item):
                 (at,) = self.fresh(1)
-                own = self.member(item, f"(seq.nth {value} {at})")
-                within = f"(and (>= {at} 0) (< {at} (seq.len {value})))"
-                return None if own is None else f"(forall (({at} Int)) (=> {within} {own}))"
+                if (own := self.member(item, f"(seq.nth {value} {at})")) is not None:
+                    return f"(forall (({at} Int)) (=> (and (>= {at} 0) (< {at} (seq.len {value}))) {own}))"
             case s.FunctionSort(parameters=parameters, result=result):
                 names = self.fresh(len(parameters))
-                own = self.member(result, application(value, names))
-                return None if own is None else self.bound("forall", names, parameters, own)
-            case _:  # every value of its SMT-LIB sort is one of it
-                return None
+                if (own := self.member(result, application(value, names))) is not None:
+                    return self.bound("forall", names, parameters, own)
+        return None  # every value of its SMT-LIB sort is one of it
 
     def members(self, sorts: Iterable[s.Sort], constructor: str, value: str) -> str | None:
         return conjunction(self.member(p, f"({field(constructor, k)} {value})") for k, p in enumerate(sorts))
@@ -160,8 +137,6 @@ class Text:
             body = f"(=> {given} {body})" if quantifier == "forall" else f"(and {given} {body})"
         binders = " ".join(f"({name} {self.array(sort)})" for sort, name in zip(sorts, names, strict=True))
         return f"({quantifier} ({binders}) {body})"
-
-    # -- terms ---------------------------------------------------------------------------------------------------------
 
     def say(self, term: t.Term, bound: Bound) -> str:
         def form(head: str, parts: Iterable[t.Term]) -> str:
@@ -182,31 +157,28 @@ class Text:
                 return form(field(self.sort(sort), name), arguments)
             case t.TupleTerm(items=items, sort=sort):
                 return form(field(self.sort(sort), "of"), items)
-            case t.And(items=()):
-                return "true"
-            case t.Or(items=()):
-                return "false"
-            case t.Compare(operator="==", left=left, right=right):
-                return self.same(left, right, bound)
-            case t.Compare(operator="!=", left=left, right=right):
-                return f"(not {self.same(left, right, bound)})"
+            case t.And(items=()) | t.Or(items=()):
+                return "true" if isinstance(term, t.And) else "false"
+            case t.Compare(operator="==" | "!=" as operator, left=left, right=right):
+                equal = self.same(left, right, bound)
+                return equal if operator == "==" else f"(not {equal})"
             case t.Compare(operator=head) | t.Arithmetic(operator=head):
                 return form(head, term.children)
+            case t.Operation(operator=t.Builtin.XOR | t.Builtin.MOD | t.Builtin.DIV as head, arguments=arguments):
+                return form(head, arguments)  # the divisor is positive and written down
             case t.Operation(operator=builtin, arguments=arguments):
                 return BUILTINS[builtin](*(self.say(a, bound) for a in arguments))
             case t.In(item=item, collection=t.SetTerm(items=items) | t.SequenceTerm(items=items)):
-                equal = [f"(= {self.say(item, bound)} {self.say(other, bound)})" for other in items]
-                return application("or", equal) if equal else "false"
+                return application("or", [form("=", (item, other)) for other in items]) if items else "false"
             case t.In(item=item, collection=t.SequenceRange(low=low, high=high)):
                 return f"(and {form('<=', (low, item))} {form('<=', (item, high))})"
             case t.In(item=item, collection=collection):
                 return f"(seq.contains {self.say(collection, bound)} (seq.unit {self.say(item, bound)}))"
             case t.SequenceTerm(items=items, sort=sort):
-                units = [f"(seq.unit {self.say(item, bound)})" for item in items]
-                empty = f"(as seq.empty {self.sort(sort)})"
+                units, empty = [form("seq.unit", (item,)) for item in items], f"(as seq.empty {self.sort(sort)})"
                 return application("seq.++", units) if len(units) > 1 else units[0] if units else empty
             case t.Length(sequence=t.SequenceRange(low=low, high=high)):
-                return _between(self.say(low, bound), self.say(high, bound))
+                return _how_many(self.say(low, bound), self.say(high, bound))
             case t.Index(sequence=sequence, index=at, sort=sort):
                 found = form("seq.nth", (sequence, at))  # beyond the end it is any value, but one of the sort
                 return f"(ite (>= {found} 0) {found} 0)" if isinstance(sort, s.NaturalSort) else found
@@ -218,25 +190,21 @@ class Text:
                 raise Untranslatable(f"{type(term).__name__} here")
 
     def name(self, variable: t.Variable, bound: Bound) -> str:
-        if variable in bound:
-            return bound[variable]
-        name, sort = self._symbols(variable)
-        self.declare(name, sort)
-        return name
+        if variable not in bound:
+            self.declare(*self._symbols(variable))
+        return bound.get(variable) or self._symbols(variable)[0]
 
     def same(self, left: t.Term, right: t.Term, bound: Bound) -> str:
-        if isinstance(left, t.SequenceRange):
-            left, right = right, left
-        match left, right:
+        match (right, left) if isinstance(left, t.SequenceRange) else (left, right):
             case t.Variable(sort=s.FunctionSort(parameters=sorts)), t.Variable():
                 names = self.fresh(len(sorts))
-                one, other = (application(self.name(v, bound), names) for v in (left, right))
-                return self.bound("forall", names, sorts, f"(= {one} {other})")
-            case _, t.SequenceRange(low=low_term, high=high_term):
-                value, low, high = (self.say(term, bound) for term in (left, low_term, high_term))
+                one, two = (application(self.name(v, bound), names) for v in (left, right) if isinstance(v, t.Variable))
+                return self.bound("forall", names, sorts, f"(= {one} {two})")
+            case other, t.SequenceRange(low=low_term, high=high_term):
+                value, low, high = (self.say(term, bound) for term in (other, low_term, high_term))
                 (at,) = self.fresh(1)
                 each = f"(=> (and (>= {at} 0) (< {at} (seq.len {value}))) (= (seq.nth {value} {at}) (+ {low} {at})))"
-                return f"(and (= (seq.len {value}) {_between(low, high)}) (forall (({at} Int)) {each}))"
+                return f"(and (= (seq.len {value}) {_how_many(low, high)}) (forall (({at} Int)) {each}))"
         return f"(= {self.say(left, bound)} {self.say(right, bound)})"
 
     def quantified(self, term: t.Quantified, bound: Bound) -> str:
@@ -263,13 +231,9 @@ def symbol(name: str) -> str:
     return f"|{''.join(plain)}|"
 
 
-def bare(name: str) -> str:
-    return name.replace("|", "")
-
-
 def field(of: str, name: object) -> str:
     """The symbol of a constructor of a type, or of a field of a constructor."""
-    return f"|{bare(of)}.{name}|"
+    return f"|{of.replace('|', '')}.{name}|"
 
 
 def application(function: str, arguments: Iterable[str]) -> str:
@@ -285,8 +249,7 @@ def conjunction(parts: Iterable[str | None]) -> str | None:
     return None if not given else given[0] if len(given) == 1 else application("and", given)
 
 
-def _between(low: str, high: str) -> str:
-    """How many whole numbers there are from the one to the other."""
+def _how_many(low: str, high: str) -> str:
     return f"(ite (>= {high} {low}) (+ (- {high} {low}) 1) 0)"
 
 

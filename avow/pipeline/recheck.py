@@ -19,13 +19,14 @@ from avow.assurance.certification import Reestablished as Told
 from avow.base.codec import Unreadable
 from avow.base.files import digest
 from avow.base.verdict import Verdict
+from avow.calculus.certificate_json import from_json, to_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import Reestablished, reestablished
 from avow.evidence.currency import as_of_now, stands
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import Evidence
-from avow.kernel.certificate import Certificate, from_json, to_json
+from avow.kernel.certificate import Certificate
 from avow.kernel.solvers import Solvers
 from avow.pipeline.engine_code import trusted_parts
 from avow.pipeline.work import COMPOSE, texts_digest

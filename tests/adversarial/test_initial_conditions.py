@@ -87,10 +87,12 @@ def test_two_of_one_output_are_taken_together(tmp_path: Path) -> None:
     """The plan's reader allows one for each output; the kernel does not rely on that."""
     certificates = compose(system(tmp_path, "out.y == in.k", "n.k == 1", "REAL", "REAL")).certificates
     other = compose(system(tmp_path / "other", "out.y == 1", "n.k == 1", "REAL", "REAL")).certificates.known
-    known = replace(certificates.known, every=(*certificates.known.every, *other.initials))
+    known = replace(
+        certificates.known, every=(*certificates.known.every, *(s for s in other.every if s.kind is Kind.INITIAL))
+    )
     claim = certificates.claim(Kind.REQUIREMENT, "R")
     assert claim is not None
-    marks = tuple(s.digest for s in known.initials)
+    marks = tuple(s.digest for s in known.every if s.kind is Kind.INITIAL)
     assert len(marks) == 2
     entry = Entry(How.SHOWN, "", claim.digest, (), (Question((), marks),), Question((Use(0, 1),)))
     with pytest.raises(Refused, match="first value"):

@@ -9,8 +9,8 @@ from calculus.make import make
 from calculus.test_commands import invoke
 
 from avow.base.diagnostics import Rejected
+from avow.calculus.certificate_json import to_json
 from avow.cli.recheck import command
-from avow.kernel.certificate import to_json
 from kernel.test_kernel import LOOP, PLAN, made
 
 
