@@ -105,15 +105,15 @@ def _groups(
 def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozenset[str]]:
     """The contract files of a system's folder; without a plan, every .rcl file in it."""
     from avow.base.diagnostics import Diagnostic, Rejected
-    from avow.system.plan_file import read_plan
+    from avow.system.plan_file import read_rest
 
     plan_file = folder / "plan.yaml"
     if plan_file.is_file():
         try:
-            plan, _, faults = read_plan(plan_file)
+            plan, _, faults, _ = read_rest(plan_file)
         except Rejected as rejected:
             found.extend(rejected.diagnostics)
-            return [], frozenset()
+            return sorted(folder.glob("*.rcl")), frozenset()
         found.extend(faults)
         given = Path.cwd() / folder
         names = [folder / f.relative_to(given) if f.is_relative_to(given) else f for f in plan.contract_files]
@@ -127,14 +127,15 @@ def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozense
 def _of_plan(folder: Path) -> Iterator[Diagnostic]:
     """What there is to say of the folder's plan beside its contract files (which are checked already)."""
     from avow.base.diagnostics import Rejected
-    from avow.pipeline.check import of_plan
+    from avow.pipeline.check import of_plan, of_rest
     from avow.system.load import load_system
 
     try:
         found = of_plan(load_system(folder))
     except Rejected as rejected:
         # what is wrong in contract files is told already; a formula of the plan has faults of the same codes
-        found = tuple(d for d in rejected.diagnostics if not d.span or not d.span.file.endswith(".rcl"))
+        every = (*rejected.diagnostics, *of_rest(folder))
+        found = tuple(d for d in every if not d.span or not d.span.file.endswith(".rcl"))
     yield from (_as_told(d, folder) for d in found)
 
 

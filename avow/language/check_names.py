@@ -146,7 +146,7 @@ class Names(Base):
             hint = f"`{name}` is declared in the context: write `{name}` alone"
         elif name in scope.environment.elements:
             hint = f"`{name}` is an element of a type: write `{name}` alone"
-        self.error("RCL203", f"node `{scope.node}` has no {words[role]} `{name}`", tree, hint=hint)
+        self.error("RCL203", f"{scope.named} has no {words[role]} `{name}`", tree, hint=hint)
 
     def elsewhere(self, before: str, name: str, tree: Syntax) -> None:
         """Reports `before.name` inside a node: a role spelled otherwise, a field, or another node's variable."""

@@ -56,6 +56,22 @@ def check_paths(
     return (None if unreadable else contract), (*unreadable, *diagnostics)
 
 
+def read_in_part(paths: Iterable[Path]) -> Contract:
+    """As much of a contract as can be read, whatever is wrong in it: to look names up, never to verify."""
+    found = [source for path in paths if isinstance(source := read_source(path), Source)]
+    return _checked(found, frozenset(), partial=True)[0]
+
+
+def syntax_faults(text: str, span: Span | None) -> tuple[Diagnostic, ...]:
+    """Why a text is no formula, whatever its names mean; empty where it may be one."""
+    source = Source("<formula>", text) if span is None else Source(span.file, text, span.line, span.column)
+    reports = Reports(source)
+    found = tokens(reports)
+    if found:
+        parse("formula", found, reports, found[-1].end)
+    return tuple(in_order(reports))
+
+
 def check_text(
     text: str, file: str, *, off: frozenset[str] = frozenset()
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
@@ -120,6 +136,13 @@ def check_sources(
     sources: Sequence[Source], *, off: frozenset[str] = frozenset(), partial: bool = False
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
     """As `check_paths`, of texts already read. `partial`: other files are missing, so names may be declared there."""
+    contract, diagnostics = _checked(sources, off, partial=partial)
+    return (None if any(d.is_error for d in diagnostics) else contract), diagnostics
+
+
+def _checked(
+    sources: Sequence[Source], off: frozenset[str], *, partial: bool
+) -> tuple[Contract, tuple[Diagnostic, ...]]:
     parsed: list[tuple[FileSyntax, Reports]] = []
     linted: list[LintedFile] = []
     declarations = Declarations()
@@ -140,10 +163,7 @@ def check_sources(
     contract = _contract(parsed, declarations)
     sound = not partial and not any(reports.failed for _, reports in parsed)
     lint(linted, contract if sound else None, off)
-    diagnostics = [d for _, reports in parsed for d in in_order(reports)]
-    if not any(d.is_error for d in diagnostics):
-        return contract, tuple(diagnostics)
-    return None, tuple(diagnostics)
+    return contract, tuple(d for _, reports in parsed for d in in_order(reports))
 
 
 def unless_torn(reports: Reports) -> Reports:

@@ -199,6 +199,6 @@ def _matched(role_text: str | None, name: Token, scope: Scope, reports: Reports)
     else:
         hint = did_you_mean(text, (*scope.inputs, *scope.outputs))
     what = {"in": "input", "out": "output", None: "input or output"}[role_text]
-    message = f"node `{scope.node}` has no {what} `{text}` for this topic to match"
+    message = f"{scope.named} has no {what} `{text}` for this topic to match"
     reports.error("RCL218", message, name.start, name.end, hint=hint)
     return None

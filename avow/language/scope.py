@@ -30,6 +30,11 @@ class Scope:
     broken: set[str] = field(default_factory=set)
     node: str | None = None
 
+    @property
+    def named(self) -> str:
+        """The node as messages call it: one whose name cannot be read has none."""
+        return f"node `{self.node}`" if self.node else "the node"
+
     def ports(self, role: Role) -> Mapping[str, Port]:
         return self.inputs if role is Role.INPUT else self.outputs
 

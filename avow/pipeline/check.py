@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from doit.exceptions import TaskError
@@ -63,6 +64,23 @@ def of_plan(system: System) -> tuple[Diagnostic, ...]:
     return tuple(d for d in found if d.is_error or d.code not in system.plan.lints_off)
 
 
+def of_rest(folder: Path) -> tuple[Diagnostic, ...]:
+    """What is to be said of the policy and of the methods' options of a system that cannot be loaded."""
+    from avow.system.faults import rest_of
+
+    rest = rest_of(folder)
+    if rest is None:
+        return ()
+    found = [*_policy(rest.system)]
+    for plan in rest.system.plan.nodes:
+        for method in plan.methods:
+            try:
+                found += _method(rest.system, plan.node, method, asks=rest.is_sound)
+            except Rejected as rejected:
+                found += rejected.diagnostics
+    return tuple(d for d in found if d.is_error)
+
+
 def _model(system: System) -> tuple[Diagnostic, ...]:
     """The paper's step 1: does the system model account for all of the ROS graph?"""
     from avow.system.graph import dataflow
@@ -85,7 +103,8 @@ def _policy(system: System) -> tuple[Diagnostic, ...]:
     return ()
 
 
-def _method(system: System, node: str, method: Method) -> Iterable[Diagnostic]:
+def _method(system: System, node: str, method: Method, *, asks: bool = True) -> Iterable[Diagnostic]:
+    """`asks`: whether the backend is asked, too, and not its schema alone."""
     if method.id in ENGINES:
         yield Diagnostic("PLAN090", f"'{method.id}' is the name of an engine of Avow's own", method.options.span)
         return
@@ -98,7 +117,7 @@ def _method(system: System, node: str, method: Method) -> Iterable[Diagnostic]:
         return
     wrong = tuple(_schema(tool.options_schema, method.options, f"nodes.{node}: {method.id}"))
     yield from wrong
-    if not any(d.is_error for d in wrong):
+    if asks and node in [n.name for n in system.contract.nodes] and not any(d.is_error for d in wrong):
         yield from tool.check(method_job(system, system.contract.node(node), method))
 
 

@@ -45,7 +45,10 @@ def survey(folder: Path) -> Survey | Rejected:
         system = load_system(folder)
         listed = catalogue(system)
     except Rejected as rejected:
-        return rejected
+        from avow.pipeline.check import of_rest
+        from avow.system.faults import in_order
+
+        return Rejected(*in_order((*rejected.diagnostics, *of_rest(folder))))
     files = (system.plan.path, *system.plan.contract_files, *system.plan.included)
     texts = [__version__, *map(digest_file, files)]
     return Survey(system, listed, digest(json.dumps(texts)))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Contract
+from avow.system.faults import every_fault
 from avow.system.formulas import check_formulas
 from avow.system.graph import dataflow
 from avow.system.include import include, still_open
@@ -25,7 +26,10 @@ def load_system(folder: Path) -> System:
 
     Raises Rejected with every fault found in the plan, in the contract, and in the systems that it takes in.
     """
-    return _load(folder, (), {})
+    try:
+        return _load(folder, (), {})
+    except Rejected as rejected:
+        raise Rejected(*every_fault(folder, rejected.diagnostics)) from None
 
 
 def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System]) -> System:

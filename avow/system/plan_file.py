@@ -38,7 +38,7 @@ from avow.system.plan import (
     is_wild,
 )
 from avow.system.ros_plan import read_ros
-from avow.system.schema import check_shape
+from avow.system.schema import check_shape, without_faults
 from avow.system.statements import read_statements
 from avow.system.strict_yaml import Piece, read_yaml
 from avow.system.tables import domain, interpretation, plain, read_csv, read_rows
@@ -54,17 +54,34 @@ def read_plan(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...]]:
 
     Raises Rejected where the file cannot be read or its shape is wrong: then nothing more can be said of it.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise Rejected(Diagnostic("PLAN100", f"{path} cannot be read: {error.strerror}")) from None
-    root, faults = read_yaml(data, str(path))
+    root, faults = _document(path)
     faults += check_shape(root)
     if faults:
         raise Rejected(*faults)
     reader = _PlanReader(path, root)
     plan = reader.plan()
     return plan, root, tuple(reader.faults)
+
+
+def read_rest(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...], frozenset[str]]:
+    """As `read_plan`, without the pieces whose shape is wrong, and with the words in those: to look for what else is
+    wrong, never to verify. Raises Rejected where there is no document, or nothing of it is left."""
+    root, faults = _document(path)
+    faults += check_shape(root)
+    rest, dropped = without_faults(root)
+    if rest is None:
+        raise Rejected(*faults)
+    reader = _PlanReader(path, rest)
+    plan = reader.plan()
+    return plan, rest, (*faults, *reader.faults), dropped
+
+
+def _document(path: Path) -> tuple[Piece, tuple[Diagnostic, ...]]:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise Rejected(Diagnostic("PLAN100", f"{path} cannot be read: {error.strerror}")) from None
+    return read_yaml(data, str(path))
 
 
 def bare_plan(name: str, files: tuple[Path, ...]) -> Plan:

@@ -6,6 +6,7 @@ import difflib
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -26,6 +27,55 @@ def plan_schema() -> dict[str, Any]:
 def check_shape(piece: Piece) -> tuple[Diagnostic, ...]:
     """Everything in which the plan departs from the schema, in the order of the file."""
     return _faults(piece, plan_schema())
+
+
+def without_faults(root: Piece) -> tuple[Piece | None, frozenset[str]]:
+    """What is left of a document without the pieces that depart from the schema, and the words of those: for looking
+    at the rest of it, never for verifying. None where nothing is left."""
+    dropped: set[str] = set()
+    for _ in range(_ROUNDS):  # to drop a piece may leave another without what it needs
+        wrong = set(_wrong_places(root))
+        if not wrong:
+            return root, frozenset(dropped)
+        if () in wrong:
+            break
+        for path in sorted(wrong, key=lambda path: (len(path), [str(step).zfill(9) for step in path]), reverse=True):
+            root = _without(root, path, dropped)
+    return None, frozenset(dropped)
+
+
+_ROUNDS = 20
+
+
+def _wrong_places(root: Piece) -> Iterator[tuple[str | int, ...]]:
+    from jsonschema import Draft202012Validator, validators
+
+    validator = validators.extend(Draft202012Validator, {"pattern": _pattern})(plan_schema())  # type: ignore[no-untyped-call]
+    for error in validator.iter_errors(root.data):
+        path = tuple(error.absolute_path)
+        if "propertyNames" in error.absolute_schema_path:
+            yield (*path, str(error.instance))
+        elif error.validator == "additionalProperties":
+            known = error.schema.get("properties", {})
+            piece = root.at(*path) or root
+            yield from ((*path, key) for key in piece.entries or {} if key not in known)
+        else:
+            yield path
+
+
+def _without(piece: Piece, path: tuple[str | int, ...], dropped: set[str]) -> Piece:
+    step, rest = path[0], path[1:]
+    inner = piece.at(step)
+    if inner is None:
+        return piece
+    kept = _without(inner, rest, dropped) if rest else None
+    if kept is None:
+        dropped.update(re.findall(r"\w+'*", f"{step} {inner.data}"))
+    if piece.entries is not None:
+        entries = {key: kept if key == step else value for key, value in piece.entries.items()}
+        return replace(piece, entries={key: value for key, value in entries.items() if value is not None})
+    items = [kept if at == step else value for at, value in enumerate(piece.items or [])]
+    return replace(piece, items=[value for value in items if value is not None])
 
 
 def violations(options: Located, schema: Mapping[str, Any], whole: str = "the plan") -> tuple[Diagnostic, ...]:

@@ -95,11 +95,48 @@ def read_yaml(data: bytes, file: str) -> tuple[Piece, tuple[Diagnostic, ...]]:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
-        problem = error.problem or "not YAML"
-        hint = "indent with spaces: YAML allows no tab there" if "'\\t'" in problem else None
+        problem, hint = _in_words(error.problem or "not YAML")
         raise Rejected(_error("PLAN101", problem, file, line, column, hint)) from None
     except yaml.YAMLError:
         raise Rejected(_error("PLAN101", "not YAML", file, 1, 1)) from None
+
+
+_PROBLEMS = (
+    (r"character '\\t'", "a tab stands where YAML wants spaces", "indent with spaces"),
+    (r"character '(.)'.*cannot start", "no plain text can begin with {0}", "put the text in quotes"),
+    (
+        r"mapping values are not allowed",
+        "a `:` stands where no key can be",
+        "check the indentation, or put the text in quotes",
+    ),
+    (r"could not find expected ':'", "a key without its `:`", "write `key: value`"),
+    (
+        r"expected <block end>, but found '(.*)'",
+        "this line is indented as none above it",
+        "a mapping's keys stand in one column",
+    ),
+    (r"expected ',' or '(.)'", "a `,` or the closing `{0}` is missing", None),
+    (r"unexpected end of stream|found document separator", "a quotation mark or a bracket is not closed", None),
+    (
+        r"unknown escape character '(.*)'",
+        "`\\{0}` means nothing in double quotes",
+        "use single quotes, or double the backslash",
+    ),
+    (
+        r"did not find expected|expected the node content|expected <document start>",
+        "something else is expected here",
+        None,
+    ),
+)
+"""What PyYAML says, as a pattern, and the same for people, with a hint."""
+
+
+def _in_words(problem: str) -> tuple[str, str | None]:
+    for pattern, words, hint in _PROBLEMS:
+        found = re.search(pattern, problem)
+        if found:
+            return words.format(*(f"`{part}`" if "{0}`" not in words else part for part in found.groups())), hint
+    return f"not YAML: {problem}", None
 
 
 def scalar(text: str) -> Any:

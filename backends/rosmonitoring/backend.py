@@ -255,7 +255,7 @@ def _outcome(obligation: str, name: str, runs: list[_Run]) -> Outcome:
         text = late or (f"undecided at {undecided} of {judged} judgements: {reason}" if undecided else reason)
         return answer(Verdict.UNKNOWN, f"not monitorable: {text}" if not undecided and not late else text)
     if not judged:
-        return answer(Verdict.UNKNOWN, "the traces never gave all the values that it speaks of")
+        return answer(Verdict.UNKNOWN, f"the traces never gave all the values that it speaks of{_topics(runs)}")
     excused = sum(t.excused for t in tallies)
     if excused == judged:
         return answer(Verdict.UNKNOWN, "every judgement fell while an assumption was broken")
@@ -266,6 +266,15 @@ def _outcome(obligation: str, name: str, runs: list[_Run]) -> Outcome:
     if vacuous:
         summary += "; but its antecedent was never met"
     return Outcome(obligation, Verdict.MONITORED, summary, bound=bound, vacuous=vacuous)
+
+
+def _topics(runs: list[_Run]) -> str:
+    """What the traces lack, and what they have."""
+    silent = sorted({topic for run in runs for topic in run.monitor.silent})
+    heard = sorted({topic for run in runs for topic in run.monitor.heard})
+    if not silent:
+        return ""
+    return f": no message on {', '.join(silent)}; the traces have {', '.join(heard[:12]) or 'no topic'}"
 
 
 def _traces(job: Job) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sys
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -116,6 +117,9 @@ def _print_summary(running: Session) -> None:
         more = f" and {len(running.unheard) - 10} more" if len(running.unheard) > 10 else ""
         click.echo(f"topics of the trace that no clause speaks of, and their events: {told}{more}")
         click.echo(f"topics listened to: {', '.join(running.topics) or 'none'}")
+        for topic in list(running.unheard)[:10]:
+            if near := get_close_matches(topic, running.topics, n=1):
+                click.echo(f"  {topic}: did you mean {near[0]}?")
     faults = ", ".join(f"{count} × {fault}" for fault, count in running.counts.items())
     fine = (
         "nothing broken"

@@ -25,6 +25,7 @@ from .numbers import Decimal, NotANumber, exact
 from .options import Setup, same_topic
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Hold, Previous
+from .tuning import TOPICS_KEPT
 from .wires import MappingError
 
 
@@ -103,6 +104,8 @@ class Monitor:
     relevant: int = 0
     tallies: dict[str, Tally] = field(default_factory=dict)
     values: dict[str, Value] = field(default_factory=dict)
+    heard: set[str] = field(default_factory=set)
+    """The topics of the messages so far."""
     _seen: set[str] = field(default_factory=set)
     _versions: dict[str, int] = field(default_factory=dict)
     _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
@@ -136,6 +139,11 @@ class Monitor:
             if name not in self.values and source in self.values:
                 self.values[name] = self.values[source]
 
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """What it listens to and never heard."""
+        return tuple(topic for topic in self.setup.topics if same_topic(topic) not in self.heard)
+
     def listens(self, topic: str) -> bool:
         """Whether a topic's messages say anything of the node."""
         return same_topic(topic) in self._readers
@@ -145,6 +153,8 @@ class Monitor:
         self.events += 1
         topic = event.get("topic")
         readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
+        if isinstance(topic, str) and len(self.heard) < TOPICS_KEPT:
+            self.heard.add(same_topic(topic))
         if readers is None:
             return []
         self.relevant += 1

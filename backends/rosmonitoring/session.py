@@ -82,6 +82,8 @@ class Session:
             "clean": self.clean,
             "faults": counts,
             "nodes": nodes,
+            "listened": list(self.topics),
+            "unknown_topics": dict(self.unheard),
         }
 
 

@@ -1,5 +1,8 @@
 """This backend's numbers: how much is read, how far is searched, how much is shown; each with its reason."""
 
+TOPICS_KEPT = 1_000
+"""Topics of a trace that are remembered by name, to say what it has where it lacks what is listened to."""
+
 VIOLATIONS_KEPT = 200
 """Violations of one trace that are written to the log; all are counted."""
 

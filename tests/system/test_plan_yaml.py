@@ -52,7 +52,7 @@ def test_scalars_are_never_guessed(text: str, value: object) -> None:
     ("text", "line", "column", "words"),
     [
         ("system: a\nsystem: b\n", 2, 1, "given twice"),
-        ("system: a\n\ttitle: b\n", 2, 1, "cannot start any token"),
+        ("system: a\n\ttitle: b\n", 2, 1, "a tab stands where YAML wants spaces"),
         ("titel: x\n", 1, 1, "unknown key 'titel'"),
         ("system: [a]\n", 1, 9, "text is wanted"),
         ("system: 'a/../b'\n", 1, 9, "right form"),

@@ -1,0 +1,130 @@
+"""Everything that is wrong with a system that cannot be loaded, in one round.
+
+`avow.system.load` stops where what follows would stand on sand. Here the rest is looked at all the same: a plan without
+the pieces whose shape is wrong, a contract as far as it can be read. What comes of it is told, and never verified.
+Whatever may only follow from a fault that is told already is left out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.language.contract import Contract
+from avow.system.formulas import check_formulas
+from avow.system.graph import dataflow
+from avow.system.links import with_links
+from avow.system.names import check_names
+from avow.system.plan import Plan, System
+from avow.system.plan_file import fill_methods, read_rest
+from avow.system.strict_yaml import Piece
+from avow.system.subsystems import check_subsystems, resolved
+
+_WORD = re.compile(r"\w+'*")
+_QUOTED = re.compile(r"'([^']*)'")
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """What is left of a system: never to be verified."""
+
+    system: System
+    is_sound: bool
+    """Whether the contract is: else it is only as much of it as can be read."""
+    root: Piece
+    told: frozenset[str]
+    """Words of which a fault is told already, so that others may follow from it."""
+
+
+def rest_of(folder: Path) -> Rest | None:
+    """None where there is no plan that could be read in part."""
+    from avow.language.load import check_paths, read_in_part
+
+    try:
+        plan, root, _, dropped = read_rest(folder / "plan.yaml")
+    except Rejected:
+        return None
+    contract, _ = check_paths(plan.contract_files)
+    if contract is not None:
+        return Rest(System(plan, contract), True, root, dropped)
+    words = frozenset(word for path in plan.contract_files for word in _WORD.findall(_text(path)))
+    return Rest(System(plan, read_in_part(plan.contract_files)), False, root, dropped | words)
+
+
+def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """`found` is what loading the system told."""
+    from avow.language.load import check_paths
+
+    told = list(found)
+    rest = rest_of(folder)
+    if rest is None:
+        if (folder / "plan.yaml").is_file():
+            told += [d for d in check_paths(sorted(folder.resolve().glob("*.rcl")))[1] if d.is_error]
+        return in_order(told)
+    told += read_rest(folder / "plan.yaml")[2]
+    told += [d for d in check_paths(rest.system.plan.contract_files)[1] if d.is_error]
+    told += [d for d in _of_names(rest) if not _follows(d, rest.told)]
+    return in_order(told)
+
+
+def in_order(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """Each fault once, file by file from top to bottom."""
+    once = {(d.code, d.span.line if d.span else 0, d.message): d for d in found}
+    return tuple(
+        sorted(once.values(), key=lambda d: (d.span.file, d.span.line, d.span.column) if d.span else ("", 0, 0))
+    )
+
+
+def _of_names(rest: Rest) -> Iterator[Diagnostic]:
+    plan, contract = rest.system.plan, rest.system.contract
+    yield from check_names(plan, rest.root, contract)
+    if not rest.is_sound:
+        yield from _syntax(plan)
+        return
+    wrong = check_subsystems(plan, contract)
+    yield from wrong
+    if wrong or plan.subsystems:
+        return  # parts of other systems: their own load says what is wrong with them
+    yield from _tried(lambda: resolved(plan, contract)[1])
+    yield from _tried(lambda: _of_formulas(plan, contract))
+
+
+def _of_formulas(plan: Plan, contract: Contract) -> tuple[Diagnostic, ...]:
+    guarantees = {node.name: tuple(clause.name for clause in node.guarantees) for node in contract.nodes}
+    system = System(with_links(fill_methods(plan, guarantees), contract), contract)
+    graph = dataflow(system)
+    return tuple(d for d in graph.findings if d.is_error) + check_formulas(system, graph)
+
+
+def _syntax(plan: Plan) -> Iterator[Diagnostic]:
+    """Formulas of the plan that are none, whatever the names in them mean."""
+    from avow.language.load import syntax_faults
+
+    texts = [(r.formula, r.formula_span) for r in plan.requirements if r.formula]
+    texts += [(e.assume, e.assume_span) for e in plan.environment if e.assume]
+    for text, span in texts:
+        yield from syntax_faults(text, span)
+
+
+def _tried(look: Callable[[], Iterable[Diagnostic]]) -> Iterable[Diagnostic]:
+    try:
+        return tuple(look())
+    except Rejected as rejected:
+        return rejected.diagnostics
+
+
+def _follows(found: Diagnostic, told: frozenset[str]) -> bool:
+    """Whether every name that it misses is a word of which something is told already."""
+    names = _QUOTED.findall(found.message)
+    last = [_WORD.findall(name)[-1] for name in names if _WORD.search(name)]
+    return found.code == "PLAN106" and bool(last) and set(last) <= told
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8", "replace")
+    except OSError:
+        return ""

@@ -1,0 +1,165 @@
+"""One run tells every fault of contract, plan and YAML, each at its place, and nothing that only follows from one."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+import pytest
+from click.testing import CliRunner
+
+from avow.base.diagnostics import Rejected
+from avow.cli import command
+from avow.pipeline.workload import survey
+from avow.system.load import load_system
+
+CONTRACT = """\
+context { Mode : {heat, idle}; Low = 18; }
+
+node thermometer {
+  inputs( raw : REAL )
+  outputs( temperature : REAL )
+  topics( a/B raw matches(in.raw), a/B temperature matches(out.temperature) )
+  assume plausible ( -40 <= in.raw <= 85 )
+  guarantee calibrated ( out.temperature == in.raw )
+}
+
+node thermostat {
+  inputs( temperature : REAL )
+  outputs( mode : Mode )
+  topics( a/B temperature matches(in.temperature), a/B mode matches(out.mode) )
+  assume in_range ( -50 <= in.temperature <= 100 )
+  guarantee warms ( in.temperature < Low -> out.mode == heat )
+}
+"""
+PLAN = """\
+system: home
+requirements:
+  REQ1:
+    text: A cold room is heated.
+    formula: "thermometer.temperature < 18 -> thermostat.mode == heat"
+    supported_by: [thermostat.warms]
+  REQ2: {text: It is calibrated., supported_by: [thermometer.calibrated]}
+environment:
+  thermometer.raw: {assume: "-40 <= in.raw <= 85", because: the data sheet says so}
+compose:
+  D: {select: [thermometer, thermostat], rule: R1}
+nodes:
+  thermometer: {criticality: low}
+  thermostat: {criticality: high}
+policy: default
+"""
+
+FAULTS: dict[str, tuple[str, str, str, str]] = {
+    # what is told → (file, text, text with the fault, code)
+    "keyword as a name": ("system.rcl", "Low = 18;", "Low = 18; forall = 3;", "RCL"),
+    "unknown port": ("system.rcl", "( out.temperature == in.raw )", "( out.temperatur == in.raw )", "RCL203"),
+    "no term": ("system.rcl", "-50 <= in.temperature <= 100", "-50 <= in.temperature <= ", "RCL120"),
+    "duplicate key": ("plan.yaml", "system: home", "system: home\nsystem: house", "PLAN102"),
+    "unknown key": ("plan.yaml", "    supported_by: [thermostat.warms]", "    supports: [thermostat.warms]", "PLAN103"),
+    "no such guarantee": ("plan.yaml", "[thermometer.calibrated]", "[thermometer.calibrates]", "PLAN106"),
+    "no such node": ("plan.yaml", "[thermometer, thermostat]", "[thermometer, boiler]", "PLAN106"),
+    "no such level": ("plan.yaml", "criticality: high", "criticality: huge", "PLAN105"),
+    "no such policy": ("plan.yaml", "policy: default", "policy: defalt", "POLICY001"),
+    "no formula": ("plan.yaml", '"-40 <= in.raw <= 85"', '"-40 <= in.raw <="', "RCL120"),
+}
+
+
+def place(folder: Path, faults: list[str]) -> Path:
+    texts = {"system.rcl": CONTRACT, "plan.yaml": PLAN}
+    for name in faults:
+        file, good, bad, _ = FAULTS[name]
+        assert good in texts[file]
+        texts[file] = texts[file].replace(good, bad)
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, text in texts.items():
+        (folder / file).write_text(text)
+    return folder
+
+
+def check(folder: Path) -> list[tuple[str, str]]:
+    done = CliRunner().invoke(command("check"), [str(folder), "--json"], standalone_mode=False)
+    found = [d for d in json.loads(done.stdout)["diagnostics"] if d["severity"] == "error"]
+    assert all(d["line"] for d in found)
+    return sorted((Path(d["file"]).name, d["code"]) for d in found)
+
+
+def surveyed(folder: Path) -> list[tuple[str, str]]:
+    found = survey(folder)
+    assert isinstance(found, Rejected)
+    assert all(d.span for d in found.diagnostics)
+    return sorted((Path(d.span.file).name, d.code) for d in found.diagnostics if d.span)
+
+
+def expected(faults: list[str]) -> list[tuple[str, str]]:
+    return sorted((FAULTS[name][0], FAULTS[name][3]) for name in faults)
+
+
+def alike(found: list[tuple[str, str]], wanted: list[tuple[str, str]]) -> bool:
+    return len(found) == len(wanted) and all(
+        f[0] == w[0] and f[1].startswith(w[1]) for f, w in zip(found, wanted, strict=True)
+    )
+
+
+@pytest.mark.parametrize("ask", [check, surveyed])
+def test_every_fault_is_told_in_one_round(ask: Callable[[Path], list[tuple[str, str]]], tmp_path: Path) -> None:
+    found, wanted = ask(place(tmp_path, list(FAULTS))), expected(list(FAULTS))
+    assert alike(found, wanted), (found, wanted)
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_each_fault_alone_is_told_once(name: str, tmp_path: Path) -> None:
+    found = check(place(tmp_path, [name]))
+    assert alike(found, expected([name])), found
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_of_any_faults_all_are_told_and_nothing_else(seed: int, tmp_path: Path) -> None:
+    chosen = Random(seed).sample(list(FAULTS), 4)
+    found = check(place(tmp_path, chosen))
+    assert alike(found, expected(chosen)), (chosen, found)
+
+
+def test_without_faults_there_is_a_system(tmp_path: Path) -> None:
+    assert load_system(place(tmp_path, [])).name == "home"
+    assert check(tmp_path) == []
+
+
+def test_a_plan_that_is_no_yaml_keeps_no_fault_of_the_contract_back(tmp_path: Path) -> None:
+    folder = place(tmp_path, ["unknown port"])
+    (folder / "plan.yaml").write_text(PLAN.replace("compose:", "compose:\n\t"))
+    for ask in (check, surveyed):
+        assert ask(folder) == [("plan.yaml", "PLAN101"), ("system.rcl", "RCL203")]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("system: a\n\tb: c\n", "a tab stands where YAML wants spaces"),
+        ("system: a: b\n", "a `:` stands where no key can be"),
+        ("system: @home\n", "no plain text can begin with `@`"),
+        ("system: [a, b\n", "the closing `]` is missing"),
+        ('system: "home\n', "a quotation mark or a bracket is not closed"),
+        ("system: home\n nodes: {}\n", "a `:` stands where no key can be"),
+    ],
+)
+def test_what_is_no_yaml_is_told_in_words(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "plan.yaml").write_text(text)
+    with pytest.raises(Rejected) as found:
+        load_system(tmp_path)
+    (fault, *_) = found.value.diagnostics
+    assert (fault.code, said in fault.message) == ("PLAN101", True), fault.message
+    assert not re.search(r"token|scalar|flow|block|stream", fault.message)
+
+
+def test_a_keyword_as_a_name_is_called_so(tmp_path: Path) -> None:
+    folder = place(tmp_path, [])
+    (folder / "system.rcl").write_text(
+        CONTRACT.replace("node thermostat", "node exists").replace("mode : Mode", "or : Mode")
+    )
+    done = CliRunner().invoke(command("check"), [str(folder)], standalone_mode=False)
+    assert "`exists` is a keyword and cannot be a name" in done.output
+    assert "`or` is a keyword and cannot be a name" in done.output
