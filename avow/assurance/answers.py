@@ -94,6 +94,9 @@ class Supposition:
 
 NO_WORDS = "(no plain words yet)"
 
+EARLIER = "As of an earlier state"
+"""Before the title of a case whose system cannot be read as it stands now, or is gone."""
+
 
 @dataclass(frozen=True, slots=True)
 class Weakening:

@@ -34,7 +34,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 
-from avow.assurance.answers import Baseline
+from avow.assurance.answers import EARLIER, Baseline
 from avow.assurance.certification import KernelRun, ProofView, proof_views, standing, trusted_base
 from avow.assurance.changes import changes
 from avow.assurance.closure import Closure
@@ -136,6 +136,11 @@ def conclude_again(case: Case) -> Case:
     return conclude(facts_of_case(case))
 
 
+def as_of_earlier(case: Case) -> Case:
+    """A case whose system cannot be read as it stands now: the same facts, and a gate that fails for it."""
+    return conclude(replace(facts_of_case(case), earlier=True))
+
+
 def conclude(facts: Facts) -> Case:
     """Everything that follows from the facts."""
     evidence, orphans = _evidence(facts)
@@ -209,7 +214,7 @@ def conclude(facts: Facts) -> Case:
     )
     case = Case(
         system=facts.system,
-        title=facts.title,
+        title=f"{EARLIER}: {facts.title}" if facts.earlier else facts.title,
         today=facts.today.isoformat(),
         run=facts.run,
         grade=grade,
@@ -250,6 +255,7 @@ def conclude(facts: Facts) -> Case:
         statements=facts.statements,
         baseline=facts.baseline,
         sources=facts.sources,
+        earlier=facts.earlier,
     )
     return replace(case, answers=with_signature(case))
 

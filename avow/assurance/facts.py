@@ -11,7 +11,7 @@ from datetime import date
 from pathlib import Path
 from types import MappingProxyType
 
-from avow.assurance.answers import Baseline
+from avow.assurance.answers import EARLIER, Baseline
 from avow.assurance.certification import KernelRun
 from avow.assurance.model import (
     Case,
@@ -63,6 +63,7 @@ class Facts:
     statements: tuple[Statement, ...] = ()
     baseline: Baseline | None = None
     kernel: KernelRun = field(default_factory=KernelRun)
+    earlier: bool = False
 
 
 def facts_of_system(
@@ -177,7 +178,7 @@ def facts_of_case(case: Case) -> Facts:
     expected = tuple(finding for how, finding in findings if how == "expected")
     return Facts(
         system=case.system,
-        title=case.title,
+        title=case.title.removeprefix(f"{EARLIER}: ") if case.earlier else case.title,
         today=date.fromisoformat(case.today),
         run=case.run,
         policy=case.policy,
@@ -213,6 +214,7 @@ def facts_of_case(case: Case) -> Facts:
         statements=case.statements,
         baseline=case.baseline,
         kernel=case.kernel,
+        earlier=case.earlier,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import date
 
-from avow.assurance.answers import How
+from avow.assurance.answers import EARLIER, How
 from avow.assurance.certification import ProofView, certifiable, claimed
 from avow.assurance.facts import Facts
 from avow.assurance.findings import FINDINGS
@@ -31,6 +31,7 @@ def gates(
     views = {view.id: view for view in obligations}
     excused = {name for f in findings if not f.expired for name in f.obligations}
     return (
+        *_earlier(facts),
         _integrity(facts),
         *_findings(facts, findings, obligations),
         _nothing_wrong(facts, obligations, excused),
@@ -50,6 +51,12 @@ def exit_code(found: Iterable[Gate]) -> int:
     if not failed:
         return 0
     return 3 if all(gate.tool_failure for gate in failed) else 1
+
+
+def _earlier(facts: Facts) -> Iterable[Gate]:
+    if facts.earlier:
+        reason = f"{EARLIER}: the system cannot be read as it stands now, or is gone"
+        yield Gate("earlier", "The report is of what stands here", False, reason)
 
 
 def _integrity(facts: Facts) -> Gate:

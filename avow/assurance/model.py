@@ -402,6 +402,8 @@ class Case:
     """The last signed report, as far as this one is compared with it."""
     sources: tuple[SourceView, ...] = ()
     """Contracts first, then the plan. No verdict is concluded from them; the remarks on how they are written are."""
+    earlier: bool = False
+    """Whether the system cannot be read as it stands now, or is gone: this is what was said of it before."""
 
     def obligation(self, name: str) -> ObligationView:
         """The obligation of that id. Raises KeyError."""

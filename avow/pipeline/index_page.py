@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from avow.base.diagnostics import Rejected
 from avow.base.files import digest_file, is_intact, write
 from avow.base.notes import read_note, write_note
 from avow.pipeline.assess import case_of
+from avow.pipeline.run_info import signing_key
 from avow.pipeline.state import State
 
 OVERVIEW = ".overview.json"
 """Beside the artifacts: the digest of the page over all systems, as it was written, and whose reports are old."""
-
-_MARK = (
-    '<p role="alert" data-earlier="yes" style="margin:0;padding:.8em 1em;background:#fff3c4;color:#4a3500;'
-    'border-bottom:3px solid #b07d00"><b>As of an earlier state.</b> The system cannot be read as it stands now, '
-    "or is gone: this report is of what it was.</p>"
-)
 
 
 def earlier(state: State) -> tuple[str, ...]:
@@ -48,11 +46,28 @@ def write_overview(state: State) -> None:
 
 
 def mark_earlier(state: State) -> None:
-    """Say on the pages of reports of an earlier state that they are. Once the system can be read again they are not as
-    they were written, and therefore written anew. Raises OSError."""
+    """Say in reports of an earlier state, in every format, that they are. Once the system can be read again they are
+    not as they were written, and therefore written anew. Raises OSError."""
+    from avow.assurance.case import as_of_earlier
+    from avow.assurance.codec import read_case
+    from avow.report import render_all
+
     for name in earlier(state):
-        for page in sorted((state.workspace.reports / name).glob("*.html")):
-            text = page.read_text(encoding="utf-8", errors="replace")
-            before, body, after = text.partition("<body>")
-            if body and not after.startswith(_MARK):
-                write(page, before + body + _MARK + after)
+        place = state.workspace.reports / name
+        try:
+            case = as_of_earlier(read_case(place))
+        except (Rejected, ValueError, KeyError, OverflowError):
+            _mark_pages(place)
+        else:
+            render_all(case, place, signing_key())
+
+
+def _mark_pages(folder: Path) -> None:
+    """Where report.json was damaged: what a person opens is marked, as it stands."""
+    from avow.report.page import environment
+
+    mark = environment().get_template("earlier.html.j2").render()
+    for page in sorted(folder.glob("*.html")):
+        before, body, after = page.read_text(encoding="utf-8", errors="replace").partition("<body>")
+        if body and not after.lstrip().startswith(mark):
+            write(page, before + body + mark + after)

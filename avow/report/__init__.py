@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from avow.assurance.answers import EARLIER
 from avow.assurance.model import Case
 from avow.base.files import digest, write
 from avow.evidence.envelope import seal_lines
@@ -60,10 +61,11 @@ def formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
 
 
 def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
-    from avow.assurance.traceability import to_csv, trace
+    from avow.assurance.traceability import Row, to_csv, trace
     from avow.report import answers_page, exchange, gsn, gsn_svg, latex, markdown, page, short
 
     rows = trace(case)
+    told = (Row(remark=f"{EARLIER}: the system cannot be read as it stands now"),) if case.earlier else ()
     as_json = exchange.render_json(case)
     yield "report.json", as_json
     yield "index.html", answers_page.render_answers(case, digest(as_json))
@@ -77,7 +79,7 @@ def _formats(case: Case) -> Iterator[tuple[str, str | bytes | LeftOut]]:
     yield "gsn.yaml", gsn.render_gsn(case)
     yield "gsn.svg", gsn_svg.draw(case)
     yield "cae.yaml", gsn.render_cae(case)
-    yield "traceability.csv", to_csv(rows)
+    yield "traceability.csv", to_csv((*told, *rows))
     yield "traceability.html", page.render_traceability(case, rows)
     yield "report.tex", latex.render_latex(case)
     yield "report.pdf", _pdf(case)

@@ -8,6 +8,7 @@ from typing import Any
 from urllib.parse import quote
 from xml.sax.saxutils import escape, quoteattr
 
+from avow.assurance.answers import EARLIER
 from avow.assurance.codec import to_json
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import sanity_property, short
@@ -133,6 +134,7 @@ def render_sarif(case: Case, *, findings_only: bool = False) -> str:
         "properties": {
             "system": case.system,
             "result": _result_of(case),
+            "title": case.title,
             "grade": case.grade.value,
             "ledgerHead": case.ledger_head,
         },
@@ -215,7 +217,9 @@ def render_attestation(case: Case) -> str:
         views = [view for view in case.obligations if view.obligation.node == node and not view.advice]
         good = all(view.standing.supports for view in views)
         bad = any(tone(view.status) == "bad" and not view.handled for view in views)
-        every.append(_statement(case, node, views, "PASSED" if good else "FAILED" if bad else "WARNED"))
+        every.append(
+            _statement(case, node, views, "FAILED" if bad else "PASSED" if good and not case.earlier else "WARNED")
+        )
     return "".join(json.dumps(statement, ensure_ascii=True, sort_keys=True) + "\n" for statement in every)
 
 
@@ -235,6 +239,7 @@ def _statement(case: Case, node: str, views: list[ObligationView], result: str) 
         "predicateType": "https://in-toto.io/attestation/test-result/v0.1",
         "predicate": {
             "result": result,
+            **({"state": EARLIER} if case.earlier else {}),
             "configuration": [{"name": f"ledger/{case.system}", "digest": {"sha256": case.ledger_head}}],
             **groups,
         },

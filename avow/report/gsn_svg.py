@@ -50,6 +50,9 @@ def draw(case: Case) -> str:
     """The picture. Deterministic: same case, same bytes."""
     parts: list[str] = []
     y = GAP
+    if case.earlier:
+        parts.append(f'<text x="{GAP}" y="{2 * GAP}">{escape(clean(case.title))}</text>')
+        y += 3 * GAP
     for root, strategy, children in _modules(case):
         y = _panel(parts, y, root, strategy, children)
     head = (
