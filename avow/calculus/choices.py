@@ -11,6 +11,7 @@ from avow.formulas.values import FunctionValue, Value
 from avow.language.contract import Clause, Node, Port
 from avow.language.sorts import FunctionSort
 from avow.language.terms import Apply, Iff, Quantified, Quantifier, Role, Term, Variable
+from avow.solving.checking import put
 from avow.solving.models import Model
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
@@ -45,7 +46,7 @@ def search(
     constraints: Sequence[Term],
     known: Mapping[Variable, Value],
     seed: int,
-    milliseconds: int,
+    effort: int,
 ) -> tuple[list[Values], bool]:
     """Every choice of outputs that meets the constraints: a bit for each point of a relation, found by Z3.
 
@@ -53,8 +54,6 @@ def search(
     """
     translator = Translator()
     solver = z3.Solver(ctx=translator.context)
-    solver.set("timeout", milliseconds)
-    solver.set("random_seed", seed)
     try:
         meanings: dict[Variable, Any] = {v: translator.value(value, v.sort) for v, value in known.items()}
         bits: list[tuple[Port, Point, Any]] = []
@@ -74,11 +73,11 @@ def search(
         solver.add(*(translator.term(constraint, meanings) for constraint in constraints))
         found: list[Values] = []
         while True:
-            status = solver.check()
-            if status == z3.unsat:
+            said = put(translator, solver, effort, seed)
+            if said.status == "unsat":
                 return found, True
-            if status != z3.sat:
-                raise CannotRun(f"the solver cannot decide which outputs are allowed: {solver.reason_unknown()}")
+            if said.status != "sat":
+                raise CannotRun(f"the solver cannot decide which outputs are allowed: {said.reason}")
             if len(found) >= CHOICES_FOUND:
                 return found, False
             model = solver.model()

@@ -15,11 +15,12 @@ from avow.evaluation.evaluate import finite_values
 from avow.formulas.values import show
 from avow.language.contract import Port
 from avow.language.sorts import FunctionSort, OpaqueSort, SequenceSort
-from avow.solving.limits import now
+from avow.solving.checking import put
+from avow.solving.limits import spent
 from avow.solving.models import Model
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.bounds import INPUTS_ALWAYS_ASKED
+from avow.tuning.effort import CUT_EFFORT
 
 
 def is_restricted(world: World, node: Answerer, port: Port) -> bool:
@@ -36,11 +37,12 @@ def first_cut(node: Answerer, deadline: float) -> str:
     ports = [port for port in node.others.values() if is_restricted(node.world, node, port)]
     if not ports:
         return ""
-    for place, (index, inputs) in enumerate(node.asked.items()):
-        if place >= INPUTS_ALWAYS_ASKED and now() > deadline:
-            return f"time ran out to see whether {node.node.name} may answer otherwise than the scenario has it"
+    shared = Translator()
+    for index, inputs in node.asked.items():
+        if spent() > deadline:
+            return f"too many inputs to see whether {node.node.name} may answer otherwise than the scenario has it"
         free = bool(node.broken(inputs))
-        found = _other(node, ports, inputs, node.found(index), free)
+        found = _other(Translator(shared), node, ports, inputs, node.found(index), free)
         if found is not None:
             given = ", ".join(f"{name} = {show(value)}" for name, value in inputs.items() if name in node.read)
             where = f" at the step with {given}" if given else ""
@@ -48,15 +50,15 @@ def first_cut(node: Answerer, deadline: float) -> str:
     return ""
 
 
-def _other(node: Answerer, ports: list[Port], inputs: Values, found: tuple[Values, ...], free: bool) -> str | None:
+def _other(
+    translator: Translator, node: Answerer, ports: list[Port], inputs: Values, found: tuple[Values, ...], free: bool
+) -> str | None:
     """An output beside the ones found, as far as it is known; None if there is none."""
-    translator = Translator()
     solver = z3.Solver(ctx=translator.context)
-    solver.set("timeout", 2_000)
     try:
         known = by_variable(node.node, inputs)
         meanings = {v: translator.value(value, v.sort) for v, value in known.items() if not is_open(value)}
-        for variable in known.keys() - meanings.keys():
+        for variable in (v for v in known if v not in meanings):
             solver.add(*known_of(translator, variable, known[variable]))
         solver.add(*translator.background([p.variable for p in node.node.outputs]))
         if not free:
@@ -65,10 +67,10 @@ def _other(node: Answerer, ports: list[Port], inputs: Values, found: tuple[Value
         for answer in {tuple((p.name, answer[p.name]) for p in ports): answer for answer in found}.values():
             pairs = [constants[p.name] != translator.value(answer[p.name], p.sort) for p in ports]
             solver.add(z3.Or(pairs))
-        answered = solver.check()
-        if answered == z3.unsat:
+        answered = put(translator, solver, CUT_EFFORT).status
+        if answered == "unsat":
             return None
-        if answered == z3.sat:
+        if answered == "sat":
             reader = Model(translator, solver.model())
             shown = [f"{p.name} = {show(reader.read(constants[p.name], p.sort))}" for p in ports]
             return f", {', '.join(shown)}"

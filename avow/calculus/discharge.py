@@ -21,7 +21,7 @@ from avow.calculus.repair import Offer, environment, initial_values, offers, pro
 from avow.calculus.variables import Facts, Frame, closest, indexed
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
-from avow.tuning.effort import DEEPER_SECONDS, NARROW_MS
+from avow.tuning.effort import DEEPER_EFFORT, NARROW_EFFORT
 
 Hypotheses = dict[str, Term]
 
@@ -30,7 +30,7 @@ Hypotheses = dict[str, Term]
 class Bounds:
     """Bounds on one question to the solver."""
 
-    milliseconds: int = 10_000
+    effort: int = 10_000
     seed: int = 0
 
 
@@ -124,9 +124,9 @@ class _Solver:
             return close
         for number, (same, before) in enumerate(attempts):
             # Only the widest question is worth the whole time: what a narrower one cannot settle, that may.
-            patience = self.bounds.milliseconds
+            patience = self.bounds.effort
             if number < len(attempts) - 1:
-                patience = min(patience, NARROW_MS)
+                patience = min(patience, NARROW_EFFORT)
 
             phases = _phases(condition, before)
             cases = tuple(self.case(condition, phase, same, before, number > 0, patience) for phase in phases)
@@ -149,7 +149,7 @@ class _Solver:
             hypotheses = closest(parts, goal)
             if len(hypotheses) == sum(len(part.terms) for part in parts):
                 return None  # these are all: the first attempt asks just that
-            case = self.ask(phase, hypotheses, goal, min(self.bounds.milliseconds, NARROW_MS))
+            case = self.ask(phase, hypotheses, goal, min(self.bounds.effort, NARROW_EFFORT))
             if case.verdict is not Verdict.PROVED:
                 return None
             cases.append(case)
@@ -178,7 +178,7 @@ class _Solver:
             f"{consumer}.{g.name}": self.frame.clause(consumer, g.name) for g in self.frame.node(consumer).guarantees
         }
         phases = _phases(condition, before)
-        cases = tuple(self.case(condition, phase, same, before, True, NARROW_MS, guaranteed) for phase in phases)
+        cases = tuple(self.case(condition, phase, same, before, True, NARROW_EFFORT, guaranteed) for phase in phases)
         answer = _settled(condition, cases)
         if answer.verdict is not Verdict.PROVED:
             return None
@@ -203,7 +203,7 @@ class _Solver:
                 frame.initials(self.selected),
                 frame.clause(condition.consumer, condition.clause),
             )
-            patience = min(DEEPER_SECONDS, self.bounds.milliseconds / 1000)
+            patience = min(DEEPER_EFFORT, self.bounds.effort)
             found = deeper(asked, patience, self.bounds.seed, str(condition.about))
         if found.proved is not None:
             case = Case(Phase.LATER, Verdict.PROVED, found.proved, engine=found.engine, depth=found.steps)
@@ -270,7 +270,7 @@ class _Solver:
         return self.ask(phase, hypotheses | dict(more or {}), goal, patience)
 
     def ask(self, phase: Phase, hypotheses: Hypotheses, goal: Term, patience: int) -> Case:
-        answer = implied(hypotheses, goal, timeout_ms=patience, seed=self.bounds.seed)
+        answer = implied(hypotheses, goal, effort=patience, seed=self.bounds.seed)
         return Case(
             phase,
             answer.verdict,

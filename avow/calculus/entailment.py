@@ -15,21 +15,21 @@ from avow.formulas.formula import substitute
 from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
 from avow.solving.questions import Entailment, entails
 from avow.tuning.bounds import WITNESSES_TRIED
-from avow.tuning.effort import QUICK_MS
+from avow.tuning.effort import QUICK_EFFORT
 
 
-def implied(hypotheses: Mapping[str, Term], goal: Term, *, timeout_ms: int, seed: int = 0) -> Entailment:
+def implied(hypotheses: Mapping[str, Term], goal: Term, *, effort: int, seed: int = 0) -> Entailment:
     """As `avow.solving.questions.entails`: the quick question first, then with witnesses, then at length."""
-    quick = min(QUICK_MS, timeout_ms)
-    answer = entails(hypotheses, goal, timeout_ms=quick, seed=seed)
+    quick = min(QUICK_EFFORT, effort)
+    answer = entails(hypotheses, goal, effort=quick, seed=seed)
     if answer.verdict is not Verdict.UNKNOWN:
         return answer
     opened, witnesses = _opened(hypotheses)
     for stronger in _witnessed(goal, witnesses):
-        found = entails(opened, stronger, timeout_ms=quick, seed=seed)
+        found = entails(opened, stronger, effort=quick, seed=seed)
         if found.verdict is Verdict.PROVED:
             return found
-    return entails(hypotheses, goal, timeout_ms=timeout_ms, seed=seed) if timeout_ms > quick else answer
+    return entails(hypotheses, goal, effort=effort, seed=seed) if effort > quick else answer
 
 
 def _opened(hypotheses: Mapping[str, Term]) -> tuple[dict[str, Term], list[tuple[Variable, ...]]]:

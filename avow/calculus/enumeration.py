@@ -17,7 +17,7 @@ from avow.tuning.bounds import VALUES_TRIED
 
 
 def enumerated(
-    known: Mapping[str, Term], goal: Term, ports: Sequence[Variable], timeout_ms: int
+    known: Mapping[str, Term], goal: Term, ports: Sequence[Variable], effort: int
 ) -> tuple[Term, bool] | None:
     """A condition on some of the ports with which the goal follows, and whether it is the weakest. None where there is
     none, or where they have too many values."""
@@ -33,7 +33,7 @@ def enumerated(
         terms = tuple(value_term(value, v.sort) for (v, _), value in zip(finite, choice, strict=True))
         given = {v: term for (v, _), term in zip(finite, terms, strict=True)}
         facts = {label: substitute(term, given) for label, term in known.items()}
-        verdict = entails(facts, substitute(goal, given), timeout_ms=timeout_ms).verdict
+        verdict = entails(facts, substitute(goal, given), effort=effort).verdict
         (good if verdict is Verdict.PROVED else bad).append(terms)
         sure = sure and verdict is not Verdict.UNKNOWN
     variables = [v for v, _ in finite]
@@ -41,8 +41,8 @@ def enumerated(
         return None
     found = Not(_one_of(variables, bad)) if len(bad) < len(good) else _one_of(variables, good)
     together = {**known, "the condition": found}
-    possible = solve(together, timeout_ms=timeout_ms).status == "sat"
-    if not possible or entails(together, goal, timeout_ms=timeout_ms).verdict is not Verdict.PROVED:
+    possible = solve(together, effort=effort).status == "sat"
+    if not possible or entails(together, goal, effort=effort).verdict is not Verdict.PROVED:
         return None
     return found, sure and frozenset(variables) >= spoken & frozenset(ports)
 

@@ -26,7 +26,7 @@ from avow.kernel.text import Text, Untranslatable
 from avow.language.terms import And, Quantified, Quantifier
 from avow.solving.z3_module import z3
 from avow.tuning.bounds import DEEPEST_INDUCTION, PREMISES_TRIED
-from avow.tuning.effort import CERTIFICATE_MS, CERTIFICATE_STEPS
+from avow.tuning.effort import CERTIFICATE_NET_MS, CERTIFICATE_STEPS
 
 
 @dataclass(frozen=True, slots=True)
@@ -353,7 +353,7 @@ class Finder:
             context = z3.Context()
             solver = z3.Solver(ctx=context)
             solver.set("rlimit", CERTIFICATE_STEPS)
-            solver.set("timeout", CERTIFICATE_MS)
+            solver.set("timeout", CERTIFICATE_NET_MS)
             solver.set("smt.arith.nl.grobner", False)
             solver.from_string("\n".join(lines))
             said = solver.check(*(z3.Bool(f"track{k}", context) for k in range(len(written))))

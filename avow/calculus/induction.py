@@ -18,10 +18,10 @@ from avow.formulas.formula import free_variables, rename
 from avow.formulas.values import Value, show
 from avow.language.sorts import FunctionSort
 from avow.language.terms import Role, Term, Variable
-from avow.solving.limits import now
+from avow.solving.limits import spent
 from avow.solving.questions import Entailment
 from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_UNROLLING
-from avow.tuning.effort import QUICK_MS
+from avow.tuning.effort import QUICK_EFFORT
 from avow.tuning.shown import STEP_VARIABLES
 
 _BEFORE = "@before"
@@ -86,15 +86,15 @@ def steps(
     return Steps(ever, last, initial, claim, frozenset(constant))
 
 
-def deeper(asked: Steps, seconds: float, seed: int = 0, claim_name: str = "the claim") -> Deeper:
-    """Unroll, and induct over more steps, in turn, for so many seconds of processor time. The claim must have been
+def deeper(asked: Steps, effort: int, seed: int = 0, claim_name: str = "the claim") -> Deeper:
+    """Unroll, and induct over more steps, in turn, with so much effort. The claim must have been
     proved at the first step."""
-    end = now() + seconds
+    end = spent() + effort
     sure = 1  # so many steps from the beginning the claim is proved
 
     def ask(hypotheses: Mapping[str, Term]) -> Entailment | None:
-        left = int((end - now()) * 1000)
-        return implied(hypotheses, asked.claim, timeout_ms=min(QUICK_MS, left), seed=seed) if left > 50 else None
+        left = int(end - spent())
+        return implied(hypotheses, asked.claim, effort=min(QUICK_EFFORT, left), seed=seed) if left > 50 else None
 
     for length in range(2, LONGEST_UNROLLING + 1):
         answer = ask(asked.run(length))

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
-from itertools import count
 from typing import assert_never
 
 from avow.formulas import ltl
 from avow.formulas.lasso import Lasso as Lasso
 from avow.formulas.lasso import accepted_run, monitor, rejected_prefix
 from avow.formulas.ltl import TooLarge
-from avow.solving.limits import now
+from avow.solving.limits import spend, spent
 from avow.system.temporal import Operator, Property, State
+from avow.tuning.effort import PRODUCT_STEPS
 
 
 def normal(formula: Property, positive: bool = True) -> ltl.Normal[State]:
@@ -51,7 +51,7 @@ def demands_progress(formula: Property) -> bool:
 
 
 class TooLong(Exception):  # noqa: N818 - it names what happened
-    """No answer within the time for it, or the property is too large to be asked about."""
+    """No answer with the effort for it, or the property is too large to be asked about."""
 
 
 def violation(
@@ -63,20 +63,20 @@ def violation(
 ) -> Lasso | None:
     """A run of the graph that breaks the property, or None. Every step must have a successor for a run to count.
 
-    `deadline` is in seconds of `avow.solving.limits.now`; raises TooLong after it.
+    `deadline` is in units of `avow.solving.limits.spent`; raises TooLong after it.
     """
     try:
         automaton = ltl.build(normal(formula, positive=False))
     except TooLarge:
         raise TooLong from None
-    seen = count()
 
     @cache
     def label(step: int) -> int:
         return sum(1 << at for at, state in enumerate(automaton.leaves) if holds(step, state))
 
     def tick() -> None:
-        if deadline is not None and next(seen) % 500 == 0 and now() > deadline:
+        spend(PRODUCT_STEPS)
+        if deadline is not None and spent() > deadline:
             raise TooLong
 
     return accepted_run(initial, successors, label, automaton, tick=tick)
@@ -91,19 +91,19 @@ def refuted_prefix(
 ) -> tuple[int, ...] | None:
     """The steps of a shortest beginning of a run that breaks the property however the run goes on, or None.
 
-    `deadline` is in seconds of `avow.solving.limits.now`; raises TooLong after it.
+    `deadline` is in units of `avow.solving.limits.spent`; raises TooLong after it.
     """
     try:
         automaton = ltl.build(normal(formula))
     except TooLarge:
         raise TooLong from None
-    seen = count()
 
     def label(step: int) -> int:
         return sum(1 << at for at, state in enumerate(automaton.leaves) if holds(step, state))
 
     def tick() -> None:
-        if deadline is not None and next(seen) % 500 == 0 and now() > deadline:
+        spend(PRODUCT_STEPS)
+        if deadline is not None and spent() > deadline:
             raise TooLong
 
     return rejected_prefix(initial, successors, cache(label), monitor(automaton), tick)

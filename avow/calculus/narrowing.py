@@ -18,7 +18,9 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause
 from avow.language.sorts import FunctionSort
 from avow.language.terms import And, Apply, Compare, Implies, Role, Term, Variable
+from avow.solving.limits import spend
 from avow.tuning.bounds import PARTIAL_ANSWERS, PARTIAL_ANSWERS_AGAIN
+from avow.tuning.effort import SEARCH_STEPS
 
 # -- equations ---------------------------------------------------------------------------------------------------------
 
@@ -150,6 +152,7 @@ class Narrowing:
         while stack:
             outputs, pending = stack.pop()
             tried += 1
+            spend(SEARCH_STEPS)
             if tried > self.most or len(found) > limit:
                 self.most = min(self.most, PARTIAL_ANSWERS_AGAIN)
                 return found[:limit], False

@@ -20,6 +20,7 @@ from avow.formulas.values import Sequence as SequenceValue
 from avow.language.contract import Clause, Node, Port
 from avow.language.sorts import BOOL, FunctionSort, NaturalSort, SequenceSort, Sort
 from avow.language.terms import Role, Term, Variable
+from avow.solving.checking import put
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
 from avow.system.formulas import ports_of
@@ -161,7 +162,7 @@ class Answerer:
         about = [clause.formula for clause in self.node.guarantees if set(ports_of(clause.formula)) <= own]
         if not self.searched or not about:
             return None
-        found, complete = search(self.searched, (), about, {}, self.seed, self.world.milliseconds)
+        found, complete = search(self.searched, (), about, {}, self.seed, self.world.effort)
         return tuple(found) if complete and len(found) <= CHOICES_FOUND else None
 
     # -- answers -------------------------------------------------------------------------------------------------------
@@ -229,7 +230,7 @@ class Answerer:
         spoken = {v for f in constraints for v in ports_of(f)}
         given = {v: value for v, value in by_variable(self.node, known).items() if v in spoken}
         answers, complete = search(
-            searched, () if alone else together, constraints, given, self.seed, self.world.milliseconds
+            searched, () if alone else together, constraints, given, self.seed, self.world.effort
         )
         if not complete:
             self.doubts.incomplete.add(f"{self.node.name} has more than {CHOICES_FOUND} answers to one input")
@@ -254,7 +255,6 @@ class Answerer:
         names = tuple(clause.name for clause in node.guarantees)
         translator = Translator()
         solver = z3.Solver(ctx=translator.context)
-        solver.set("timeout", self.world.milliseconds)
         try:
             meanings = {}
             for variable, value in by_variable(node, inputs).items():
@@ -268,7 +268,7 @@ class Answerer:
                 switch = z3.Bool(f"use {clause.name}", translator.context)
                 solver.add(z3.Implies(switch, translator.term(clause.formula, meanings)))
                 switches.append(switch)
-            if solver.check(*switches) == z3.unsat:
+            if put(translator, solver, self.world.effort, 0, *switches).status == "unsat":
                 core = {str(switch) for switch in solver.unsat_core()}
                 needed = tuple(name for name in names if f"use {name}" in core)
                 return Stuck(node.name, shown, needed or names, True)

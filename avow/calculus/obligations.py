@@ -31,6 +31,7 @@ from avow.kernel.check import Established
 from avow.kernel.statements import Kind as Claimed
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
+from avow.solving.limits import from_seconds
 from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint, Requirement, System
 
@@ -76,7 +77,7 @@ def discharge(system: System, obligations: Sequence[Obligation], limits: TimeLim
 
 def settle_all(composition: Composition, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
     """As `discharge`, of derivations that are made already (they remember what was settled)."""
-    bounds = Bounds(int(limits.seconds * 1000), limits.seed)
+    bounds = Bounds(from_seconds(limits.seconds), limits.seed)
 
     made = tuple(_tasks(composition))
     resting = Resting(composition, {task.obligation.name: task.obligation for task in made})

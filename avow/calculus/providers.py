@@ -124,7 +124,7 @@ def _bearing(whole: Frame, spoken: frozenset[Variable]) -> dict[str, Term]:
 def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
     claim = asked.claim
     about = f"{node.name}.{asked.clause}"
-    answer = solve(asked.formulas, timeout_ms=bounds.milliseconds, seed=bounds.seed, shown=False)
+    answer = solve(asked.formulas, effort=bounds.effort, seed=bounds.seed, shown=False)
     because = None
     match answer.status:
         case "sat":

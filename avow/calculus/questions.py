@@ -274,7 +274,7 @@ class StartQuestion:
                 details={"cycles": [list(cycle) for cycle in stuck]},
             )
         initials = composition.frame.initials(frozenset(self.members))
-        solution = solve(initials, timeout_ms=bounds.milliseconds, seed=bounds.seed)
+        solution = solve(initials, effort=bounds.effort, seed=bounds.seed)
         listed = ", ".join(initials)
         match solution.status:
             case "sat":
@@ -334,7 +334,7 @@ class JointQuestion:
         about = f"{self.node}.{self.clause}"
         shown: list[str] = []
         for situation in triggers(frame.clause(self.node, self.clause)):
-            answer = implied(hypotheses, negation(situation), timeout_ms=bounds.milliseconds, seed=bounds.seed)
+            answer = implied(hypotheses, negation(situation), effort=bounds.effort, seed=bounds.seed)
             details: dict[str, object] = {"needed": list(answer.needed), "situation": show_term(situation)}
             own = all(label.startswith(f"{self.node}.") for label in answer.needed)
             if answer.verdict is Verdict.PROVED and own and not answer.vacuous:

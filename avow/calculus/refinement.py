@@ -21,6 +21,7 @@ from avow.language.printer import show_type
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort, SequenceSort, Sort, TupleSort
 from avow.language.terms import Compare, Literal, Quantified, Term, Variable
 from avow.solving.counterexample import show_values
+from avow.solving.limits import NO_ANSWER
 from avow.system.graph import fits
 
 
@@ -97,7 +98,7 @@ def refines(
     demands: list[Demand] = []
 
     def ask(node: str, clause: Clause, goal: Term, hypotheses: dict[str, Term]) -> None:
-        answer = implied(hypotheses, goal, timeout_ms=bounds.milliseconds, seed=bounds.seed)
+        answer = implied(hypotheses, goal, effort=bounds.effort, seed=bounds.seed)
         shown = answer.counterexample
         if shown is not None:
             shown = Counterexample(shown.values, f"{node}.{clause.name} is false")
@@ -128,7 +129,7 @@ def _kept_by_something(
         mine(concrete.outputs),
         {a.name: a.formula for a in abstract.assumptions} | _narrower(abstract.inputs, concrete.inputs),
         {g.name: recast(g.formula) for g in concrete.guarantees},
-        timeout_ms=bounds.milliseconds,
+        effort=bounds.effort,
         seed=bounds.seed,
         doubtful=True,
     )
@@ -139,7 +140,7 @@ def _kept_by_something(
         case Verdict.PROVED:
             return found
         case _:  # no answer: a doubt, never a proof
-            return replace(found, doubt=answer.reason or "no answer in time")
+            return replace(found, doubt=answer.reason or NO_ANSWER)
 
 
 def _narrower(sources: tuple[Port, ...], targets: tuple[Port, ...]) -> dict[str, Term]:

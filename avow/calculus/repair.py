@@ -11,7 +11,6 @@ nothing.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -37,11 +36,12 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+from avow.solving.limits import spent
 from avow.solving.quantifier_elimination import eliminable, remedy
 from avow.solving.questions import entails, solve
 from avow.system.plan import Endpoint
 from avow.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, OFFER_REWRITINGS
-from avow.tuning.effort import OFFER_STEP_MS, OFFERS_SECONDS
+from avow.tuning.effort import OFFER_STEP_EFFORT, OFFERS_EFFORT
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,13 +91,13 @@ class Offer:
 
 
 def offers(
-    frame: Frame, hypotheses: Mapping[str, Term], goal: Term, places: Iterable[Place], seconds: float = OFFERS_SECONDS
+    frame: Frame, hypotheses: Mapping[str, Term], goal: Term, places: Iterable[Place], effort: int = OFFERS_EFFORT
 ) -> tuple[Offer, ...]:
     """What would make the hypotheses imply the goal, at most one offer for each place."""
-    end = time.monotonic() + seconds
+    end = spent() + effort
     found: dict[tuple[str, str], Offer] = {}
     for number, place in enumerate(places):
-        if number >= OFFER_PLACES or time.monotonic() > end:
+        if number >= OFFER_PLACES or spent() > end:
             break
         known = {label: term for label, term in hypotheses.items() if label != place.without}
         offer = _offer(frame, known, goal, place)
@@ -110,7 +110,7 @@ def _offer(frame: Frame, known: Mapping[str, Term], goal: Term, place: Place) ->
     found = _eliminated(known, goal, place)
     if found is None or not found[1]:
         # What elimination cannot do, or only without some hypothesis, trying every value can, if they are few.
-        tried = enumerated(known, goal, tuple(place.ports), OFFER_STEP_MS)
+        tried = enumerated(known, goal, tuple(place.ports), OFFER_STEP_EFFORT)
         found = tried if tried is not None and (tried[1] or found is None) else found
     if found is None:
         rewritten = _rewritten(known, goal, place)
@@ -130,15 +130,15 @@ def _eliminated(known: Mapping[str, Term], goal: Term, place: Place) -> tuple[Te
     assumption: Term | None = None
     weakest = False
     if eliminable(goal) and len(usable) <= OFFER_HYPOTHESES:
-        remedied = remedy(usable, goal, place.ports, timeout_ms=OFFER_STEP_MS)
+        remedied = remedy(usable, goal, place.ports, effort=OFFER_STEP_EFFORT)
         if remedied is not None:
             assumption, weakest = _tidy(remedied.assumption), remedied.weakest and len(usable) == len(known)
     sufficient = assumption is None and free_variables(goal) <= frozenset(place.ports)
-    if sufficient and solve({**known, "the goal": goal}, timeout_ms=OFFER_STEP_MS).status == "sat":
+    if sufficient and solve({**known, "the goal": goal}, effort=OFFER_STEP_EFFORT).status == "sat":
         assumption = goal
     if assumption is None or not free_variables(assumption) <= frozenset(place.ports):
         return None
-    if len(usable) < len(known) and solve({**known, "offer": assumption}, timeout_ms=OFFER_STEP_MS).status == "unsat":
+    if len(usable) < len(known) and solve({**known, "offer": assumption}, effort=OFFER_STEP_EFFORT).status == "unsat":
         return None
     return assumption, weakest
 
@@ -171,9 +171,9 @@ def _rewritten(known: Mapping[str, Term], goal: Term, place: Place) -> Term | No
     if term == goal or not free_variables(term) <= frozenset(place.ports):
         return None
     together = {**known, "the offer": term}
-    if entails(together, goal, timeout_ms=OFFER_STEP_MS).verdict is not Verdict.PROVED:
+    if entails(together, goal, effort=OFFER_STEP_EFFORT).verdict is not Verdict.PROVED:
         return None
-    return term if solve(together, timeout_ms=OFFER_STEP_MS).status == "sat" else None
+    return term if solve(together, effort=OFFER_STEP_EFFORT).status == "sat" else None
 
 
 _OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">", "==": "!=", "!=": "=="}
@@ -205,7 +205,7 @@ def _may_be_kept(frame: Frame, name: str, further: Term) -> bool:
     bound = {v: Variable(Role.BOUND, f"some {v.name}", v.sort) for v in outputs}
     possible: Term = Quantified(Quantifier.EXISTS, tuple(bound.values()), rename(meets, bound)) if bound else meets
     accepted = conjunction(clause.formula for clause in node.assumptions) if node.assumptions else TRUE
-    return entails({}, Implies(accepted, possible), timeout_ms=OFFER_STEP_MS).verdict is not Verdict.REFUTED
+    return entails({}, Implies(accepted, possible), effort=OFFER_STEP_EFFORT).verdict is not Verdict.REFUTED
 
 
 # -- places ------------------------------------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from avow.solving.questions import replay
 from avow.system.formulas import initial_condition, ports_of
 from avow.system.temporal import Operator, Property, State, states_of
 from avow.tuning.bounds import COMPLETIONS
-from avow.tuning.effort import REPLAY_MS
+from avow.tuning.effort import REPLAY_EFFORT
 
 Truth = Mapping[State, bool]
 
@@ -115,7 +115,7 @@ def _truth(machine: Machine, formula: Term, values: Mapping[str, Value]) -> bool
     if any(map(is_open, given.values())):
         return None
     wanted = formula if found else negation(formula)
-    return found if replay((wanted,), given, timeout_ms=REPLAY_MS) else None
+    return found if replay((wanted,), given, effort=REPLAY_EFFORT) else None
 
 
 # -- the property ------------------------------------------------------------------------------------------------------

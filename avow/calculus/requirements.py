@@ -29,7 +29,7 @@ from avow.language.terms import Term
 from avow.solving.questions import Entailment
 from avow.system.plan import Requirement
 from avow.system.temporal import Property, State, Temporal, parse_property, parse_state, show_property
-from avow.tuning.effort import DEEPER_SECONDS, QUICK_MS
+from avow.tuning.effort import DEEPER_EFFORT, QUICK_EFFORT
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,15 +45,15 @@ class FormulaQuestion:
     def __call__(self, composition: Composition, bounds: Bounds) -> Answer:
         """In short rounds first: what one way cannot show, at any length, another may in no time. A run over the plan's
         scenario that breaks the formula is looked for before anything takes long."""
-        quick = min(QUICK_MS, bounds.milliseconds)
-        answer = self.attempt(composition, replace(bounds, milliseconds=quick))
+        quick = min(QUICK_EFFORT, bounds.effort)
+        answer = self.attempt(composition, replace(bounds, effort=quick))
         if answer.verdict is not Verdict.UNKNOWN:
             return answer
         run, searched = self.broken_by_a_run(composition, bounds)
         if run is not None:
             listed = {key: answer.details[key] for key in ("would_hold_if",) if key in answer.details}
             return replace(run, details=run.details | listed)
-        if "step" not in answer.details and bounds.milliseconds > quick:
+        if "step" not in answer.details and bounds.effort > quick:
             answer = self.attempt(composition, bounds, patient=True)
         if answer.verdict is not Verdict.UNKNOWN or not searched:
             return answer
@@ -119,7 +119,7 @@ class FormulaQuestion:
         frame = composition.frame
         now = contracts(frame, everything) | frame.environment()
         initial = frame.initials(frame.graph.nodes)
-        quick = replace(bounds, milliseconds=min(QUICK_MS, bounds.milliseconds))
+        quick = replace(bounds, effort=min(QUICK_EFFORT, bounds.effort))
         first = self.ask(now | initial, goal, quick)
         if patient and first.verdict is Verdict.UNKNOWN:
             first = self.ask(now | initial, goal, bounds)
@@ -136,7 +136,7 @@ class FormulaQuestion:
         if later.verdict is not Verdict.REFUTED:
             return self.not_proved(later)
         asked = steps(frame, now, now, initial, goal)
-        more = deeper(asked, min(DEEPER_SECONDS, bounds.milliseconds / 1000), bounds.seed, self.name)
+        more = deeper(asked, min(DEEPER_EFFORT, bounds.effort), bounds.seed, self.name)
         if more.proved is not None:
             further = Entailment(Verdict.PROVED, needed=more.proved, engine=more.engine)
             return self.proved(composition, (first, further), Phase.LATER, bounds, more.steps)
@@ -162,7 +162,7 @@ class FormulaQuestion:
         )
 
     def ask(self, hypotheses: Mapping[str, Term], goal: Term, bounds: Bounds) -> Entailment:
-        return implied(hypotheses, goal, timeout_ms=bounds.milliseconds, seed=bounds.seed)
+        return implied(hypotheses, goal, effort=bounds.effort, seed=bounds.seed)
 
     def proved(
         self,

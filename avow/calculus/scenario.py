@@ -53,8 +53,8 @@ class World:
     frame: Frame
     scenario: Scenario
     domains: dict[Sort, tuple[Value, ...]]
-    milliseconds: int = 10_000
-    """The time for one question to the solver."""
+    effort: int = 10_000
+    """For one question to the solver."""
 
     def choices(self, node: str, port: Port) -> tuple[Value, ...]:
         """The values that an environment input may take at each step. Raises CannotRun."""

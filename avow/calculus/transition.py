@@ -23,9 +23,11 @@ from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
 from avow.language.terms import Role, Term
+from avow.solving.limits import spend
 from avow.system.formulas import initial_condition, ports_of
 from avow.system.plan import Endpoint
 from avow.tuning.bounds import NODE_ANSWERS
+from avow.tuning.effort import SEARCH_STEPS
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +95,7 @@ class Machine:
 
     def look_for_cuts(self, deadline: float) -> None:
         """Notes where the contracts allow an output that the scenario's values leave out: what follows on it was not
-        looked at. `deadline` is in seconds of `avow.solving.limits.now`."""
+        looked at. `deadline` is in units of `avow.solving.limits.spent`."""
         for answerer in self.nodes.values():
             cut = first_cut(answerer, deadline)
             if cut:
@@ -197,7 +199,7 @@ class Machine:
             points = self.world.points(endpoint.node, port)
             constraints = [] if condition is None else [condition]
             known = by_variable(self.frame.node(endpoint.node), given)
-            answers, complete = search(((port, points),), (), constraints, known, self.seed, self.world.milliseconds)
+            answers, complete = search(((port, points),), (), constraints, known, self.seed, self.world.effort)
             found = tuple(answer[port.name] for answer in answers)
         else:
             clauses = [] if condition is None else [Clause(ClauseKind.GUARANTEE, "initial", 1, condition)]
@@ -318,6 +320,7 @@ class Machine:
                 at, point = undecided.wanted[0]
                 waiting += self._decided(values, self.frame.input(name, at[3:]).qualified, point, random)
                 continue
+            spend(SEARCH_STEPS)
             for answer in answers:
                 more = values.copy()
                 for port, value in answer.items():

@@ -188,7 +188,8 @@ class Frame:
                     if condition is not None:
                         found.setdefault(edge.source.node, {})[label] = condition
             self._initials = {node: tuple(conditions.items()) for node, conditions in found.items()}
-        return dict(item for node in nodes for item in self._initials.get(node, ()))
+        wanted = frozenset(nodes)
+        return dict(item for node, items in self._initials.items() if node in wanted for item in items)
 
     def _initially(self, edge: Edge) -> Term | None:
         condition = initial_condition(self.system, edge)

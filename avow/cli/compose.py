@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
+from avow.solving.limits import from_seconds
 
 if TYPE_CHECKING:
     from avow.base.verdict import Outcome
@@ -76,7 +77,7 @@ def command(
         from avow.language.translate import to_rcl
 
         goal = chosen[-1] if goals else composition.whole
-        standing = composition.stands(goal, Bounds(int(seconds * 1000), seed))
+        standing = composition.stands(goal, Bounds(from_seconds(seconds), seed))
         if standing is not Verdict.PROVED:
             click.echo(f"{goal.name} is {standing}: no contract follows from it (see `avow compose {path}`)", err=True)
             return 1

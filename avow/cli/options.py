@@ -49,14 +49,14 @@ class _Seconds(click.ParamType[float]):
 
 
 def seconds_option(default: float) -> Callable[[Command], Command]:
-    """``--seconds``: the time for one question to the solver."""
+    """``--seconds``: the effort for one question to the solver, as the time that it usually takes."""
     return click.option(
         "--seconds",
         type=_Seconds(),
         metavar="SECONDS",
         default=default,
         show_default=True,
-        help="Time for one question to the solver.",
+        help="Effort for one question to the solver, as the time that it usually takes; what is counted is steps.",
     )
 
 
@@ -90,8 +90,3 @@ def json_option(what: str = "") -> Callable[[Command], Command]:
 def node_option() -> Callable[[Command], Command]:
     """``--node``: only some nodes."""
     return click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
-
-
-def milliseconds(seconds: float) -> int:
-    """As the solver wants it, never 0 (which it takes for no limit at all)."""
-    return max(1, int(seconds * 1000))

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from avow.cli.options import ContractArgument, json_option, milliseconds, seconds_option, seed_option
+from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
+from avow.solving.limits import from_seconds
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -49,7 +50,7 @@ def command(
     from avow.calculus.discharge import Bounds
     from avow.calculus.refinement import refines
 
-    bounds = Bounds(milliseconds(seconds), seed)
+    bounds = Bounds(from_seconds(seconds), seed)
     new, stands = _nodes(concrete, bounds)
     old, _ = _nodes(abstract, bounds)
     pairs, missing = _pairs(new, old, node, concrete, abstract)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from avow.cli.options import ContractArgument, json_option, milliseconds, node_option, seconds_option, seed_option
+from avow.cli.options import ContractArgument, json_option, node_option, seconds_option, seed_option
+from avow.solving.limits import from_seconds
 
 if TYPE_CHECKING:
     from avow.base.verdict import Counterexample
@@ -44,7 +45,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     known = [node.name for node in system.contract.nodes]
     if unknown := [name for name in nodes if name not in known]:
         raise Rejected(Diagnostic("CLI003", f"there is no node '{unknown[0]}'", hint=f"known: {', '.join(known)}"))
-    bounds = Bounds(milliseconds(seconds), seed)
+    bounds = Bounds(from_seconds(seconds), seed)
 
     def settle(node: Node) -> tuple[SanityResult, ...]:
         scenario = interpretation(node, system.plan.scenario)

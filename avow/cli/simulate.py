@@ -7,7 +7,8 @@ from pathlib import Path
 
 import click
 
-from avow.cli.options import ContractArgument, json_option, milliseconds, seconds_option, seed_option
+from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
+from avow.solving.limits import from_seconds
 
 
 @click.command()
@@ -36,7 +37,7 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
 
     loaded = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
     try:
-        machine = Machine(replace(world(frame(loaded)), milliseconds=milliseconds(seconds)), seed)
+        machine = Machine(replace(world(frame(loaded)), effort=from_seconds(seconds)), seed)
         scenario = loaded.plan.scenario
         length = steps or (scenario.steps if scenario else None) or 20
         walk = machine.walk(Random(seed), length)

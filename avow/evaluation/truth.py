@@ -9,7 +9,7 @@ from avow.formulas.values import Value
 from avow.language.terms import Role, Term, Variable
 
 
-def judge(term: Term, valuation: Mapping[str, Value], *, timeout_ms: int = 5_000) -> bool | None:
+def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) -> bool | None:
     """Whether the formula holds of the values; None where neither evaluation nor Z3 can tell.
 
     What lies outside a partial operation (division by zero) is unspecified: True and False hold whatever it yields.
@@ -23,7 +23,7 @@ def judge(term: Term, valuation: Mapping[str, Value], *, timeout_ms: int = 5_000
         return None
     from avow.solving.questions import replay  # Z3 takes a quarter of a second to load, and is seldom needed here
 
-    return replay([term], {v: valuation[v.qualified] for v in sorts.values()}, timeout_ms=timeout_ms)
+    return replay([term], {v: valuation[v.qualified] for v in sorts.values()}, effort=effort)
 
 
 def _free_sorts(term: Term) -> dict[str, Variable]:

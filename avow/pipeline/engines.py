@@ -14,11 +14,12 @@ def discharge_sanity(cut: SanitySlice, obligations: Sequence[Obligation], limits
     """Settle sanity claims of one node by the solver."""
     from avow.calculus import providers
     from avow.sanity.analysis import Bounds, outcomes
+    from avow.solving.limits import from_seconds
     from avow.solving.questions import z3_version
 
     bounds = Bounds(seed=limits.seed)
     if limits.asked:
-        bounds = replace(bounds, milliseconds=max(1, int(limits.seconds * 1000)))
+        bounds = replace(bounds, effort=from_seconds(limits.seconds))
     linked = {asked.claim.name: asked for asked in cut.linked}
     own = {o.id: o.name for o in obligations if o.name not in linked}
     found = outcomes(cut.node, own, scenario=cut.given, ranges=cut.ranges, bounds=bounds)

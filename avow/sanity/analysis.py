@@ -23,8 +23,8 @@ from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, claims, node_key, triggers
 from avow.sanity.results import Bounds, Patience, SanityResult, as_outcome, listing
-from avow.solving.limits import now
-from avow.tuning.effort import CONSISTENT_MS
+from avow.solving.limits import spent
+from avow.tuning.effort import CONSISTENT_EFFORT
 
 if TYPE_CHECKING:
     from avow.sanity.conflicts import Conflict
@@ -126,7 +126,7 @@ class _Analysis:
         self.node = node
         self.scenario = scenario
         self.ranges = ranges
-        self.patience = Patience(bounds.milliseconds)
+        self.patience = Patience(bounds.effort)
         self.serious = True
         self.seed = bounds.seed
         self.inputs = tuple(port.variable for port in node.inputs)
@@ -140,19 +140,19 @@ class _Analysis:
     def settle(self, claim: Claim) -> _Finding:
         if claim.name not in self.known:
             asked, self.serious = self.serious, claim.severity is Severity.ERROR
-            start, lost = now(), self.patience.lost
+            start, lost = spent(), self.patience.lost
             try:
                 found = self.known[claim.name] = self._settle(claim)
             finally:
                 self.serious = asked
             if found.verdict is Verdict.UNKNOWN:
-                self.patience.lost = max(self.patience.lost, lost + now() - start)
+                self.patience.lost = max(self.patience.lost, lost + spent() - start)
         return self.known[claim.name]
 
     @property
     def limit(self) -> int:
-        """Milliseconds for a question of the claim that is being settled."""
-        return self.patience.milliseconds(self.serious)
+        """Effort for a question of the claim that is being settled."""
+        return self.patience.effort(self.serious)
 
     def _settle(self, claim: Claim) -> _Finding:
         subject = claim.subject or ""
@@ -184,7 +184,7 @@ class _Analysis:
 
         if finding.verdict is Verdict.REFUTED:
             return finding
-        verdict, reason = in_small_types(self.assumptions, self.guarantees, timeout_ms=self.limit, seed=self.seed)
+        verdict, reason = in_small_types(self.assumptions, self.guarantees, effort=self.limit, seed=self.seed)
         clauses = tuple(self.guarantees) if verdict is Verdict.REFUTED else ()
         if verdict is Verdict.PROVED:
             return finding
@@ -193,8 +193,8 @@ class _Analysis:
     def _consistent(self) -> _Finding:
         together = {**self.assumptions, **self.guarantees}
         texts = ("no inputs and outputs meet {} together", "no inputs and outputs meet {}")
-        finding = self._possible(together, *texts, limit=CONSISTENT_MS)
-        if finding.verdict is Verdict.UNKNOWN and self.limit > CONSISTENT_MS:
+        finding = self._possible(together, *texts, limit=CONSISTENT_EFFORT)
+        if finding.verdict is Verdict.UNKNOWN and self.limit > CONSISTENT_EFFORT:
             answer, bounded = self._realizability()
             if answer.verdict is Verdict.PROVED and not bounded:
                 allowed = self._other("assumptions-satisfiable")
@@ -210,7 +210,7 @@ class _Analysis:
 
         if finding.verdict is not Verdict.REFUTED or not finding.clauses:
             return finding
-        sets = contradictions(formulas, finding.clauses, timeout_ms=self.patience.full // 2, seed=self.seed)
+        sets = contradictions(formulas, finding.clauses, effort=self.patience.full // 2, seed=self.seed)
         if len(sets) == 1:
             return finding
         text = ", nor ".join((finding.explanation, *map(listing, sets[1:])))
@@ -223,19 +223,19 @@ class _Analysis:
 
         if self.answer is not None:
             return self.answer
-        start = now()
+        start = spent()
 
         def ask(
             assumptions: Mapping[str, Term], guarantees: Mapping[str, Term], given: Given | None = None
         ) -> Realizability:
-            limit = 2 * self.patience.milliseconds(serious=True)
+            limit = 2 * self.patience.effort(serious=True)
             return realizable(
                 self.inputs,
                 self.outputs,
                 assumptions,
                 guarantees,
                 given=given,
-                timeout_ms=limit,
+                effort=limit,
                 seed=self.seed,
             )
 
@@ -257,7 +257,7 @@ class _Analysis:
                 answer, bounded = replace(within, needed=needed), True
         self.answer = answer, bounded
         if answer.verdict is Verdict.UNKNOWN:
-            self.patience.lose(now() - start)
+            self.patience.lose(spent() - start)
         return self.answer
 
     def _realizable(self) -> _Finding:
@@ -277,7 +277,7 @@ class _Analysis:
             at = answer.inputs if tuple(group.guarantees) == answer.group else self._refuting(group)
             if at is not None:
                 limit = 2 * self.patience.full
-                found += conflicts(self.inputs, group, self.assumptions, at, timeout_ms=limit, seed=self.seed)
+                found += conflicts(self.inputs, group, self.assumptions, at, effort=limit, seed=self.seed)
         found.sort(key=lambda conflict: not set(conflict.clauses) <= set(answer.group))
         listed = tuple((conflict.clauses, conflict.counterexample()) for conflict in found)
         if not listed:
@@ -297,7 +297,7 @@ class _Analysis:
 
         limit = self.patience.full
         answer = realizable(
-            self.inputs, group.outputs, self.assumptions, group.guarantees, timeout_ms=limit, seed=self.seed
+            self.inputs, group.outputs, self.assumptions, group.guarantees, effort=limit, seed=self.seed
         )
         return answer.inputs if answer.verdict is Verdict.REFUTED else None
 
@@ -366,7 +366,7 @@ class _Analysis:
             self.outputs,
             outside,
             self.guarantees,
-            timeout_ms=2 * self.limit,
+            effort=2 * self.limit,
             seed=self.seed,
             doubtful=True,
         )
@@ -414,7 +414,7 @@ class _Analysis:
             "different": Not(Compare("==", output, again[output])),
         }
         for given in self._attempts():
-            answer = solve(question, timeout_ms=self.limit, seed=self.seed, given=given, shown=False)
+            answer = solve(question, effort=self.limit, seed=self.seed, given=given, shown=False)
             if answer.status == "unsat" and not given:
                 return _Finding(Verdict.PROVED, engine=answer.engine, because=self._if_refuted("consistent"))
             if answer.status == "sat":
@@ -438,7 +438,7 @@ class _Analysis:
         """Whether any input of the scenario meets these: without one, nothing has been checked."""
         from avow.solving.questions import solve
 
-        return solve(assumed, timeout_ms=self.limit, given=self.scenario, shown=False).status == "sat"
+        return solve(assumed, effort=self.limit, given=self.scenario, shown=False).status == "sat"
 
     def _if_refuted(self, name: str) -> str | None:
         return name if name in self.claims and self._other(name).verdict is Verdict.REFUTED else None
@@ -448,9 +448,9 @@ class _Analysis:
         from avow.solving.questions import solve
 
         limit = min(limit or self.limit, self.limit)
-        answer = solve(formulas, timeout_ms=limit, seed=self.seed, shown=False)
+        answer = solve(formulas, effort=limit, seed=self.seed, shown=False)
         if answer.status == "unknown" and self.scenario:
-            within = solve(formulas, timeout_ms=limit, seed=self.seed, given=self.scenario)
+            within = solve(formulas, effort=limit, seed=self.seed, given=self.scenario)
             # An example in the scenario is an example; that there is none in it proves nothing.
             answer = within if within.status == "sat" else answer
         if answer.status == "unknown" and self._by_definitions(formulas, limit // 2):
@@ -468,7 +468,7 @@ class _Analysis:
         """Whether these hold together, for functions that have no finite table."""
         from avow.sanity.realizability import possible
 
-        return _are_endless(formulas.values()) and possible(formulas, timeout_ms=limit, seed=self.seed)
+        return _are_endless(formulas.values()) and possible(formulas, effort=limit, seed=self.seed)
 
     def _fails_somewhere(self, hypotheses: Mapping[str, Term], formula: Term, alone: str, implied: str) -> _Finding:
         """Is there a case where the hypotheses hold and the formula does not? If not, the texts say so."""

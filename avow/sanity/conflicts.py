@@ -18,11 +18,11 @@ from avow.language.sorts import DataSort, FunctionSort
 from avow.language.terms import Compare, Construct, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.realizability import Formulas, Given, Group, Search
 from avow.solving.counterexample import show_values
-from avow.solving.limits import now
+from avow.solving.limits import spent
 from avow.solving.questions import Unsupported, solve
 from avow.solving.z3_module import z3
 from avow.tuning.bounds import CONFLICTS
-from avow.tuning.effort import CONFLICT_MS
+from avow.tuning.effort import CONFLICT_EFFORT
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +44,11 @@ def conflicts(
     first: Mapping[Variable, Value],
     *,
     given: Given | None = None,
-    timeout_ms: int = 4_000,
+    effort: int = 4_000,
     seed: int = 0,
 ) -> tuple[Conflict, ...]:
     """The conflicts among a group's guarantees: those at the input `first`, and others found within the time."""
-    deadline = now() + timeout_ms / 1000
+    deadline = spent() + effort
     found: dict[frozenset[str], Mapping[Variable, Value]] = {}
 
     def learn(at: Mapping[Variable, Value]) -> None:
@@ -60,7 +60,7 @@ def conflicts(
     # Two guarantees against each other are what people want to see first, and what happens most.
     for size, patience in ((2, 1_000), (1, 400), (3, 400)):
         for chosen in combinations(labels, size):
-            left = int((deadline - now()) * 1000)
+            left = int(deadline - spent())
             if frozenset(chosen) in found or left <= 0:
                 continue
             formulas = {label: group.guarantees[label] for label in chosen}
@@ -81,21 +81,21 @@ def conflicts(
 
 
 def contradictions(
-    formulas: Mapping[str, Term], first: Iterable[str], *, timeout_ms: int, seed: int = 0
+    formulas: Mapping[str, Term], first: Iterable[str], *, effort: int, seed: int = 0
 ) -> tuple[tuple[str, ...], ...]:
     """The minimal sets of formulas that cannot hold together, `first` before the others that are found within the time
     (eight at most): a set other than these lacks a formula of each of them (Reiter, "A theory of diagnosis from first
     principles", 1987)."""
-    deadline = now() + timeout_ms / 1000
+    deadline = spent() + effort
     found = [frozenset(first)]
     waiting: list[frozenset[str]] = [frozenset()]
     for without in waiting:  # which grows
-        if now() > deadline or len(found) >= CONFLICTS:
+        if spent() > deadline or len(found) >= CONFLICTS:
             break
         core = next((known for known in found if not known & without), None)
         if core is None:
             kept = {label: formula for label, formula in formulas.items() if label not in without}
-            answer = solve(kept, timeout_ms=min(500, timeout_ms), seed=seed, shown=False)
+            answer = solve(kept, effort=min(500, effort), seed=seed, shown=False)
             if answer.status != "unsat":
                 continue
             core = frozenset(answer.core)
@@ -112,10 +112,10 @@ def _minimal_sets(group: Group, at: Mapping[Variable, Value], deadline: float, s
         for chosen in map(frozenset, combinations(group.guarantees, size)):
             if any(smaller <= chosen for smaller in minimal):
                 continue
-            if now() > deadline and size > 2:
+            if spent() > deadline and size > 2:
                 return minimal
             formulas = {label: group.guarantees[label] for label in group.guarantees if label in chosen}
-            if solve(formulas, given=at, variables=group.outputs, timeout_ms=CONFLICT_MS, seed=seed).status == "unsat":
+            if solve(formulas, given=at, variables=group.outputs, effort=CONFLICT_EFFORT, seed=seed).status == "unsat":
                 minimal.append(chosen)
     return minimal
 
@@ -130,7 +130,7 @@ def _explain(clauses: tuple[str, ...], group: Group, at: Mapping[Variable, Value
 def _demand(formula: Term, outputs: Sequence[Variable], at: Mapping[Variable, Value], seed: int) -> str:
     """What a guarantee asks for at this input, in the contract's words."""
     mentioned = [output for output in outputs if output in free_variables(formula)]
-    answer = solve([formula], given=at, variables=mentioned, timeout_ms=CONFLICT_MS, seed=seed)
+    answer = solve([formula], given=at, variables=mentioned, effort=CONFLICT_EFFORT, seed=seed)
     if answer.status == "unsat":
         return "cannot be met"
     if answer.status != "sat":
@@ -150,13 +150,13 @@ def _shown(formula: Term, output: Variable, value: Value, at: Mapping[Variable, 
         return ""
     other = Variable(Role.INPUT, "the value shown", output.sort)
     different = Not(Compare("==", output, other))
-    if solve([formula, different], given={**at, other: value}, timeout_ms=CONFLICT_MS, seed=seed).status == "unsat":
+    if solve([formula, different], given={**at, other: value}, effort=CONFLICT_EFFORT, seed=seed).status == "unsat":
         return show(value)
     if isinstance(output.sort, DataSort) and isinstance(value, Data):
         fields = output.sort.constructor(value.constructor).parameters
         bound = tuple(Variable(Role.BOUND, f"field {k}", sort) for k, sort in enumerate(fields))
         built = Compare("==", output, Construct(value.constructor, bound, output.sort))
         made: Term = Quantified(Quantifier.EXISTS, bound, built) if bound else built
-        if solve([formula, Not(made)], given=at, timeout_ms=CONFLICT_MS, seed=seed).status == "unsat":
+        if solve([formula, Not(made)], given=at, effort=CONFLICT_EFFORT, seed=seed).status == "unsat":
             return f"{value.constructor}(…)" if bound else value.constructor
     return ""

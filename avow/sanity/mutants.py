@@ -53,7 +53,7 @@ def mutants(formula: Term) -> tuple[Mutant, ...]:
 
 
 def telling(
-    formula: Term, assumptions: tuple[Term, ...], limit: int, timeout_ms: int = 2_000, others: tuple[Term, ...] = ()
+    formula: Term, assumptions: tuple[Term, ...], limit: int, effort: int = 2_000, others: tuple[Term, ...] = ()
 ) -> tuple[Mutant, ...]:
     """Up to `limit` mutants that do not follow from the original under the assumptions, spread over the formula; nor
     from it and the `others`, the node's further guarantees: what keeps the contract keeps such a mutant."""
@@ -63,10 +63,9 @@ def telling(
     kept = [
         m
         for m in mutants(formula)
-        if entails((*assumptions, formula), m.formula, timeout_ms=timeout_ms).verdict is Verdict.REFUTED
+        if entails((*assumptions, formula), m.formula, effort=effort).verdict is Verdict.REFUTED
         and not (
-            others
-            and entails((*assumptions, *others, formula), m.formula, timeout_ms=timeout_ms).verdict is Verdict.PROVED
+            others and entails((*assumptions, *others, formula), m.formula, effort=effort).verdict is Verdict.PROVED
         )
     ]
     if len(kept) <= limit:

@@ -71,7 +71,7 @@ def confirmed(
     guarantees: Formulas,
     given: Mapping[Variable, Value],
     *,
-    timeout_ms: int,
+    effort: int,
     seed: int = 0,
 ) -> bool:
     """Whether the proofs together, each about outputs of its own, show that some output meets all guarantees."""
@@ -82,8 +82,8 @@ def confirmed(
     try:
         return all(
             _conservative(proof, given)
-            and _met(proof, assumptions, given, timeout_ms, seed)
-            and implied(proof.shown, guarantees, timeout_ms=timeout_ms, seed=seed)
+            and _met(proof, assumptions, given, effort, seed)
+            and implied(proof.shown, guarantees, effort=effort, seed=seed)
             for proof in proofs
         )
     except (Unsupported, z3.Z3Exception):
@@ -96,28 +96,28 @@ def refutes(
     guarantees: Formulas,
     outputs: Iterable[Variable],
     *,
-    timeout_ms: int,
+    effort: int,
     seed: int = 0,
 ) -> bool:
     """Whether the inputs are allowed, and no output meets the guarantees there."""
     outputs = tuple(outputs)
     spoken = {v for formula in (*assumptions.values(), *guarantees.values()) for v in free_variables(formula)}
-    if not spoken - set(outputs) <= inputs.keys() or not replay(assumptions.values(), inputs, timeout_ms=timeout_ms):
+    if not spoken - set(outputs) <= inputs.keys() or not replay(assumptions.values(), inputs, effort=effort):
         return False
-    found = solve(guarantees, timeout_ms=timeout_ms, seed=seed, given=inputs, variables=outputs)
+    found = solve(guarantees, effort=effort, seed=seed, given=inputs, variables=outputs)
     return found.status == "unsat"
 
 
-def implied(stronger: Formulas, weaker: Formulas, *, timeout_ms: int, seed: int = 0) -> bool:
+def implied(stronger: Formulas, weaker: Formulas, *, effort: int, seed: int = 0) -> bool:
     """Whether it is proved that each formula implies the one with the same label: what was shown, or assumed, in other
     words was that."""
     pairs = [(stronger[label], formula) for label, formula in weaker.items() if label in stronger]
-    return all(one == other or _implies(one, other, timeout_ms, seed) for one, other in pairs)
+    return all(one == other or _implies(one, other, effort, seed) for one, other in pairs)
 
 
-def _implies(one: Term, other: Term, timeout_ms: int, seed: int) -> bool:
+def _implies(one: Term, other: Term, effort: int, seed: int) -> bool:
     def proved(left: Term, right: Term) -> bool:
-        return entails([left], right, timeout_ms=timeout_ms, seed=seed).verdict is Verdict.PROVED
+        return entails([left], right, effort=effort, seed=seed).verdict is Verdict.PROVED
 
     pushed = push_negations(other) if depth(other) <= REWRITTEN_DEPTH else other
     return proved(pushed, other) if _is_instance(one, pushed) else proved(one, other)
@@ -159,7 +159,7 @@ def _align(one: Term, body: Term, variables: set[Variable], values: dict[Variabl
             _align(part, other, variables, values)
 
 
-def _met(proof: Proof, assumptions: Formulas, given: Mapping[Variable, Value], timeout_ms: int, seed: int) -> bool:
+def _met(proof: Proof, assumptions: Formulas, given: Mapping[Variable, Value], effort: int, seed: int) -> bool:
     """No allowed input, and constants as the axioms have them, at which every alternative fails."""
     shown = tuple(proof.shown.values())
     if not proof.alternatives:
@@ -168,7 +168,7 @@ def _met(proof: Proof, assumptions: Formulas, given: Mapping[Variable, Value], t
         if bound:
             never = Quantified(Quantifier.FORALL, tuple(bound.values()), never)
         formulas = (*assumptions.values(), never)
-        return solve(formulas, timeout_ms=timeout_ms, seed=seed, given=given, variables=proof.inputs).status == "unsat"
+        return solve(formulas, effort=effort, seed=seed, given=given, variables=proof.inputs).status == "unsat"
     translator = Translator()
     fixed: dict[Variable, Meaning] = {v: translator.value(value, v.sort) for v, value in given.items()}
     # what is given says which elements an unspecified sort has; a value that the search has met does not
@@ -181,7 +181,7 @@ def _met(proof: Proof, assumptions: Formulas, given: Mapping[Variable, Value], t
     free.difference_update(fixed, named)
     facts += translator.background([*named, *sorted(free, key=lambda v: v.qualified)])
     tracked = [(label, translator.term(formula, fixed)) for label, formula in assumptions.items()]
-    return check(translator, facts, tracked=tracked, timeout_ms=timeout_ms, seed=seed).status == "unsat"
+    return check(translator, facts, tracked=tracked, effort=effort, seed=seed).status == "unsat"
 
 
 def _meets(

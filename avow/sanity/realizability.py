@@ -24,8 +24,8 @@ from avow.language.sorts import SequenceSort
 from avow.language.terms import Apply, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.proofs import confirmed, implied, refutes
 from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
-from avow.solving.limits import budget, now
-from avow.tuning.effort import CONFIRMING_MS, REALIZABLE_SHARE
+from avow.solving.limits import budget, spent
+from avow.tuning.effort import CONFIRMING_EFFORT, REALIZABLE_SHARE
 
 __all__ = ["Formulas", "Given", "Group", "Question", "Realizability", "Search", "groups", "possible", "realizable"]
 
@@ -41,7 +41,7 @@ class Question:
     assumptions: Formulas
     guarantees: Formulas
     given: Given = field(default_factory=dict)
-    timeout_ms: int = 10_000
+    effort: int = 10_000
     seed: int = 0
     doubtful: bool = False
 
@@ -49,8 +49,8 @@ class Question:
         """The group that these guarantees belong to."""
         return next(g for g in groups(self.guarantees, self.outputs) if set(labels) <= set(g.guarantees))
 
-    def search(self, group: Group, timeout_ms: int) -> Search:
-        return Search(self.inputs, group, self.assumptions, self.given, timeout_ms, self.seed)
+    def search(self, group: Group, effort: int) -> Search:
+        return Search(self.inputs, group, self.assumptions, self.given, effort, self.seed)
 
 
 def realizable(
@@ -60,27 +60,27 @@ def realizable(
     guarantees: Formulas,
     *,
     given: Given | None = None,
-    timeout_ms: int = 10_000,
+    effort: int = 10_000,
     seed: int = 0,
     doubtful: bool = False,
 ) -> Realizability:
     """Decide it: see `Question`."""
-    asked = Question(tuple(inputs), tuple(outputs), assumptions, guarantees, given or {}, timeout_ms, seed, doubtful)
-    start = now()
-    with budget(timeout_ms * REALIZABLE_SHARE):
+    asked = Question(tuple(inputs), tuple(outputs), assumptions, guarantees, given or {}, effort, seed, doubtful)
+    start = spent()
+    with budget(effort * REALIZABLE_SHARE):
         for method in (_with_items, _with_functions):
             answer = method(asked)
             if answer is not None:
                 return answer
-        left = max(100, timeout_ms - int((now() - start) * 1000))
-        return _grouped(replace(asked, timeout_ms=left))
+        left = max(100, effort - int(spent() - start))
+        return _grouped(replace(asked, effort=left))
 
 
-def possible(formulas: Formulas, *, timeout_ms: int, seed: int = 0) -> bool:
+def possible(formulas: Formulas, *, effort: int, seed: int = 0) -> bool:
     """Whether formulas hold together for some values: as the question whether some output meets them, where there are
     no inputs. It helps where functions are wanted that are no tables, such as ``f(x) = x``. False proves nothing."""
     wanted = sorted(frozenset().union(*map(free_variables, formulas.values())), key=lambda v: v.qualified)
-    return realizable((), wanted, {}, formulas, timeout_ms=timeout_ms, seed=seed).verdict is Verdict.PROVED
+    return realizable((), wanted, {}, formulas, effort=effort, seed=seed).verdict is Verdict.PROVED
 
 
 def _grouped(asked: Question) -> Realizability:
@@ -88,7 +88,7 @@ def _grouped(asked: Question) -> Realizability:
     engines: list[str] = []
     open_question: Realizability | None = None
     for group in groups(asked.guarantees, asked.outputs):
-        answer = _at_a_point(asked, group) or _searched(asked, group, asked.timeout_ms)
+        answer = _at_a_point(asked, group) or _searched(asked, group, asked.effort)
         if answer.verdict is Verdict.REFUTED:
             return answer
         if answer.verdict is not Verdict.PROVED:
@@ -101,14 +101,14 @@ def _grouped(asked: Question) -> Realizability:
     return Realizability(Verdict.PROVED, needed=ordered, engine=", ".join(dict.fromkeys(engines)) or "z3")
 
 
-def _searched(asked: Question, group: Group, timeout_ms: int) -> Realizability:
+def _searched(asked: Question, group: Group, effort: int) -> Realizability:
     """What the search says of a group, if a question of its own confirms it."""
-    answer = asked.search(group, timeout_ms).decide(asked.doubtful)
-    limit = max(CONFIRMING_MS, timeout_ms)
+    answer = asked.search(group, effort).decide(asked.doubtful)
+    limit = max(CONFIRMING_EFFORT, effort)
     match answer.verdict:
         case Verdict.PROVED:
             good = confirmed(
-                answer.proofs, asked.assumptions, group.guarantees, asked.given, timeout_ms=limit, seed=asked.seed
+                answer.proofs, asked.assumptions, group.guarantees, asked.given, effort=limit, seed=asked.seed
             )
         case Verdict.REFUTED:
             good = _refutes(asked, group, answer.inputs, limit)
@@ -119,14 +119,14 @@ def _searched(asked: Question, group: Group, timeout_ms: int) -> Realizability:
 
 def _refutes(asked: Question, group: Group, inputs: Given, limit: int) -> bool:
     at = {**inputs, **asked.given}
-    return refutes(at, asked.assumptions, group.guarantees, group.outputs, timeout_ms=limit, seed=asked.seed)
+    return refutes(at, asked.assumptions, group.guarantees, group.outputs, effort=limit, seed=asked.seed)
 
 
 def _same(asked: Question, assumptions: Formulas, guarantees: Formulas) -> bool:
     """Whether what was shown with these formulas was shown of the question."""
-    limit = max(CONFIRMING_MS, asked.timeout_ms)
-    return implied(guarantees, asked.guarantees, timeout_ms=limit, seed=asked.seed) and implied(
-        asked.assumptions, assumptions, timeout_ms=limit, seed=asked.seed
+    limit = max(CONFIRMING_EFFORT, asked.effort)
+    return implied(guarantees, asked.guarantees, effort=limit, seed=asked.seed) and implied(
+        asked.assumptions, assumptions, effort=limit, seed=asked.seed
     )
 
 
@@ -139,8 +139,8 @@ def _at_a_point(asked: Question, group: Group) -> Realizability | None:
     if there is None:
         return None
     inputs = (*asked.inputs, *there.point)
-    answer = _searched(replace(asked, inputs=inputs), Group(there.guarantees, there.outputs), asked.timeout_ms // 2)
-    limit = max(CONFIRMING_MS, asked.timeout_ms // 2)
+    answer = _searched(replace(asked, inputs=inputs), Group(there.guarantees, there.outputs), asked.effort // 2)
+    limit = max(CONFIRMING_EFFORT, asked.effort // 2)
     match answer.verdict:
         case Verdict.PROVED:
             point = tuple(replace(v, role=Role.BOUND) for v in there.point)
@@ -150,7 +150,7 @@ def _at_a_point(asked: Question, group: Group) -> Realizability | None:
                 label: Quantified(Quantifier.FORALL, point, substitute(formula, put))
                 for label, formula in there.guarantees.items()
             }
-            good = implied(everywhere, group.guarantees, timeout_ms=limit, seed=asked.seed)
+            good = implied(everywhere, group.guarantees, effort=limit, seed=asked.seed)
         case Verdict.REFUTED:
             answer = replace(answer, inputs={v: x for v, x in answer.inputs.items() if v not in there.point})
             good = _refutes(asked, group, answer.inputs, limit)
@@ -173,7 +173,7 @@ def _with_items(asked: Question) -> Realizability | None:
         assumed,
         wanted,
         given=asked.given,
-        timeout_ms=asked.timeout_ms // 2,
+        effort=asked.effort // 2,
         seed=asked.seed,
         doubtful=asked.doubtful,
     )
@@ -188,7 +188,7 @@ def _with_items(asked: Question) -> Realizability | None:
         case Verdict.REFUTED:
             group = asked.group(answer.group)
             at = apart.values(asked.inputs, answer.inputs)
-            good = _refutes(asked, group, at, max(CONFIRMING_MS, asked.timeout_ms // 2))
+            good = _refutes(asked, group, at, max(CONFIRMING_EFFORT, asked.effort // 2))
             return replace(answer, inputs=at, group=tuple(group.guarantees)) if good else None
         case _:  # some other way may tell more
             return None
@@ -217,13 +217,13 @@ def _with_functions(asked: Question) -> Realizability | None:
         outputs=flat.variables(outputs),
         assumptions=assumed,
         guarantees=wanted,
-        timeout_ms=asked.timeout_ms // 2,
+        effort=asked.effort // 2,
     )
     answer = _grouped(changed)
     if answer.verdict is Verdict.REFUTED:
         values = flat.values(answer.inputs)
         at = None if values is None else {v: values[v] for v in inputs if v in values}
-        limit = asked.timeout_ms // 4
+        limit = asked.effort // 4
         return asked.search(asked.group(answer.group), limit).judge(at, limit) if at is not None else None
     if answer.verdict is not Verdict.PROVED:
         return None

@@ -12,11 +12,10 @@ from avow.sanity.claims import Property
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Limits on the analysis of a node: milliseconds for one question whose answer makes a contract good or bad (a
-    third of it for warnings and notes; less, the more time went into questions that stayed open), and the solver's
-    seed."""
+    """Limits on the analysis of a node: effort for one question whose answer makes a contract good or bad (a third
+    of it for warnings and notes; less, the more went into questions that stayed open), and the solver's seed."""
 
-    milliseconds: int = 3_000
+    effort: int = 3_000
     seed: int = 0
 
 
@@ -54,17 +53,17 @@ class SanityResult:
 
 @dataclass(slots=True)
 class Patience:
-    """How long one question may take, in milliseconds: less, the more time went into claims that stayed open."""
+    """Effort for one question: less, the more went into claims that stayed open."""
 
     full: int
     lost: float = 0.0
 
-    def lose(self, seconds: float) -> None:
-        self.lost += seconds
+    def lose(self, effort: float) -> None:
+        self.lost += effort
 
-    def milliseconds(self, serious: bool) -> int:
-        """What is merely worth knowing is not worth waiting for."""
-        share = 1 / (1 + self.lost * 1000 / self.full)
+    def effort(self, serious: bool) -> int:
+        """What is merely worth knowing is not worth much."""
+        share = 1 / (1 + self.lost / self.full)
         return max(1, int(self.full * share) // (1 if serious else 3))
 
 

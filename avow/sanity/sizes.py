@@ -17,7 +17,7 @@ from avow.tuning.bounds import SIZES_TRIED
 
 
 def in_small_types(
-    assumptions: Mapping[str, Term], guarantees: Mapping[str, Term], *, timeout_ms: int, seed: int = 0
+    assumptions: Mapping[str, Term], guarantees: Mapping[str, Term], *, effort: int, seed: int = 0
 ) -> tuple[Verdict, str]:
     """Whether inputs and outputs meet all formulas where each unspecified type has one element, and where each has two:
     unless the assumptions exclude that. `refuted` and `unknown` come with the reason."""
@@ -26,10 +26,10 @@ def in_small_types(
     verdict, reason = Verdict.PROVED, ""
     for size in SIZES_TRIED if sorts else ():
         types = {f"size of {sort.name}": _has(sort, size) for sort in sorts}
-        found = solve({**together, **types}, timeout_ms=timeout_ms, seed=seed, shown=False).status
+        found = solve({**together, **types}, effort=effort, seed=seed, shown=False).status
         if found == "sat":
             continue
-        allowed = solve({**assumptions, **types}, timeout_ms=timeout_ms, seed=seed, shown=False).status
+        allowed = solve({**assumptions, **types}, effort=effort, seed=seed, shown=False).status
         names = ", ".join(sort.name for sort in sorts)
         many = "just one element" if size == 1 else "just two elements"
         if allowed == "sat" and found == "unsat":

@@ -45,26 +45,25 @@ class Difference:
         return f"the contract also allows {_listed(self.answer)}{place}, which breaks it, and others, which do not"
 
 
-def difference(node: Node, mutant: Mutant, seconds: float = 4.0) -> Difference:
-    """What distinguishes the mutant of one of the node's guarantees from the node's contract; at most `seconds` for
-    each of two questions."""
+def difference(node: Node, mutant: Mutant, effort: int = 4_000) -> Difference:
+    """What distinguishes the mutant of one of the node's guarantees from the node's contract; at most so much
+    effort for each of two questions."""
     from avow.sanity.realizability import realizable
     from avow.solving.questions import entails, solve
 
-    milliseconds = int(seconds * 1000)
     told = Difference(mutant.change, show_term(mutant.formula))
     assumptions = {f"assumed {c.name}": c.formula for c in node.assumptions}
     guarantees = {c.name: c.formula for c in node.guarantees}
     inputs = tuple(port.variable for port in node.inputs)
     outputs = tuple(port.variable for port in node.outputs)
     wanted = {**guarantees, " mutant": mutant.formula}
-    kept = realizable(inputs, outputs, assumptions, wanted, timeout_ms=milliseconds, doubtful=True)
+    kept = realizable(inputs, outputs, assumptions, wanted, effort=effort, doubtful=True)
     if kept.verdict is Verdict.REFUTED:
-        found = solve(guarantees, given=kept.inputs, variables=outputs, timeout_ms=milliseconds)
+        found = solve(guarantees, given=kept.inputs, variables=outputs, effort=effort)
         if found.status == "sat":  # else the contract itself has no answer there, and shows no difference
             concerned = [formula for name, formula in guarantees.items() if name in kept.group]
             return _shown(told, {**kept.inputs, **found.values}, [mutant.formula, *concerned], forced=True)
-    answer = entails({**assumptions, **guarantees}, mutant.formula, timeout_ms=milliseconds)
+    answer = entails({**assumptions, **guarantees}, mutant.formula, effort=effort)
     return _shown(told, answer.values, [mutant.formula]) if answer.verdict is Verdict.REFUTED else told
 
 

@@ -16,12 +16,12 @@ from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.proofs import Proof
 from avow.sanity.witness_candidates import Definition, candidates
 from avow.sanity.witnesses import Cases, Fixed, Witness, instantiate, meanings_of, witnesses
-from avow.solving.limits import now
+from avow.solving.limits import NO_ANSWER, spend, spent
 from avow.solving.questions import Translator, Unsupported, check, entails, replay, search_tables, solve
 from avow.solving.translation import Expr, Meaning
 from avow.solving.z3_module import z3
 from avow.tuning.bounds import WITNESS_REFUTATIONS
-from avow.tuning.effort import WITNESS_PATIENT_MS
+from avow.tuning.effort import WITNESS_PATIENT_EFFORT, WITNESS_STEPS
 
 Formulas = Mapping[str, Term]
 Given = Mapping[Variable, Value]
@@ -75,13 +75,13 @@ class Search:
     """One group's question, with the witnesses found so far."""
 
     def __init__(
-        self, inputs: Sequence[Variable], group: Group, assumptions: Formulas, given: Given, timeout_ms: int, seed: int
+        self, inputs: Sequence[Variable], group: Group, assumptions: Formulas, given: Given, effort: int, seed: int
     ) -> None:
         self.group = group
         self.assumptions = assumptions
         self.given = given
         self.inputs = tuple(v for v in inputs if v not in given)
-        self.deadline = now() + timeout_ms / 1000
+        self.deadline = spent() + effort
         self.seed = seed
         self.found = candidates(group.outputs, assumptions.values(), group.guarantees.values())
         self.witnesses: list[Witness] = witnesses(self.found)
@@ -90,7 +90,7 @@ class Search:
         self.reason = ""
 
     def left(self) -> int:
-        return int((self.deadline - now()) * 1000)
+        return int(self.deadline - spent())
 
     def decide(self, doubtful: bool = False) -> Realizability:
         try:
@@ -112,13 +112,13 @@ class Search:
                 if answer is not None:
                     return answer
                 if self.left() <= 0:
-                    return Realizability(Verdict.UNKNOWN, reason=self.reason or "no answer in time")
-        return Realizability(Verdict.UNKNOWN, reason=self.reason or "no answer in time")
+                    return Realizability(Verdict.UNKNOWN, reason=self.reason or NO_ANSWER)
+        return Realizability(Verdict.UNKNOWN, reason=self.reason or NO_ANSWER)
 
     def _without_outputs(self) -> Realizability:
         goal = conjunction(self.group.guarantees.values())
         answer = entails(
-            self.assumptions, goal, timeout_ms=self.left(), seed=self.seed, given=self.given, variables=self.inputs
+            self.assumptions, goal, effort=self.left(), seed=self.seed, given=self.given, variables=self.inputs
         )
         labels = tuple(self.group.guarantees)
         proofs = (self._shown(),) if answer.verdict is Verdict.PROVED else ()
@@ -145,7 +145,7 @@ class Search:
         label = _unused("no output", self.assumptions)
         answer = solve(
             {**self.assumptions, label: never},
-            timeout_ms=limit,
+            effort=limit,
             seed=self.seed,
             given=self.given,
             variables=self.inputs,
@@ -179,13 +179,13 @@ class Search:
         translator = Translator()
         fixed = self._fixed(translator)
         facts = self._defeated(translator, guarantees, fixed, few, limit)
-        if limit >= WITNESS_PATIENT_MS:
+        if limit >= WITNESS_PATIENT_EFFORT:
             facts += [translator.term(axiom, fixed) for axiom in self.found.least]
         facts += translator.background([*self.inputs, *self.found.constants])
         tracked = [(label, translator.term(formula, fixed)) for label, formula in self.assumptions.items()]
-        answer = check(translator, facts, tracked=tracked, timeout_ms=limit, seed=self.seed)
+        answer = check(translator, facts, tracked=tracked, effort=limit, seed=self.seed)
         if answer.status == "unsat":
-            proof = self._shown(guarantees, self._asked(few), limit >= WITNESS_PATIENT_MS)
+            proof = self._shown(guarantees, self._asked(few), limit >= WITNESS_PATIENT_EFFORT)
             return Realizability(Verdict.PROVED, needed=answer.core, engine="z3, by witnesses", proofs=(proof,))
         self.reason = answer.reason or self.reason
         return None
@@ -199,14 +199,15 @@ class Search:
         limit: int,
     ) -> list[Expr]:
         """That the constants are as chosen, and no witness meets the guarantees (of those read off the contract, only
-        the first `few` are asked, and no more than can be written down in `limit` ms)."""
-        end = now() + limit / 1000
+        the first `few` are asked, and no more than can be written down with so much effort)."""
+        end = spent() + limit
         guarantees = list(guarantees)
         asked = self._asked(few)
         facts = [translator.term(axiom, meanings) for axiom in self._axioms(asked, guarantees)]
         for witness in asked:
-            if now() > end:
+            if spent() > end:
                 break
+            spend(WITNESS_STEPS)
             try:
                 whole = {**meanings, **meanings_of(translator, witness, meanings)}
             except Unsupported:  # `<1 upto in.n>` as a value: to suggest less is sound
@@ -239,11 +240,11 @@ class Search:
 
     def refute(self, possible: Sequence[Formulas], limit: int, few: int | None = None) -> Realizability | None:
         """Inputs without an output, at which each of the `possible` sets of guarantees could be met by itself; None
-        if none are found in `limit` ms. `few`: only so many witnesses are to be defeated from the start."""
-        end = now() + limit / 1000
+        if none are found with so much effort. `few`: only so many witnesses are to be defeated from the start."""
+        end = spent() + limit
         known = len(self.witnesses)
-        while now() < end and (few is None or len(self.witnesses) < known + WITNESS_REFUTATIONS):
-            inputs = self._defeat(self.group.guarantees, possible, int((end - now()) * 1000), few)
+        while spent() < end and (few is None or len(self.witnesses) < known + WITNESS_REFUTATIONS):
+            inputs = self._defeat(self.group.guarantees, possible, int(end - spent()), few)
             if inputs is None:
                 return None
             before = len(self.witnesses)
@@ -274,7 +275,7 @@ class Search:
                 facts += [translator.term(substitute(formula, copy), whole) for formula in formulas.values()]
             return facts + self._defeated(translator, guarantees.values(), whole, few, limit)
 
-        values = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=self.seed)
+        values = search_tables(translator, build, ordinary, functions, effort=limit, seed=self.seed)
         if values is None:
             return None
         return {**{v: values[v] for v in self.inputs}, **self.given}
@@ -282,11 +283,11 @@ class Search:
     def judge(self, inputs: Mapping[Variable, Value], limit: int) -> Realizability | None:
         """Is there no output at these inputs? If there is one, it becomes a witness."""
         inputs = {v: value for v, value in inputs.items() if v in self.inputs or v in self.given}
-        if not replay(self.assumptions.values(), inputs, timeout_ms=limit):
+        if not replay(self.assumptions.values(), inputs, effort=limit):
             return None
         answer = solve(
             self.group.guarantees,
-            timeout_ms=max(limit, 200),
+            effort=max(limit, 200),
             seed=self.seed,
             given=inputs,
             variables=self.group.outputs,

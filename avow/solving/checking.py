@@ -1,20 +1,21 @@
-"""One question to Z3 about expressions, bounded in (processor) time: the engines under `avow.solving.questions`."""
+"""One question to Z3 about expressions, bounded in effort: the engines under `avow.solving.questions`."""
 
 from __future__ import annotations
 
-import contextlib
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 from typing import Literal as OneOf
 
 import z3
 
-from avow.solving.limits import allowed, watchdog
+from avow.solving.limits import NO_ANSWER, allowed, net, spend, steps, watchdog
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Translator
+from avow.solving.z3_sorts import Sorts
 from avow.tuning.bounds import SMALL_NUMBER
-from avow.tuning.effort import QUESTION_MS, SMALLER_MODEL_MS, WALL_CLOCK
+from avow.tuning.effort import QUESTION_EFFORT, QUESTION_STEPS, SMALLER_MODEL_EFFORT
 
 Status = OneOf["sat", "unsat", "unknown"]
 
@@ -40,22 +41,22 @@ def check(
     translator: Translator,
     assertions: Iterable[Expr],
     *,
-    timeout_ms: int = QUESTION_MS,
+    effort: int = QUESTION_EFFORT,
     seed: int = 0,
     tracked: Iterable[tuple[str, Expr]] = (),
     engine: Engine = "smt",
 ) -> Answer:
     """Are the assertions satisfiable together? With `unsat`, `core` is a minimal set of tracked labels (each is needed,
-    as far as the solver can tell in time). Crashes of the solver are `unknown`.
+    as far as the solver can tell with a like effort). Crashes of the solver are `unknown`.
 
     The engine `qsat` decides quantified linear arithmetic, where the usual one mostly gives up; it knows no functions.
     """
     start = time.monotonic()
     assertions, tracked = list(assertions), list(tracked)
     try:
-        status, model, core, reason = _ask(translator, assertions, tracked, timeout_ms, seed, engine)
+        status, model, core, reason = _ask(translator, assertions, tracked, effort, seed, engine)
         if status == "unsat" and len(core) > 1:
-            core = _minimal(translator, assertions, tracked, core, timeout_ms, seed, engine)
+            core = _minimal(translator, assertions, tracked, core, effort, seed, engine)
     except z3.Z3Exception as error:
         status, model, core, reason = "unknown", None, (), f"Z3: {error}"
     found = Model(translator, model) if model is not None else None
@@ -74,7 +75,7 @@ def with_small_numbers(
     assertions = list(assertions)
     for least, most in ((0, 9), (-9, 9), (-SMALL_NUMBER, SMALL_NUMBER)):
         within = [z3.And(least <= number, number <= most) for number in numbers]
-        again = check(translator, [*assertions, *within], timeout_ms=SMALLER_MODEL_MS, seed=seed)
+        again = check(translator, [*assertions, *within], effort=SMALLER_MODEL_EFFORT, seed=seed)
         if again.model is not None:
             return again
     return answer
@@ -92,78 +93,107 @@ def _ask(
     translator: Translator,
     assertions: Sequence[Expr],
     tracked: Sequence[tuple[str, Expr]],
-    timeout_ms: int,
+    effort: int,
     seed: int,
     engine: Engine,
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
-    timeout_ms = allowed(timeout_ms)
-    if timeout_ms <= 0:
-        return "unknown", None, (), "no answer in time"
+    effort = allowed(effort)
+    if effort <= 0:
+        return "unknown", None, (), NO_ANSWER
     if engine == "qsat":
-        with limited(translator, timeout_ms):
-            return _ask_qsat(translator, assertions, tracked, timeout_ms)
+        return _ask_qsat(translator, assertions, tracked, effort)
     solver = z3.Solver(ctx=translator.context)
-    configured(solver, timeout_ms, seed)
     solver.add(*assertions)
     switches = {}
     for number, (label, expr) in enumerate(tracked):
         switch = z3.Bool(f"track!{number}", translator.context)
         solver.add(z3.Implies(switch, expr))
         switches[switch.get_id()] = (switch, label)
-    with limited(translator, timeout_ms):
-        result = solver.check(*(switch for switch, _ in switches.values()))
-    if result == z3.sat:
-        return "sat", solver.model(), (), ""
-    if result == z3.unsat:
-        return "unsat", None, tuple(switches[s.get_id()][1] for s in solver.unsat_core()), ""
-    return "unknown", None, (), _reason(solver)
+    said = put(translator, solver, effort, seed, *(switch for switch, _ in switches.values()))
+    match said.status:
+        case "sat":
+            return "sat", solver.model(), (), ""
+        case "unsat":
+            return "unsat", None, tuple(switches[s.get_id()][1] for s in solver.unsat_core()), ""
+        case _:  # unknown
+            return "unknown", None, (), said.reason
 
 
-def configured(solver: z3.Solver, timeout_ms: int, seed: int) -> None:
-    """Set a solver's limits and seed."""
-    solver.set("timeout", _wall(timeout_ms))
-    solver.set("random_seed", seed)
-    # Its Gröbner bases of non-linear integer terms cannot be interrupted: Z3 would hang.
-    solver.set("smt.arith.nl.grobner", False)
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What a solver answered, and why it gave up, for people."""
+
+    status: Status
+    reason: str = ""
 
 
-def _reason(solver: z3.Solver) -> str:
-    """Why it gave up, for people."""
-    reason = str(solver.reason_unknown()).strip("()")
-    return "no answer in time" if reason in _IN_TIME else f"the solver gave up: {reason}" if reason else "no answer"
+HANGS = "the solver hangs"
 
 
-_IN_TIME = ("canceled", "interrupted", "interrupted from keyboard", "timeout", "max. memory exceeded")
-
-
-@contextlib.contextmanager
-def limited(translator: Translator, timeout_ms: int) -> Iterator[None]:
-    """What is asked of the translator's context within the block ends with its limit."""
-    with watchdog(timeout_ms, translator.context.interrupt) as interrupted:
-        yield
+def put(translator: Sorts, solver: Any, effort: int, seed: int = 0, *assumptions: Expr) -> Said:
+    """Put what a solver holds to it: every question to Z3 goes through here. Its steps bound it and are counted
+    (`avow.solving.limits`); the clock only ends what hangs. Raises Z3Exception."""
+    configured(solver, effort, seed)
+    with watchdog(net(effort), translator.context.interrupt) as interrupted:
+        result = solver.check(*assumptions)
+    charge(translator, solver)
     if interrupted.is_set():
         # An interrupt that came too late to end the search would end what is asked of this context next.
         z3.Solver(ctx=translator.context).check()
+    if result == z3.sat:
+        return Said("sat")
+    if result == z3.unsat:
+        return Said("unsat")
+    return Said("unknown", HANGS if interrupted.is_set() else _reason(solver))
 
 
-def _wall(timeout_ms: int) -> int:
-    """Z3 counts wall-clock time: its limit is only for where the watchdog cannot help."""
-    return max(1, int(timeout_ms)) * WALL_CLOCK * 2
+def configured(solver: Any, effort: int, seed: int) -> None:
+    """Set a solver's limit and seed."""
+    solver.set("rlimit", steps(effort))
+    if isinstance(solver, z3.Solver):
+        solver.set("random_seed", seed)
+        # Its Gröbner bases of non-linear integer terms cannot be interrupted: Z3 would hang.
+        solver.set("smt.arith.nl.grobner", False)
+
+
+def charge(translator: Sorts, solver: Any = None) -> None:
+    """Count what was done in the translator's context since it was last asked; any solver of the context can tell."""
+    before = translator.steps
+    translator.steps = _steps_of(solver or z3.Solver(ctx=translator.context))
+    spend(QUESTION_STEPS + max(0, translator.steps - before))
+
+
+def _steps_of(solver: Any) -> int:
+    """What the solver's context has counted so far."""
+    found = solver.statistics()
+    for k in range(len(found)):
+        if z3.Z3_stats_get_key(found.ctx.ref(), found.stats, k) == "rlimit count":
+            return int(z3.Z3_stats_get_uint_value(found.ctx.ref(), found.stats, k))
+    return 0
+
+
+def _reason(solver: Any) -> str:
+    """Why it gave up, for people."""
+    reason = str(solver.reason_unknown()).strip("()")
+    return NO_ANSWER if reason in _USED_UP else f"the solver gave up: {reason}" if reason else "no answer"
+
+
+_USED_UP = ("canceled", "interrupted", "interrupted from keyboard", "timeout", "max. resource limit exceeded")
 
 
 def _ask_qsat(
-    translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]], timeout_ms: int
+    translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]], effort: int
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
     everything = [*assertions, *(expr for _, expr in tracked)]
     tactic = "nlqsat" if _real_polynomials(everything) else "qsat"
-    solver = z3.TryFor(z3.Tactic(tactic, ctx=translator.context), _wall(timeout_ms)).solver()
+    solver = z3.Tactic(tactic, ctx=translator.context).solver()
     solver.add(*everything)
-    result = solver.check()
-    if result == z3.sat:
+    said = put(translator, solver, effort)
+    if said.status == "sat":
         return "sat", solver.model(), (), ""
-    if result == z3.unsat and _arithmetic_only(everything):
+    if said.status == "unsat" and _arithmetic_only(everything):
         return "unsat", None, tuple(label for label, _ in tracked), ""
-    return "unknown", None, (), _reason(solver)
+    return "unknown", None, (), said.reason
 
 
 def _arithmetic_only(exprs: Iterable[Expr]) -> bool:
@@ -210,7 +240,7 @@ def _minimal(
     assertions: Sequence[Expr],
     tracked: Sequence[tuple[str, Expr]],
     core: tuple[str, ...],
-    timeout_ms: int,
+    effort: int,
     seed: int,
     engine: Engine,
 ) -> tuple[str, ...]:
@@ -218,7 +248,7 @@ def _minimal(
     kept = list(core)
     for label in core:
         rest = [(name, expr) for name, expr in tracked if name in kept and name != label]
-        status, _, smaller, _ = _ask(translator, assertions, rest, min(timeout_ms, 2_000), seed, engine)
+        status, _, smaller, _ = _ask(translator, assertions, rest, min(effort, 2_000), seed, engine)
         if status == "unsat":
             kept = [name for name in kept if name in smaller]
     return tuple(kept)

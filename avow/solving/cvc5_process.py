@@ -10,13 +10,13 @@ from __future__ import annotations
 import sys
 
 
-def answer(script: str, timeout_ms: int) -> str | None:
+def answer(script: str, effort: int) -> str | None:
     """``sat``, ``unsat`` or ``unknown``; None where cvc5 cannot read the script."""
     import cvc5
 
     terms = cvc5.TermManager()
     solver = cvc5.Solver(terms)
-    solver.setOption("tlimit-per", str(timeout_ms))
+    solver.setOption("tlimit-per", str(effort))
     solver.setOption("full-saturate-quant", "true")
     parser = cvc5.InputParser(solver)
     parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, script, "query")

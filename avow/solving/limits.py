@@ -1,7 +1,11 @@
-"""Time limits that a busy machine does not change.
+"""Limits that no machine changes: a question gets so many steps, not so much time.
 
-A limit is counted in processor time of the thread that asks, so that the same question gets the same effort, and
-mostly the same answer, whatever else runs; wall-clock time is bounded by a multiple of it.
+Effort is counted, never measured: Z3 counts its own steps (its `rlimit`), and Avow's searches count what they look at,
+in the same unit. So the same question gets the same answer on a slow machine, on a busy one and on a cluster, and a
+deadline is a number of steps. A unit of effort is `STEPS` of Z3's steps, which take about a millisecond. What a person
+writes in seconds (`--seconds`, a plan's ``seconds:``) is a thousand units a second.
+
+Clocks are only read to end what hangs: what counts no steps and still does not return.
 """
 
 from __future__ import annotations
@@ -14,40 +18,58 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from avow.tuning.effort import WALL_CLOCK
+from avow.tuning.effort import HANGS, HANGS_SECONDS, MOST_STEPS, STEPS, WALL_CLOCK
+
+NO_ANSWER = "no answer with the effort allowed"
 
 
-def now() -> float:
-    """Seconds of processor time of this thread: for deadlines."""
-    return time.thread_time()
+class _Spent(threading.local):
+    """What this thread has spent so far, in steps, and when the effort of all its questions together is used up."""
 
-
-class _Budget(threading.local):
-    """When the time of all questions of this thread together is up, by `now`."""
-
+    steps: int = 0
     end: float = math.inf
 
 
-_budget = _Budget()
+_spent = _Spent()
+
+
+def spend(steps: int) -> None:
+    """Count work of this thread, in Z3's steps: 2,500 take about a millisecond."""
+    _spent.steps += steps
+
+
+def spent() -> float:
+    """Units of effort that this thread has spent: for deadlines."""
+    return _spent.steps / STEPS
+
+
+def from_seconds(seconds: float) -> int:
+    """The effort that a person's limit in seconds stands for; never 0."""
+    return max(1, int(seconds * 1000))
+
+
+def steps(effort: float) -> int:
+    """Z3's limit for so much effort; never 0, which it takes for no limit at all."""
+    return max(1, min(int(effort * STEPS), MOST_STEPS))
 
 
 @contextlib.contextmanager
-def budget(milliseconds: float) -> Iterator[None]:
-    """All questions asked within the block share this much processor time, however long each may take by itself; a
-    block within a block cannot extend it."""
-    before = _budget.end
-    _budget.end = min(before, now() + milliseconds / 1000)
+def budget(effort: float) -> Iterator[None]:
+    """All questions asked within the block share this much effort, however much each may take by itself; a block within
+    a block cannot extend it."""
+    before = _spent.end
+    _spent.end = min(before, spent() + effort)
     try:
         yield
     finally:
-        _budget.end = before
+        _spent.end = before
 
 
-def allowed(milliseconds: int) -> int:
-    """What is left of a question's limit within the budget; 0 if nothing is."""
-    if math.isinf(_budget.end):
-        return milliseconds
-    return max(0, min(milliseconds, int((_budget.end - now()) * 1000)))
+def allowed(effort: int) -> int:
+    """What is left of a question's effort within the budget; 0 if nothing is."""
+    if math.isinf(_spent.end):
+        return effort
+    return max(0, min(effort, int(_spent.end - spent())))
 
 
 def _clock() -> Callable[[], float]:
@@ -59,21 +81,26 @@ def _clock() -> Callable[[], float]:
 
 
 @contextlib.contextmanager
-def watchdog(milliseconds: int, interrupt: Callable[[], None]) -> Iterator[threading.Event]:
-    """Call `interrupt`, again and again, while the block goes on beyond its limit; what is yielded is set once it was.
+def watchdog(seconds: float, interrupt: Callable[[], None]) -> Iterator[threading.Event]:
+    """Call `interrupt`, again and again, while the block goes on beyond so many seconds of processor time
+    (`WALL_CLOCK` times as many by the clock); what is yielded is set once it was.
 
-    Z3's own limit is in wall-clock time, and sometimes it misses it altogether (seen: 84 s for 16 ms).
+    For what hangs: Z3 sometimes misses its limits altogether (seen: 84 s for 16 ms).
     """
-    limit = milliseconds / 1000
     used = _clock()
-    watched = _Watched(used, used() + limit, time.monotonic() + limit * WALL_CLOCK + 1, interrupt)
-    _kennel.dog.watch(watched, limit)
+    watched = _Watched(used, used() + seconds, time.monotonic() + seconds * WALL_CLOCK, interrupt)
+    _kennel.dog.watch(watched, seconds)
     try:
         yield watched.interrupted
     finally:
         with watched.lock:  # from here on nothing is interrupted: it would be what is asked next
             watched.done = True
             watched.interrupt = _nothing  # the list of blocks must not keep alive what it holds
+
+
+def net(effort: float) -> float:
+    """Seconds of processor time after which a question of so much effort hangs."""
+    return HANGS_SECONDS + HANGS * effort / 1000
 
 
 def _nothing() -> None:

@@ -42,10 +42,12 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
+from avow.solving.checking import charge
 from avow.solving.limits import watchdog
 from avow.solving.questions import entails, solve
 from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
+from avow.tuning.effort import ELIMINATION_SECONDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +59,7 @@ class Remedy:
 
 
 def remedy(
-    hypotheses: Mapping[str, Term], goal: Term, about: Collection[Variable], *, timeout_ms: int = 5_000
+    hypotheses: Mapping[str, Term], goal: Term, about: Collection[Variable], *, effort: int = 5_000
 ) -> Remedy | None:
     """The weakest assumption about the variables `about` that makes the hypotheses imply the goal.
 
@@ -72,20 +74,20 @@ def remedy(
     body = substitute(whole, renamed)
     exact: Term = Quantified(Quantifier.FORALL, tuple(renamed.values()), body) if renamed else body
     try:
-        raw = _eliminate(exact, timeout_ms)
+        raw = _eliminate(exact)
     except (Unsupported, z3.Z3Exception, RecursionError):  # what is too deep to be read back is no use to anyone
         return None
     if raw is None:
         return None
-    found = _simplified(raw, hypotheses, goal, timeout_ms)
+    found = _simplified(raw, hypotheses, goal, effort)
     together = {**hypotheses, "the remedy": found}
-    if len(together) == len(hypotheses) or solve(together, timeout_ms=timeout_ms).status != "sat":
+    if len(together) == len(hypotheses) or solve(together, effort=effort).status != "sat":
         return None
-    if entails(together, goal, timeout_ms=timeout_ms).verdict is not Verdict.PROVED:
+    if entails(together, goal, effort=effort).verdict is not Verdict.PROVED:
         return None
     # Weaker than every assumption that would do, as far as the hypotheses leave a difference.
     context = [h for h in hypotheses.values() if free_variables(h) <= frozenset(about)]
-    weakest = entails([*context, exact], found, timeout_ms=timeout_ms).verdict is Verdict.PROVED
+    weakest = entails([*context, exact], found, effort=effort).verdict is Verdict.PROVED
     return Remedy(found, weakest)
 
 
@@ -97,7 +99,7 @@ def eliminable(term: Term) -> bool:
     return all(isinstance(v.sort, _ELIMINABLE) for v in free_variables(term))
 
 
-def _eliminate(formula: Term, timeout_ms: int) -> Term | None:
+def _eliminate(formula: Term) -> Term | None:
     translator = Translator()
     goal = z3.Goal(ctx=translator.context)
     goal.add(translator.term(formula))
@@ -107,34 +109,35 @@ def _eliminate(formula: Term, timeout_ms: int) -> Term | None:
         z3.Tactic("ctx-simplify", ctx=translator.context),
         ctx=translator.context,
     )
-    with watchdog(timeout_ms, translator.context.interrupt):  # Z3's own limit is sometimes missed
-        result = z3.TryFor(chain, timeout_ms)(goal)
+    with watchdog(ELIMINATION_SECONDS, translator.context.interrupt):  # it keeps no limit of steps
+        result = chain.apply(goal)
+    charge(translator)
     free = {v.qualified: v for v in free_variables(formula)}
     reader = _TermReader(translator, free)
     options = [conjunction(reader.formula(expr) for expr in subgoal) for subgoal in result]
     return push_negations(disjunction(options))
 
 
-def _simplified(term: Term, hypotheses: Mapping[str, Term], goal: Term, timeout_ms: int) -> Term:
+def _simplified(term: Term, hypotheses: Mapping[str, Term], goal: Term, effort: int) -> Term:
     """Without the parts that the hypotheses make superfluous: alternatives that they exclude or that are stronger than
     another, conditions that they imply."""
     known = list(hypotheses.values())
-    limit = min(timeout_ms, 1_000)
+    limit = min(effort, 1_000)
     alternatives = list(term.items) if isinstance(term, Or) else [term]
     kept: list[Term] = []
     for alternative in alternatives:
         parts = list(alternative.items) if isinstance(alternative, And) else [alternative]
-        if solve([*known, *parts], timeout_ms=limit).status == "unsat":
+        if solve([*known, *parts], effort=limit).status == "unsat":
             continue
         for part in tuple(parts):
             rest = [p for p in parts if p is not part]
             # Weaken an alternative as far as it still does its work.
-            if entails([*known, *rest], goal, timeout_ms=limit).verdict is Verdict.PROVED:
+            if entails([*known, *rest], goal, effort=limit).verdict is Verdict.PROVED:
                 parts = rest
         kept.append(conjunction(parts))
     for one in tuple(kept):
         others = [k for k in kept if k is not one]
-        if others and entails([*known, one], disjunction(others), timeout_ms=limit).verdict is Verdict.PROVED:
+        if others and entails([*known, one], disjunction(others), effort=limit).verdict is Verdict.PROVED:
             kept = others
     return disjunction(kept)
 

@@ -1,4 +1,4 @@
-"""Questions to the solver: satisfiable? entailed? Every answer is bounded in (processor) time, none taken on trust.
+"""Questions to the solver: satisfiable? entailed? Every answer is bounded in effort, none taken on trust.
 
 `solve` asks whether some formulas hold together, `entails` whether some imply another. A model is shown, and a
 refutation reported, only after it has been replayed: its values put into the formulas, and the result proved true under
@@ -31,11 +31,11 @@ from avow.language.sorts import (
 from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
 from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers, z3_version
 from avow.solving.counterexample import show_values
-from avow.solving.limits import allowed, budget, now
+from avow.solving.limits import NO_ANSWER, allowed, budget, spent
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.effort import ANOTHER_SOLVER_MS, FIRST_LOOK_MS, QUESTION_MS, QUESTION_SHARE, ROUNDS
+from avow.tuning.effort import ANOTHER_SOLVER_EFFORT, FIRST_LOOK_EFFORT, QUESTION_EFFORT, QUESTION_SHARE, ROUNDS
 
 __all__ = [
     "Answer",
@@ -90,7 +90,7 @@ class Entailment:
 def solve(
     formulas: Mapping[str, Term] | Iterable[Term],
     *,
-    timeout_ms: int = QUESTION_MS,
+    effort: int = QUESTION_EFFORT,
     seed: int = 0,
     variables: Iterable[Variable] = (),
     given: Mapping[Variable, Value] | None = None,
@@ -105,20 +105,20 @@ def solve(
     start = time.monotonic()
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
     free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
-    with budget(timeout_ms * QUESTION_SHARE):
+    with budget(effort * QUESTION_SHARE):
         try:
-            solution = _within_bounds(labelled, free, given or {}, timeout_ms, seed) or _solve(
-                Translator(), labelled, free, given or {}, timeout_ms, seed
+            solution = _within_bounds(labelled, free, given or {}, effort, seed) or _solve(
+                Translator(), labelled, free, given or {}, effort, seed
             )
         except Unsupported as error:
             solution = Solution("unknown", reason=f"Avow cannot express {error.what} for the solver")
         except z3.Z3Exception as error:
             solution = Solution("unknown", reason=f"Z3: {error}")
-        if solution.status == "unknown" and not shown and _has_solution(labelled, free, given or {}, timeout_ms, seed):
+        if solution.status == "unknown" and not shown and _has_solution(labelled, free, given or {}, effort, seed):
             solution = Solution("sat")
-        patient = solution.status == "unknown" and not given and timeout_ms >= ANOTHER_SOLVER_MS
-        if patient and allowed(timeout_ms):
-            solution = _second_opinion(labelled, timeout_ms) or solution
+        patient = solution.status == "unknown" and not given and effort >= ANOTHER_SOLVER_EFFORT
+        if patient and allowed(effort):
+            solution = _second_opinion(labelled, effort) or solution
     return Solution(
         solution.status,
         solution.values,
@@ -133,7 +133,7 @@ def entails(
     hypotheses: Mapping[str, Term] | Iterable[Term],
     goal: Term,
     *,
-    timeout_ms: int = QUESTION_MS,
+    effort: int = QUESTION_EFFORT,
     seed: int = 0,
     variables: Iterable[Variable] = (),
     given: Mapping[Variable, Value] | None = None,
@@ -146,7 +146,7 @@ def entails(
     while denied in labelled:
         denied += "!"
     asked = {**labelled, denied: negation(goal)}
-    solution = solve(asked, timeout_ms=timeout_ms, seed=seed, variables=variables, given=given)
+    solution = solve(asked, effort=effort, seed=seed, variables=variables, given=given)
     reason, engine, seconds = solution.reason, solution.engine, solution.seconds
     match solution.status:
         case "unsat":
@@ -164,7 +164,7 @@ def replay(
     formulas: Iterable[Term],
     values: Mapping[Variable, Value],
     *,
-    timeout_ms: int = 5_000,
+    effort: int = 5_000,
     beside: Translator | None = None,
 ) -> bool | None:
     """Do the formulas hold of these values, whatever partial operations yield outside their domains?
@@ -177,7 +177,7 @@ def replay(
     unspecified = sorted({sort for f in formulas for sort in opaque_sorts(f)}, key=lambda sort: sort.name)
     try:
         for more in range(4 if unspecified else 1):
-            found = _replay(Translator(beside), formulas, values, unspecified, more, timeout_ms)
+            found = _replay(Translator(beside), formulas, values, unspecified, more, effort)
             if found or not unspecified:
                 return found
     except (Unsupported, z3.Z3Exception):
@@ -191,7 +191,7 @@ def _replay(
     values: Mapping[Variable, Value],
     unspecified: Sequence[OpaqueSort],
     more: int,
-    timeout_ms: int,
+    effort: int,
 ) -> bool | None:
     meanings = {variable: translator.value(value, variable.sort) for variable, value in values.items()}
     for sort in unspecified:
@@ -201,17 +201,17 @@ def _replay(
     whole = z3.And(facts) if facts else translator.true()
     denied = [*known, z3.Not(whole)]
     attempts: tuple[tuple[Engine, int], ...] = (
-        ("smt", min(500, timeout_ms)),
-        ("qsat", timeout_ms),
-        ("smt", timeout_ms),
+        ("smt", min(500, effort)),
+        ("qsat", effort),
+        ("smt", effort),
     )
     for engine, limit in attempts:
-        status = check(translator, denied, timeout_ms=limit, engine=engine).status
+        status = check(translator, denied, effort=limit, engine=engine).status
         if status == "unsat":
             return True
         if status == "sat":
             break
-    if check(translator, [*known, whole], timeout_ms=timeout_ms).status == "unsat":
+    if check(translator, [*known, whole], effort=effort).status == "unsat":
         return False
     return None
 
@@ -231,15 +231,16 @@ def _solve(
     labelled: Mapping[str, Term],
     free: frozenset[Variable],
     given: Mapping[Variable, Value],
-    timeout_ms: int,
+    effort: int,
     seed: int,
 ) -> Solution:
     fixed = {variable: translator.value(value, variable.sort) for variable, value in given.items()}
     free = free - set(fixed)
     tracked = [(label, translator.term(formula, fixed)) for label, formula in labelled.items()]
     background = [*translator.background(free), *translator.opaque_facts()]
-    ordinary = [v for v in free if not isinstance(v.sort, FunctionSort)]
-    functions = [v for v in free if isinstance(v.sort, FunctionSort)]
+    ordered = sorted(free, key=lambda v: (v.qualified, repr(v.sort)))
+    ordinary = [v for v in ordered if not isinstance(v.sort, FunctionSort)]
+    functions = [v for v in ordered if isinstance(v.sort, FunctionSort)]
 
     whole = [*background, *(expr for _, expr in tracked)]
     numbers = [translator.variable(v) for v in ordinary]
@@ -250,10 +251,10 @@ def _solve(
 
     reason = ""
     for plain, tables in ROUNDS:
-        limit = max(1, int(timeout_ms * plain))
+        limit = max(1, int(effort * plain))
         if functions and plain == ROUNDS[0][0]:
-            limit = min(limit, FIRST_LOOK_MS)
-        answer = check(translator, background, timeout_ms=limit, seed=seed, tracked=tracked)
+            limit = min(limit, FIRST_LOOK_EFFORT)
+        answer = check(translator, background, effort=limit, seed=seed, tracked=tracked)
         if answer.status == "unsat":
             return Solution("unsat", core=answer.core)
         answer = with_small_numbers(translator, whole, numbers, answer, seed=seed)
@@ -264,8 +265,8 @@ def _solve(
                 return Solution("sat", values)
         reason = answer.reason
         if not functions:
-            limit = max(1, int(timeout_ms * tables))
-            answer = check(translator, background, timeout_ms=limit, tracked=tracked, engine="qsat")
+            limit = max(1, int(effort * tables))
+            answer = check(translator, background, effort=limit, tracked=tracked, engine="qsat")
             if answer.status == "unsat":
                 return Solution("unsat", core=answer.core, engine="z3, qsat")
             answer = with_small_numbers(translator, whole, numbers, answer, seed=seed)
@@ -273,8 +274,8 @@ def _solve(
             if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
                 return Solution("sat", values, engine="z3, qsat")
         if functions:
-            limit = max(1, int(timeout_ms * tables))
-            found = search_tables(translator, build, ordinary, functions, timeout_ms=limit, seed=seed)
+            limit = max(1, int(effort * tables))
+            found = search_tables(translator, build, ordinary, functions, effort=limit, seed=seed)
             if found is not None and replay(labelled.values(), {**found, **given}, beside=translator):
                 return Solution("sat", found, engine="z3, functions as tables")
         if answer.model is not None:
@@ -282,14 +283,14 @@ def _solve(
             if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
                 return Solution("sat", values)
             reason = "the solver's model could not be replayed"
-    return Solution("unknown", reason=reason or "no answer in time")
+    return Solution("unknown", reason=reason or NO_ANSWER)
 
 
 def _within_bounds(
     labelled: Mapping[str, Term],
     free: frozenset[Variable],
     given: Mapping[Variable, Value],
-    timeout_ms: int,
+    effort: int,
     seed: int,
 ) -> Solution | None:
     """Where there are sequences or divisions: values for which nothing outside a sequence matters, and no division by
@@ -302,7 +303,7 @@ def _within_bounds(
     formulas = dict(flat.formulas if flat else {**labelled, _INSIDE: inside})
     variables = frozenset(flat.variables(free) if flat else free)
     translator = Translator()
-    found = _solve(translator, formulas, variables, given, timeout_ms // 3, seed)
+    found = _solve(translator, formulas, variables, given, effort // 3, seed)
     if found.status == "sat":
         values = flat.values(found.values) if flat else found.values
         if values is not None and replay(labelled.values(), {**values, **given}, beside=translator):
@@ -310,7 +311,7 @@ def _within_bounds(
     if flat is None:
         return None
     del formulas[_INSIDE]
-    anywhere = _solve(Translator(), formulas, variables, given, timeout_ms // 3, seed)
+    anywhere = _solve(Translator(), formulas, variables, given, effort // 3, seed)
     return anywhere if anywhere.status == "unsat" else None
 
 
@@ -321,7 +322,7 @@ def _has_solution(
     labelled: Mapping[str, Term],
     free: frozenset[Variable],
     given: Mapping[Variable, Value],
-    timeout_ms: int,
+    effort: int,
     seed: int,
 ) -> bool:
     """Whether formulas without quantifiers, functions and partial operations hold together: there, what the solver
@@ -336,7 +337,7 @@ def _has_solution(
         fixed = {variable: translator.value(value, variable.sort) for variable, value in given.items()}
         facts = [translator.term(formula, fixed) for formula in labelled.values()]
         asked = [*translator.background(free - set(fixed)), *facts]
-        return check(translator, asked, timeout_ms=timeout_ms, seed=seed).status == "sat"
+        return check(translator, asked, effort=effort, seed=seed).status == "sat"
     except (Unsupported, z3.Z3Exception):
         return False
 
@@ -363,18 +364,18 @@ def search_tables(
     ordinary: Iterable[Variable],
     functions: Iterable[Variable],
     *,
-    timeout_ms: int,
+    effort: int,
     seed: int = 0,
 ) -> dict[Variable, Value] | None:
     """Values of the variables for which what `build` makes of the functions' meanings is satisfiable, with functions
     that are tables of few entries. A best effort: None proves nothing, and what is found wants replaying."""
     ordinary, functions = tuple(ordinary), sorted(functions, key=lambda v: v.qualified)
-    deadline = now() + timeout_ms / 1000
+    deadline = spent() + effort
     for tried, (size, sparse) in enumerate(_TABLES if functions else _TABLES[:1]):
-        left = (deadline - now()) * 1000
+        left = deadline - spent()
         if left < 1:
             return None
-        limit = max(min(120, max(50, timeout_ms)), int(left / min(3, len(_TABLES) - tried)))
+        limit = max(min(120, max(50, effort)), int(left / min(3, len(_TABLES) - tried)))
         values = _with_tables(translator, build, ordinary, functions, size, sparse, limit, seed)
         if values is not None:
             return values
@@ -395,7 +396,7 @@ def _with_tables(
     functions: Sequence[Variable],
     size: int,
     sparse: bool,
-    timeout_ms: int,
+    effort: int,
     seed: int,
 ) -> dict[Variable, Value] | None:
     """A model in which every function has at most `size` exceptions; a `sparse` relation is false but at these."""
@@ -422,9 +423,9 @@ def _with_tables(
     facts.extend(translator.background(ordinary))
     facts.extend(build(meanings))
     # The usual engine first: its numbers are smaller.
-    answer = check(translator, facts, timeout_ms=timeout_ms // 3, seed=seed)
+    answer = check(translator, facts, effort=effort // 3, seed=seed)
     if answer.status == "unknown":
-        answer = check(translator, facts, timeout_ms=timeout_ms * 2 // 3, engine="qsat")
+        answer = check(translator, facts, effort=effort * 2 // 3, engine="qsat")
     numbers = [translator.variable(v) for v in ordinary]
     for points, default in parts.values():
         numbers += [default, *(e for point, value in points for e in (*point, value))]
@@ -447,7 +448,7 @@ def _with_tables(
     return values
 
 
-def _second_opinion(labelled: Mapping[str, Term], timeout_ms: int) -> Solution | None:
+def _second_opinion(labelled: Mapping[str, Term], effort: int) -> Solution | None:
     """cvc5, if it is installed: only its `unsat` counts, since its models are not read."""
     from avow.solving import smtlib
 
@@ -455,5 +456,5 @@ def _second_opinion(labelled: Mapping[str, Term], timeout_ms: int) -> Solution |
         script = smtlib.export(labelled)
     except Unsupported:
         return None
-    answer = smtlib.ask_cvc5(script, timeout_ms=timeout_ms)
+    answer = smtlib.ask_cvc5(script, effort=effort)
     return Solution("unsat", core=tuple(labelled), engine="cvc5") if answer == "unsat" else None

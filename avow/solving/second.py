@@ -13,12 +13,12 @@ from avow.formulas.formula import disjunction
 from avow.language.terms import FALSE, Term
 from avow.solving import smtlib
 from avow.solving.translation import Unsupported
-from avow.tuning.effort import SECOND_OPINION_MS
+from avow.tuning.effort import SECOND_OPINION_EFFORT
 
 CONTRADICTED = "two solvers contradict each other: Z3 says that there are no such values, and cvc5 that there are"
 
 
-def contradicted(impossible: Iterable[Term], *, timeout_ms: int = SECOND_OPINION_MS) -> bool:
+def contradicted(impossible: Iterable[Term], *, effort: int = SECOND_OPINION_EFFORT) -> bool:
     """Whether cvc5 says that one of these formulas, of which Z3 said that none can hold, can."""
     questions = [formula for formula in impossible if formula != FALSE]
     if not questions or importlib.util.find_spec("cvc5") is None:
@@ -27,4 +27,4 @@ def contradicted(impossible: Iterable[Term], *, timeout_ms: int = SECOND_OPINION
         script = smtlib.export([disjunction(questions)])
     except Unsupported:
         return False
-    return smtlib.ask_cvc5(script, timeout_ms=max(1, min(timeout_ms, SECOND_OPINION_MS))) == "sat"
+    return smtlib.ask_cvc5(script, effort=max(1, min(effort, SECOND_OPINION_EFFORT))) == "sat"

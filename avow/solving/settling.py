@@ -14,7 +14,7 @@ from typing import Any
 from avow.base.verdict import Verdict
 from avow.formulas.formula import free_variables, negation
 from avow.language.terms import Term
-from avow.solving.checking import Status, configured, limited
+from avow.solving.checking import Status, put
 from avow.solving.limits import allowed
 from avow.solving.questions import entails, is_partial
 from avow.solving.translation import Expr, Translator, Unsupported
@@ -32,26 +32,26 @@ class Settler:
     _exprs: dict[Term, tuple[Expr, ...] | None] = field(default_factory=dict)
     _solver: Any = None
 
-    def settles(self, hypotheses: Iterable[Term], goal: Term, *, timeout_ms: int) -> Status:
+    def settles(self, hypotheses: Iterable[Term], goal: Term, *, effort: int) -> Status:
         """`unsat`: the hypotheses imply the goal, for all values of the free variables; that is proved. `sat`: it
         cannot be proved (the model is not looked at, so that nothing is refuted). `unknown` says nothing."""
         try:
             facts = [self._facts(term) for term in (*hypotheses, negation(goal))]
             exprs = [expr for fact in facts if fact is not None for expr in fact]
-            return "unknown" if None in facts else self._ask(exprs, timeout_ms)
+            return "unknown" if None in facts else self._ask(exprs, effort)
         except (Unsupported, z3.Z3Exception):
             self._solver = None
             return "unknown"
 
-    def proves(self, hypotheses: Sequence[Term], goal: Term, *, timeout_ms: int) -> bool:
+    def proves(self, hypotheses: Sequence[Term], goal: Term, *, effort: int) -> bool:
         """Whether the hypotheses imply the goal; where the short question does not say, by the whole one."""
-        match self.settles(hypotheses, goal, timeout_ms=timeout_ms):
+        match self.settles(hypotheses, goal, effort=effort):
             case "unsat":
                 return True
             case "sat":
                 return False
             case _:  # not settled: asked in full
-                answer = entails(hypotheses, goal, timeout_ms=timeout_ms, seed=self.seed)
+                answer = entails(hypotheses, goal, effort=effort, seed=self.seed)
                 return answer.verdict is Verdict.PROVED
 
     def _facts(self, term: Term) -> tuple[Expr, ...] | None:
@@ -64,8 +64,8 @@ class Settler:
                 self._exprs[term] = (*self._translator.background(free_variables(term)), expr)
         return self._exprs[term]
 
-    def _ask(self, exprs: list[Expr], timeout_ms: int) -> Status:
-        limit = allowed(timeout_ms)
+    def _ask(self, exprs: list[Expr], effort: int) -> Status:
+        limit = allowed(effort)
         if limit <= 0:
             return "unknown"
         known = self._translator.opaque_facts()
@@ -81,13 +81,11 @@ class Settler:
     def _check(self, solver: Any, exprs: list[Expr], limit: int, *, pop: bool) -> Status:
         if limit <= 0:
             return "unknown"
-        configured(solver, limit, self.seed)
         if pop:
             solver.push()
         solver.add(*exprs)
         self.checks += 1
-        with limited(self._translator, limit):
-            result = solver.check()
+        status = put(self._translator, solver, limit, self.seed).status
         if pop:
             solver.pop()
-        return "unsat" if result == z3.unsat else "sat" if result == z3.sat else "unknown"
+        return status

@@ -72,13 +72,13 @@ def _harmless(text: str) -> str:
     return "".join(c if c.isprintable() and c not in "|\\" else "?" for c in text)
 
 
-def ask_cvc5(script: str, *, timeout_ms: int = 10_000) -> str | None:
+def ask_cvc5(script: str, *, effort: int = 10_000) -> str | None:
     """cvc5's answer to a script (``unknown`` where it takes longer), or None where the package is not installed or
     cannot read the script."""
     if importlib.util.find_spec("cvc5") is None:
         return None
-    command = (sys.executable, "-P", "-m", "avow.solving.cvc5_process", str(timeout_ms))
-    done = process.run(command, seconds=timeout_ms / 1000 + CVC5_START_SECONDS, stdin=script)
+    command = (sys.executable, "-P", "-m", "avow.solving.cvc5_process", str(effort))
+    done = process.run(command, seconds=effort / 1000 + CVC5_START_SECONDS, stdin=script)
     if done.timed_out:
         return "unknown"
     return done.stdout.strip() or None

@@ -72,6 +72,16 @@ class Sorts:
         self._names: dict[str, Sort] = beside._names if beside else {}
         self._opaque: dict[tuple[str, int], Expr] = {}
         self._count = 0
+        self._counted: list[int] = beside._counted if beside else [0]
+
+    @property
+    def steps(self) -> int:
+        """Z3's steps in this context, as last counted."""
+        return self._counted[0]
+
+    @steps.setter
+    def steps(self, count: int) -> None:
+        self._counted[0] = count
 
     # -- sorts ---------------------------------------------------------------------------------------------------------
 

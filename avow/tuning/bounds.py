@@ -164,7 +164,3 @@ SUPPORT_STEPS = 2_000_000
 
 VALUES_LOOKED_AT = 500
 """So many values of one domain or column are looked at; a table may have a million."""
-
-INPUTS_ALWAYS_ASKED = 20
-"""Inputs about which a cut by the scenario is sought however late it is, so that a slow machine says what a fast one
-says: most cuts show at the first inputs, and a question takes some milliseconds."""

@@ -1,33 +1,62 @@
-"""Processor time and solver steps that questions and searches get.
+"""What questions and searches get, in effort and in solver steps.
 
-Milliseconds and seconds are of processor time (`avow.solving.limits`) unless a number says otherwise.
+A unit of effort is `STEPS` of Z3's steps (`avow.solving.limits`): about a millisecond. No clock decides an answer;
+numbers in seconds only end what hangs.
 """
 
-QUESTION_MS = 10_000
-"""A question's time where nothing else is said: as long as a person waits for one answer."""
+STEPS = 4_000
+"""Z3's steps in a unit of effort: so many it takes in a millisecond or two (three thousand questions of the shipped
+systems took 1,500 to 4,000, in all of Z3's engines)."""
 
-SMALLER_MODEL_MS = 150
+MOST_STEPS = 4_000_000_000
+"""Z3's limit is a number of 32 bits: some 25 minutes."""
+
+QUESTION_STEPS = 4_000
+"""Steps that a question counts for beside those of its answer: writing it down takes time too, and a loop of questions
+comes to an end."""
+
+WITNESS_STEPS = 5_000
+"""Steps that a question's part about one witness counts for: writing it down takes some two milliseconds."""
+
+PRODUCT_STEPS = 50
+"""Steps that a pair of a system's step and a state of an automaton counts for: some twenty microseconds."""
+
+SEARCH_STEPS = 50
+"""Steps that a partial answer or a step of a system counts for: looking at it takes some twenty
+microseconds."""
+
+HANGS = 20
+"""A question hangs once it has used so many times the processor time that its effort usually takes, and
+`HANGS_SECONDS` besides: the slowest of Z3's steps were seen to take ten times as long as most."""
+
+HANGS_SECONDS = 10.0
+"""Processor time that every question gets before it is called hanging: a stalled machine is no reason."""
+
+WALL_CLOCK = 20
+"""Wall-clock time allowed, as a multiple of that processor time: on a machine that is shared by so many, a question
+still gets all its effort."""
+
+QUESTION_EFFORT = 10_000
+"""A question's effort where nothing else is said: as long as a person waits for one answer."""
+
+SMALLER_MODEL_EFFORT = 150
 """For a model with small numbers, once there is one: a kindness to the reader, which must not cost more than the
 answer."""
 
-WALL_CLOCK = 20
-"""Wall-clock time allowed, as a multiple of the limit in processor time: on a machine that is shared by so many, a
-question still gets all its effort."""
-
 ROUNDS = ((0.025, 0.1), (0.1, 0.2), (0.275, 0.3))
-"""Parts of the time allowed, for the solver's own methods and for functions as tables: short rounds of different
+"""Parts of the effort allowed, for the solver's own methods and for functions as tables: short rounds of different
 methods before any gets long."""
 
-FIRST_LOOK_MS = 30
+FIRST_LOOK_EFFORT = 30
 """Where there are functions, the solver's own methods answer at once or mostly not at all; then tables are tried."""
 
 QUESTION_SHARE = 1.3
 """The share of the limit for everything that is done to answer one question, replays of what is found included."""
 
-ANOTHER_SOLVER_MS = 1_500
-"""From this much time on, another solver is worth the start of its process."""
+ANOTHER_SOLVER_EFFORT = 1_500
+"""From this much effort on, another solver is worth the start of its process."""
 
-SECOND_OPINION_MS = 1_000
+SECOND_OPINION_EFFORT = 1_000
 """How long cvc5 may look for values that Z3 says there are not: where it finds them it mostly does so at once."""
 
 KERNEL_SECOND_MS = 5_000
@@ -37,49 +66,56 @@ version."""
 CVC5_START_SECONDS = 2.0
 """Seconds that cvc5's process may take beyond the limit of the question: to begin, and to read the script."""
 
-NARROW_MS = 4_000
+NARROW_EFFORT = 4_000
 """For the same question with fewer hypotheses, which is easier or hopeless: the last attempt, with all of them, has
 the whole limit."""
 
-DEEPER_SECONDS = 4.0
+DEEPER_EFFORT = 4_000
 """For more steps, where one step of induction fails: beyond two or three steps, questions grow faster than what
 they prove."""
 
-QUICK_MS = 1_500
+QUICK_EFFORT = 1_500
 """Most side conditions are settled in a fraction of this."""
 
 CERTIFICATE_STEPS = 1_500_000
 """Z3's steps for one question of the search for a certificate: a fifth of what the kernel allows, since a
 certificate that is found so is checked within its budget."""
 
-CERTIFICATE_MS = 2_000
-"""A net for what Z3's steps do not count."""
+CERTIFICATE_NET_MS = 60_000
+"""A net for what Z3's steps do not count, by the clock."""
 
-OFFERS_SECONDS = 3.0
+CUT_EFFORT = 2_000
+"""For whether a node may answer an input otherwise than was found: hundreds of inputs are asked about."""
+
+OFFERS_EFFORT = 3_000
 """For all the offers to one failed question together; an offer is a service, not part of the answer."""
 
-OFFER_STEP_MS = 500
+OFFER_STEP_EFFORT = 500
 """For one question of an offer: six of them fit into the time for all."""
 
-CONSISTENT_MS = 300
+ELIMINATION_SECONDS = 4.0
+"""Processor time to eliminate variables for an offer: Z3 counts no steps there; it mostly takes a hundredth of this, or
+never ends."""
+
+CONSISTENT_EFFORT = 300
 """Whether a contract is consistent is asked for so long; then, whether it is realizable, which says more."""
 
 REALIZABLE_SHARE = 1.2
 """The share of the limit for everything that is done, as long as it comes to an end by itself."""
 
-CONFIRMING_MS = 500
+CONFIRMING_EFFORT = 500
 """For a question that should only confirm an answer."""
 
-WITNESS_PATIENT_MS = 300
-"""From this much time on for one attempt, all that is known of the chosen constants is told: short attempts are
+WITNESS_PATIENT_EFFORT = 300
+"""From this much effort on for one attempt, all that is known of the chosen constants is told: short attempts are
 quicker without."""
 
-CONFLICT_MS = 500
+CONFLICT_EFFORT = 500
 """For each of the questions that make a conflict smaller: there are many, and none of them decides anything."""
 
-REPLAY_MS = 1_000
+REPLAY_EFFORT = 1_000
 """For whether values that a search found make a formula true, where only open values are left to be chosen."""
 
-JUDGE_MS = 2_000
+JUDGE_EFFORT = 2_000
 """For the truth of a formula over values that a tool, a trace or a test gave, where enumeration cannot tell it: a run
 may ask a thousand times."""

@@ -15,7 +15,7 @@ from avow.formulas.values import Value, show
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Variable
-from avow.tuning.effort import JUDGE_MS
+from avow.tuning.effort import JUDGE_EFFORT
 
 from .names import Names
 from .printer import Vocabulary
@@ -75,4 +75,4 @@ def _allowed(node: Node, values: Mapping[Variable, Value]) -> bool:
     from avow.solving.questions import replay  # Z3 is slow to import
 
     spoken = [a.formula for a in node.assumptions if free_variables(a.formula) <= values.keys()]
-    return not spoken or replay(spoken, values, timeout_ms=JUDGE_MS) is not False
+    return not spoken or replay(spoken, values, effort=JUDGE_EFFORT) is not False

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
@@ -19,6 +18,7 @@ from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.values import show as show_value
 from avow.language.terms import FALSE, TRUE, Not, Role, Variable
+from avow.solving.limits import from_seconds, spent
 from avow.solving.questions import Entailment, entails, z3_version
 from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
@@ -32,7 +32,7 @@ from .outline import outline, show
 from .parser import parse_program
 from .program import Program, While, has_loops, statements
 from .triples import Triple, every_run, triples
-from .tuning import BRIEFLY_SECONDS, ENDLESS_MS
+from .tuning import BRIEFLY_SECONDS, ENDLESS_EFFORT
 from .witness import Breach, breach
 from .wp import Condition, TooLarge, conditions
 
@@ -224,7 +224,7 @@ class Settled:
 def _obligation(
     obligation: Obligation, found: Sequence[Triple], work: Work, limits: Limits, logs: dict[str, str]
 ) -> Outcome:
-    deadline = time.monotonic() + limits.seconds
+    deadline = spent() + from_seconds(limits.seconds)
     settled = [_guarded(triple, work, limits, deadline) for triple in found]
     log = [f"{s.triple.name}: {s.verdict} - {s.why}{f' ({s.vacuous})' if s.vacuous else ''}" for s in settled]
     logs[f"{_stem(found[0])}.log" if found else f"{obligation.digest[:12]}.log"] = "\n".join(log) + "\n"
@@ -277,7 +277,7 @@ def _obligation(
 def _every_run(work: Work, limits: Limits) -> Settled:
     """Whether the program runs to its end on every input that is allowed. Where a loop has no variant, or one that is
     not shown to fall, an input on which it never ends is looked for: that is none to be content with either."""
-    triple, deadline = work.every_run, time.monotonic() + limits.seconds
+    triple, deadline = work.every_run, spent() + from_seconds(limits.seconds)
     program = work.checked.program
     unfaithful = _unfaithful(triple, work.settler, deadline)
     if unfaithful is Verdict.REFUTED:
@@ -289,7 +289,7 @@ def _every_run(work: Work, limits: Limits) -> Settled:
         failed = [c for c in wanted if not _holds(c, work.settler, deadline)]
         shown = breach(triple, program, failed, max(1000, _left(deadline))) if failed else None
         if shown is None and (_termination(work) or (failed and has_loops(program))):
-            shown = endless_run(triple, program, max(1000, min(_left(deadline), ENDLESS_MS)))
+            shown = endless_run(triple, program, max(1000, min(_left(deadline), ENDLESS_EFFORT)))
     except TooLarge as error:
         return Settled(triple, Verdict.UNKNOWN, str(error))
     except RecursionError:
@@ -305,13 +305,13 @@ def _every_run(work: Work, limits: Limits) -> Settled:
 def _proved(settled: Settled, wanted: Sequence[Condition], deadline: float) -> Settled:
     """What Z3 has proved; an error where a second solver finds values for which a condition fails."""
     broken = [conjunction((*c.hypotheses, negation(c.goal))) for c in wanted]
-    if contradicted([negation(settled.triple.fidelity), *broken], timeout_ms=_left(deadline)):
+    if contradicted([negation(settled.triple.fidelity), *broken], effort=_left(deadline)):
         return Settled(settled.triple, Verdict.ERROR, CONTRADICTED)
     return settled
 
 
 def _holds(condition: Condition, settler: Settler, deadline: float) -> bool:
-    return settler.proves(condition.hypotheses, condition.goal, timeout_ms=_left(deadline))
+    return settler.proves(condition.hypotheses, condition.goal, effort=_left(deadline))
 
 
 def _total(outcome: Outcome) -> Outcome:
@@ -370,9 +370,9 @@ def _unfaithful(triple: Triple, settler: Settler, deadline: float) -> Verdict | 
     if triple.fidelity == TRUE:
         return None
     limit = min(5000, _left(deadline))
-    if settler.settles([], triple.fidelity, timeout_ms=limit) == "unsat":
+    if settler.settles([], triple.fidelity, effort=limit) == "unsat":
         return None
-    answer = entails([], triple.fidelity, timeout_ms=limit, seed=settler.seed)
+    answer = entails([], triple.fidelity, effort=limit, seed=settler.seed)
     return None if answer.verdict is Verdict.PROVED else answer.verdict
 
 
@@ -389,9 +389,9 @@ def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Sett
         return Settled(triple, Verdict.UNKNOWN, str(error))
     failed: list[tuple[Condition, Entailment]] = []
     for condition in wanted:
-        if work.settler.settles(condition.hypotheses, condition.goal, timeout_ms=_left(deadline)) == "unsat":
+        if work.settler.settles(condition.hypotheses, condition.goal, effort=_left(deadline)) == "unsat":
             continue
-        answer = entails(condition.hypotheses, condition.goal, timeout_ms=_left(deadline), seed=limits.seed)
+        answer = entails(condition.hypotheses, condition.goal, effort=_left(deadline), seed=limits.seed)
         if answer.verdict is not Verdict.PROVED:
             failed.append((condition, answer))
     if not failed:
@@ -415,11 +415,11 @@ def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Sett
 
 def _vacuous(triple: Triple, settler: Settler, deadline: float) -> str:
     """A triple that every program meets says nothing of this one."""
-    if settler.settles([triple.pre], triple.post, timeout_ms=min(2000, _left(deadline))) == "sat":
+    if settler.settles([triple.pre], triple.post, effort=min(2000, _left(deadline))) == "sat":
         return ""  # and then some input meets the precondition too
-    if settler.proves([triple.pre], FALSE, timeout_ms=min(2000, _left(deadline))):
+    if settler.proves([triple.pre], FALSE, effort=min(2000, _left(deadline))):
         return f"no input meets the precondition {show(triple.pre)}"
-    if settler.proves([triple.pre], triple.post, timeout_ms=min(2000, _left(deadline))):
+    if settler.proves([triple.pre], triple.post, effort=min(2000, _left(deadline))):
         return "it holds whatever a program does: it says nothing of this one"
     return ""
 
@@ -429,13 +429,13 @@ def _endless(triple: Triple, work: Work, deadline: float) -> bool:
     if not _termination(work):
         return False
     return all(
-        work.settler.proves(c.hypotheses, c.goal, timeout_ms=min(2000, _left(deadline)))
+        work.settler.proves(c.hypotheses, c.goal, effort=min(2000, _left(deadline)))
         for c in conditions(replace(triple, post=FALSE), work.checked.program.body)
     )
 
 
 def _left(deadline: float) -> int:
-    return max(100, min(20_000, int((deadline - time.monotonic()) * 1000)))
+    return max(100, min(20_000, int(deadline - spent())))
 
 
 def _counterexample(settled: Settled, work: Work) -> Counterexample:

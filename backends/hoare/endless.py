@@ -6,7 +6,6 @@ meets a predicate that implies the test and that the loop's body, by its weakest
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import combinations, pairwise
@@ -17,24 +16,25 @@ from avow.formulas.formula import conjunction, negation
 from avow.formulas.values import Element, Value
 from avow.language.sorts import INTEGER, REAL, EnumSort, Sort
 from avow.language.terms import TRUE, Arithmetic, Compare, EnumValue, Literal, Or, Term, Variable, Widen
+from avow.solving.limits import spent
 from avow.solving.questions import entails, solve
 
 from .guesses import NUMERIC, filled, guesses, starting_from
 from .interpreter import Endless, Fault, Machine, NoEnd, State
 from .program import Assign, Block, If, Program, Update, While, statements, variable
 from .triples import Triple, equation
-from .tuning import LASTING_MS, UNENDED_RUNS
+from .tuning import LASTING_EFFORT, UNENDED_RUNS
 from .witness import Breach, first_state
 from .wp import Conditions, TooLarge, defined, weakest
 
 
-def endless_run(triple: Triple, program: Program, milliseconds: int) -> Breach | None:
+def endless_run(triple: Triple, program: Program, effort: int) -> Breach | None:
     """A run from the precondition that provably never ends, or None where none was found."""
-    deadline = time.monotonic() + milliseconds / 1000
+    deadline = spent() + effort
     machine, given_up = Machine(), 0
     wanted = starting_from(triple, program)
     for values in _candidates(triple, program, wanted):
-        if time.monotonic() > deadline or given_up >= UNENDED_RUNS:
+        if spent() > deadline or given_up >= UNENDED_RUNS:
             return None
         start = first_state(triple, program, values)
         if start is None:
@@ -61,7 +61,7 @@ def _candidates(triple: Triple, program: Program, wanted: tuple[Variable, ...]) 
                 reached = _reached(program.body, loop, goal)
             except TooLarge:
                 continue
-            found = solve([triple.full_pre, reached], timeout_ms=LASTING_MS)
+            found = solve([triple.full_pre, reached], effort=LASTING_EFFORT)
             if found.status == "sat":
                 yield filled(found.values, wanted)
     yield from guesses(triple, program, wanted)
@@ -129,7 +129,7 @@ def goes_on(loop: While, heads: Sequence[State], program: Program) -> bool:
 
 
 def _implied(known: Sequence[Term], goal: Term) -> bool:
-    return entails(known, goal, timeout_ms=LASTING_MS).verdict is Verdict.PROVED
+    return entails(known, goal, effort=LASTING_EFFORT).verdict is Verdict.PROVED
 
 
 def _true(term: Term, state: State) -> bool:

@@ -32,7 +32,7 @@ from avow.solving.translation import Unsupported
 
 from .program import Assign, If, Match, Program, Statement, Update, While, statements
 from .triples import Triple
-from .tuning import GUESS_MS, INPUTS_TRIED, LENGTHS, VALUE_DEPTH
+from .tuning import GUESS_EFFORT, INPUTS_TRIED, LENGTHS, VALUE_DEPTH
 
 NUMERIC: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
 
@@ -58,7 +58,7 @@ def guesses(triple: Triple, program: Program, wanted: tuple[Variable, ...]) -> I
         (),
         *((Compare("==", Length(v, NATURAL), Literal(n, NATURAL)),) for v in sequences for n in (1, 2, 3)),
     ):
-        found = solve([pre, *extra], timeout_ms=GUESS_MS)
+        found = solve([pre, *extra], effort=GUESS_EFFORT)
         if found.status == "sat" or not extra:
             bases.append(filled(found.values if found.status == "sat" else {}, wanted))
             yield bases[-1]

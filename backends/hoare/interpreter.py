@@ -11,9 +11,10 @@ from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.formulas.values import Data, FunctionValue, Value
 from avow.language.sorts import NATURAL, FunctionSort, Sort
 from avow.language.terms import Term
+from avow.solving.limits import spend
 
 from .program import Assign, Block, If, Match, Skip, Statement, Update, While
-from .tuning import LOOP_STATES, RUN_STEPS
+from .tuning import LOOP_STATES, RUN_STEPS, STATEMENT_STEPS
 from .wp import defined
 
 _UNDEFINED = "a division by zero, an element that the sequence does not have, or a negative number for a natural one,"
@@ -60,7 +61,10 @@ class Machine:
         """The last state. Raises NoEnd, Endless, Fault, or NotEvaluable."""
         self.steps = 0
         state: State = dict(start)
-        self._block(body, state)
+        try:
+            self._block(body, state)
+        finally:
+            spend(STATEMENT_STEPS * (1 + self.steps))
         return state
 
     def value(self, term: Term, state: State) -> Value:

@@ -1,13 +1,14 @@
 """This backend's numbers: how much is read, how far is searched, how much is shown; each with its reason."""
 
 BRIEFLY_SECONDS = 5.0
-"""Seconds for whether the program has an output for every input, where that can only turn `unknown` into `refuted`."""
+"""Seconds' worth of effort for whether the program has an output for every input, where that can only turn
+`unknown` into `refuted`."""
 
-ENDLESS_MS = 8_000
-"""Milliseconds for an input on which the program never ends: it takes proof and time limit away from nothing, since
+ENDLESS_EFFORT = 8_000
+"""Effort for an input on which the program never ends: it takes proof and limit away from nothing, since
 it is asked last."""
 
-LASTING_MS = 1_000
+LASTING_EFFORT = 1_000
 """For one question whether a predicate lasts round a loop: such questions are small, and there are many."""
 
 UNENDED_RUNS = 4
@@ -21,6 +22,9 @@ LENGTHS = (0, 1, 2, 3, 6)
 
 VALUE_DEPTH = 3
 """Constructors within constructors among them; deeper values are of plain constructors only, so that they end."""
+
+STATEMENT_STEPS = 25
+"""Z3's steps that the run of a statement counts for: both take some ten microseconds."""
 
 RUN_STEPS = 5_000
 """Statements after which a run is given up: some milliseconds, for programs that mostly take a few dozen."""
@@ -37,5 +41,5 @@ ENDLESS_RUNS = 3
 FORMULA_NODES = 50_000
 """Nodes of a formula beyond which a program is too much for this method: branches in sequence double it."""
 
-GUESS_MS = 1_000
+GUESS_EFFORT = 1_000
 """For one input that meets the precondition: what is not found at once is left to the proof."""

@@ -47,14 +47,14 @@ class Breach:
     why: str
 
 
-def breach(triple: Triple, program: Program, failed: Sequence[Condition], milliseconds: int) -> Breach | None:
+def breach(triple: Triple, program: Program, failed: Sequence[Condition], effort: int) -> Breach | None:
     """Such a run, or None where none was found. Every answer has been replayed."""
     machine = Machine()
     wanted = starting_from(triple, program)
     for condition in failed:
         if condition.name != "pre":
             continue
-        for values in _models(condition, triple, program, wanted, milliseconds):
+        for values in _models(condition, triple, program, wanted, effort):
             found = _shown(triple, program, machine, values)
             if found is not None:
                 return found
@@ -117,7 +117,7 @@ def _holds(term: Term, state: Mapping[str, Value]) -> bool:
 
 
 def _models(
-    condition: Condition, triple: Triple, program: Program, wanted: tuple[Variable, ...], milliseconds: int
+    condition: Condition, triple: Triple, program: Program, wanted: tuple[Variable, ...], effort: int
 ) -> Iterator[dict[Variable, Value]]:
     """The solver's inputs: first with every number a simple one, then as they come."""
     formulas: list[Term] = [*condition.hypotheses, Not(condition.goal)]
@@ -128,7 +128,7 @@ def _models(
             choice = _one_of(term, pool)
             if choice is None:
                 continue
-            tried = solve([*formulas, *fixed, choice], timeout_ms=min(milliseconds, 2000))
+            tried = solve([*formulas, *fixed, choice], effort=min(effort, 2000))
             if tried.status != "sat":
                 continue
             number = _value(term, tried.values)
@@ -136,7 +136,7 @@ def _models(
                 fixed.append(Compare("==", term, _literal(number, term.sort)))
                 break
     for extra in ([fixed] if fixed else []) + [[]]:
-        found = solve([*formulas, *extra], timeout_ms=milliseconds)
+        found = solve([*formulas, *extra], effort=effort)
         if found.status == "sat":
             yield filled(found.values, wanted)
 

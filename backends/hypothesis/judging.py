@@ -13,7 +13,7 @@ from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.values import Value
 from avow.language.printer import show_term
 from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
-from avow.tuning.effort import JUDGE_MS
+from avow.tuning.effort import JUDGE_EFFORT
 
 from . import wire
 from .generate import Inputs
@@ -36,7 +36,7 @@ class Judged:
                 return bool(self.evaluator(valuation))
             except NotEvaluable:
                 pass
-        return judge(self.formula, valuation, timeout_ms=JUDGE_MS)
+        return judge(self.formula, valuation, effort=JUDGE_EFFORT)
 
 
 @dataclass(slots=True)

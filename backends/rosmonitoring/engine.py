@@ -19,7 +19,7 @@ from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.language.terms import Implies, Quantified, Quantifier, Role, Term, Variable
-from avow.tuning.effort import JUDGE_MS
+from avow.tuning.effort import JUDGE_EFFORT
 
 from .numbers import Decimal, NotANumber, exact
 from .options import Setup, same_topic
@@ -289,7 +289,7 @@ class Monitor:
         try:
             return bool(watched.holds(values))
         except NotEvaluable as error:
-            answer = judge(watched.clause.formula, values, timeout_ms=JUDGE_MS) if self.solver else None
+            answer = judge(watched.clause.formula, values, effort=JUDGE_EFFORT) if self.solver else None
             if answer is None and not watched.tally.reason:
                 watched.tally.reason = error.reason
             return answer

@@ -13,7 +13,7 @@ from avow.calculus import replaying
 from avow.calculus.ltl import TooLong, demands_progress, violation
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Variable
-from avow.solving.limits import now
+from avow.solving.limits import spent
 from avow.system.temporal import Operator, Property, State, Temporal
 
 P, Q = (State(Variable(Role.OUTPUT, name, BOOL), name) for name in "pq")
@@ -138,4 +138,4 @@ def test_long_runs_are_held_against_a_property_in_time_that_grows_with_them() ->
 
 def test_a_search_for_a_violation_ends_at_its_deadline() -> None:
     with pytest.raises(TooLong):
-        violation(Temporal(Operator.ALWAYS, (P,)), [0], lambda step: (step + 1,), lambda step, state: True, now() - 1)
+        violation(Temporal(Operator.ALWAYS, (P,)), [0], lambda step: (step + 1,), lambda step, state: True, spent() - 1)

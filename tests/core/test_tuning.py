@@ -128,6 +128,6 @@ def test_no_limit_of_a_question_is_written_where_it_is_asked() -> None:
         f"{path.relative_to(ROOT)}: {line.strip()}"
         for path in files()
         for line in path.read_text("utf-8").splitlines()
-        if re.search(r"timeout_ms=[0-9_]+\b(?! \*)", line)
+        if re.search(r"effort=[0-9_]+\b(?! \*)", line)
     ]
     assert found == []

@@ -307,7 +307,7 @@ def test_dafny_and_z3_agree_on_meanings(tmp_path: Path) -> None:
     assert len(proved) == len(node.guarantees)
     assert [m.name for m in run.members if m.kind != "Impl" and m.outcome != "correct"] == [], run.output
     for clause in node.guarantees:
-        by_z3 = entails((), clause.formula, timeout_ms=10_000).verdict
+        by_z3 = entails((), clause.formula, effort=10_000).verdict
         if clause.name.startswith("yes_"):
             assert by_z3 is not Verdict.REFUTED, clause.name
             assert proved[clause.name], (clause.name, run.output)

@@ -466,7 +466,7 @@ def test_agrees_with_z3_on_random_formulas(seed: int) -> None:
         except NotEvaluable:
             continue
         evaluated += 1
-        theirs = replay([formula], {v: values[n] for n, v in variables.items()}, timeout_ms=1000)
+        theirs = replay([formula], {v: values[n] for n, v in variables.items()}, effort=1000)
         if theirs is not None:
             compared += 1
             true += bool(mine)

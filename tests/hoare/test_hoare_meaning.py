@@ -200,7 +200,7 @@ def test_simplified_formulas_are_equivalent(seed: int) -> None:
     long = weakest(made.program.body, assertion(writer.test(), made), Conditions(TRUE))
     short = simplify(long)
     for one, other in ((long, short), (short, long)):
-        assert entails([one], other, timeout_ms=3000).verdict is not Verdict.REFUTED
+        assert entails([one], other, effort=3000).verdict is not Verdict.REFUTED
 
 
 def test_the_simplifier_would_be_caught() -> None:
@@ -208,7 +208,7 @@ def test_the_simplifier_would_be_caught() -> None:
     made = checked(START + "x := a")
     wide = assertion("a < 3 or b < 3", made)
     assert isinstance(wide, Or)
-    assert entails([wide], wide.items[0], timeout_ms=3000).verdict is Verdict.REFUTED
+    assert entails([wide], wide.items[0], effort=3000).verdict is Verdict.REFUTED
 
 
 @pytest.mark.parametrize("seed", range(0, 60, 6))

@@ -97,7 +97,7 @@ def numeric(draw: st.DrawFn, depth: int = 3) -> Term:
 @given(numeric())
 def test_also_with_numbers_and_divisions_by_anything(formula: Term) -> None:
     """Asked of the solver, for which a quotient by zero is some number."""
-    assert entails([], Iff(formula, simplify(formula)), timeout_ms=4000).verdict is not Verdict.REFUTED
+    assert entails([], Iff(formula, simplify(formula)), effort=4000).verdict is not Verdict.REFUTED
 
 
 CONTRACT = """

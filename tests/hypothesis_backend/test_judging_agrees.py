@@ -79,7 +79,7 @@ def test_three_judges_agree(seed: int, make_system: Callable[..., System]) -> No
             expected = truth(clause.formula, snapshot, {}, REALS, NATURALS)
             assert judge.holds({v.qualified: found for v, found in values.items()}) is expected, (clause.text, values)
             if rng.random() < 0.3:
-                by_z3 = replay([clause.formula], values, timeout_ms=3000)
+                by_z3 = replay([clause.formula], values, effort=3000)
                 assert by_z3 in (None, expected), (clause.text, values)
                 asked += by_z3 is not None
             held, broken = held + expected, broken + (not expected)

@@ -207,7 +207,7 @@ def test_its_text_says_what_the_other_translation_says(formula: str) -> None:
     written = Text()
     body = written.formula(term, lambda v: (f"|{v.name}~0|", v.sort))
     script = written.script([f"(not {body})"])
-    mine, theirs = ask_z3(script, BUDGET), entails({}, term, timeout_ms=5_000).verdict
+    mine, theirs = ask_z3(script, BUDGET), entails({}, term, effort=5_000).verdict
     assert {"proved": Said.UNSAT, "refuted": Said.SAT}.get(theirs, mine) is mine, export([term])
 
 

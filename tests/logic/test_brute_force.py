@@ -60,7 +60,7 @@ def as_value(value: object) -> Value:
 def test_satisfiability_is_right_and_models_are_models(term: Term) -> None:
     free = tuple(sorted(free_variables(term), key=lambda v: v.qualified))
     expected = any(holds(term, s) for s in situations(free))
-    answer = solve([term], timeout_ms=20_000)
+    answer = solve([term], effort=20_000)
     assert answer.status == ("sat" if expected else "unsat")
     if expected:
         assert holds(term, spread(dict(answer.values))) is True
@@ -71,7 +71,7 @@ def test_satisfiability_is_right_and_models_are_models(term: Term) -> None:
 def test_entailment_is_right(left: Term, right: Term) -> None:
     free = tuple(sorted(free_variables(left) | free_variables(right), key=lambda v: v.qualified))
     expected = all(holds(right, s) for s in situations(free) if holds(left, s))
-    answer = entails({"H": left}, right, timeout_ms=20_000)
+    answer = entails({"H": left}, right, effort=20_000)
     assert answer.verdict is (Verdict.PROVED if expected else Verdict.REFUTED)
     if not expected:
         values = {**{v: as_value(domain(v.sort)[0]) for v in free}, **answer.values}
@@ -116,7 +116,7 @@ def test_realizability_is_right(outputs: tuple[Variable, ...]) -> None:
         allowed = [inputs for inputs in situations(INPUTS) if holds(assumption, inputs)]
         expected = all(met(inputs) for inputs in allowed)
         labelled = {f"G{k}": g for k, g in enumerate(guarantees)}
-        answer = realizable(INPUTS, outputs, {"A": assumption}, labelled, timeout_ms=20_000)
+        answer = realizable(INPUTS, outputs, {"A": assumption}, labelled, effort=20_000)
         verdicts.append(answer.verdict)
         assert answer.verdict in {Verdict.PROVED if expected else Verdict.REFUTED, Verdict.UNKNOWN}
         if answer.verdict is Verdict.REFUTED:

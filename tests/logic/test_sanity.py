@@ -279,7 +279,7 @@ def test_a_scenario_gives_bounded_answers_only_where_needed() -> None:
         "| guarantee( forall(i in NATURAL | in.f(i * i * i + i) + in.f(i) <= out.v) )"
     )
     given = {of.input("f").variable: FunctionValue({(1,): 4}, 0)}
-    found = {r.name: r for r in analyse(of, scenario=given, bounds=Bounds(milliseconds=300))}
+    found = {r.name: r for r in analyse(of, scenario=given, bounds=Bounds(effort=300))}
     answer = found["realizable"]
     assert answer.verdict in {Verdict.CHECKED, Verdict.REFUTED, Verdict.UNKNOWN}
     assert answer.bounded == (answer.verdict is Verdict.CHECKED)

@@ -33,7 +33,7 @@ def say(text: str) -> Term:
 
 
 def ask(hypothesis: str, goal: str) -> Entailment:
-    return entails({"H": say(hypothesis)}, say(goal), timeout_ms=10_000)
+    return entails({"H": say(hypothesis)}, say(goal), effort=10_000)
 
 
 TRUE_ALWAYS = [
@@ -164,7 +164,7 @@ def test_no_time_is_unknown() -> None:
     hard: Term = say(
         "forall(x, y in REAL | exists(u, v in REAL | in.at(x * u + v, y * v - u) and in.id(x * y) > in.id(u * u * v)))"
     )
-    answer = entails({"H": hard}, say("in.id(in.r * in.r * in.r) > in.n"), timeout_ms=50)
+    answer = entails({"H": hard}, say("in.id(in.r * in.r * in.r) > in.n"), effort=50)
     assert answer.verdict in {Verdict.UNKNOWN, Verdict.REFUTED}
 
 
@@ -202,5 +202,5 @@ def test_fractions_are_exact() -> None:
 @pytest.mark.slow
 @pytest.mark.needs_cvc5
 def test_another_solver_helps_where_z3_gives_up() -> None:
-    answer = entails([], say("exists(i in NATURAL | i > in.r)"), timeout_ms=5_000)
+    answer = entails([], say("exists(i in NATURAL | i > in.r)"), effort=5_000)
     assert answer.verdict is Verdict.PROVED

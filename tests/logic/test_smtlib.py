@@ -35,7 +35,7 @@ def test_both_solvers_read_it_and_agree(hypothesis: str, goal: str) -> None:
     script = export(question, comment=f"{hypothesis} |- {goal}\n(check-sat)")
     expected = "unsat" if (hypothesis, goal) in TRUE_ALWAYS else "sat"
     assert ask_z3(script) in {expected, "unknown"}
-    answer = ask_cvc5(script, timeout_ms=5_000)
+    answer = ask_cvc5(script, effort=5_000)
     assert answer in {expected, "unknown"}, "cvc5 must be able to read it, and must not contradict"
     if expected == "unsat":
         assert answer == "unsat"
@@ -46,8 +46,8 @@ def test_both_solvers_read_it_and_agree(hypothesis: str, goal: str) -> None:
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 @given(formulas())
 def test_cvc5_never_contradicts_z3(term: Term) -> None:
-    answer = solve([term], timeout_ms=10_000).status
-    other = ask_cvc5(export([term]), timeout_ms=5_000)
+    answer = solve([term], effort=10_000).status
+    other = ask_cvc5(export([term]), effort=5_000)
     assert other in {answer, "unknown"}
 
 
@@ -57,7 +57,7 @@ def test_the_case_study_s_clauses_export(system: str) -> None:
     for node in case_study(system).nodes:
         script = export({clause.name: clause.formula for clause in node.clauses}, comment=node.name)
         assert ask_z3(script) != "unsat"
-        assert ask_cvc5(script, timeout_ms=500) in {"sat", "unknown"}
+        assert ask_cvc5(script, effort=500) in {"sat", "unknown"}
         assert all(f"|clause {clause.name}|" in script for clause in node.clauses)
 
 
@@ -91,6 +91,6 @@ def test_a_cvc5_that_does_not_keep_its_time_limit_is_ended(monkeypatch: pytest.M
     """On some scripts it does not look at its clock; nothing but the end of its process ends it."""
     pytest.importorskip("cvc5")
     monkeypatch.setattr(smtlib, "CVC5_START_SECONDS", 0.0)
-    assert ask_cvc5("(set-logic ALL)\n(check-sat)\n", timeout_ms=1) == "unknown"
+    assert ask_cvc5("(set-logic ALL)\n(check-sat)\n", effort=1) == "unknown"
     monkeypatch.undo()
-    assert ask_cvc5("(set-logic ALL)\n(check-sat)\n", timeout_ms=20_000) == "sat"
+    assert ask_cvc5("(set-logic ALL)\n(check-sat)\n", effort=20_000) == "sat"

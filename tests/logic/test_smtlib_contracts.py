@@ -78,7 +78,7 @@ def test_the_exported_contract_has_the_verdict_of_sanity() -> None:
         for about, script in questions.items():
             verdict = found[about].verdict
             wanted = SAYS.get(verdict)
-            for name, answer in (("z3", ask_z3(script)), ("cvc5", ask_cvc5(script, timeout_ms=2_000))):
+            for name, answer in (("z3", ask_z3(script)), ("cvc5", ask_cvc5(script, effort=2_000))):
                 assert answer in {"sat", "unsat", "unknown"}, f"{name} cannot read it:\n{script}"
                 if wanted is not None and not found[about].bounded:
                     assert answer in {wanted, "unknown"}, (seed, about, verdict, name, [c.text for c in node.clauses])
@@ -96,5 +96,5 @@ def test_the_comparison_can_fail() -> None:
     for sign in (">=", "<"):
         contract = check_text(text % sign, "f")[0]
         assert contract is not None
-        answers.append((ask_z3(to_smtlib(contract)), ask_cvc5(to_smtlib(contract), timeout_ms=2_000)))
+        answers.append((ask_z3(to_smtlib(contract)), ask_cvc5(to_smtlib(contract), effort=2_000)))
     assert answers == [("sat", "sat"), ("unsat", "unsat")]

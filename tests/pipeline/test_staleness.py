@@ -396,9 +396,9 @@ def test_temporal_requirements_look_at_the_steps_and_others_do_not(tmp_path: Pat
     temporal, formula = asked["REQ4"], asked["REQ3"]
     assert isinstance(temporal, TemporalQuestion)
     assert isinstance(formula, FormulaQuestion)
-    formula.broken_by_a_run(composition, Bounds(milliseconds=300))
+    formula.broken_by_a_run(composition, Bounds(effort=300))
     with pytest.raises(AssertionError, match="looks at the scenario's steps"):
-        temporal(composition, Bounds(milliseconds=300))
+        temporal(composition, Bounds(effort=300))
 
 
 def test_a_plug_in_is_taken_to_look_at_the_steps(tmp_path: Path) -> None:

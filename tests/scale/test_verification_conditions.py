@@ -90,8 +90,8 @@ def formulas() -> st.SearchStrategy[Term]:
 def test_one_solver_for_many_questions_says_what_the_whole_question_says(asked: list[tuple[list[Term], Term]]) -> None:
     settler = Settler()
     for hypotheses, goal in asked:
-        said = settler.settles(hypotheses, goal, timeout_ms=300)
-        whole = entails(hypotheses, goal, timeout_ms=300).verdict
+        said = settler.settles(hypotheses, goal, effort=300)
+        whole = entails(hypotheses, goal, effort=300).verdict
         assert said != "unsat" or whole is not Verdict.REFUTED
         assert said != "sat" or whole is not Verdict.PROVED
 
@@ -99,5 +99,5 @@ def test_one_solver_for_many_questions_says_what_the_whole_question_says(asked: 
 def test_where_operations_are_partial_the_whole_question_is_asked() -> None:
     x = Variable(Role.BOUND, "x", INTEGER)
     divided = Compare("==", Arithmetic("/", x, x, INTEGER), Literal(1, INTEGER))
-    assert Settler().settles([], divided, timeout_ms=300) == "unknown"
-    assert not Settler().proves([], divided, timeout_ms=300)
+    assert Settler().settles([], divided, effort=300) == "unknown"
+    assert not Settler().proves([], divided, effort=300)
