@@ -40,7 +40,7 @@ def compare(term: Term, told: Counter[str], second: Apart | None = None) -> None
     except Untranslatable:
         told["no text"] += 1
         return
-    theirs = NAMED.get(solve([term], timeout_ms=1_500).status, Said.UNKNOWN)
+    theirs = NAMED.get(solve([term], effort=1_500).status, Said.UNKNOWN)
     assert {mine, theirs} != {Said.SAT, Said.UNSAT}, question
     told[f"{mine}"] += 1
     if second is not None and mine is not Said.UNKNOWN:
