@@ -7,8 +7,10 @@ evidence, it is none.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+
+from avow.base.codec import LATER
 
 
 class Tone(StrEnum):
@@ -226,3 +228,15 @@ class Answers:
     """``not signed``, or by whom and whether the case is still that one."""
     statement: str
     """What a signature says."""
+    warned: str = field(default="", metadata=LATER)
+    """``WARNED: 13 findings known``, beside the verdict; empty where nothing is known to be bad."""
+
+    @property
+    def beside(self) -> str:
+        """What stands beside the verdict in every format."""
+        return " · ".join(part for part in (self.warned, self.counts, self.weakened, self.gates) if part)
+
+    @property
+    def told(self) -> str:
+        """The verdict where nothing stands beside it."""
+        return f"{self.verdict} ({self.warned})" if self.warned else self.verdict

@@ -75,8 +75,8 @@ def weakest_of(
 
 
 WARNED = "WARNED"
-"""The first word of a verdict that every gate lets pass although something is known to be bad: expected refutations,
-accepted findings."""
+"""Stands beside the verdict where every gate passes although something is known to be bad: an expected refutation, an
+accepted finding."""
 
 
 def answers(
@@ -97,9 +97,10 @@ def answers(
     """Everything that the first screen says, but whether it is signed."""
     number = Counter(r.how for r in requirements)
     headline, verdict, tone = _verdict(requirements, suppositions, gates, strict=strict, passed=passed)
+    warned = ""
     bad = sum(bool(view.handled) and not view.standing.supports for view in views)
     if bad and passed:  # whatever else holds: what is known to be bad is no green
-        verdict, tone = f"{WARNED}: {verdict}; {count(bad, 'finding')} known", Tone.AMBER
+        warned, tone = f"{WARNED}: {count(bad, 'finding')} known", Tone.AMBER
     by_how = tuple((how, number[how]) for how in _HOW_ORDER if number[how])
     asked = [gate for gate in gates if not gate.idle]
     good = sum(gate.passed for gate in asked)
@@ -127,7 +128,8 @@ def answers(
         changed_against=f"Against the report signed by {changes.against}:" if changes.against else "",
         changed=_changed(changes),
         signed="not signed",
-        statement=_statement(verdict, suppositions, kinds),
+        statement=_statement(f"{verdict} ({warned})" if warned else verdict, suppositions, kinds),
+        warned=warned,
     )
 
 

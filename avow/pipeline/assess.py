@@ -277,7 +277,7 @@ def _summarise(assessment: Assessment, case: Case, left_out: tuple[tuple[str, st
         index,
         tuple(gates),
         left_out,
-        case.answers.verdict,
+        case.answers.told,
         case.answers.tone.value,
         tuple(terminal_lines(case)),
     )

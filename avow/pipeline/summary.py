@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
+from avow.base.verdict import said
 from avow.pipeline.results import Result
 from avow.tuning.shown import GATE_REASON
 
@@ -30,8 +31,9 @@ def print_summary(
     shown = [word for word in (*GOOD, *BAD) if any(r.counts.get(word) for r in results)]
     table = Table(box=None, header_style="bold", pad_edge=False)
     table.add_column("system")
-    for word in shown:
-        table.add_column(word, justify="right", style="red" if word in ("refuted", "contradictory", "error") else None)
+    for at, word in enumerate(shown):
+        head = said(word) if at else f"claims {said(word)}"
+        table.add_column(head, justify="right", style="red" if word in ("refuted", "contradictory", "error") else None)
     table.add_column("verdict")
     for r in sorted(results, key=lambda r: r.system):
         colour = (
@@ -105,7 +107,7 @@ def job_summary(results: Sequence[Result], broken: Sequence[str]) -> str:
     lines = [
         "## Assurance",
         "",
-        f"| system | {' | '.join([*shown, 'verdict'])} |",
+        f"| system | {' | '.join([*map(said, shown), 'verdict'])} |",
         "|---|" + "--:|" * len(shown) + "---|",
     ]
     for r in sorted(results, key=lambda r: r.system):

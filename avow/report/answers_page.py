@@ -159,7 +159,15 @@ def _refuted(text: str) -> Markup:
 
 def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
     """The page over all systems: a row each, the worst first; then those whose reports are as of an earlier state."""
-    ranked = sorted(cases, key=lambda case: (case.good, _ORDER.index(case.answers.tone)))
+    ranked = sorted(
+        cases,
+        key=lambda case: (
+            case.good,
+            _ORDER.index(case.answers.tone),
+            case.answers.headline is not Headline.EXAMINED,
+            case.system,
+        ),
+    )
     relied = [case for case in cases if case.answers.headline is not Headline.EXAMINED]
     failing = [case for case in relied if case.answers.tone is Tone.RED]
     if failing:

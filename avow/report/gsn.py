@@ -23,7 +23,7 @@ def render_gsn(case: Case) -> str:
     goal_of_node = {node.name: f"G{at}" for at, node in enumerate(case.nodes, 1 + len(case.requirements) + 1)}
     whole: _Elements = {
         "module": {"name": f"system-{case.system}", "brief": case.title},
-        "G1": {"text": f"{case.title}\n{case.answers.verdict}"},
+        "G1": {"text": f"{case.title}\n{case.answers.told}"},
         "C1": {"text": f"Policy {case.policy.name}: {case.policy.title}"},
     }
     whole["G1"]["inContextOf"] = ["C1"]
@@ -118,7 +118,7 @@ def cae(case: Case) -> _Elements:
     is incorporated as evidence; conditions of the composition are the side-warrant. An element's name begins with its
     kind and with what it is of, so that no requirement and no node can be called as another element."""
     found: _Elements = {
-        "claim-system": {"text": case.title, "verdict": case.answers.verdict, "argued_by": ["argument-system"]},
+        "claim-system": {"text": case.title, "verdict": case.answers.told, "argued_by": ["argument-system"]},
         "argument-system": {
             "kind": "decomposition",
             "supports": ["claim-system"],

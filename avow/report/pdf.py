@@ -138,7 +138,7 @@ def _first(case: Case) -> dict[str, Any]:
         "kicker": f"{case.today} · {a.signed}",
         "verdict": f"{TONE_MARKS[a.tone]} {a.verdict}",
         "tone": a.tone.value,
-        "counts": f"{a.counts} · {a.weakened} · {a.gates}",
+        "counts": a.beside,
         "by_how": [
             [f"{number} {how}", ", ".join(r.id for r in case.requirements if r.how is how)] for how, number in a.by_how
         ]

@@ -21,7 +21,7 @@ def terminal_lines(case: Case, command: str = "") -> list[str]:
     verdict = f": {a.verdict}"
     title = _cut(f"{_MARKS[a.tone]} {case.title}", WIDTH - len(verdict))
     lines = [title + verdict]
-    lines += _cut_lines(f"{a.counts} · {a.weakened} · {a.gates}", 2)
+    lines += _cut_lines(a.beside, 2)
     lines += ["1 Claimed"]
     listed = [r for r in case.requirements if r.id in a.listed][:6]
     lines += [_cut(f"  {_MARKS[r.tone]} {r.id} {r.how}, {_weakest(r)}: {_one(r)}") for r in listed]
@@ -50,7 +50,7 @@ def comment(case: Case) -> str:
     lines = [
         f"<!-- avow {_md(case.system)} -->",
         f"**{_MARKS[a.tone]} {_md(case.title)}: {_md(was + a.verdict)}**",
-        f"{_md(a.counts)} · {_md(a.weakened)} · {_md(a.gates)}",
+        _md(a.beside),
         _md(a.changed_against) or "No report has been signed yet.",
         "\n".join(f"- {mark} {_md(_few(words))}" for mark, words in a.changed if mark),
         f"Weakest evidence: {_md(_few(_weakest_words(case)))}",
@@ -66,7 +66,7 @@ def markdown_head(case: Case) -> Iterator[str]:
     """The five answers as paragraphs of Markdown."""
     a = case.answers
     yield f"**{_MARKS[a.tone]} {_md(a.verdict)}**"
-    yield _md(f"{a.counts} · {a.weakened} · {a.gates} · {a.signed}")
+    yield _md(f"{a.beside} · {a.signed}")
     yield "## 1 What is claimed?"
     rows = [
         f"| **{_md(r.id)}** {_md(_one(r))} | {_MARKS[r.tone]} {r.how} | {_md(_weakest(r))} | {len(r.supposes)} |"

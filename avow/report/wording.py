@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 from urllib.parse import quote
 
-from avow.assurance.first_screen import WARNED
 from avow.assurance.model import Case, EvidenceView, ObligationView
 from avow.evidence.obligation import Kind
 from avow.evidence.record import RETRY, Evidence
@@ -180,7 +179,7 @@ def banner_tone(case: Case) -> str:
     if not case.good:
         return "bad"
     examined = case.strict and not all(r.status.supports for r in case.requirements)
-    return "open" if examined or case.answers.verdict.startswith(WARNED) else "good"
+    return "open" if examined or case.answers.warned else "good"
 
 
 _CONNECTIVES = ("→↔⇒⇔", "∨", "∧")

@@ -134,7 +134,7 @@ def test_the_verdict_counts_what_it_speaks_of_and_follows_from_what_the_case_hol
             assert a.tone is Tone.RED
             assert found.exit_code != 0 or any(r.how is How.OPEN for r in found.requirements)
         case Headline.EXAMINED:
-            assert a.tone is (Tone.AMBER if a.verdict.startswith(WARNED) else Tone.GREY)
+            assert a.tone is (Tone.AMBER if a.warned.startswith(WARNED) else Tone.GREY)
     assert sum(many for _, many in a.by_how) == len(found.requirements)
     assert sum(line.count for line in a.supposed) == len(found.suppositions)
     assert len({s.key for s in found.suppositions}) == len(found.suppositions)

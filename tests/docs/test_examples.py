@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 from helpers import some
+from report.first_screen import departures
+
+from avow.assurance.codec import read_case
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "docs/examples"
@@ -52,6 +55,9 @@ def test_the_examples_verify(tmp_path: Path) -> None:
     for name, verdict in VERDICTS.items():
         case = json.loads((place / "reports" / name / "report.json").read_text())
         assert case["answers"]["verdict"] == verdict, name
+        if shutil.which("chromium"):
+            report = place / "reports" / name
+            assert departures(read_case(report), (report / "index.html").read_text(), tmp_path) == [], name
 
 
 @pytest.mark.parametrize("template", some(["plain", "ros1", "ros2"], 1))

@@ -26,6 +26,7 @@ from avow.evidence.status import Status
 from avow.report import LeftOut, formats, render_all, wording, write_index
 from avow.report.gsn import cae, cae_rows, render_gsn
 from avow.report.latex import latex
+from avow.report.short import terminal_lines
 from avow.system.plan import Requirement
 from report.hostile import hostile_case
 from report.test_page import Page
@@ -349,7 +350,12 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
     text = render_index([examined, good])
     assert "None is relied upon" in text, "of a system without requirements nothing is claimed either"
     assert text.count("Examined, not relied upon") == 2
-    assert "WARNED: Examined, not relied upon" in text
+    assert examined.answers.verdict == "Examined, not relied upon", "one of four sentences"
+    assert text.count("WARNED: 1 finding known") == 1
+    made = dict(formats(examined))
+    for name in ("index.html", "report.md", "comment.md", "gsn.yaml"):
+        assert "WARNED: 1 finding known" in str(made[name]), name
+    assert any("WARNED: 1 finding known" in line for line in terminal_lines(examined))
     assert examined.answers.tone is Tone.AMBER
     assert "✔" not in text.split("<main")[0]
     relied = case(system({"n": ["g"]}, requirements=[Requirement("R", "t", None, None, ("n.g",))]), [g], [evidence(g)])

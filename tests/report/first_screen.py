@@ -1,0 +1,74 @@
+"""What the first page of any report has to keep to, measured in a browser: its budgets, its words, its layout."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from avow.assurance.model import Case
+from avow.base.plain import identifiers
+from avow.report.pdf import _data as pdf_data
+from avow.report.short import LINES, WIDTH, WORDS, comment, markdown_head, terminal_lines
+from report.chromium import dark, frames_of, measure
+
+OWN_WORDS, ALL_WORDS, BOXES_WITHIN, CONTRAST = 280, 3000, 900, 4.5
+"""Own words above the signature, visible words in all, pixels within which the five boxes end, least contrast."""
+WIDTHS = (320, 390, 420, 1366, 1400)
+
+
+def departures(found: Case, page: str, folder: Path) -> list[str]:
+    """In what the page departs from what it should be; empty where in nothing."""
+    measured = measure(frames_of(page, WIDTHS) | {"dark": (dark(page), 1400)}, folder)
+    return [*_layout(measured), *_budgets(measured["1400"]), *counts(found, page)]
+
+
+def _layout(measured: dict[str, Any]) -> list[str]:
+    told = []
+    for width, said in measured.items():
+        told += [f"{width}, folds closed: {text}" for text in said["closed"]]
+        told += [f"{width}, folds open: {text}" for text in said["open"]]
+        if said["scroll"] or said["openScroll"]:
+            told.append(f"{width}: scrolls sideways")
+        worst = min(said["contrast"], said["openContrast"])
+        if worst[0] < CONTRAST:
+            told.append(f"{width}: contrast {worst}")
+    return told
+
+
+def _budgets(wide: dict[str, Any]) -> list[str]:
+    told = []
+    if [head[0] for head in wide["heads"]] != ["1", "2", "3", "4", "5"]:
+        told.append(f"the five questions: {wide['heads']}")
+    for name, most in (("own", OWN_WORDS), ("all", ALL_WORDS), ("bottom", BOXES_WITHIN)):
+        if wide[name] > most:
+            told.append(f"{name}: {wide[name]}, at most {most}")
+    told += [f"an identifier: {word}" for word in identifiers(wide["ownText"])]
+    return told
+
+
+def counts(found: Case, page: str) -> list[str]:
+    """Page, Markdown, terminal, comment and PDF say the same, and each supposition in full once."""
+    a, told = found.answers, []
+    pdf = pdf_data(found)["first"]
+    plain = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", "", page))
+    markdown = "\n".join(markdown_head(found)).replace("\\", "")
+    terminal = terminal_lines(found)
+    for name, text in (
+        ("page", plain),
+        ("Markdown", markdown),
+        ("terminal", " ".join(" ".join(terminal).split())),
+        ("comment", comment(found).replace("\\", "")),
+        ("PDF", f"{pdf['verdict']} {pdf['counts']}"),
+    ):
+        told += [f"{name} lacks {part!r}" for part in (a.verdict, *a.beside.split(" · ")) if part not in text]
+    if page.count('class="supposition"') != len(found.suppositions):
+        told.append("a supposition stands not once on the page")
+    if len(re.findall(r'<details id="requirement', page)) != len(found.requirements):
+        told.append("a requirement stands not once on the page")
+    if len(terminal) > LINES or any(len(line) > WIDTH for line in terminal):
+        told.append(f"the terminal has {LINES} lines of {WIDTH} columns")
+    outside = re.sub(r"<details>.*?</details>", "", comment(found), flags=re.DOTALL)
+    if len(outside.split()) > WORDS:
+        told.append(f"the comment has {len(outside.split())} words, at most {WORDS}")
+    return told
