@@ -12,7 +12,7 @@ from .environment import Environment
 from .psl import Atom, Modality
 from .syntax import Condition, DeedKind, GoalKind, Program, Struct, Term, Var, is_ground
 
-RUNNER = Path(__file__).with_name("agent.c")
+RUNNER = tuple(Path(__file__).with_name(name) for name in ("agent.c", "agent_mind.c", "agent_deeds.c"))
 _DEEDS = {
     DeedKind.ACTION: "ACT",
     DeedKind.ADD_BELIEF: "ADDBEL",
@@ -126,6 +126,8 @@ def header(program: Program, environment: Environment, wanted: Sequence[Atom], *
     names = ", ".join(f'"{_escaped(name)}"' for name in tables.names)
     return "\n".join(
         [
+            "#ifndef AGENT_H",
+            "#define AGENT_H",
             *(f"#define {name} {value}" for name, value in sizes.items()),
             "enum { ACT, ADDBEL, DROPBEL, ADDGOAL, DROPGOAL, WAITS, WAITSNOT, LOCKS, UNLOCKS };",
             "typedef struct { int functor, n, args[MAXARGS]; } Pat;",
@@ -137,6 +139,8 @@ def header(program: Program, environment: Environment, wanted: Sequence[Atom], *
             "typedef struct { int what, pat; } Said;",
             "typedef struct { short nb, bel[MAXBEL], ng, goal[MAXGOALS], nq, q[MAXQUEUE], cur, last, now[NGROUPS];",
             "  unsigned char seen[MAXBEL], planned, fresh, begun, asleep, waited, over, up; } S;",
+            "int says(const S *, int), ways(const S *);",
+            "void go(S *, int);",
             "#define HERE (&now.s)",  # Spin takes no calls in conditions, and does not look into macros
             *(f"#define SAYS_{at} says(HERE, {at})" for at in range(len(said))),
             *(f"#define MORE_{way} (ways(HERE) > {way})" for way in range(most_ways(environment))),
@@ -152,6 +156,7 @@ def header(program: Program, environment: Environment, wanted: Sequence[Atom], *
             f"static const Said atoms[] = {_table(said, '{0}')};",
             percepts,
             rows,
+            "#endif",
             "",
         ]
     )

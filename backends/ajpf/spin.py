@@ -5,10 +5,12 @@ interpreter (`promela`); where that cannot run it, of the state graph that we ex
 from __future__ import annotations
 
 import functools
+import os
 import re
 import shutil
 import time
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from avow.tuning.running import VERSION_SECONDS
 from . import promela, psl
 from .checker import Checker, Property
 from .interpreter import Semantics
+from .tuning import SPIN_DEPTH
 
 _ERRORS = re.compile(r"errors: (\d+)")
 
@@ -80,15 +83,23 @@ def _asked(
 ) -> dict[str, bool]:
     for name, text in files.items():
         write(folder / name, text)
-    for command in (["spin", "-a", "agent.pml"], ["gcc", "-O1", "-w", "-DNOREDUCE", "-o", "pan", "pan.c"]):
+    # The model's own code grows with the properties, and takes longer to optimize than it then saves.
+    runner = [["gcc", "-O2", "-w", "-c", "agent.c"]] if "agent.c" in files else []
+    model = ["gcc", "-O0", "-w", "-DNOREDUCE", "-o", "pan", "pan.c", *(["agent.o"] if runner else [])]
+    for command in (["spin", "-a", "agent.pml"], *runner, model):
         try:
             done = run(command, cwd=folder, seconds=_left(deadline))
         except ToolMissing as error:
             raise NoOpinion(str(error)) from None
         if done.code != 0:
             raise NoOpinion(f"{command[0]} failed: {(done.stdout + done.stderr).strip()[:300]}")
-    depth = 20 * len(checker.graph) + 10_000
-    return {p.key: _verdict(folder, f"c{number}", depth, _left(deadline)) for number, p in enumerate(properties)}
+    depth = 20 * len(checker.graph) + SPIN_DEPTH
+
+    def one(number: int) -> bool:
+        return _verdict(folder, f"c{number}", depth, deadline)
+
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        return dict(zip([p.key for p in properties], pool.map(one, range(len(properties))), strict=True))
 
 
 def _translated(checker: Checker, properties: Sequence[Property]) -> dict[str, str]:
@@ -101,15 +112,15 @@ def _translated(checker: Checker, properties: Sequence[Property]) -> dict[str, s
     if agent.environment.fair:
         raise promela.NotTranslated("fairness assumptions")
     tables = promela.header(agent.program, agent.environment, checker.atoms, probed=agent.probed)
-    lines = ['c_decl {\n\\#include "agent.h"\n\\#include "agent.c"\n}', 'c_state "S s" "Global"', ""]
+    lines = ['c_decl {\n\\#include "agent.h"\n}', 'c_state "S s" "Global"', ""]
     lines += [f"#define a{at} (c_expr {{ SAYS_{at} }})" for at in range(len(checker.atoms))]
     lines += ["", "active proctype agent() {", "end: do"]
     for way in range(promela.most_ways(agent.environment)):
         lines.append(f"  :: atomic {{ c_expr {{ MORE_{way} }} -> c_code {{ go(HERE, {way}); }} }}")
     lines += ["  od", "}", ""]
     lines += [f"ltl c{number} {{ {_ltl(p.formula, checker.places)} }}" for number, p in enumerate(properties)]
-    runner = promela.RUNNER.read_text(encoding="utf-8")
-    return {"agent.h": tables, "agent.c": runner, "agent.pml": "\n".join(lines) + "\n"}
+    runner = {path.name: path.read_text(encoding="utf-8") for path in promela.RUNNER}
+    return {"agent.h": tables, **runner, "agent.pml": "\n".join(lines) + "\n"}
 
 
 def _left(deadline: float) -> float:
@@ -119,9 +130,12 @@ def _left(deadline: float) -> float:
     return left
 
 
-def _verdict(folder: Path, claim: str, depth: int, seconds: float) -> bool:
-    done = run(["./pan", "-a", "-n", f"-m{depth}", "-w18", "-N", claim], cwd=folder, seconds=seconds)
-    text = done.stdout + done.stderr
+def _verdict(folder: Path, claim: str, deepest: int, deadline: float) -> bool:
+    for depth in (SPIN_DEPTH, deepest):  # a deep stack costs more than most searches
+        done = run(["./pan", "-a", "-n", f"-m{depth}", "-w18", "-N", claim], cwd=folder, seconds=_left(deadline))
+        text = done.stdout + done.stderr
+        if "too small" not in text:
+            break
     found = _ERRORS.search(text)
     if done.timed_out or found is None or "too small" in text or ("Search not completed" in text and found[1] == "0"):
         raise NoOpinion(f"pan gave no answer: {text.strip()[:200]}")

@@ -54,8 +54,11 @@ LAZY_SHARE = 0.02
 SPIN_SHARE = 0.5
 """Of the time that is left, what Spin may use for its second opinion."""
 
-SPIN_SECONDS = 20.0
-"""The most that a second opinion may take that the plan did not ask for."""
+SPIN_SECONDS = 60.0
+"""The most that a second opinion may take that the plan did not ask for: the case study's agents take five to ten."""
+
+SPIN_DEPTH = 10_000
+"""Steps of the run that Spin follows at first; the case study's searches go to 1,300."""
 
 FORMULA_DEPTH = 120
 """Deeper guarantees are refused by name: what translates them recurses."""
