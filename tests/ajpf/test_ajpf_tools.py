@@ -178,7 +178,19 @@ def test_ajpf_agrees_on_small_agents(tmp_path, seed):
     program, draws = parse_system(made.program, "ag.gwen"), read_environment(tmp_path / "e.yaml")
     wanted = [Property(f"f{n}", instantiate(parse_psl(text), {})) for n, text in enumerate(made.formulas)]
     setup = Setup(
-        program, program[0].name, tmp_path, "", draws, tmp_path, (), {}, (), Semantics.MCAPL, "ajpf", 5_000, environment_class=None
+        program,
+        program[0].name,
+        tmp_path,
+        "",
+        draws,
+        tmp_path,
+        (),
+        {},
+        (),
+        Semantics.MCAPL,
+        "ajpf",
+        5_000,
+        environment_class=None,
     )
     installation = ajpf_tool.find()
     assert installation is not None
