@@ -66,7 +66,7 @@ def planned_seconds_option() -> Callable[[Command], Command]:
         "--seconds",
         type=_Seconds(),
         metavar="SECONDS",
-        help="Time for one question to the solver, and for one run of a tool, whatever the plan says.",
+        help="Effort for one question to the solver, and time for one run of a tool, whatever the plan says.",
     )
 
 

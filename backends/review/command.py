@@ -36,8 +36,9 @@ def stamp(system: str, node: str, method: str | None, as_json: bool, renewed: st
 @click.argument("system")
 @click.argument("node")
 @click.option("--method", help="The review's id, where the node has several.")
+@click.option("--json", "as_json", is_flag=True, help="For machines.")
 @click.option("--key", required=True, metavar="FILE", help="A private key (`avow audit --new-key`).")
-def sign(system: str, node: str, method: str | None, key: str) -> int:
+def sign(system: str, node: str, method: str | None, as_json: bool, key: str) -> int:
     """Sign the review of NODE in SYSTEM as it is now: RECORD.sig, beside it, vouches for these bytes.
 
     A record that was changed afterwards, be it by a stamp, has to be read and signed again. With `key: FILE` (a public
@@ -55,5 +56,5 @@ def sign(system: str, node: str, method: str | None, key: str) -> int:
         found = sign_record(record_of(system_folder(system), node, method)[0], Path(key))
     except OSError as error:
         raise Rejected(Diagnostic("REV123", f"the signature cannot be written: {error.strerror}")) from None
-    click.echo(f"signed: {found}")
+    click.echo(json.dumps({"signed": str(found)}) if as_json else f"signed: {found}")
     return 0

@@ -22,7 +22,7 @@ SERVERS = {"lsp", "worker"}
 NO_QUESTIONS = {
     *SERVERS,
     *("agent run", "audit", "check", "diff", "doctor", "explain", "fmt", "init", "monitor", "recheck", "report"),
-    *("requirements", "review stamp", "sign", "translate"),
+    *("requirements", "review sign", "review stamp", "sign", "translate"),
 }
 """They ask no solver and run no tool that a time would bound (`recheck`: the kernel counts steps, not seconds)."""
 
@@ -57,7 +57,7 @@ def test_seconds_are_there_wherever_a_question_is_asked() -> None:
     assert lacking == NO_QUESTIONS
     for name in LEAVES.keys() - NO_QUESTIONS:
         flag = options(LEAVES[name])["--seconds"]
-        assert (flag.help or "").startswith("Time for one question to the solver"), name
+        assert (flag.help or "").startswith("Effort for one question to the solver"), name
         assert type(flag.type).__name__ == "_Seconds", name
 
 
