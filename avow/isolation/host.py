@@ -153,7 +153,7 @@ def read_sources_only(root: str) -> None:
 
 # -- what the subject does besides answering ----------------------------------------------------------------------
 
-_READS = frozenset({"sqlite3.connect", "os.chdir"})
+_READS = frozenset({"os.chdir"})
 _LISTS = frozenset({"os.listdir", "os.scandir"})
 _CHANGES = frozenset(
     {"os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate", "os.chmod", "os.chown"}
@@ -165,11 +165,11 @@ _NETWORK = ("socket.", "urllib.", "http.", "ftplib.", "smtplib.", "telnetlib.", 
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
-def watch(scratch: str) -> tuple[list[list[str]], list[str], Callable[[], None]]:
-    """(what it looks at, as [event, path]; what no subject may do), growing as it runs, and what is to be called at the
-    end. A hook cannot be taken away."""
+def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Callable[[], None]]:
+    """What it looks at, as [event, path], growing as it runs, and what is to be called at the end. What no subject may
+    do ends the process by `end`, before it is done: nothing can catch that, or have it forgotten. A hook cannot be
+    taken away."""
     seen: list[list[str]] = []
-    faults: list[str] = []
     known: set[tuple[str, str]] = set()
     fspath, isabs, join, getcwd, norm = os.fspath, os.path.isabs, os.path.join, os.getcwd, os.path.normpath
 
@@ -190,8 +190,7 @@ def watch(scratch: str) -> tuple[list[list[str]], list[str], Callable[[], None]]
             seen.append([event, path])
 
     def fault(what: str) -> None:
-        if len(faults) < 20 and what not in faults:
-            faults.append(what)
+        end(what)
         raise PermissionError(f"a subject {what}")
 
     def changes(place: Any, what: str) -> None:
@@ -221,6 +220,12 @@ def watch(scratch: str) -> tuple[list[list[str]], list[str], Callable[[], None]]
             told("outside", f"the library {arguments[0]}")
         elif event.startswith("ctypes.dlsym"):
             told("outside", "a library's functions")
+        elif event == "sqlite3.connect":
+            name = str(arguments[0])
+            if name.startswith("file:") and "mode=ro" in name:
+                told("read", name.removeprefix("file:").partition("?")[0])
+            elif name not in ("", ":memory:"):
+                changes(arguments[0], "writes")
         elif event in _READS:
             told("read", arguments[0])
         elif event in _CHANGES:
@@ -234,7 +239,7 @@ def watch(scratch: str) -> tuple[list[list[str]], list[str], Callable[[], None]]
 
     sys.addaudithook(hook)
     _look_out(told)
-    return seen, faults, watch_chance(told)
+    return seen, watch_chance(told)
 
 
 _HARMLESS = ("self", "thread-self", "cpuinfo", "meminfo", "stat", "version", "filesystems", "mounts", "sys")
@@ -409,12 +414,17 @@ def main() -> None:
     look = posix.access  # without an audit event: for whoever traces system calls
     with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
         read_sources_only(os.path.realpath(root))
-        seen, faults, drawn = watch(tempfile.gettempdir())
-        dumps = json.dumps
+        dumps, write, leave = json.dumps, os.write, os._exit
+
+        def end(fault: str) -> None:
+            write(sink, (dumps({"faults": [fault]}) + "\n").encode())
+            leave(1)
+
+        seen, drawn = watch(tempfile.gettempdir(), end)
 
         def say(message: dict[str, Any]) -> None:
             told, seen[:] = seen[:], []
-            answers.write(dumps({**message, "seen": told, "faults": faults}) + "\n")
+            answers.write(dumps({**message, "seen": told}) + "\n")
             answers.flush()
 
         look(f"{mark}-begin", os.F_OK)
@@ -435,7 +445,7 @@ def main() -> None:
         processes = [int(name) for name in os.listdir("/proc") if name.isdigit()] if level == "sealed" else []  # noqa: PTH208
         seen[:] = told  # that was us
         if set(processes) - {1, os.getpid()}:
-            faults.append("left processes behind")
+            end("left processes behind")
         say({"end": True})
 
 

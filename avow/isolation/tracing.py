@@ -68,7 +68,7 @@ def traces() -> bool:
 def _strace(place: str) -> list[str]:
     calls = ",".join(["%file", *sorted(_SIGNALS | _PROBES | _NETWORK)])
     program = shutil.which("strace") or "strace"
-    return [program, "-f", "--seccomp-bpf", "-y", "-qq", "-e", "signal=none", "-e", f"trace={calls}", "-o", place]
+    return [program, "-f", "--seccomp-bpf", "-y", "-q", "-e", "signal=none", "-e", f"trace={calls}", "-o", place]
 
 
 class Trace:
@@ -97,7 +97,8 @@ class Trace:
 
 
 def _whole(lines: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
-    """(process, call), calls that were interrupted by others' joined again, in the order in which they ended."""
+    """(process, call), calls that were interrupted by others' joined again, in the order in which they ended; nothing
+    where a process ended."""
     open_: dict[int, bytes] = {}
     for line in lines:
         number, _, rest = line.partition(b" ")
@@ -108,6 +109,8 @@ def _whole(lines: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
             open_[process] = rest.removesuffix(b"<unfinished ...>")
         elif rest.startswith(b"<... "):
             yield process, open_.pop(process, b"") + rest.partition(b"resumed>")[2]
+        elif rest.startswith(b"+++ "):
+            yield process, b""
         else:
             yield process, rest
     yield from open_.items()
@@ -123,10 +126,15 @@ def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: s
     places: dict[int, str] = {}
     host: int | None = None
     ended = False
+    running: set[int] = set()
     for process, line in lines:
+        if not line:
+            running.discard(process)
         found = _CALL.match(line)
         if found is None:
             continue
+        if host is not None and not ended:
+            running.add(process)
         call, base, text, rest = found[1].decode(), found[2], found[3], found[4]
         if text is not None and _text(text) == f"{mark}-begin" and host is None:
             host = process
@@ -135,6 +143,8 @@ def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: s
             continue
         if text is not None and _text(text) == f"{mark}-end":
             ended = ended or process == host
+            if running - {host}:
+                faults["left processes behind"] = None
         if ended and process == host:
             continue  # it looks whether something is left
         if call in _SIGNALS:

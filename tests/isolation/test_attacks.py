@@ -73,6 +73,67 @@ ATTACKS = {
     "def step(**inputs):\n    " + WRONG,
 }
 
+STEP = "\ndef step(**inputs):\n    " + WRONG
+FORGE = f"""
+import os
+FORGERY = ({FORGERY!r} + chr(10)).encode()
+def forge(*ignored):
+    for n in range(3, 40):
+        try:
+            os.write(n, FORGERY)
+        except OSError:
+            pass
+"""
+ATTACKS |= {
+    "a thread that writes on": FORGE + "import threading\ndef on():\n    while True:\n        forge()\n"
+    "threading.Thread(target=on, daemon=True).start()" + STEP,
+    "writes as it ends": FORGE + "import atexit\natexit.register(forge)\nstep = lambda **k: exit(0)\n",
+    "writes at a signal": FORGE + "import signal\nsignal.signal(signal.SIGALRM, forge)\n"
+    "signal.setitimer(signal.ITIMER_REAL, 0.01, 0.01)" + STEP,
+    "writes when it is collected": FORGE + "class C:\n    __del__ = forge\nkept = C()\n"
+    "def step(**inputs):\n    global kept\n    kept = C()\n    " + WRONG,
+    "writes as it is traced": FORGE + "import sys\nsys.setprofile(forge)" + STEP,
+    "takes the channels": "import os\nfor n in range(3, 40):\n    try:\n        os.dup2(1, n)\n    except OSError:\n"
+    "        pass" + STEP,
+    "closes the channels": "import os\nos.closerange(3, 40)" + STEP,
+    "ends with a code": "import sys\ndef step(**inputs):\n    sys.exit(0)\n",
+    "aborts": "import os\ndef step(**inputs):\n    os.abort()\n",
+    "kills itself": "import signal\ndef step(**inputs):\n    signal.raise_signal(9)\n",
+    "stops itself": "import signal\ndef step(**inputs):\n    signal.raise_signal(signal.SIGSTOP)\n",
+    "recurses": "def step(**inputs):\n    return step(**inputs)\n",
+    "answers without end": "def step(**inputs):\n    return {'colour': 'x' * 20_000_000, 'done': set()}\n",
+    "answers what never ends": "import itertools\nfrom collections.abc import Mapping\nclass M(dict):\n"
+    "    def items(self):\n        return ((n, 0) for n in itertools.count())\ndef step(**inputs):\n    return M()\n",
+    "answers what pretends": "class S(str):\n    __eq__ = lambda *a: True\n    __hash__ = str.__hash__\n"
+    "def step(**inputs):\n    return {'colour': S('green'), 'done': set()}\n",
+    "patches the language": "import builtins, fractions\nbuiltins.isinstance = lambda *a: True\n"
+    "builtins.len = lambda x: 0\nfractions.Fraction.__lt__ = lambda *a: True" + STEP,
+    "makes its faults forgotten": "import gc\ndef step(**inputs):\n    try:\n        open('x', 'w')\n"
+    "    except OSError:\n        pass\n    for o in gc.get_objects():\n        if type(o) is list and o and "
+    "type(o[0]) is str and 'writes' in o[0]:\n            o.clear()\n    " + WRONG,
+    "a pool": "import multiprocessing as m\ndef f(x):\n    return x\ndef step(**inputs):\n    try:\n"
+    "        m.Pool(1).map(f, [1])\n    except OSError:\n        pass\n    " + WRONG,
+    "a spawned process": "import os\nos.posix_spawn('/bin/sleep', ['sleep', '30'], {})" + STEP,
+    "a shell in the background": "import os\nos.system('sleep 30 &')" + STEP,
+    "a daemon in the background": "import os\nos.system('setsid sleep 30 >/dev/null 2>&1 &')" + STEP,
+    "forks by hand": "import ctypes\nif ctypes.CDLL(None).fork() == 0:\n    import time\n    time.sleep(30)" + STEP,
+    "another copy of a module": "import importlib.util as u\nspec = u.find_spec('_posixsubprocess')\n"
+    "m = u.module_from_spec(spec)\nspec.loader.exec_module(m)\nimport os, subprocess\n"
+    "subprocess._fork_exec = m.fork_exec\nsubprocess.Popen(['sleep', '30'])" + STEP,
+    "traces its parent": "import ctypes, os\nctypes.CDLL(None).ptrace(16, os.getppid(), 0, 0)" + STEP,
+    "a database beside itself": "import sqlite3\ntry:\n    sqlite3.connect('s2.py').execute('create table t(x)')\n"
+    "except Exception:\n    pass" + STEP,
+    "a link beside itself": "import os\ntry:\n    os.symlink('/etc/passwd', 's2.py')\nexcept OSError:\n    pass" + STEP,
+    "a program that writes": "import subprocess\nsubprocess.run(['sh', '-c', 'echo x > s2.py'], stderr=-3)" + STEP,
+    "a program that kills": "import os, subprocess\n"
+    "subprocess.run(['sh', '-c', 'kill -0 %d' % os.getppid()], stderr=-3)" + STEP,
+    "a module's name": "import sys\nsys.modules['__main__'].__dict__['say'] = None\nsys.modules['json'] = None" + STEP,
+    "an endless import": "while True:\n    pass\n",
+}
+
+ONLY_WRONG = ("answers what pretends", "a module's name")
+"""These do nothing forbidden: what they answer is judged as any other's answer, and one guarantee holds of it."""
+
 
 def settle(folder: Path, text: str) -> Report:
     given = {"subject": "s.py:step", "cases": 40}
@@ -85,12 +146,18 @@ def settle(folder: Path, text: str) -> Report:
 def test_no_attack_is_believed(tmp_path: Path, name: str, level: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(SANDBOX, level)
     report = settle(tmp_path, ATTACKS[name])
+    found = {o.obligation.rpartition("/")[2]: o.verdict for o in report.outcomes}
+    if name in ONLY_WRONG:
+        assert found.pop("low") is Verdict.TESTED
     bad = {Verdict.ERROR, Verdict.REFUTED}
+    if name == "writes at a signal":
+        bad |= {Verdict.UNKNOWN}  # when it strikes is chance: it may be only that it does not answer alike twice
     if any(o.kind is Seen.OUTSIDE for o in report.observed):
         bad |= {Verdict.TESTED}  # which the core does not let count: see test_observed
-    assert {o.verdict for o in report.outcomes} <= bad, [o.summary for o in report.outcomes]
+    assert {*found.values()} <= bad, [o.summary for o in report.outcomes]
     assert (tmp_path / "s.py").read_text() == ATTACKS[name]
-    assert not (tmp_path / "s2.py").exists()
+    if name != "a program that writes" or level != "off":  # there nothing keeps it from writing: it is an error
+        assert not (tmp_path / "s2.py").exists()
 
 
 @pytest.mark.parametrize("level", LEVELS)

@@ -1,0 +1,107 @@
+"""Commands that read, and the language server, execute nothing of a workspace, whatever lies in it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from helpers import some
+
+AVOW = str(Path(sys.executable).with_name("avow"))
+RCL = "node n { inputs( x : REAL ) outputs( y : REAL ) topics() guarantee g ( out.y <= 1 ) }\n"
+PLAN = """system: s
+plugins: [evil]
+model: {graph: graph.dot}
+requirements: {R: {text: It is small., supported_by: [n]}}
+nodes: {n: {criticality: low, methods: [{hypothesis: {subject: 'm.py:step', cases: 5}}, evil]}}
+"""
+EVIL = """
+import os, pathlib
+pathlib.Path({root!r}, "executed").open("a").write(__file__ + os.linesep)
+def step(x):
+    return 0
+"""
+NAMES = [
+    *("evil", "sitecustomize", "usercustomize", "conftest", "dodo", "setup", "z3", "lark", "yaml", "json", "click"),
+    *("hypothesis", "pygls", "doit", "jinja2", "rich", "avow/__init__", "avow/cli", "backends/__init__", "typing"),
+    *("encodings/__init__", "cryptography/__init__", "jsonschema", "_avow", "antigravity"),
+]
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("theirs")
+    folder = root / "contracts" / "s"
+    folder.mkdir(parents=True)
+    (folder / "s.rcl").write_text(RCL)
+    (folder / "plan.yaml").write_text(PLAN)
+    (folder / "graph.dot").write_text("digraph { a -> b }\n")
+    text = EVIL.format(root=str(root))
+    for where in (root, folder, root / "contracts", root / "artifacts", root / ".venv"):
+        for name in NAMES:
+            (where / name).parent.mkdir(parents=True, exist_ok=True)
+            (where / f"{name}.py").write_text(text)
+        (where / "evil.pth").write_text("import evil\n")
+        (where / "pyvenv.cfg").write_text("home = .\n")
+        (where / "pyproject.toml").write_text("[tool.avow]\nplugins = ['evil']\n[tool.doit]\n")
+    (folder / "m.py").write_text(text)
+    return root
+
+
+def run(root: Path, *words: str, stdin: bytes = b"") -> str:
+    done = subprocess.run([AVOW, *words], cwd=root, capture_output=True, timeout=120, check=False, input=stdin)
+    said = (done.stdout + done.stderr).decode(errors="replace")
+    assert "Traceback" not in said, said
+    left = root / "executed"
+    assert not left.exists(), (words, left.read_text())
+    return said
+
+
+READERS = [
+    ["check"],
+    ["check", "contracts/s"],
+    ["audit"],
+    ["report"],
+    ["fmt", "--check", "contracts/s/s.rcl"],
+    ["explain", "s/n/guarantee/g"],
+    ["sanity", "contracts/s"],
+    ["compose", "contracts/s"],
+    ["refines", "contracts/s/s.rcl", "contracts/s/s.rcl"],
+    ["diff", "contracts/s", "contracts/s"],
+    ["recheck"],
+    ["requirements", "contracts/s"],
+    ["doctor"],
+    ["review", "stamp", "contracts/s", "n"],
+    ["--help"],
+]
+
+
+@pytest.mark.parametrize("words", some(READERS, 2), ids=" ".join)
+def test_a_command_that_reads(place: Path, words: list[str]) -> None:
+    run(place, *words)
+
+
+def message(**body: object) -> bytes:
+    text = json.dumps({"jsonrpc": "2.0", **body}).encode()
+    return b"Content-Length: %d\r\n\r\n%s" % (len(text), text)
+
+
+def test_the_language_server(place: Path) -> None:
+    asked = [
+        message(id=0, method="initialize", params={"processId": None, "rootUri": place.as_uri(), "capabilities": {}})
+    ]
+    asked.append(message(method="initialized", params={}))
+    for name in ("s.rcl", "plan.yaml"):
+        path = place / "contracts" / "s" / name
+        document = {"uri": path.as_uri(), "languageId": "rcl", "version": 1, "text": path.read_text()}
+        asked.append(message(method="textDocument/didOpen", params={"textDocument": document}))
+        for number, question in enumerate(("hover", "definition", "documentSymbol", "completion"), 1):
+            about = {"textDocument": {"uri": path.as_uri()}, "position": {"line": 0, "character": 80}}
+            asked.append(message(id=number, method=f"textDocument/{question}", params=about))
+        asked.append(message(method="textDocument/didSave", params={"textDocument": {"uri": path.as_uri()}}))
+    asked += [message(id=99, method="shutdown"), message(method="exit")]
+    said = run(place, "lsp", stdin=b"".join(asked))
+    assert '"id":99' in said.replace(" ", ""), said[-2000:]
