@@ -238,7 +238,12 @@ _NAMES = (
         "A node lists a topic once, or once for each variable that its messages carry; always with the same type.",
         _node(topics="bool t, bool t"),
     ),
-    Code("RCL217", "no ROS type", "A topic has a ROS built-in type, or one of a package.", _node(topics="Bool t")),
+    Code(
+        "RCL217",
+        "no ROS type or name",
+        "A topic has a ROS built-in type, or one of a package, and a name as ROS takes it.",
+        _node(topics="Bool t"),
+    ),
     Code(
         "RCL218",
         "matches nothing",

@@ -23,4 +23,35 @@ ROS_CODES = register(
         "The common message types of a distribution, and .idl files, are read by a package that is not installed.",
         "`pip install 'avow[bags]'`, or name the .msg files under `messages`.",
     ),
+    declare(
+        "ROS111",
+        "topic of two types",
+        "A topic is published or heard as messages of different types: in ROS the two never meet.",
+        "Give the topic one type in the contract, or remap one of its ends under `ros`.",
+    ),
+    declare(
+        "ROS112",
+        "connection against the topics",
+        "The plan connects ports whose topics have different names when the robot runs.",
+        "Say under `ros` what remaps one of them, or take the connection out.",
+    ),
+    declare(
+        "ROS113",
+        "one name, two topics",
+        "An output and an input of one name are on different topics, which do not link them.",
+        "Say under `ros` what remaps one of them, where they are one topic when the robot runs.",
+        warning=True,
+    ),
+    declare(
+        "ROS114",
+        "node hears itself",
+        "A node listens to a topic that it publishes itself, and the plan does not say from when on.",
+        "Connect the two, delayed, with an initial value.",
+    ),
+    declare(
+        "ROS115",
+        "which variable of the topic",
+        "A topic carries several variables, and which of them an input is cannot be seen from names.",
+        "Give both ports one name, or connect them.",
+    ),
 )

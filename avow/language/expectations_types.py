@@ -34,7 +34,7 @@ def in_topics(tokens: Sequence[Token], at: int, found: Token, expected: frozense
     if found.type == "MATCHES" and "SLASH" in recent:
         return "between type and name stands no slash: write `package/Type name matches(in.v)`"
     if found.type == "SLASH" and (before is None or before.type in ("COMMA", "NAME")):
-        return f"{_TOPIC}; the name stands last and without slashes"
+        return f"{_TOPIC}; the name stands last"
     return _TOPIC
 
 

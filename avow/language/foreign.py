@@ -37,7 +37,7 @@ SIGNS: dict[str, Foreign] = {
     **_as("AND", "and", "&&", "&", "∧", "/\\"),
     **_as("OR", "or", "||", "∨", "\\/"),
     **_as("NOT", "not", "!", "¬"),
-    **_as("NOT", "not", "~", hint="write `not`; the name of a topic stands without `~/`"),
+    **_as("NOT", "not", "~", hint="write `not`"),
     **_as("EQ", "==", "===", "≔"),
     **_as("EQ", "==", ":=", hint="write `==` for equality, `=` for a constant"),
     **_as("NE", "!=", "/=", "=/=", "!==", "~=", "≠"),

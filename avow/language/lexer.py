@@ -135,10 +135,13 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
 
 
 _STRUCTURE = frozenset(("CONTEXT", "NODE", "INPUTS", "OUTPUTS", "TOPICS", "MATCHES", "ASSUME", "GUARANTEE"))
+_SECTIONS = _STRUCTURE - {"MATCHES"}
 _WITHIN = frozenset(("LPAR", "COMMA", "DOT", "EQ", "NE", "LE", "GE", "LT", "GT", "IN", "NOT_IN", "PLUS", "MINUS"))
 _CONNECTIVES = frozenset(("AND", "OR", "NOT", "IMPLIES", "IFF", "BAR"))
 _GOES_ON = re.compile(r"\s*(?:[.:,)=<>!+*/|&-]|(?:in|and|or)\b)")
 _ARRAY = re.compile(r"\]|\s*(?:REAL|INTEGER|NATURAL|BOOL|STRING)\b")
+_PRIVATE = re.compile(r"~/?[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*")
+"""A topic's name in its node's own namespace."""
 _PORT = re.compile(r"\.[A-Za-z_]")
 
 
@@ -189,6 +192,9 @@ class _Other:
             reports.error("RCL102", "`#` does not begin a comment", start, end, hint="write `// …`")
             line_end = reports.source.text.find("\n", start)
             return line_end if line_end >= 0 else len(reports.source.text)
+        if piece == "~" and (private := _PRIVATE.match(reports.source.text, start)) and self.among_topics():
+            self.found.append(Token("NAME", private.group(), start, private.end()))
+            return private.end()
         hint, token = foreign(piece)
         if piece == "::" and len(self.found) > 1 and self.found[-2].start in reports.odd:
             self.found.append(Token("SLASH", "/", start, end))  # `std_msgs::msg::Bool` is one mistake
@@ -200,6 +206,10 @@ class _Other:
         if token is not None:
             self.stand_in(token, start, end)
         return end
+
+    def among_topics(self) -> bool:
+        """Whether the latest section that has begun is a list of topics."""
+        return next((t.type for t in reversed(self.found) if t.type in _SECTIONS), "") == "TOPICS"
 
     def bracket(self, piece: str, start: int, end: int) -> None:
         """A square bracket: of an item (`s[0]`), an array type (`REAL[]`), an interval, or a collection."""
@@ -230,6 +240,8 @@ class _Other:
         """A keyword that begins a clause or section; or one that someone took for a name, or for `in`."""
         reports, text = self.reports, self.reports.source.text
         before = self.found[-1].type if self.found else ""
+        if before == "SLASH" and self.found[-1].end == start and self.among_topics():
+            return Token("NAME", word, start, end)  # a segment of a topic's name
         if kind in ("INPUTS", "OUTPUTS") and before != "RPAR" and _PORT.match(text, end):
             meant = "in" if kind == "INPUTS" else "out"
             reports.error("RCL101", f"`{word}.` is not RCL", start, end, hint=f"write `{meant}.`")

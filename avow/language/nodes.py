@@ -18,6 +18,7 @@ from avow.language.scope import Scope
 from avow.language.source import Reports
 from avow.language.syntax import RosType, UnspecifiedType
 from avow.language.terms import Role, Term
+from avow.ros.names import is_name
 from avow.tuning.sizes import CONTRACT_PARTS, NESTING
 
 ROS_BUILTINS = (
@@ -135,6 +136,9 @@ def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]
     for tree in node.topics.items if node.topics is not None else ():
         name = tree.name
         _check_ros_type(tree.type, reports)
+        if not is_name(name.text.replace("'", "")):
+            hint = "letters, digits and _, set apart by single slashes, with / or ~ before it"
+            reports.error("RCL217", f"`{name.text}` is no name of a topic", name.start, name.end, hint=hint)
         port = _matched(tree.role, tree.port, scope, reports) if tree.port is not None else None
         if tree.port is not None and port is None:
             continue

@@ -59,6 +59,7 @@ from avow.language.syntax import (
     UnspecifiedType,
 )
 from avow.language.terms import Quantifier
+from avow.language.topic_names import topic_names
 from avow.tuning.bounds import CHAIN
 from avow.tuning.sizes import NESTING
 
@@ -93,6 +94,8 @@ def parse(
 def parse(start: str, tokens: Sequence[Token], reports: Reports, end: int, begin: int | None = None) -> Syntax | None:
     """The tree of one part of a file, which stands between the offsets `begin` (of its first token, where not given)
     and `end`. Reports the first error, unless it follows from what the lexer had to leave out or guess; then None."""
+    if start == "topics":
+        tokens = topic_names(tokens)
     tree = _run(_tables(start), tokens, Token("$END", "", end, end))
     if begin is None:
         begin = tokens[0].start if tokens else end

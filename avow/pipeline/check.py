@@ -48,10 +48,12 @@ def diagnostics(system: System) -> tuple[Diagnostic, ...]:
 def of_plan(system: System) -> tuple[Diagnostic, ...]:
     """What is to be said of a plan that can be read: its account of the ROS graph, its requirements' sentences, and
     what each backend says of its options; without the warnings that the plan switches off."""
+    from avow.system.graph import dataflow
     from avow.system.sentences import requirement_sentences
     from avow.system.statements import unconfirmed, without_words
 
     found = [
+        *(d for d in dataflow(system).findings if d.code.startswith("ROS")),
         *_model(system),
         *_policy(system),
         *requirement_sentences(system),

@@ -1,20 +1,23 @@
-"""The dataflow graph: which output feeds which input, by names and types, and by the plan where they do not suffice.
+"""The dataflow graph: which output feeds which input, by topics, by names and types, and by the plan where they do not
+suffice.
 
-An output feeds the inputs of *other* nodes that bear its name and type. A connection of the plan renames, chooses among
-several providers, delays, or lets a node feed itself; an input named by a connection takes that source and no other.
+Where both ends have a topic, the topic links them (`avow.system.topics`). Otherwise an output feeds the inputs of
+*other* nodes that bear its name and type. A connection of the plan renames, chooses among several providers, delays, or
+lets a node feed itself; an input named by a connection takes that source and no other.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.graphs import components, cycles_in
 from avow.language.contract import Node, Port
 from avow.language.sorts import INTEGER, NATURAL, Sort
 from avow.system.plan import Connection, Endpoint, System
+from avow.system.topics import Carrier, Ends, contradicted, ends, unlinked, wrong_types
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +29,8 @@ class Edge:
     delayed: bool = False
     initial: str | None = None
     declared: bool = False
+    topic: str = field(default="", compare=False)
+    """The topic that carries it, by its whole name; empty where an end has none."""
     span: Span | None = field(default=None, compare=False, repr=False)
     initial_span: Span | None = field(default=None, compare=False, repr=False)
 
@@ -70,10 +75,14 @@ class Graph:
 def dataflow(system: System) -> Graph:
     """The graph of a system. Never raises: what is wrong with it stands in `findings`."""
     nodes = system.contract.nodes
-    faults: list[Diagnostic] = []
+    found = ends(nodes, system.plan.ros.names)
+    faults: list[Diagnostic] = [*wrong_types(found), *contradicted(system.plan.connections, found)]
     edges = _declared(system, faults)
     taken = {edge.target for edge in edges}
-    edges += _by_names(nodes, taken, faults)
+    edges += _by_topics(nodes, taken, found, faults)
+    taken = {edge.target for edge in edges}
+    edges += _by_names(nodes, taken, found, faults)
+    edges = [replace(e, topic=_topic(e, found)) for e in edges]
     return wired(nodes, edges, faults, {node.name: node.span for node in nodes})
 
 
@@ -138,7 +147,13 @@ def _declared(system: System, faults: list[Diagnostic]) -> list[Edge]:
             faults.append(Diagnostic("PLAN122", message, connection.span, notes=notes))
             continue
         edges[target] = Edge(
-            source, target, connection.delayed, connection.initial, True, connection.span, connection.initial_span
+            source,
+            target,
+            connection.delayed,
+            connection.initial,
+            True,
+            span=connection.span,
+            initial_span=connection.initial_span,
         )
     return list(edges.values())
 
@@ -151,7 +166,64 @@ def _ports(system: System, connection: Connection) -> tuple[Port, Port] | None:
         return None  # told, with its place, by avow.system.names
 
 
-def _by_names(nodes: Sequence[Node], taken: set[Endpoint], faults: list[Diagnostic]) -> list[Edge]:
+def _topic(edge: Edge, found: Ends) -> str:
+    carrier = found.outputs.get(edge.source)
+    return carrier.topic if carrier is not None and edge.target in found.inputs else ""
+
+
+def _by_topics(nodes: Sequence[Node], taken: set[Endpoint], found: Ends, faults: list[Diagnostic]) -> list[Edge]:
+    """What one topic carries from a node that publishes it to one that listens to it. Of a topic that carries several
+    variables, those of one name belong together; otherwise there has to be one at either end."""
+    listening: dict[tuple[str, str], int] = defaultdict(int)
+    for at, carrier in found.inputs.items():
+        listening[at.node, carrier.topic] += 1
+    edges: list[Edge] = []
+    for node in nodes:
+        for port in node.inputs:
+            target = Endpoint(node.name, port.name)
+            if target in taken or target not in found.inputs:
+                continue
+            carrier = found.inputs[target]
+            sources = found.published.get(carrier.topic, ())
+            others = [(at, output) for at, output in sources if at.node != node.name]
+            if sources and not others:
+                faults.append(_own_topic(target, sources[0][0], carrier))
+                continue
+            named = [(at, output) for at, output in others if output.name == port.name]
+            single = len(others) == 1 and listening[node.name, carrier.topic] == 1
+            chosen = named or (others if single else [])
+            if len(chosen) == 1:
+                at, output = chosen[0]
+                if fits(output.sort, port.sort):
+                    edges.append(Edge(at, target, span=port.span))
+                else:
+                    faults.append(_other_type(at, output, target, port, carrier))
+            elif chosen:
+                faults.append(_several(target, [at.node for at, _ in chosen], port))
+            elif others:
+                faults.append(_which(target, others, carrier))
+    return edges
+
+
+def _own_topic(target: Endpoint, source: Endpoint, carrier: Carrier) -> Diagnostic:
+    message = f"{target.node} hears on {carrier.topic} what it publishes itself as {source.port}"
+    hint = f"connections: {{from: {source}, to: {target}, delayed: true, initial: …}}"
+    return Diagnostic("ROS114", message, carrier.span, hint=hint)
+
+
+def _other_type(at: Endpoint, output: Port, target: Endpoint, port: Port, carrier: Carrier) -> Diagnostic:
+    message = f"{carrier.topic} links {at} ({output.type_name}) and {target} ({port.type_name}): other types"
+    return Diagnostic("PLAN121", message, carrier.span, hint="give both ports one type, or remap one of them")
+
+
+def _which(target: Endpoint, others: Sequence[tuple[Endpoint, Port]], carrier: Carrier) -> Diagnostic:
+    known = ", ".join(str(at) for at, _ in others)
+    message = f"{carrier.topic} carries {known}, and which of them is {target} is not said"
+    hint = f"connections: {{from: {others[0][0]}, to: {target}}}"
+    return Diagnostic("ROS115", message, carrier.span, hint=hint)
+
+
+def _by_names(nodes: Sequence[Node], taken: set[Endpoint], found: Ends, faults: list[Diagnostic]) -> list[Edge]:
     outputs: dict[str, list[tuple[str, Port]]] = defaultdict(list)
     for node in nodes:
         for port in node.outputs:
@@ -162,7 +234,16 @@ def _by_names(nodes: Sequence[Node], taken: set[Endpoint], faults: list[Diagnost
             target = Endpoint(node.name, port.name)
             if target in taken or port.name not in outputs:
                 continue
+            carrier = found.inputs.get(target)
             others = [(name, output) for name, output in outputs[port.name] if name != node.name]
+            if carrier is not None:  # an output with a topic is linked by it, or not at all
+                apart = [Endpoint(name, o.name) for name, o in others if Endpoint(name, o.name) in found.outputs]
+                others = [(name, o) for name, o in others if Endpoint(name, o.name) not in found.outputs]
+                if apart and not others:
+                    other = found.outputs[apart[0]]
+                    if other.topic != carrier.topic:
+                        faults.append(unlinked(target, carrier, apart[0], other, port.span))
+                    continue
             fitting = [(name, output) for name, output in others if fits(output.sort, port.sort)]
             if len(fitting) == 1:
                 name, output = fitting[0]
@@ -176,7 +257,7 @@ def _by_names(nodes: Sequence[Node], taken: set[Endpoint], faults: list[Diagnost
                     "other type; the input is left to the environment"
                 )
                 faults.append(Diagnostic("PLAN121", message, port.span, Severity.WARNING))
-            else:
+            elif carrier is None or Endpoint(node.name, port.name) not in found.outputs:
                 message = (
                     f"{node.name} has an input and an output {port.name!r}; a node feeds itself only by a connection"
                 )

@@ -16,6 +16,7 @@ from avow.system.names import check_names
 from avow.system.plan import System
 from avow.system.plan_file import bare_plan, fill_methods, read_plan
 from avow.system.subsystems import check_subsystems, resolved
+from avow.system.topics import heard
 from avow.tuning.sizes import SYSTEMS_WITHIN
 
 PLAN_FILE = "plan.yaml"
@@ -63,6 +64,7 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System]) -> 
     faults += more
     if any(fault.is_error for fault in more):
         raise Rejected(*faults)
+    plan, contract = heard(plan, contract)
     wrong = check_subsystems(plan, contract)
     faults += (*wrong, *check_names(plan, root, contract))
     if not wrong:
@@ -85,7 +87,8 @@ def load_bare(files: Sequence[Path], name: str | None = None) -> System:
     contract, faults = _contract(tuple(files))
     if contract is None:
         raise Rejected(*faults)
-    return System(bare_plan(name or (files[0].stem if files else "system"), tuple(files)), contract)
+    plan = bare_plan(name or (files[0].stem if files else "system"), tuple(files))
+    return System(*heard(plan, contract))
 
 
 def load_path(path: Path) -> System:

@@ -35,10 +35,8 @@ def topic_types(setup: Setup) -> dict[str, str]:
     """Topic → dotted type, each once: the contract's topics, then those that only the plan names."""
     found: dict[str, str] = {}
     seen: set[str] = set()
-    rules = [
-        (rule.topic, rule.kind) for rule in setup.rules.values() if isinstance(rule, Fields | Choice) and rule.kind
-    ]
-    for name, kind in [*((topic.name, topic.ros_type) for topic in setup.node.topics), *rules]:
+    rules = (rule for rule in setup.rules.values() if isinstance(rule, Fields | Choice) and rule.kind)
+    for name, kind in [*setup.named, *((rule.topic, rule.kind) for rule in rules)]:
         if same_topic(name) not in seen:
             seen.add(same_topic(name))
             found[name] = dotted_type(kind)

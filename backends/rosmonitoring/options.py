@@ -44,6 +44,8 @@ class Setup:
     """When a clause is judged: the option of that name."""
     known: Definitions = NOTHING_KNOWN
     """The message types."""
+    named: tuple[tuple[str, str], ...] = ()
+    """The contract's topics, by their whole names, and their types."""
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -72,7 +74,8 @@ def setup(
         work.port(port)
     work.shared_fields()
     data = options.data if options is not None and isinstance(options.data, Mapping) else {}
-    return Setup(node, work.rules, work.hidden, str(data.get("when", "outputs")), known), tuple(work.faults)
+    named = tuple((resolved(system, node, topic.name), topic.ros_type) for topic in node.topics)
+    return Setup(node, work.rules, work.hidden, str(data.get("when", "outputs")), known, named), tuple(work.faults)
 
 
 def origin(system: System) -> Origin:
@@ -109,6 +112,12 @@ def readable(setup: Setup, path: File, where: Origin) -> tuple[Diagnostic, ...]:
     kinds = setup.kinds
     types = {topic: kinds[same_topic(topic)] for topic in found.types if same_topic(topic) in kinds}
     return tuple(conflicts(path, found, setup.known, types))
+
+
+def resolved(system: System, node: Node, topic: str) -> str:
+    """The topic's whole name when the robot runs; as it is written where only the first slash is missing."""
+    whole = system.plan.ros.names.topic(node.name, topic)
+    return topic if whole == f"/{topic}" else whole
 
 
 def same_topic(name: str) -> str:
@@ -172,7 +181,7 @@ class _Work:
         entry = self.mapping().get(name)
         if isinstance(entry, Mapping) and not entry.keys() & {"scenario", "previous", "constructor"}:
             check_keys(entry, port.sort)
-        topic, kind = _topic(self.node, port)
+        topic, kind = self.topic(self.node, port)
         edge = self.edge(port)
         if isinstance(entry, Mapping) and entry.get("scenario"):
             return self.scenario(port)
@@ -186,11 +195,11 @@ class _Work:
         if edge is not None and edge.source.node != self.node.name:
             source = self.system.contract.node(edge.source.node)
             if topic is None:
-                topic, kind = _topic(source, source.output(edge.source.port))
+                topic, kind = self.topic(source, source.output(edge.source.port))
             if entry is None:
                 entry = self.neighbour(edge)
         if isinstance(entry, Mapping):
-            topic = entry.get("topic", topic)
+            topic = resolved(self.system, self.node, entry["topic"]) if "topic" in entry else topic
         if topic is None:
             return f"no topic of {self.node.name} matches {name}, and the plan does not map it"
         return self.observed(port, topic, kind, entry)
@@ -203,6 +212,11 @@ class _Work:
             if self.asked(port):
                 raise Wrong(str(undecided), hint=undecided.hint or _FIELD_HINT) from None
             return str(undecided)
+
+    def topic(self, node: Node, port: Port) -> tuple[str | None, str | None]:
+        """The name and the type of the topic that carries a port."""
+        found = next((t for t in node.topics if t.port == port), None)
+        return (None, None) if found is None else (resolved(self.system, node, found.name), found.ros_type)
 
     def message(self, kind: str | None, entry: Mapping[str, Any]) -> Message | str:
         """The definition of the messages of a topic; else the type's name, of which nothing is known."""
@@ -249,7 +263,7 @@ class _Work:
     def wires(self, port: Port, entry: Any) -> tuple[Wire | None, ...]:
         """The types in which a port's messages carry its values: a map of decimals, read by a node as binary numbers,
         holds those."""
-        topic, kind = _topic(self.node, port)
+        topic, kind = self.topic(self.node, port)
         fields = {k: v for k, v in entry.items() if k in ("fields", "type")} if isinstance(entry, Mapping) else {}
         if topic is None or not isinstance(self.message(kind, fields), Message):
             return ()
@@ -325,11 +339,6 @@ def _mapping(options: Located | None) -> Mapping[str, Any]:
     data = options.data if options is not None else None
     found = data.get("mapping") if isinstance(data, Mapping) else None
     return found if isinstance(found, Mapping) else {}
-
-
-def _topic(node: Node, port: Port) -> tuple[str | None, str | None]:
-    """The name and the type of the topic that carries a port."""
-    return next(((t.name, t.ros_type) for t in node.topics if t.port == port), (None, None))
 
 
 def _says_empty(term: Term, port: str) -> bool:

@@ -229,7 +229,7 @@ class _Machine:
 
     def _written(self, topic: str) -> str:
         """The topic's name as the configuration has it."""
-        for name in (*(t.name for t in self.setup.node.topics), *self.setup.topics):
+        for name in (*(name for name, _ in self.setup.named), *self.setup.topics):
             if same_topic(name) == topic:
                 return name
         return topic

@@ -63,7 +63,7 @@ def fits(sort: Sort, wire: Wire, known: Definitions) -> bool:
             return len(parts) == len(items) and all(
                 fits(item, part, known) for item, (_, part) in zip(items, parts, strict=True)
             )
-        case _:
+        case _:  # functions, algebraic types: the plan says how
             return False
 
 
@@ -143,7 +143,7 @@ def of_type(value: Fraction, wire: Wire | None) -> Fraction:
             return _nearest(value, float(value), wide=True)
         case Scalar(name="float32"):
             return _nearest(value, _single(float(value)), wide=False)
-        case _:
+        case _:  # exact as it is
             return value
 
 

@@ -3,6 +3,7 @@
 REPAIRED = """\
 system: remote_inspection
 contract: system.rcl
+ros: {nodes: {navigation: {remap: {currentLoc: position}}}}
 connections:
   - {from: agent.command, to: [navigation.command, radiationSensor.command], delayed: true,
      initial: "exists(x, y in REAL | out.command == move(x, y))"}
@@ -29,6 +30,7 @@ compose:
 PUBLISHED = """\
 system: remote_inspection_published
 contract: system.rcl
+ros: {nodes: {navigation: {remap: {currentLoc: position}}}}
 compose:
   D1: {select: [navigation, radiationSensor, agent], rule: R3, persistence: {because: "topics are latched"}}
 """
@@ -58,6 +60,7 @@ requirements:
 PUBLISHED_DELAYED = """\
 system: remote_inspection_published
 contract: system.rcl
+ros: {nodes: {navigation: {remap: {currentLoc: position}}}}
 connections:
   - {from: agent.command, to: [navigation.command, radiationSensor.command], delayed: true,
      initial: "exists(x, y in REAL | out.command == move(x, y))"}

@@ -136,7 +136,7 @@ SLIPS = [
     (node(inputs="r : Missing, st : Stat"), ["check this file with the one that declares it"]),
     (node(topics="std_msgs.Bool o matches(out.o)"), ["`std_msgs/…`"]),
     (node(topics="std_msgs::msg::Bool o matches(out.o)"), ["write `package/Type`"]),
-    (node(topics="std_msgs/Bool /o matches(out.o)"), ["between type and name stands no slash"]),
+    (node(topics="std_msgs/Bool / o matches(out.o)"), ["between type and name stands no slash"]),
     (node(topics="std_msgs/Bool o match(out.o)"), ["did you mean `matches`?"]),
     (node(topics="Bool o matches(out.o)"), ["did you mean `bool`?"]),
     # formulas

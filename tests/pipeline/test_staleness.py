@@ -494,11 +494,11 @@ def test_another_backend_tool_or_solver_reruns_what_it_answered(
 def test_wiring_reruns_the_monitors_and_only_them(tmp_path: Path) -> None:
     folder = copied(SHIPPED, tmp_path)
     before = keys(folder)
-    edit(folder / "system.rcl", ("gazebo_radiation_plugins/Snapshot position", "gazebo_radiation_plugins/Snapshot pos"))
+    edit(folder / "system.rcl", ("gazebo_radiation_plugins/Snapshot r ", "gazebo_radiation_plugins/Snapshot dose "))
     moved = changed(before, keys(folder))
     assert moved, "monitors listen to topics"
     assert {method for _, method in moved} == {"rosmonitoring"}
-    assert {name.split("/")[0] for name, _ in moved} <= {"localisation", "navigation"}
+    assert {name.split("/")[0] for name, _ in moved} == {"agent", "radiationSensor"}  # which listens to it
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def test_nominal_trace_supports_every_guarantee(with_traces: System, name: str, 
     for clause, outcome in discharge(with_traces, name, tmp_path).items():
         assert outcome.verdict is Verdict.MONITORED, (clause, outcome.summary)
         assert not outcome.vacuous
-        assert outcome.bound["events"] == 135
+        assert outcome.bound["events"] == 118
         (digest,) = outcome.bound["traces"].values()  # type: ignore[attr-defined]
         assert len(digest) == 64
 

@@ -27,7 +27,9 @@ def test_the_case_study(name: str, case: System) -> None:
     monitor = whole["monitors"][0]["monitor"]
     assert monitor["id"] == f"monitor_{name}"
     names = [t["name"] for t in monitor["topics"]]
-    wanted = {t.name for t in case.contract.node(name).topics} | ({"phase"} if name == "agent" else set())
+    topics = {t.name for t in case.contract.node(name).topics}
+    wanted = {{"currentLoc": "/position"}.get(topic, topic) for topic in topics}
+    wanted |= {"phase"} if name == "agent" else set()
     assert set(names) == wanted
     assert len(names) == len(set(names))
     assert {t["type"] for t in monitor["topics"]} == {"gazebo_radiation_plugins.msg.Snapshot"}

@@ -49,7 +49,6 @@ def events(seed: int = SEED) -> Iterator[dict[str, object]]:
     def sense(at: int, low: int = 3, high: int = 119) -> Iterator[dict[str, object]]:
         x, y = places[at]
         yield event("position", posX=x, posY=y)
-        yield event("currentLoc", posX=x, posY=y)
         value = reading(low, high)
         yield event("r", radiation=float(value))
         yield event("radiationStatus", level=status(value))
