@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from avow.formulas.renaming import bound_names
-from avow.language.sorts import BOOL, FunctionSort
+from avow.language.operators import definition
+from avow.language.sorts import BOOL, BoolSort, FunctionSort
 from avow.language.terms import (
     And,
-    Builtin,
     Compare,
     Conditional,
     Iff,
@@ -93,8 +93,8 @@ def alternatives(term: Term, positive: bool) -> tuple[tuple[Term, bool], ...] | 
             if positive:
                 return ((And((left, right)), True), (And((Not(left), Not(right))), True))
             return ((And((left, Not(right))), True), (And((Not(left), right)), True))
-        case Operation(operator=Builtin.XOR, arguments=(left, right)):
-            return alternatives(Iff(left, right), not positive)
+        case Operation(sort=BoolSort()) if (defined := definition(term)) is not None:
+            return alternatives(defined, positive)
         case Conditional(condition=condition, then=then, otherwise=otherwise):
             return ((_both(condition, then, positive), True), (_both(Not(condition), otherwise, positive), True))
         case _:  # no disjunction: evaluated as a whole

@@ -9,19 +9,17 @@ between terms. The meaning is the same, the size may double with each conditiona
 from __future__ import annotations
 
 from collections.abc import Iterator
-from fractions import Fraction
 
 from avow.formulas.traversal import Steps, run
-from avow.language.sorts import BOOL, INTEGER, REAL, RealSort
+from avow.language.operators import definition
+from avow.language.sorts import BOOL
 from avow.language.terms import (
+    FALSE,
+    TRUE,
     And,
-    Builtin,
-    Compare,
     Conditional,
     Iff,
     Implies,
-    Literal,
-    Negative,
     Not,
     Operation,
     Or,
@@ -42,9 +40,9 @@ def lifted(formula: Term) -> Term:
 
 def _formula(term: Term, left: Iterator[int]) -> Steps[Term]:
     match term:
-        case Operation(operator=Builtin.XOR, arguments=(one, other)):
-            same: Term = yield _formula(Iff(one, other, term.span), left)
-            return Not(same, term.span)
+        case Operation() if (made_of := definition(term)) is not None:
+            defined: Term = yield _formula(made_of, left)
+            return defined
         case Conditional(condition=condition, then=then, otherwise=otherwise):
             parts = (Implies(condition, then, term.span), Implies(Not(condition), otherwise, term.span))
             cases: Term = yield _formula(And(parts, term.span), left)
@@ -71,16 +69,8 @@ def _choice(term: Term) -> tuple[Term, Term, Term] | None:
     match term:
         case Conditional():
             return term.condition, term.then, term.otherwise
-        case Operation(operator=Builtin.XOR, arguments=(one, other)):
-            return one, Not(other), other
-        case Operation(operator=Builtin.ABS, arguments=(inner,)):
-            real = isinstance(inner.sort, RealSort)
-            zero = Literal(Fraction(0), REAL) if real else Literal(0, INTEGER)
-            return Compare("<", inner, zero), Negative(inner, REAL if real else INTEGER), inner
-        case Operation(operator=Builtin.MIN | Builtin.MAX as operator, arguments=(one, other, *rest)):
-            better = Compare("<" if operator is Builtin.MIN else ">", other, one)
-            first, second = (Operation(operator, (kept, *rest), term.sort) if rest else kept for kept in (other, one))
-            return better, first, second
+        case Operation() if (made_of := definition(term)) is not None:
+            return _choice(made_of) if isinstance(made_of, Conditional) else (made_of, TRUE, FALSE)
         case Quantified():
             return None  # a formula within a term: what it chooses depends on its variables
         case _:  # no choice itself: the first one within it

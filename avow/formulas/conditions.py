@@ -15,11 +15,11 @@ from itertools import product
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import depth
-from avow.language.sorts import BOOL
+from avow.language.operators import definition
+from avow.language.sorts import BOOL, BoolSort
 from avow.language.terms import (
     TRUE,
     And,
-    Builtin,
     Compare,
     Conditional,
     Iff,
@@ -122,8 +122,8 @@ def _clauses(term: Term, positive: bool, halve: bool = True) -> Iterator[_Clause
             yield from _clauses(right, False, halve)
         case Iff(left=left, right=right) if halve:
             yield from _halves(left, right, positive)
-        case Operation(operator=Builtin.XOR, arguments=(left, right)) if halve:
-            yield from _halves(left, right, not positive)
+        case Operation(sort=BoolSort()) if halve and (defined := definition(term)) is not None:
+            yield from _clauses(defined, positive, halve)
         case Conditional(condition=condition, then=then, otherwise=otherwise) if halve:
             yield from _joined([(condition, False), (then, positive)], False)
             yield from _joined([(condition, True), (otherwise, positive)], False)

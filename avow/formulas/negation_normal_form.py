@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from avow.formulas.formula import conjunction, disjunction, negation
 from avow.formulas.traversal import Steps, run
-from avow.language.sorts import BOOL
+from avow.language.operators import definition
+from avow.language.sorts import BOOL, BoolSort
 from avow.language.terms import (
     And,
-    Builtin,
     Compare,
     Conditional,
     Iff,
@@ -50,10 +50,9 @@ def _push(term: Term, positive: bool) -> Steps[Term]:
             one = yield _push(left, True)
             other = yield _push(right, positive)
             return _iff(one, other)
-        case Operation(operator=Builtin.XOR, arguments=(left, right)):
-            one = yield _push(left, True)
-            other = yield _push(right, not positive)
-            return _iff(one, other)
+        case Operation(sort=BoolSort()) if (defined := definition(term)) is not None:
+            result = yield _push(defined, positive)
+            return result
         case Conditional(condition=condition, then=then, otherwise=otherwise):
             test: Term = yield _push(condition, True)
             one = yield _push(then, positive)

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.language.sorts import BoolSort
 from avow.language.terms import (
     Arithmetic,
-    Builtin,
     Compare,
     Conditional,
     Iff,
@@ -57,7 +57,7 @@ def bounds(formula: Term) -> Iterator[Bound]:
                 stack += [(right, turned), (left, True)]
             case Conditional(condition=condition, then=then, otherwise=otherwise):
                 stack += [(otherwise, turned), (then, turned), (condition, True)]
-            case Iff() | Or() | Not() | Operation(operator=Builtin.XOR):
+            case Iff() | Or() | Not() | Operation(sort=BoolSort()):
                 stack += [(part, True) for part in reversed(term.children)]
             case _:  # what holds of its parts is not turned round by anything else
                 stack += [(part, turned) for part in reversed(term.children)]

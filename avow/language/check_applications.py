@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from avow.language.check_base import count
 from avow.language.check_names import Names
 from avow.language.conversions import WHOLE, common, joined
-from avow.language.operators import Mistyped, operation
+from avow.language.operators import OPERATORS, Mistyped, operation
 from avow.language.printer import show_sort
 from avow.language.sorts import (
     INTEGER,
@@ -147,7 +147,8 @@ class Applications(Names):
         return Length(made[0], NATURAL, self.span(tree))
 
     def builtin_operation(self, tree: Syntax, name: Builtin, arguments: Sequence[TermSyntax]) -> Term | None:
-        made = [self.formula(a) if name is Builtin.XOR else self.term(a) for a in arguments]
+        formulas = OPERATORS[name].typing.startswith("formulas")
+        made = [self.formula(a) if formulas else self.term(a) for a in arguments]
         terms = [m for m in made if m is not None]
         if len(terms) != len(made):
             return None

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from fractions import Fraction
 from functools import reduce
@@ -19,7 +19,7 @@ from typing import Any, assert_never
 from avow.base.diagnostics import Span
 from avow.language.conversions import NUMERIC, WHOLE, common, joined
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SetSort, Sort
-from avow.language.terms import Builtin, Conditional, Literal, Operation, Term
+from avow.language.terms import Builtin, Compare, Conditional, Iff, Literal, Negative, Not, Operation, Term
 
 
 class Level(IntEnum):
@@ -69,6 +69,11 @@ class Operator:
     """The sign in an RML condition; or `lifted`: conditions tell the cases apart."""
     program: str | Why
     """How a program to be proved by Hoare triples writes it."""
+    definition: Callable[[Operation], Term] | Why
+    """The same said with forms of the terms: what has no such operator, and every pass that takes formulas apart, uses
+    it."""
+    takes: tuple[int, int | None] | Why
+    """How many arguments, at least and at most, where it is written like a function."""
 
     @property
     def rcl(self) -> str:
@@ -80,6 +85,8 @@ LIFTED = "lifted"
 _IN_PARTS = Why("its parts are evaluated one after another, as far as they are needed")
 _NO_WHOLE_DIVISION = Why("RML's conditions have neither whole division nor remainder")
 _NOT_COMPUTED = Why("programs say it with IF")
+_A_FORM = Why("it is a form of the terms itself, of as many parts as the form has")
+_ARITHMETIC = Why("it is arithmetic: no form of the terms says it")
 
 
 def _infix(
@@ -94,7 +101,9 @@ def _infix(
     rml: str,
 ) -> Operator:
     text, unicode, latex = (f" {word} " for word in words)
-    return Operator(name, level, typing, text, unicode, latex, evaluate, z3, smtlib, dafny, rml, name)
+    return Operator(
+        name, level, typing, text, unicode, latex, evaluate, z3, smtlib, dafny, rml, name, _A_FORM, _A_FORM
+    )  # fmt: skip
 
 
 def _function(
@@ -105,15 +114,40 @@ def _function(
     smtlib: str,
     dafny: str,
     rml: str | Why,
+    definition: Callable[[Operation], Term] | Why,
+    takes: tuple[int, int | None],
 ) -> Operator:
     latex = rf"\mathrm{{{name}}}"
     return Operator(
-        name, Level.ATOM, typing, name, name, latex, evaluate, z3, smtlib, dafny, rml, _NOT_COMPUTED
+        name, Level.ATOM, typing, name, name, latex, evaluate, z3, smtlib, dafny, rml, _NOT_COMPUTED, definition, takes
     )  # fmt: skip
 
 
 def _exact(left: Any, right: Any) -> Any:
     return Fraction(left) / right
+
+
+def _differing(term: Operation) -> Term:
+    left, right = term.arguments
+    return Not(Iff(left, right), term.span)
+
+
+def _without_sign(term: Operation) -> Term:
+    (inner,) = term.arguments
+    real = inner.sort == REAL
+    zero = Literal(Fraction(0), REAL) if real else Literal(0, INTEGER)
+    return Conditional(Compare("<", inner, zero), Negative(inner, REAL if real else INTEGER), inner, term.sort)
+
+
+def _better(sign: str) -> Callable[[Operation], Term]:
+    """Of two numbers the second where it stands so to the first, and the same among those that are left."""
+
+    def choice(term: Operation) -> Term:
+        one, other, *rest = term.arguments
+        first, second = (replace(term, arguments=(kept, *rest)) if rest else kept for kept in (other, one))
+        return Conditional(Compare(sign, other, one), first, second, term.sort)
+
+    return choice
 
 
 _FORMULAS, _NUMBERS, _WHOLE = "formulas → formula", "numbers → number", "whole number, positive literal → whole number"
@@ -127,7 +161,7 @@ _ROWS = (
     _infix("and", Level.AND, _FORMULAS, ("and", "∧", r"\land"), _IN_PARTS,
            lambda z, *parts: z.And(parts), "and", "&&", "&&"),
     Operator("not", Level.NOT, "formula → formula", "not ", "¬", r"\lnot ", operator.not_,
-             lambda z, a: z.Not(a), "not", "!", LIFTED, "not"),
+             lambda z, a: z.Not(a), "not", "!", LIFTED, "not", _A_FORM, _A_FORM),
     _infix("==", Level.COMPARE, "terms of one type → formula", ("is", "=", "="), operator.eq,
            lambda z, a, b: a == b, "=", "==", "=="),
     _infix("!=", Level.COMPARE, "terms of one type → formula", ("is not", "≠", r"\neq"), operator.ne,
@@ -143,16 +177,20 @@ _ROWS = (
     _infix("*", Level.PRODUCT, _NUMBERS, ("*", "·", r"\cdot"), operator.mul, lambda z, a, b: a * b, "*", "*", "*"),
     _infix("/", Level.PRODUCT, "numbers → REAL", ("/", "/", "/"), _exact,
            lambda z, a, b: a / b, "/", "Types.Divide", "/"),
-    _function(Builtin.XOR, _FORMULAS, operator.ne, lambda z, a, b: z.Xor(a, b), "xor", "!=", LIFTED),
-    _function(Builtin.ABS, "number → number", abs, lambda z, a: z.If(a < 0, -a, a), "ite", "Types.Abs", LIFTED),
+    _function(Builtin.XOR, _FORMULAS, operator.ne, lambda z, a, b: z.Xor(a, b), "xor", "!=", LIFTED,
+              _differing, (2, 2)),
+    _function(Builtin.ABS, "number → number", abs, lambda z, a: z.If(a < 0, -a, a), "ite", "Types.Abs", LIFTED,
+              _without_sign, (1, 1)),
     _function(Builtin.MIN, _NUMBERS, min, lambda z, *all: reduce(lambda a, b: z.If(b < a, b, a), all), "ite",
-              "Types.Min", LIFTED),
+              "Types.Min", LIFTED, _better("<"), (2, None)),
     _function(Builtin.MAX, _NUMBERS, max, lambda z, *all: reduce(lambda a, b: z.If(b > a, b, a), all), "ite",
-              "Types.Max", LIFTED),
-    _function(Builtin.MOD, _WHOLE, operator.mod, lambda z, a, b: a % b, "mod", "%", _NO_WHOLE_DIVISION),
-    _function(Builtin.DIV, _WHOLE, operator.floordiv, lambda z, a, b: a / b, "div", "/", _NO_WHOLE_DIVISION),
+              "Types.Max", LIFTED, _better(">"), (2, None)),
+    _function(Builtin.MOD, _WHOLE, operator.mod, lambda z, a, b: a % b, "mod", "%", _NO_WHOLE_DIVISION,
+              _ARITHMETIC, (2, 2)),
+    _function(Builtin.DIV, _WHOLE, operator.floordiv, lambda z, a, b: a / b, "div", "/", _NO_WHOLE_DIVISION,
+              _ARITHMETIC, (2, 2)),
     Operator("if", Level.LOOSEST, "formula, two terms of one type → that type", "if ", "if ", r"\mathbf{if}\ ",
-             _IN_PARTS, lambda z, c, a, b: z.If(c, a, b), "ite", "if", LIFTED, _NOT_COMPUTED),
+             _IN_PARTS, lambda z, c, a, b: z.If(c, a, b), "ite", "if", LIFTED, _NOT_COMPUTED, _A_FORM, _A_FORM),
 )  # fmt: skip
 # Division and remainder are Euclid's, as in SMT-LIB and Dafny: with a positive divisor that is Python's floor.
 
@@ -171,6 +209,12 @@ def _complete() -> None:
 
 
 _complete()
+
+
+def definition(term: Operation) -> Term | None:
+    """The operation said with other forms, one step; None where it is no choice or connective but arithmetic."""
+    column = OPERATORS[term.operator].definition
+    return None if isinstance(column, Why) else column(term)
 
 
 def implementation(column: Callable[..., Any] | Why) -> Callable[..., Any]:
@@ -192,19 +236,11 @@ class Mistyped:
     hint: str | None = None
 
 
-_COUNTS: Mapping[Builtin, tuple[int, int | None]] = {
-    Builtin.XOR: (2, 2),
-    Builtin.ABS: (1, 1),
-    Builtin.MIN: (2, None),
-    Builtin.MAX: (2, None),
-    Builtin.MOD: (2, 2),
-    Builtin.DIV: (2, 2),
-}
-
-
 def wrong_count(name: Builtin, given: int) -> Mistyped | None:
     """That an operator has too few or too many arguments."""
-    least, most = _COUNTS[name]
+    counts = OPERATORS[name].takes
+    assert not isinstance(counts, Why), counts.reason
+    least, most = counts
     if given >= least and (most is None or given <= most):
         return None
     wanted = f"{least} argument{'' if least == 1 else 's'}{'' if most else ' or more'}"

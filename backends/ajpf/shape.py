@@ -12,13 +12,13 @@ from fractions import Fraction
 from avow.formulas.flattening import flattened
 from avow.formulas.renaming import bound_names
 from avow.formulas.traversal import depth
-from avow.language.sorts import BOOL, INTEGER, NATURAL, IntegerSort, NaturalSort, RealSort
+from avow.language.operators import definition
+from avow.language.sorts import BOOL, INTEGER, NATURAL, BoolSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import (
     FALSE,
     TRUE,
     And,
     Arithmetic,
-    Builtin,
     Compare,
     Conditional,
     Iff,
@@ -57,7 +57,7 @@ def _written_out(term: Term) -> int:
     match term:
         case Conditional(sort=sort) if sort == BOOL:
             return 1 + sum(sizes) + sizes[0]
-        case Iff() | Operation(operator=Builtin.XOR):
+        case Iff() | Operation(sort=BoolSort()):
             return 1 + 2 * sum(sizes)
         case Compare(left=left) if left.sort == BOOL:
             return 1 + 2 * sum(sizes)
@@ -103,8 +103,8 @@ def _formula(term: Term, positive: bool) -> Term:
             return disjunction(made) if positive else conjunction(made)
         case Iff(left=left, right=right):
             return _equivalence(left, right, positive)
-        case Operation(operator=Builtin.XOR, arguments=(left, right)):
-            return _equivalence(left, right, not positive)
+        case Operation(sort=BoolSort()) if (defined := definition(term)) is not None:
+            return _formula(defined, positive)
         case Conditional(condition=condition, then=then, otherwise=otherwise):
             yes = disjunction([_formula(condition, False), _formula(then, positive)])
             return conjunction([yes, disjunction([_formula(condition, True), _formula(otherwise, positive)])])

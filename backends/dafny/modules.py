@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 from avow.formulas.formula import free_variables
 from avow.language.contract import Clause, Node
+from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import DataSort, EnumSort, OpaqueSort
 from avow.language.terms import Variable
 
-from .names import Names, file_stem, identifier
+from .names import RESERVED, Names, file_stem, identifier
 from .printer import NotExpressible, Predicate, Vocabulary, call, print_clause, sort_text
 
 _MODULE = 'module {:options "--function-syntax:3"}'
@@ -28,7 +29,7 @@ _HELPERS = """\
     decreases b - a
   { if b < a then [] else [a] + Upto(a + 1, b) }
 """
-_NUMERIC = {
+_FUNCTIONS = {
     "AbsInt": "(a: int): nat { if a < 0 then 0 - a else a }",
     "AbsReal": "(a: real): real { if a < 0.0 then 0.0 - a else a }",
     "MinInt": "(a: int, b: int): int { if b < a then b else a }",
@@ -36,7 +37,26 @@ _NUMERIC = {
     "MaxInt": "(a: int, b: int): int { if a < b then b else a }",
     "MaxReal": "(a: real, b: real): real { if a < b then b else a }",
 }
-"""Functions that are generated where a formula uses them."""
+"""Functions that are generated where a formula uses them: of each operator that is one, for each type it has."""
+
+
+def _complete() -> None:
+    """Raises where the table of operators names a function that would not be generated, or whose name is not kept."""
+    wanted = {
+        f"{row.dafny.removeprefix('Types.')}{kind}"
+        for row in OPERATORS.values()
+        if row.level is Level.ATOM and row.dafny.startswith("Types.")
+        for kind in (("Bool",) if row.typing.startswith("formula") else ("Int", "Real"))
+    }
+    missing = wanted - set(_FUNCTIONS)
+    unkept = set(_FUNCTIONS) - RESERVED
+    if missing or unkept:
+        raise TypeError(
+            f"Dafny functions without a text: {sorted(missing)}; names that are not reserved: {sorted(unkept)}"
+        )
+
+
+_complete()
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +154,7 @@ def _types(words: Vocabulary) -> str:
         for sort in pending:
             done.add(sort)
             body.append(_type(sort, words))
-    used = (f"  function {name}{rest}" for name, rest in _NUMERIC.items() if name in words.functions)
+    used = (f"  function {name}{rest}" for name, rest in _FUNCTIONS.items() if name in words.functions)
     return "\n".join([*lines, *body, _HELPERS.rstrip("\n"), *used, "}", ""])
 
 

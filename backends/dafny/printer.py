@@ -19,6 +19,7 @@ from avow.formulas.formula import free_variables
 from avow.formulas.traversal import Steps, run
 from avow.language.operators import OPERATORS, Level, Operator
 from avow.language.sorts import (
+    BOOL,
     REAL,
     BoolSort,
     DataSort,
@@ -286,7 +287,8 @@ class _Printer:
             texts.append(text)
         if operator.level is not Level.ATOM:
             return f"{operator.dafny}({', '.join(texts)})", True
-        name = f"{operator.dafny}{'Real' if term.sort == REAL else 'Int'}"
+        kind = "Real" if term.sort == REAL else "Bool" if term.sort == BOOL else "Int"
+        name = f"{operator.dafny}{kind}"
         self.words.functions.add(name.removeprefix("Types."))
         return (f"{name}({texts[0]})" if len(texts) == 1 else reduce(lambda a, b: f"{name}({a}, {b})", texts)), True
 

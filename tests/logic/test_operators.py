@@ -7,6 +7,7 @@ import dataclasses
 import random
 from fractions import Fraction
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,10 +23,11 @@ from avow.formulas.sequences import defined
 from avow.formulas.traversal import subterms
 from avow.language.contract import Node
 from avow.language.load import check_text, parse_formula
-from avow.language.operators import OPERATORS, Operator, Why
+from avow.language.operators import OPERATORS, Operator, Why, definition
 from avow.language.printer import show_term
+from avow.language.sorts import BOOL
 from avow.language.styles import STYLES
-from avow.language.terms import Arithmetic, Builtin, Compare, Conditional, Literal, Operation, Term, Variable
+from avow.language.terms import Arithmetic, Builtin, Compare, Conditional, Iff, Literal, Operation, Term, Variable
 from avow.sanity.mutants import mutants
 from avow.solving.questions import entails, solve
 from avow.solving.smtlib import ask_cvc5, export
@@ -50,6 +52,21 @@ GRID = [
         (-7, -1, 0, 2, 6), (0, 3), (False, True), (Fraction(-3, 2), Fraction(0), Fraction(6)), (False,)
     )
 ]
+
+
+LOGICAL = [name for name in Builtin if OPERATORS[name].typing.startswith("formulas")]
+
+
+SAMPLES = {
+    **{sign: f"(a {sign} k) == (2 {sign} 3)" for sign in ("+", "-", "*")},
+    "/": "a / 4 == 2 / 4",
+    **{sign: f"(a {sign} k) <=> (p)" for sign in ("==", "!=", "<", "<=", ">", ">=")},
+    **{sign: f"p {sign} (a < 0)" for sign in ("and", "or", "->", "<=>")},
+    "not": "not p", "xor": "xor(p, a < 0)", "if": "if p then a < 2 else a > 3",
+    "abs": "abs(a) == 2", "min": "min(a, k) == 2", "max": "max(a, k) == 2", "mod": "mod(a, 3) == 2",
+    "div": "div(a, 3) == -3",
+}  # fmt: skip
+"""A formula with each operator of the table."""
 
 
 class Writer:
@@ -103,7 +120,7 @@ class Writer:
             (
                 f"({self.whole(depth)} {sign} {self.whole(depth)})",
                 f"({self.real(depth)} {sign} {self.real(depth)})",
-                f"xor({one}, {other})",
+                *(f"{name}({one}, {other})" for name in LOGICAL),
                 f"(if {one} then {other} else {self.formula(depth - 1)})",
                 f"({one} {choice(('and', 'or', '->', '<=>'))} {other})",
                 f"(not {one})",
@@ -136,6 +153,23 @@ def test_every_operator_has_every_column_or_a_reason() -> None:
         assert all(row.name in style.words for style in STYLES.values())
 
 
+def test_every_operator_is_described() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "language.md").read_text("utf-8")
+    assert [name for name in Builtin if f"`{name}(" not in page] == []
+
+
+@pytest.mark.parametrize("name", Builtin)
+def test_a_definition_means_what_the_operator_means(name: Builtin) -> None:
+    """Passes that take formulas apart take the definition for the operator."""
+    term = next(p for p in subterms(parse_formula(SAMPLES[name], NODE)) if isinstance(p, Operation))
+    said = definition(term)
+    if said is None:
+        return
+    formula = Iff(term, said) if term.sort == BOOL else Compare("==", term, said)
+    for values in GRID:
+        assert evaluate(formula, named(values)) is True, values
+
+
 def test_an_operator_without_a_row_is_an_error_at_import(monkeypatch: pytest.MonkeyPatch) -> None:
     from avow.language import operators
 
@@ -150,17 +184,8 @@ def test_an_operator_without_a_row_is_an_error_at_import(monkeypatch: pytest.Mon
 @pytest.mark.parametrize("name", sorted(OPERATORS))
 def test_the_columns_of_one_operator_agree(name: str) -> None:
     """What evaluation computes of small values, Z3 proves; and its script has the head that the table says."""
-    left, right = {"not": ("p", "p"), "if": ("p", "p")}.get(name, ("a", "k"))
-    texts = {
-        **{sign: f"({left} {sign} {right}) == (2 {sign} 3)" for sign in ("+", "-", "*")},
-        "/": "a / 4 == 2 / 4",
-        **{sign: f"(a {sign} k) <=> (p)" for sign in ("==", "!=", "<", "<=", ">", ">=")},
-        **{sign: f"p {sign} (a < 0)" for sign in ("and", "or", "->", "<=>")},
-        "not": "not p", "xor": "xor(p, a < 0)", "if": "if p then a < 2 else a > 3",
-        "abs": "abs(a) == 2", "min": "min(a, k) == 2", "max": "max(a, k) == 2", "mod": "mod(a, 3) == 2",
-        "div": "div(a, 3) == -3",
-    }  # fmt: skip
-    formula = parse_formula(texts[name], NODE)
+    assert name in SAMPLES, f"a formula with `{name}`, true for some values"
+    formula = parse_formula(SAMPLES[name], NODE)
     row = OPERATORS[name]
     script = export([formula])
     assert f"({row.smtlib} " in script or ((name in ("!=", "if") and "not" in script) or "ite" in script), script
