@@ -15,7 +15,7 @@ from avow.calculus.hierarchy import innermost
 from .make import make, node, settled
 from .test_random_systems import Enumeration, random_system
 
-SYSTEMS = 200
+SYSTEMS = 100
 
 
 def random_groups(seed: int, nodes: list[str]) -> str:

@@ -18,7 +18,7 @@ from avow.system.plan import Endpoint
 from .make import make, node, settled
 
 Values = dict[str, object]
-SYSTEMS = 160
+SYSTEMS = 96
 BLOCKS = 8
 
 

@@ -28,7 +28,7 @@ from avow.evidence.heads import GENESIS, Event, index_path, note, read_index
 from avow.evidence.ledger import Ledger
 from avow.evidence.record import Evidence
 
-TIMES = int(os.environ.get("AVOW_TAMPERINGS", "40"))
+TIMES = int(os.environ.get("AVOW_TAMPERINGS", "20"))
 NAMES = [f"c{n}" for n in range(12)]
 CLAIMS = {name: guarantee("node", name) for name in NAMES}
 METHODS = ("hoare", "dafny", "hypothesis")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import z3
 from helpers import some
 
 from avow.base.diagnostics import Rejected
@@ -21,6 +22,7 @@ from avow.formulas.formula import digest, normalise
 from avow.formulas.negation_normal_form import push_negations
 from avow.formulas.sequences import defined
 from avow.formulas.traversal import subterms
+from avow.kernel.text import Text
 from avow.language.contract import Node
 from avow.language.load import check_text, parse_formula
 from avow.language.operators import OPERATORS, Operator, Why, definition
@@ -168,6 +170,21 @@ def test_a_definition_means_what_the_operator_means(name: Builtin) -> None:
     formula = Iff(term, said) if term.sort == BOOL else Compare("==", term, said)
     for values in GRID:
         assert evaluate(formula, named(values)) is True, values
+
+
+@pytest.mark.parametrize("name", sorted(OPERATORS))
+def test_the_kernel_says_it_by_itself(name: str) -> None:
+    """In a text of its own, in which Z3 finds the values for which evaluation has the sample true, and no others."""
+    formula = parse_formula(SAMPLES[name], NODE)
+    text = Text()
+    said = text.formula(formula, lambda variable: (f"|{variable.qualified}|", variable.sort))
+    for values in GRID[::7]:
+        known = {part for part in subterms(formula) if isinstance(part, Variable)}
+        fixed = [Compare("==", part, Literal(values[part.name], part.sort)) for part in known]
+        given = [text.formula(term, lambda variable: (f"|{variable.qualified}|", variable.sort)) for term in fixed]
+        solver = z3.Solver()
+        solver.from_string(text.script([*given, said]))
+        assert (solver.check() == z3.sat) is evaluate(formula, named(values)), (values, said)
 
 
 def test_an_operator_without_a_row_is_an_error_at_import(monkeypatch: pytest.MonkeyPatch) -> None:

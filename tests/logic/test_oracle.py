@@ -25,7 +25,7 @@ from .oracle import Survey, is_small, judge
 from .random_contracts import random_contract
 
 QUICK = (1, 3, 7, 8, 22, 24, 25, 28)
-COUNT = int(os.environ.get("AVOW_ORACLE_CONTRACTS", "16"))
+COUNT = int(os.environ.get("AVOW_ORACLE_CONTRACTS", "8"))
 FIRST = int(os.environ.get("AVOW_ORACLE_FIRST", "100"))
 
 ONE_SIDED = {Property.TAUTOLOGY, Property.VACUOUS, Property.REDUNDANT, Property.UNNEEDED}

@@ -31,7 +31,7 @@ from avow.pipeline.state import State
 from avow.pipeline.workload import Survey, survey
 
 TEMPLATE = Path(__file__).parents[2] / "avow" / "cli" / "template" / "contracts" / "thermostat"
-TIMES = int(os.environ.get("AVOW_CRASHES", "3"))
+TIMES = int(os.environ.get("AVOW_CRASHES", "1"))
 """How many runs of each kind are disturbed; some dozens were, when this was written."""
 
 
