@@ -14,6 +14,7 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic
 from avow.system.plan import Located
 from avow.system.strict_yaml import Piece
+from avow.tuning.sizes import REPAIR_ROUNDS
 
 
 @cache
@@ -33,7 +34,7 @@ def without_faults(root: Piece) -> tuple[Piece | None, frozenset[str]]:
     """What is left of a document without the pieces that depart from the schema, and the words of those: for looking
     at the rest of it, never for verifying. None where nothing is left."""
     dropped: set[str] = set()
-    for _ in range(_ROUNDS):  # to drop a piece may leave another without what it needs
+    for _ in range(REPAIR_ROUNDS):  # to drop a piece may leave another without what it needs
         wrong = set(_wrong_places(root))
         if not wrong:
             return root, frozenset(dropped)
@@ -42,9 +43,6 @@ def without_faults(root: Piece) -> tuple[Piece | None, frozenset[str]]:
         for path in sorted(wrong, key=lambda path: (len(path), [str(step).zfill(9) for step in path]), reverse=True):
             root = _without(root, path, dropped)
     return None, frozenset(dropped)
-
-
-_ROUNDS = 20
 
 
 def _wrong_places(root: Piece) -> Iterator[tuple[str | int, ...]]:

@@ -84,3 +84,7 @@ PROPERTY_DEPTH = 60
 
 PROPERTY_LENGTH = 50_000
 """Characters of a temporal property: one so long is generated, and no automaton of it would be built."""
+
+REPAIR_ROUNDS = 20
+"""Times that the pieces of a plan at fault are dropped to look at the rest: each may leave another without what it
+needs, and nothing but further messages hangs on it."""
