@@ -36,6 +36,10 @@ _STEP = re.compile(r"\[MS:\s*(\d+),\s*BS:\s*([^,\]]+),\s*UN:\s*([^\]]+)\]")
 _FRAMEWORK = re.compile(r"^MCAPL Framework (.+)$", re.MULTILINE)
 
 
+BRIEF = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC")
+"""For a Java that runs for a second or two: it compiles lightly, and starts no threads for its garbage."""
+
+
 class Said(StrEnum):
     HOLDS = "holds"
     VIOLATED = "violated"
@@ -53,6 +57,8 @@ class Answer:
     log: str = ""
     framework: str = ""
     """What MCAPL calls its own version."""
+    kept: bool = False
+    """It was given in an earlier run, to the same files (`kept`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +67,13 @@ class Installation:
     java: str
     javac: str | None
     version: str
+
+    def mark(self) -> str:
+        """Changes with any class or jar that is compiled anew or put in another's place."""
+        folders = (self.home / "bin", self.home / "lib")
+        files = sorted(path for folder in folders for path in folder.rglob("*") if path.is_file())
+        seen = [(str(path), (stat := path.stat()).st_size, stat.st_mtime_ns) for path in files]
+        return sha256(repr((self.version, seen)).encode()).hexdigest()
 
     def class_path(self, *folders: str) -> str:
         jars = sorted(str(p) for p in (self.home / "lib" / "3rdparty").glob("*.jar"))
@@ -121,7 +134,17 @@ def prepare(installation: Installation, folder: Path, files: Mapping[str, str]) 
         return None
     if installation.javac is None:
         return "there is no javac to compile the environment with (apt-get install openjdk-17-jdk-headless)"
-    command = [installation.javac, "--release", "11", "-nowarn", "-encoding", "UTF-8", "-d", "."]
+    command = [
+        installation.javac,
+        *(f"-J{option}" for option in BRIEF),
+        "--release",
+        "11",
+        "-nowarn",
+        "-encoding",
+        "UTF-8",
+        "-d",
+        ".",
+    ]
     done = run([*command, "-cp", installation.class_path(), *sources], cwd=folder, seconds=120)
     return None if done.code == 0 else f"the environment does not compile: {(done.stdout + done.stderr).strip()[:300]}"
 

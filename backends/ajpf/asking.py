@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from math import ceil
 from pathlib import Path
 
+from . import kept, psl
 from .ajpf_tool import Answer, Installation, Said, check, prepare
 from .checker import Property
 from .files import ail_file, psl_file
@@ -34,14 +35,36 @@ def files(setup: Setup, properties: Sequence[Property]) -> Mapping[str, str]:
 def ask(
     installation: Installation, setup: Setup, properties: Sequence[Property], seconds: float, megabytes: int
 ) -> dict[str, Answer]:
-    """An answer for each property, by its key. What is left of `seconds` is shared out among those still to come, so
-    that one that takes for ever costs the others nothing."""
+    """An answer for each property, by its key. What was answered before is not asked again (`kept`). What is left of
+    `seconds` is shared out among those still to come, so that one that takes for ever costs the others nothing."""
+    given = files(setup, properties)
+    mark = installation.mark()
+    # Of a class that the plan gives, only the name is known.
+    keys = {p.key: kept.key(given, psl.show(p.formula), mark) for p in properties if not setup.environment_class}
+    answers = {p: answer for p, key in keys.items() if (answer := kept.recall(key)) is not None}
+    asked = [p for p in properties if p.key not in answers]
+    for key, answer in _asked(installation, given, asked, seconds, megabytes).items():
+        answers[key] = answer
+        if key in keys:
+            kept.keep(keys[key], answer)
+    return answers
+
+
+def _asked(
+    installation: Installation,
+    given: Mapping[str, str],
+    properties: Sequence[Property],
+    seconds: float,
+    megabytes: int,
+) -> dict[str, Answer]:
     deadline = time.monotonic() + seconds
+    if not properties:
+        return {}
     workers = max(1, min(len(properties), os.cpu_count() or 1))
     waiting, lock = len(properties), threading.Lock()
     with tempfile.TemporaryDirectory(prefix="avow-ajpf-") as temporary:
         folder = Path(temporary)
-        wrong = prepare(installation, folder, files(setup, properties))
+        wrong = prepare(installation, folder, given)
         if wrong is not None:
             return {p.key: Answer(Said.ERROR, wrong) for p in properties}
 

@@ -14,6 +14,8 @@ from .environment import Choice, Environment
 from .syntax import CONS, NIL, Struct, Term, Var
 
 CLASS = "AvowEnvironment"
+SCRIPT = "script.txt"
+"""The file that a scripted environment reads its choices from."""
 MARK = "avow: "
 """Starts the lines of output in which a scripted environment tells what happens."""
 
@@ -24,6 +26,13 @@ class Script:
 
     draws: Sequence[Choice]
     turns: Sequence[str] = ()
+    probed: bool = False
+    """The environment looks for percepts before the agents do, as AJPF does for properties that ask for them."""
+
+    def text(self) -> str:
+        draws = [f"draw {' '.join(map(str, choice))}" for choice in self.draws]
+        probe = ["probe "] if self.probed else []
+        return "\n".join([*probe, *draws, *(f"turn {name}" for name in self.turns)]) + "\n"
 
 
 _FRAME = """\
@@ -44,6 +53,10 @@ import ail.util.AILexception;
 import ajpf.MCAPLJobber;
 import ajpf.util.VerifyList;
 import ajpf.util.choice.UniformIntChoice;
+import java.io.IOException;
+import java.io.UncheckedIOException;
+import java.nio.file.Files;
+import java.nio.file.Paths;
 import java.util.List;
 import java.util.Set;
 import java.util.TreeSet;
@@ -155,13 +168,28 @@ _CHANCE = """\
             }
         }"""
 _SCRIPTED = """\
-        if (drawn == SCRIPT.length) {
+        String[] next = script("draw", drawn++);
+        if (next == null) {
             System.exit(0);
         }
-        System.arraycopy(SCRIPT[drawn++], 0, now, 0, now.length);"""
+        for (int group = 0; group < now.length; group++) {
+            now[group] = Integer.parseInt(next[group + 1]);
+        }"""
 _SCRIPT = """
-    private static final int[][] SCRIPT = %s;
     private int drawn = 0;
+
+    private static String[] script(String kind, int number) {
+        try {
+            for (String line : Files.readAllLines(Paths.get("%s"))) {
+                if (line.startsWith(kind + " ") && number-- == 0) {
+                    return line.split(" ");
+                }
+            }
+        } catch (IOException error) {
+            throw new UncheckedIOException(error);
+        }
+        return null;
+    }
 
     private String named(String agent) {
         return agentmap.size() > 1 ? agent + ": " : "";
@@ -185,8 +213,6 @@ _ALONE = """\
 
 """
 _TURNS = """
-    private static final String[] TURNS = {%s};
-
     private static class Scripted extends ActionScheduler {
         private int taken = 0;
 
@@ -196,13 +222,13 @@ _TURNS = """
             if (all.isEmpty()) {
                 return all;
             }
-            if (taken == TURNS.length) {
+            String[] turn = script("turn", taken++);
+            if (turn == null) {
                 System.exit(0);
             }
-            String turn = TURNS[taken++];
             List<MCAPLJobber> next = new VerifyList<MCAPLJobber>();
             for (MCAPLJobber jobber : all) {
-                if (jobber.getName().equals(turn)) {
+                if (jobber.getName().equals(turn[1])) {
                     next.add(jobber);
                 }
             }
@@ -213,7 +239,9 @@ _TURNS = """
 _PROBE = """
     @Override
     public void begin() {
-        getPercepts("", false);
+        if (script("probe", 0) != null) {
+            getPercepts("", false);
+        }
     }
 """
 
@@ -247,11 +275,10 @@ def environment_class(
     name: str = CLASS,
     *,
     agents: int = 1,
-    script: Script | None = None,
-    probed: bool = False,
+    scripted: bool = False,
 ) -> str:
-    """The class's source. With a `script` it chooses that and nothing else, and tells what happens; `probed` then looks
-    for percepts before the agent does, as AJPF does for properties that ask for them."""
+    """The class's source. A `scripted` one chooses what a `Script` beside it says and nothing else, and tells what
+    happens."""
     groups = environment.groups
     everything = {group: tuple(range(len(words))) for group, words in groups}
     lines = []
@@ -265,19 +292,19 @@ def environment_class(
         tables.append(
             f"    private static final int[][] AFTER_{at} = {_options(groups, {**everything, **narrowed})};\n"
         )
-    tell_idle = "" if script is None else 'tell("idle");\n            '
+    tell_idle = "" if not scripted else 'tell("idle");\n            '
     quiet = sorted(environment.quiet | {"print"})
     return _FRAME.format(
         name=name,
         alone=_ALONE if agents == 1 else "",
-        scheduler=_scheduler(agents, script),
+        scheduler=_scheduler(agents, scripted),
         now="{" + ", ".join("-1" for _ in groups) + "}",
         begun=str(not environment.at_start).lower(),
         done=_DONE[environment.at_quiescence].replace("draw(", tell_idle + "draw("),
-        tell_start="" if script is None else '            tell("start");\n',
-        tell_action="" if script is None else _TELL_ACTION,
-        draw=_CHANCE if script is None else _SCRIPTED,
-        script="" if script is None else _scripted(script, agents, probed),
+        tell_start="" if not scripted else '            tell("start");\n',
+        tell_action="" if not scripted else _TELL_ACTION,
+        draw=_CHANCE if not scripted else _SCRIPTED,
+        script="" if not scripted else _scripted(agents),
         percepts="\n".join(lines),
         quiet=" || ".join(f"action.equals({_text(action)})" for action in quiet),
         after="\n".join(after),
@@ -294,17 +321,15 @@ _TELL_ACTION = """\
 """
 
 
-def _scheduler(agents: int, script: Script | None) -> str:
+def _scheduler(agents: int, scripted: bool) -> str:
     """Several agents have the scheduler that `DefaultEnvironment` gives them; in a script, one that knows it."""
     if agents == 1:
         return "        setScheduler(new SingleAgentScheduler());\n"
-    return "" if script is None else "        setup_scheduler(this, new Scripted());\n"
+    return "" if not scripted else "        setup_scheduler(this, new Scripted());\n"
 
 
-def _scripted(script: Script, agents: int, probed: bool) -> str:
-    turns = _TURNS % ", ".join(map(_text, script.turns)) if agents > 1 else ""
-    rows = "{" + ", ".join("{" + ", ".join(map(str, choice)) + "}" for choice in script.draws) + "}"
-    return _SCRIPT % (rows, MARK, turns + (_PROBE if probed else ""))
+def _scripted(agents: int) -> str:
+    return _SCRIPT % (SCRIPT, MARK, (_TURNS if agents > 1 else "") + _PROBE)
 
 
 def _options(groups: Sequence[tuple[str, object]], places: Mapping[str, tuple[int, ...]]) -> str:

@@ -7,7 +7,6 @@ then; our run says what should be told. Where they part, one of the two interpre
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +14,11 @@ from typing import Any
 
 from avow.base.process import ToolMissing, run
 
-from .ajpf_tool import Installation, prepare
+from .ajpf_tool import BRIEF, Installation, prepare
 from .explore import Graph, System
+from .files import BUILDER
 from .interpreter import PRINT
-from .java import CLASS, MARK, Script, environment_class
+from .java import CLASS, MARK, SCRIPT, Script, environment_class
 from .options import Setup
 from .printer import program_text
 from .structure import Lasso
@@ -55,7 +55,7 @@ def expected(graph: Graph, lasso: Lasso) -> tuple[tuple[Moment, ...], Script]:
             moments.append(moment)
             if after.drawn:
                 draws.append(system.world.choices.items[after.choice])
-    return tuple(moments), Script(tuple(draws), tuple(turns))
+    return tuple(moments), Script(tuple(draws), tuple(turns), system.probed)
 
 
 def _moment(system: System, before: Any, after: Any) -> Moment | None:
@@ -85,26 +85,25 @@ def _told(system: System, state: Any, why: str) -> Moment:
     return Moment(why, tuple(sorted(texts)))
 
 
-def replay(installation: Installation, setup: Setup, graph: Graph, lasso: Lasso) -> tuple[str | None, str]:
-    """How AIL's run differs from ours, None where it does not; and AIL's output. Raises Unable."""
+def replay(
+    installation: Installation, setup: Setup, graph: Graph, lasso: Lasso, folder: Path
+) -> tuple[str | None, str]:
+    """How AIL's run differs from ours, None where it does not; and AIL's output. In `folder` the environment's class is
+    compiled once for all runs of the setup. Raises Unable."""
     moments, script = expected(graph, lasso)
-    files = {
-        "agent.gwen": program_text(setup.programs),
-        "agent.ail": f"env = {CLASS}\nmas.file = agent.gwen\nmas.builder = gwendolen.GwendolenMASBuilder\n",
-        f"{CLASS}.java": environment_class(
-            setup.environment, agents=len(setup.programs), script=script, probed=graph.system.probed
-        ),
-    }
-    with tempfile.TemporaryDirectory(prefix="avow-ail-") as temporary:
-        folder = Path(temporary)
+    if not (folder / f"{CLASS}.class").is_file():
+        source = environment_class(setup.environment, agents=len(setup.programs), scripted=True)
+        ail = f"env = {CLASS}\nmas.file = agent.gwen\nmas.builder = {BUILDER}\n"
+        files = {"agent.gwen": program_text(setup.programs), "agent.ail": ail, f"{CLASS}.java": source}
         wrong = prepare(installation, folder, files)
         if wrong is not None:
             raise Unable(wrong)
-        command = [installation.java, "-cp", installation.class_path("."), "ail.mas.AIL", "agent.ail"]
-        try:
-            done = run(command, cwd=folder, seconds=REPLAY_SECONDS, env={"AJPF_HOME": str(installation.home)})
-        except ToolMissing as error:
-            raise Unable(str(error)) from None
+    (folder / SCRIPT).write_text(script.text(), encoding="utf-8")
+    command = [installation.java, *BRIEF, "-cp", installation.class_path("."), "ail.mas.AIL", "agent.ail"]
+    try:
+        done = run(command, cwd=folder, seconds=REPLAY_SECONDS, env={"AJPF_HOME": str(installation.home)})
+    except ToolMissing as error:
+        raise Unable(str(error)) from None
     told = [line.removeprefix(MARK) for line in done.stdout.splitlines() if line.startswith(MARK)]
     return _difference(moments, [_VARIABLE.sub("_", line) for line in told]), done.stdout + done.stderr
 

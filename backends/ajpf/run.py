@@ -178,6 +178,10 @@ class _Run:
 
     def explain(self) -> None:
         """A run for the first refuted property of each guarantee, and of each further property."""
+        with tempfile.TemporaryDirectory(prefix="avow-ail-") as ail:
+            self.explained(Path(ail))
+
+    def explained(self, ail: Path) -> None:
         groups = [claim.properties for claim in self.made.claims] + [ps for _, ps in self.made.extras]
         for group in groups:
             refuted = next((p for p in group if self.results[p.key].verdict is Verdict.REFUTED), None)
@@ -192,15 +196,17 @@ class _Run:
             self.counterexamples[refuted.key] = found
             self.logs[f"{refuted.key}.trace.txt"] = _trace(found)
             if self.setup.engine in ("auto", "ajpf") and self.ajpf is not None and not self.setup.environment_class:
-                self.replay(self.ajpf, checker, lasso, refuted)
+                self.replay(self.ajpf, checker, lasso, refuted, ail)
 
-    def replay(self, installation: Installation, checker: Checker, lasso: Lasso, refuted: Property) -> None:
+    def replay(
+        self, installation: Installation, checker: Checker, lasso: Lasso, refuted: Property, folder: Path
+    ) -> None:
         """The run that refutes, done again by the real AIL: if that goes another way, our interpreter is not AIL's for
         this program, and there is no verdict on anything."""
         name = f"AIL ({installation.version})"
         result = self.results[refuted.key]
         try:
-            difference, log = replay(installation, self.setup, checker.graph, lasso)
+            difference, log = replay(installation, self.setup, checker.graph, lasso, folder)
         except Unable as error:
             self.bound["replay"] = f"not replayed by {name}: {error}"
             return
@@ -264,6 +270,9 @@ class _Run:
         answers = ask(self.ajpf, self.setup, self.made.properties, self.left(), self.limits.megabytes)
         named = {answer.framework for answer in answers.values() if answer.framework}
         self.bound["ajpf"] = f"{self.ajpf.version}, {' and '.join(sorted(named)) or 'which did not name itself'}"
+        kept = sum(answer.kept for answer in answers.values())
+        if kept:
+            self.bound["ajpf"] += f"; {kept} of {len(answers)} answers kept of an earlier run with the same files"
         for p in self.made.properties:
             answer = answers[p.key]
             if answer.log:

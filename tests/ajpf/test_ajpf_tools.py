@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from helpers import some
 from small_agents import case
 
 from avow.backend_kit.protocol import Limits
-from avow.backends.ajpf import BACKEND, ajpf_tool, replay, spin
+from avow.backends.ajpf import BACKEND, ajpf_tool, kept, replay, spin
 from avow.backends.ajpf.ajpf_tool import Said, judge
 from avow.backends.ajpf.asking import ask
 from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
@@ -117,8 +116,48 @@ def test_ajpf_missing_is_not_run_and_says_how_to_get_it(lift, tmp_path, monkeypa
     assert "AJPF_HOME" in report.outcomes[0].summary
 
 
-def test_a_substitute_is_never_called_ajpf(lift, tmp_path):
-    os.environ.pop("AJPF_HOME", None)
+def test_answers_are_kept_and_asked_again_when_anything_changes(lift, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    _installed(tmp_path, monkeypatch, HOLDS)
+    javac = tmp_path / "javac"
+    javac.write_text("#!/bin/sh\ntrue\n")
+    javac.chmod(0o755)
+
+    def asked(options=None, files=None):
+        (tmp_path / "asked").write_text("")
+        (tmp_path / "out").mkdir(exist_ok=True)
+        options = {"engine": "ajpf", "semantics": "mcapl", **(options or {})}
+        report = BACKEND.discharge(lift(options, files), tmp_path / "out", Limits(seconds=60))
+        assert {o.verdict for o in report.outcomes} == {Verdict.CHECKED}
+        return (tmp_path / "asked").read_text().count(".jpf"), report.outcomes[0].bound["ajpf"]
+
+    assert asked()[0] == 3
+    again, said = asked()
+    assert again == 0
+    assert "3 of 3 answers kept" in said
+    assert asked({"properties": {"more": "[] (~D(cabin, go(9)))"}})[0] == 1, "only what is new"
+    program = lift({"engine": "ajpf", "semantics": "mcapl"}).options["program"]
+    text = (lift().root / program).read_text()
+    assert asked(files={program: text + "+new : { True } <- act;\n"})[0] == 3, "another program"
+    (tmp_path / "mcapl" / "bin" / "a.class").write_text("another build")
+    ajpf_tool._find.cache_clear()
+    assert asked()[0] == 3, "another MCAPL"
+    for note in (tmp_path / "cache" / "avow" / "ajpf").glob("*.json"):
+        note.write_text(
+            note.read_text().replace('"said": "holds"', '"said":  "holds"').replace('"path": []', '"path": [1]')
+        )
+    assert asked()[0] == 3, "an edited note is none"
+
+
+def test_what_ajpf_did_not_decide_is_not_kept(lift, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    for answer in ("crash", "search constraint"):
+        kept.keep("k", replace(judge(completed(answer))))
+        assert kept.recall("k") is None
+
+
+def test_a_substitute_is_never_called_ajpf(lift, tmp_path, monkeypatch):
+    monkeypatch.delenv("AJPF_HOME", raising=False)
     report = BACKEND.discharge(lift(), tmp_path, Limits(seconds=60))
     said = " ".join([report.tool, *(o.summary for o in report.outcomes), str([o.details for o in report.outcomes])])
     assert "AJPF" not in said
@@ -242,7 +281,6 @@ def test_what_a_run_tells(tmp_path):
     assert moments[0].text() == "start\tb"
     assert any(moment.text().startswith("shout\tb; warn") for moment in moments)
     assert len(script.draws) >= len(moments) - 1
-    source = environment_class(draws, script=script, probed=True)
-    assert f"SCRIPT = {{{{{script.draws[0][0]}}}" in source
-    assert "public void begin()" in source
-    assert "SCRIPT" not in environment_class(draws)
+    assert script.text().startswith(f"draw {script.draws[0][0]}\n")
+    assert "readAllLines" in environment_class(draws, scripted=True)
+    assert "readAllLines" not in environment_class(draws)
