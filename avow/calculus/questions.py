@@ -21,6 +21,7 @@ from avow.language.printer import show_term
 from avow.language.terms import Term
 from avow.sanity.claims import triggers
 from avow.solving.questions import solve
+from avow.solving.sizes import in_every_size
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,6 +223,12 @@ def made_up(answer: Answer, found: Sequence[Established] | None) -> Answer:
     return replace(answer, details=answer.details | {"certificate": told})
 
 
+def _counted(found: tuple[Verdict, str]) -> Answer:
+    """What hinges on how many elements an unspecified type has."""
+    verdict, why = found
+    return Answer(verdict, why, Counterexample(explanation=why) if verdict is Verdict.REFUTED else None)
+
+
 # -- loops and start-up ------------------------------------------------------------------------------------------------
 
 
@@ -278,6 +285,11 @@ class StartQuestion:
         listed = ", ".join(initials)
         match solution.status:
             case "sat":
+                counted = in_every_size(
+                    {}, initials, what="the initial conditions", effort=bounds.effort, seed=bounds.seed
+                )
+                if counted[0] is not Verdict.PROVED:
+                    return _counted(counted)
                 told = Answer(Verdict.PROVED, f"delayed edges start it: {listed}", details={"initial": list(initials)})
                 return made_up(told, composition.certificates.existence(start_name(self.members)))
             case "unsat":
@@ -351,6 +363,10 @@ class JointQuestion:
                 return Answer(Verdict.REFUTED, f"{summary}; {hint}", shape, details=details)
             if answer.verdict is not Verdict.REFUTED:
                 return Answer(Verdict.UNKNOWN, f"the solver gave up: {answer.reason}", details=details)
+            what = f"what {about} is about"
+            counted = in_every_size(hypotheses, {what: situation}, what=what, effort=bounds.effort, seed=bounds.seed)
+            if counted[0] is not Verdict.PROVED:
+                return _counted(counted)
             shown.append(answer.counterexample.text() if answer.counterexample else "")
         room = Answer(Verdict.PROVED, f"there is room: {'; '.join(shown)}")
         return made_up(room, composition.certificates.existence(f"joint.{about}"))

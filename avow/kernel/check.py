@@ -9,6 +9,7 @@ directly or through others, are all its hypotheses. Of a certificate nothing is 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass
 from functools import cached_property
@@ -28,8 +29,7 @@ class Refused(Exception):  # noqa: N818 - it says what came of it
 
 @dataclass(frozen=True, slots=True, order=True)
 class Needed:
-    """A hypothesis. `conds`: the assumptions that a guarantee's evidence may use (digests); the nodes whose values are
-    taken together, as of one step: they persist until used, and each input gives one output."""
+    """A hypothesis. `conds`: assumptions that a guarantee's evidence may use; nodes whose values are as of one step."""
 
     kind: How
     node: str
@@ -39,9 +39,8 @@ class Needed:
 
 @dataclass(frozen=True, slots=True)
 class Established:
-    """A claim that the kernel has established, up to its hypotheses. `goal`: its digest; `shown`: (node, digest) of the
-    claims shown on the way, itself included; `key`: what it was established from, digested; `vacuous`: its premises
-    contradict each other; `solvers`: how many, of different makers, answered each of its questions."""
+    """A claim established, up to its hypotheses. `goal`: its digest; `shown`: (node, digest) of those shown on the way;
+    `key`: of what it was established from; `vacuous`: its premises contradict; `solvers`: how many answered each."""
 
     goal: str
     hypotheses: tuple[Needed, ...]
@@ -60,7 +59,6 @@ class Answered(NamedTuple):
     vacuous: bool = False
 
 
-# what may be known how
 KINDS = {How.SHOWN: (Kind.ASSUMPTION, Kind.REQUIREMENT, Kind.IMPOSSIBLE), How.GUARANTEE: (Kind.GUARANTEE,)}
 KINDS |= {How.ENVIRONMENT: (Kind.ENVIRONMENT, Kind.ASSUMPTION), How.OPEN: (Kind.ASSUMPTION,)}
 KINDS |= {How.POSSIBLE: (Kind.POSSIBLE,)}
@@ -156,6 +154,10 @@ class Kernel:
         return claim
 
     def _asked(self, script: str, wanted: Said, otherwise: str) -> Answered:
+        if wanted is Said.SAT and (types := re.findall(r"^\(declare-sort (.*) 0\)$", script, re.MULTILINE)):
+            if re.search(r"\((forall|exists) \(", script):  # else what is so in one element is so in any number
+                raise Refused(f"{otherwise}, however many elements {' and '.join(types)} may have")
+            script += "".join(f"(assert (forall ((x {name}) (y {name})) (= x y)))\n" for name in types)
         if not (count := self.solvers.ask(script, wanted)):
             raise Refused(otherwise)
         return Answered(sha256(script), count)
@@ -199,9 +201,8 @@ class Kernel:
         return found
 
     def begins(self, question: Question, step: int) -> Iterator[Answered]:
-        """`Begins`: initial conditions that are used say nothing of the environment. Whatever its constant values are,
-        as far as the question's environment entries allow, there is a first value of each output. Conditions of one
-        output are taken together (`Apart`: others share nothing but what is constant). Raises Refused."""
+        """`Begins`: initials say nothing of the environment: whatever constants the question's environment allows,
+        there is a first value of each output, its conditions taken together (`Apart`). Raises Refused."""
         initials = [each for each in self.known.every if each.kind is Kind.INITIAL]
         given = [use for use in question.uses if self.certificate.entries[use.entry].how is How.ENVIRONMENT]
         for mark in dict.fromkeys(question.initials):
@@ -220,7 +221,7 @@ class Kernel:
                 yield self._asked(text.script(conditions), Said.SAT, f"no first value of {called} is found")
                 continue
             begin = text.bound("exists", names.values(), [first[n] for n in names], conjunction(conditions) or "true")
-            allowed = [text.formula(each.term, each.symbols(back)) for each, back in self._used(given)]
+            allowed = (text.formula(each.term, each.symbols(back)) for each, back in self._used(given))
             asked = text.script([*allowed, f"(not {begin})"])
             yield self._asked(asked, Said.UNSAT, f"{called}: no first value for every constant input that is allowed")
 

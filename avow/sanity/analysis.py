@@ -158,8 +158,8 @@ class _Analysis:
         subject = claim.subject or ""
         methods: dict[Property, Callable[[str], _Finding]] = {
             Property.ASSUMPTIONS_SATISFIABLE: lambda _: self._satisfiable(),
-            Property.CONSISTENT: lambda _: self._in_small_types(self._consistent()),
-            Property.REALIZABLE: lambda _: self._in_small_types(self._realizable(), "consistent"),
+            Property.CONSISTENT: lambda _: self._in_every_size(self._consistent()),
+            Property.REALIZABLE: lambda _: self._in_every_size(self._realizable(), "consistent"),
             Property.TAUTOLOGY: self._tautology,
             Property.VACUOUS: self._vacuous,
             Property.REDUNDANT: self._redundant,
@@ -178,13 +178,15 @@ class _Analysis:
         finding = self._possible(self.assumptions, "no input meets {} together", "no input meets {}")
         return self._with_all_sets(finding, self.assumptions)
 
-    def _in_small_types(self, finding: _Finding, because: str = "") -> _Finding:
-        """What was not refuted is, if it fails where the unspecified types have few elements."""
-        from avow.sanity.sizes import in_small_types
+    def _in_every_size(self, finding: _Finding, because: str = "") -> _Finding:
+        """What was not refuted is, if it fails for some number of elements of the unspecified types."""
+        from avow.solving.sizes import in_every_size
 
         if finding.verdict is Verdict.REFUTED:
             return finding
-        verdict, reason = in_small_types(self.assumptions, self.guarantees, effort=self.limit, seed=self.seed)
+        verdict, reason = in_every_size(
+            self.assumptions, self.guarantees, what="the guarantees", effort=self.limit, seed=self.seed
+        )
         clauses = tuple(self.guarantees) if verdict is Verdict.REFUTED else ()
         if verdict is Verdict.PROVED:
             return finding

@@ -126,8 +126,12 @@ spine of 7 levels is 7 * 8 < CHAIN terms long."""
 CONFLICTS = 8
 """Conflicts that are looked for: whoever mends eight asks again."""
 
-SIZES_TRIED = (1, 2)
-"""Sizes of an opaque type that a contract should allow: with one element nothing differs, two are enough for `!=`."""
+SIZES_TRIED = (1, 2, 3)
+"""Sizes of an unspecified type that a contract should allow, beside larger ones: with one element nothing differs, two
+are enough for `!=`, three for what two of them are not."""
+
+SIZES_COMBINED = 16
+"""Combinations of sizes that are asked about, for all such types together: each is a question or two."""
 
 NUMBERS_PAIRED = 4
 """Half way between so many numbers, each with each, values are looked for."""

@@ -22,6 +22,8 @@ from avow.evidence.record import CASE
 from avow.isolation import judge
 from avow.isolation.level import Isolation, Unavailable, available
 from avow.isolation.observed import from_json
+from avow.language.contract import Clause, Node
+from avow.solving.questions import opaque_sorts
 
 from . import export, wire
 from .subject import subject
@@ -71,7 +73,7 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         return replace(Report.alike(job, verdict, why, "hypothesis", version), command=command, logs=logs)
     try:
         observed, isolation = from_json(answer.pop("observed")), Isolation(answer.pop("isolation"))
-        outcomes = tuple(_outcome(o, answer, limits.seed) for o in job.obligations)
+        outcomes = tuple(_counted(_outcome(o, answer, limits.seed), job.clause(o), job.node) for o in job.obligations)
     except (KeyError, ValueError, TypeError) as error:
         return Report.alike(job, Verdict.ERROR, f"the judge's answer is not one: {error!r}", "hypothesis", version)
     logs["result.json"] = json.dumps(answer, indent=1) + "\n"
@@ -157,6 +159,16 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Ou
     if valid < wanted:
         summary += f"; the generator has no more than these, of {wanted} wanted"
     return replace(outcome, verdict=Verdict.TESTED, summary=summary)
+
+
+def _counted(outcome: Outcome, clause: Clause, node: Node) -> Outcome:
+    """Elements of unspecified types are made up, by the cases and by the subject: it may have fewer, or others."""
+    sorts = {sort for c in (clause, *node.assumptions) for sort in opaque_sorts(c.formula)}
+    if outcome.verdict is not Verdict.TESTED or not sorts:
+        return outcome
+    names = " and ".join(sorted(sort.name for sort in sorts))
+    told = f"{names}: an unspecified type has the elements that the cases and the subject's answers name, and no fewer"
+    return replace(outcome, hypotheses=(*outcome.hypotheses, told))
 
 
 def _doubt(answer: Mapping[str, Any], own: Mapping[str, Any], valid: int, rejected: int, wanted: int) -> str:
