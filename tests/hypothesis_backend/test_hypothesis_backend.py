@@ -222,8 +222,8 @@ def free(
 @pytest.mark.parametrize(("guarantee", "supposed"), [("out.y != out.z", 1), ("in.a > 3 -> in.a > 2", 0)])
 def test_made_up_elements_are_a_hypothesis(tmp_path: Path, guarantee: str, supposed: int) -> None:
     """A type of which nothing is known may have one element only: then no subject answers with two."""
-    subject = "def f(**inputs):\n    return {'y': 'U#0', 'z': 'U#1'}\n"
-    found = free(tmp_path, guarantee, subject, outputs="y : U, z : U", subject="s.py:f")
+    subject = "def step(**inputs):\n    return {'y': 'U#0', 'z': 'U#1'}\n"
+    found = free(tmp_path, guarantee, subject, outputs="y : U, z : U")
     assert found.verdict is Verdict.TESTED, found.summary
     assert len(found.hypotheses) == supposed
     assert all(text.startswith("U: ") for text in found.hypotheses)
