@@ -1,7 +1,8 @@
 """Does a report on disk say what the ledger says?
 
-Four steps, none of which trusts the one before: every record that the report quotes is in the ledger, unchanged, and
+Five steps, none of which trusts the one before: every record that the report quotes is in the ledger, unchanged, and
 the ledger has no other for its claims; every conclusion follows again from those records (statuses, gates, exit code);
+the kernel establishes from the certificates in the report what it says that the kernel established;
 the contracts' texts that it shows have the digests that it names; every other format is, byte for byte, what that case
 renders to. What the report was made *of* (contract, plan) is compared by digest where the files are here. One thing it
 cannot know: whether the obligations are still those of today's contract; that is what `avow verify` is for.
@@ -18,10 +19,17 @@ from avow.assurance.codec import from_json, to_json
 from avow.assurance.model import Case
 from avow.assurance.signed import KEYS
 from avow.base.codec import Unreadable
+from avow.base.diagnostics import Rejected
 from avow.base.files import digest, digest_file
+from avow.calculus.certificate_json import from_json as certificate
+from avow.calculus.certificates import Certificates
+from avow.calculus.composition import compose
+from avow.calculus.obligations import reestablished
 from avow.evidence.envelope import unseal_lines
 from avow.evidence.ledger import Ledger
 from avow.report import ATTESTATION, LeftOut, formats
+from avow.solving.apart import Both
+from avow.system.load import PLAN_FILE, load_system
 
 
 def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tuple[str, ...]:
@@ -40,7 +48,9 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
     found = [*_conclusions(case), *_texts(case), *_formats(case, folder, keys)]
     found += ["there is no ledger to compare with"] if ledger is None else _ledger(case, ledger)
     if root is not None:
-        found += _sources(case, root)
+        found += [*_sources(case, root), *_kernel(case, root)]
+    elif case.kernel.established:
+        found.append("the contracts are not here: what the kernel established cannot be established again")
     return tuple(found)
 
 
@@ -127,6 +137,30 @@ def _ledger(case: Case, ledger: Ledger) -> Iterable[str]:
         yield f"the ledger has {len(newer)} record(s) that the report does not show; first: {what}"
     if not newer and case.ledger_head != ledger.head:
         yield "the report names another ledger head than the ledger's"
+
+
+def _kernel(case: Case, root: Path) -> Iterable[str]:
+    """What the report says that the kernel established, from the certificates in it and the contracts that are here."""
+    if not case.kernel.established:
+        return
+    made_of = sorted((Path(path).name != PLAN_FILE, path) for path, _ in case.digests)
+    try:
+        composition = compose(load_system((root / made_of[0][1]).parent if made_of else root))
+        if composition.frame.system.name != case.system:
+            yield f"report.json: it names the contract of another system than {case.system}"
+            return
+        kept = {scope: certificate(data) for scope, data in case.kernel.certificates.items()}
+    except (OSError, Rejected, Unreadable) as error:
+        yield f"what the kernel established cannot be established again: {error}"
+        return
+    with Both() as solvers:
+        certificates = Certificates(composition, kept, solvers=solvers)
+        for told in case.kernel.established:
+            found = reestablished(certificates, told.obligation)
+            if found is None or (found.key, found.scope) != (told.key, told.scope):
+                yield f"report.json: the kernel does not establish {told.obligation} from the certificate in it"
+            elif found.solvers < told.solvers and solvers.second is not None:
+                yield f"report.json: {told.obligation}: {found.solvers} of {told.solvers} solvers answer"
 
 
 def _sources(case: Case, root: Path) -> Iterable[str]:
