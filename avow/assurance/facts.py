@@ -5,6 +5,7 @@ That it can be taken from a finished case as well is what lets ``avow report --c
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
@@ -220,11 +221,16 @@ def facts_of_case(case: Case) -> Facts:
 
 def _relative(span: Span | None, plan: Plan) -> Span | None:
     """A place relative to the workspace (the folder above ``contracts/``): a report is the same on every machine."""
-    if span is None or not Path(span.file).is_absolute() or len(plan.path.resolve().parents) < 3:
-        return span
-    root = plan.path.resolve().parents[2]
-    path = Path(span.file)
-    return replace(span, file=path.relative_to(root).as_posix()) if path.is_relative_to(root) else span
+    return span if span is None else replace(span, file=_place(span.file, plan.path))
+
+
+@functools.lru_cache(maxsize=1000)
+def _place(file: str, plan: Path) -> str:
+    """As `_relative`; many places lie in one file."""
+    if not Path(file).is_absolute() or len(plan.resolve().parents) < 3:
+        return file
+    root, path = plan.resolve().parents[2], Path(file)
+    return path.relative_to(root).as_posix() if path.is_relative_to(root) else file
 
 
 def _say(clause: Clause) -> str:

@@ -14,12 +14,14 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from avow.base.codec import Unreadable, canonical
 from avow.base.files import digest, read_regular, write
@@ -151,6 +153,7 @@ class Ledger:
     # -- inside -------------------------------------------------------------------------------------------------
 
     def _forget(self) -> None:
+        self._seen: tuple[int, ...] = ()
         self._offset = 0
         self._lines = 0
         self._tail = b""
@@ -187,15 +190,18 @@ class Ledger:
     def _refresh(self) -> None:
         """Read what was added since the last look (by this or another process)."""
         try:
+            if self._seen and _identity(self.path.stat()) == self._seen:
+                return
             with open(self.path, "rb", opener=open_file) as file:
-                size = os.fstat(file.fileno()).st_size
-                if size < self._offset:
+                info = os.fstat(file.fileno())
+                if info.st_size < self._offset or (self._seen and _identity(info)[:2] != self._seen[:2]):
                     self._forget()
                 file.seek(self._offset)
                 data = file.read()
         except FileNotFoundError:
             self._forget()
             return
+        self._seen = _identity(info)
         whole = data[: data.rfind(b"\n") + 1]
         self._offset += len(whole)
         self._tail = data[len(whole) :]
@@ -206,7 +212,8 @@ class Ledger:
         number = self._lines
         self._lines += 1
         try:
-            entry = read_line(line)
+            data = _parsed(line)
+            entry = _entry(data)
         except Unreadable as problem:
             self._damage.append(Damage(number + 1, f"cannot be read as a record: {problem}"))
             return
@@ -215,7 +222,7 @@ class Ledger:
         if not follows:  # told, but the record itself may still be whole: dropping it could hide a refutation
             reason = "does not follow the record before it: a record was removed, inserted, moved or made unreadable"
             self._damage.append(Damage(number + 1, reason))
-        identity = canonical(encode(entry.evidence))
+        identity = canonical(data["evidence"])
         mark, spelled = _spell(identity, entry.number, entry.previous)
         if mark != entry.hash:
             self._damage.append(Damage(number + 1, f"was changed after it was written ({entry.evidence.obligation})"))
@@ -256,6 +263,12 @@ class Ledger:
         return ()
 
 
+@functools.cache
+def ledger_of(path: Path) -> Ledger:
+    """One reader for each file and process: it reads what was added since, not all again."""
+    return Ledger(path)
+
+
 def _spell(evidence: str, number: int, previous: str) -> tuple[str, str]:
     """A line's hash and the line itself; `evidence` is the record's canonical text."""
     tail = f'"n":{number},"prev":{canonical(previous)}}}'
@@ -263,14 +276,26 @@ def _spell(evidence: str, number: int, previous: str) -> tuple[str, str]:
     return mark, f'{{"evidence":{evidence},"hash":"{mark}",{tail}'
 
 
+def _identity(info: os.stat_result) -> tuple[int, ...]:
+    return info.st_dev, info.st_ino, info.st_size, info.st_mtime_ns, info.st_ctime_ns
+
+
 def read_line(line: bytes) -> Entry:
     """One line of a ledger; its hash is not checked here. Raises Unreadable."""
+    return _entry(_parsed(line))
+
+
+def _parsed(line: bytes) -> dict[str, Any]:
     try:
         data = json.loads(line)
     except (ValueError, RecursionError) as error:
         raise Unreadable(f"not JSON ({error})") from error
     if not isinstance(data, dict) or data.keys() != {"evidence", "hash", "n", "prev"}:
         raise Unreadable("not a ledger line")
+    return data
+
+
+def _entry(data: dict[str, Any]) -> Entry:
     number, previous, mark = data["n"], data["prev"], data["hash"]
     if isinstance(number, bool) or not isinstance(number, int):
         raise Unreadable("n is not a number")

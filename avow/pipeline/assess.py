@@ -26,11 +26,10 @@ from avow.base.workspace import Workspace
 from avow.evidence.continuity import continuity
 from avow.evidence.currency import as_of_now
 from avow.evidence.heads import index_path, read_index
-from avow.evidence.ledger import Ledger
+from avow.evidence.ledger import Ledger, ledger_of
 from avow.evidence.record import CASE, RETRY
 from avow.evidence.signing import private_key
 from avow.pipeline import check as checking
-from avow.pipeline.discharge import ledger_of
 from avow.pipeline.integrity import acknowledge, confirm, discrepancies
 from avow.pipeline.recheck import counting_now, kernel_run
 from avow.pipeline.results import Result

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import os
 import time
 from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 from avow import __version__
@@ -17,7 +15,7 @@ from avow.base.files import digest, digest_file, is_intact, write
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.currency import outlived
-from avow.evidence.ledger import Ledger
+from avow.evidence.ledger import Ledger, ledger_of
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY, Evidence
 from avow.isolation.level import Isolation
@@ -28,12 +26,6 @@ from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
 from avow.tuning.bounds import CASES_KEPT
-
-
-@functools.cache
-def ledger_of(path: Path) -> Ledger:
-    """One reader for each file and process: it reads what was added since, not all again."""
-    return Ledger(path)
 
 
 def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obligation, ...]:

@@ -21,10 +21,10 @@ from pathlib import Path
 
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.base.workspace import Workspace
+from avow.evidence.ledger import ledger_of
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY, Evidence
 from avow.pipeline import asking
-from avow.pipeline.discharge import ledger_of
 from avow.pipeline.mutant_systems import Altered, chosen
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work, method_backend, planned_method

@@ -82,9 +82,9 @@ def _stamp(workspace: Workspace) -> Path:
 def _observed(workspace: Workspace) -> tuple[Observed, ...]:
     """What subjects were seen to look at beyond the workspace."""
     from avow.evidence.currency import outside_of
-    from avow.evidence.ledger import Ledger
+    from avow.evidence.ledger import ledger_of
 
-    entries = [e for path in sorted(workspace.ledgers.glob("*.jsonl")) for e in Ledger(path).records()]
+    entries = [e for path in sorted(workspace.ledgers.glob("*.jsonl")) for e in ledger_of(path).records()]
     return outside_of(entries, workspace.root)
 
 

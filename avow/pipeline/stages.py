@@ -19,10 +19,11 @@ from doit.exceptions import TaskError
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.workspace import Workspace
 from avow.evidence.heads import index_path, read_index
+from avow.evidence.ledger import ledger_of
 from avow.pipeline import check as checking
 from avow.pipeline import export as exporting
 from avow.pipeline.assess import Assessment, certify, gate, report
-from avow.pipeline.discharge import discharge, ledger_of, open_obligations
+from avow.pipeline.discharge import discharge, open_obligations
 from avow.pipeline.state import State
 from avow.pipeline.work import LANGUAGE, Work
 from avow.pipeline.workload import Survey, survey, write_obligations

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,7 +61,8 @@ def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False)
     for work in surveyed.catalogue.works:
         for obligation in work.obligations:
             methods.setdefault(obligation.id, []).append(work.method)
-    listed = [obligation_json(workspace, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations]
+    shown = functools.cache(lambda file: workspace.relative(Path(file)))
+    listed = [obligation_json(shown, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations]
     text = json.dumps({"system": surveyed.system.name, "obligations": listed}, indent=1, ensure_ascii=False) + "\n"
     path = workspace.artifacts / surveyed.system.name / "obligations.json"
     if dry:
@@ -68,7 +70,7 @@ def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False)
     return write(path, text)
 
 
-def obligation_json(workspace: Workspace, obligation: Obligation, methods: list[str]) -> dict[str, Any]:
+def obligation_json(shown: Callable[[str], str], obligation: Obligation, methods: list[str]) -> dict[str, Any]:
     span = obligation.span
     return {
         "id": obligation.id,
@@ -77,6 +79,6 @@ def obligation_json(workspace: Workspace, obligation: Obligation, methods: list[
         "formula": obligation.formula,
         "digest": obligation.digest,
         "clauses": list(obligation.clauses),
-        "at": f"{workspace.relative(Path(span.file))}:{span.line}:{span.column}" if span else None,
+        "at": f"{shown(span.file)}:{span.line}:{span.column}" if span else None,
         "methods": methods,
     }

@@ -12,11 +12,12 @@ from helpers import some
 
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
+from avow.evidence.ledger import ledger_of
 from avow.isolation.level import SANDBOX, seals
 from avow.isolation.observed import Seen
 from avow.isolation.subject import Subject
 from avow.isolation.tracing import traces
-from avow.pipeline.discharge import discharge, ledger_of, open_obligations
+from avow.pipeline.discharge import discharge, open_obligations
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work
 from avow.pipeline.workload import Survey, survey

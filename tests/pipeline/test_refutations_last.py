@@ -12,8 +12,9 @@ from helpers import edit
 
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
+from avow.evidence.ledger import ledger_of
 from avow.evidence.record import CASE
-from avow.pipeline.discharge import discharge, ledger_of, open_obligations
+from avow.pipeline.discharge import discharge, open_obligations
 from avow.pipeline.run_info import Run
 from avow.pipeline.work import Work
 from avow.pipeline.workload import Survey, survey

@@ -23,10 +23,10 @@ from avow.backend_kit.protocol import Limits
 from avow.backend_kit.registry import backend
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
-from avow.evidence.ledger import Ledger
+from avow.evidence.ledger import Ledger, ledger_of
 from avow.pipeline import asking, forks
 from avow.pipeline import work as work_module
-from avow.pipeline.discharge import discharge, ledger_of
+from avow.pipeline.discharge import discharge
 from avow.pipeline.executors import Asked, Came, Desk, Executor, Local
 from avow.pipeline.requests import Request, Response, Unanswered, read_response, response_bytes
 from avow.pipeline.run_info import Run
