@@ -16,6 +16,7 @@ from avow.assurance.certification import KernelRun, ProofView, Trusted
 from avow.assurance.naming import is_advice
 from avow.assurance.policy import Policy
 from avow.base.diagnostics import Span
+from avow.base.remembered import by_identity
 from avow.base.verdict import Link, Verdict
 from avow.evidence.audit import Discrepancy
 from avow.evidence.ledger import Entry
@@ -407,10 +408,7 @@ class Case:
 
     def obligation(self, name: str) -> ObligationView:
         """The obligation of that id. Raises KeyError."""
-        for view in self.obligations:
-            if view.id == name:
-                return view
-        raise KeyError(name)
+        return _by_id(self.obligations)[name]
 
     def said(self, name: str) -> Handled | None:
         """What the plan says of a claim's finding: the first entry with a reason that matches it, else any."""
@@ -420,3 +418,8 @@ class Case:
     @property
     def good(self) -> bool:
         return self.exit_code == 0
+
+
+@by_identity(4)
+def _by_id(views: tuple[ObligationView, ...]) -> Mapping[str, ObligationView]:
+    return {view.id: view for view in reversed(views)}

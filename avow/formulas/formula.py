@@ -11,6 +11,7 @@ import hashlib
 from collections.abc import Iterable, Mapping
 from typing import assert_never
 
+from avow.base.remembered import by_identity
 from avow.formulas.flattening import flattened
 from avow.formulas.traversal import Steps, run, subterms, transform
 from avow.language.contract import Clause, Node
@@ -196,8 +197,13 @@ def normalise(term: Term) -> Term:
 
 def digest(*terms: Term, sorts: Iterable[Sort] = ()) -> str:
     """SHA-256 of the meaning of some formulas (their order does not count) and of some sorts."""
-    keys = sorted({run(_normal(term, {}, 0))[1] for term in terms})
+    keys = sorted(set(map(_meaning, terms)))
     return _hash("formulas", *keys, "sorts", *sorted({sort_digest(sort) for sort in sorts}))
+
+
+@by_identity(50_000)
+def _meaning(term: Term) -> str:
+    return run(_normal(term, {}, 0))[1]
 
 
 def node_digest(node: Node, clause: Clause) -> str:

@@ -5,6 +5,7 @@ Every function reports all that is wrong at once. Nothing here raises anything b
 
 from __future__ import annotations
 
+import functools
 import stat
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -59,7 +60,7 @@ def check_paths(
 def read_in_part(paths: Iterable[Path]) -> Contract:
     """As much of a contract as can be read, whatever is wrong in it: to look names up, never to verify."""
     found = [source for path in paths if isinstance(source := read_source(path), Source)]
-    return _checked(found, frozenset(), partial=True)[0]
+    return _checked(tuple(map(_as_read, found)), frozenset(), True)[0]
 
 
 def syntax_faults(text: str, span: Span | None) -> tuple[Diagnostic, ...]:
@@ -136,13 +137,24 @@ def check_sources(
     sources: Sequence[Source], *, off: frozenset[str] = frozenset(), partial: bool = False
 ) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
     """As `check_paths`, of texts already read. `partial`: other files are missing, so names may be declared there."""
-    contract, diagnostics = _checked(sources, off, partial=partial)
+    contract, diagnostics = _checked(tuple(map(_as_read, sources)), off, partial)
     return (None if any(d.is_error for d in diagnostics) else contract), diagnostics
 
 
+_Text = tuple[str, str, int, int]
+"""A source as a value: its file, the text, and where in the file it begins."""
+
+
+def _as_read(source: Source) -> _Text:
+    return source.file, source.text, source.line, source.column
+
+
+@functools.lru_cache(maxsize=8)
 def _checked(
-    sources: Sequence[Source], off: frozenset[str], *, partial: bool
+    texts: tuple[_Text, ...], off: frozenset[str], partial: bool
 ) -> tuple[Contract, tuple[Diagnostic, ...]]:
+    """Kept for a while: a run loads a contract, and then asks what there is to say of it."""
+    sources = [Source(*text) for text in texts]
     parsed: list[tuple[FileSyntax, Reports]] = []
     linted: list[LintedFile] = []
     declarations = Declarations()

@@ -16,7 +16,8 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_file
 from avow.base.notes import read_note, write_note
 from avow.base.workspace import Workspace
-from avow.pipeline.work import ENGINES, method_backend, method_job
+from avow.pipeline import export as exporting
+from avow.pipeline.work import ENGINES, Work, is_portable, method_backend, method_job, planned_method
 from avow.pipeline.workload import Survey
 from avow.system.plan import Located, Method, System
 
@@ -27,27 +28,39 @@ def is_current(workspace: Workspace, surveyed: Survey) -> bool:
 
 
 def check(workspace: Workspace, surveyed: Survey) -> None:
-    """Raises Rejected with all errors; warnings go to the terminal and into the report."""
-    found = diagnostics(surveyed.system)
+    """Raises Rejected with all errors; warnings go to the terminal and into the report. A method of which there was
+    nothing to say is not asked about again while its slice is the same."""
+    keys = {(w.node, w.method): exporting.key(w) for w in surveyed.catalogue.works if _depends_on_slice(w)}
+    known = set((read_note(_stamp(workspace, surveyed)) or {}).get("clean", ()))
+    clean = {name for name, key in keys.items() if key in known}
+    found = diagnostics(surveyed.system, clean)
     errors = tuple(d for d in found if d.is_error)
     if errors:
         raise Rejected(*found)
     show(found)
     warnings = [f"{d.span}: {d.message} [{d.code}]" for d in found if d.severity is Severity.WARNING]
-    write_note(_stamp(workspace, surveyed), {"key": _key(surveyed), "warnings": warnings})
+    kept = sorted(keys[name] for name in clean if name in keys)
+    write_note(_stamp(workspace, surveyed), {"key": _key(surveyed), "warnings": warnings, "clean": kept})
 
 
-def diagnostics(system: System) -> tuple[Diagnostic, ...]:
-    """Lints of the contract, and what is to be said of the plan; without the warnings that the plan switches off."""
+def _depends_on_slice(work: Work) -> bool:
+    """Whether what its check says depends on nothing else."""
+    return not work.is_engine and is_portable(method_backend(work.system, planned_method(work)))
+
+
+def diagnostics(system: System, clean: set[tuple[str, str]] | None = None) -> tuple[Diagnostic, ...]:
+    """Lints of the contract, and what is to be said of the plan; without the warnings that the plan switches off.
+    `clean`: (node, method) of which nothing is to be said; those found to be so are added."""
     from avow.language.load import check_paths
 
     off = frozenset(system.plan.lints_off)
-    return (*check_paths(system.plan.contract_files, off=off)[1], *of_plan(system))
+    return (*check_paths(system.plan.contract_files, off=off)[1], *of_plan(system, clean))
 
 
-def of_plan(system: System) -> tuple[Diagnostic, ...]:
+def of_plan(system: System, clean: set[tuple[str, str]] | None = None) -> tuple[Diagnostic, ...]:
     """What is to be said of a plan that can be read: its account of the ROS graph, its requirements' sentences, and
-    what each backend says of its options; without the warnings that the plan switches off."""
+    what each backend says of its options; without the warnings that the plan switches off. `clean`: as for
+    `diagnostics`."""
     from avow.system.graph import dataflow
     from avow.system.sentences import requirement_sentences
     from avow.system.statements import unconfirmed, without_words
@@ -62,7 +75,12 @@ def of_plan(system: System) -> tuple[Diagnostic, ...]:
     ]
     for plan in system.plan.nodes:
         for method in plan.methods:
-            found += _method(system, plan.node, method)
+            name = plan.node, method.id
+            if clean is None or name not in clean:
+                said = tuple(_method(system, plan.node, method))
+                found += said
+                if clean is not None and not said:
+                    clean.add(name)
     return tuple(d for d in found if d.is_error or d.code not in system.plan.lints_off)
 
 

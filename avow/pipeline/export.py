@@ -10,6 +10,7 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import digest, is_intact, write
 from avow.base.notes import read_note, write_note
+from avow.base.remembered import by_identity
 from avow.base.workspace import Workspace
 from avow.pipeline.slices import MethodSlice
 from avow.pipeline.work import Work, method_backend, method_job, planned_method
@@ -30,6 +31,7 @@ def is_current(workspace: Workspace, work: Work, key: str) -> bool:
     return all(is_intact(place / name, sha) for name, sha in stamp["files"].items())
 
 
+@by_identity(20_000)
 def key(work: Work) -> str:
     """An artifact may show more than its obligations' meaning (names, sentences): all that its slice says."""
     from avow.pipeline.blobs import encode

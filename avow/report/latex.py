@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterable
 
@@ -41,9 +42,10 @@ _DANGEROUS = re.compile(
 
 def latex(text: str) -> str:
     """Text as LaTeX that prints it and does nothing else."""
-    return "".join(_latex_character(c) for c in clean(text))
+    return "".join(map(_latex_character, clean(text)))
 
 
+@functools.lru_cache(maxsize=4096)
 def _latex_character(c: str) -> str:
     if c == '"':
         return r"\textquotedbl{}"
