@@ -206,6 +206,7 @@ def _meaning(term: Term) -> str:
     return run(_normal(term, {}, 0))[1]
 
 
+@by_identity(50_000)
 def node_digest(node: Node, clause: Clause) -> str:
     """SHA-256 of one clause under its node's assumptions: what evidence for it is about."""
     assumed = digest(*(a.formula for a in node.assumptions if a != clause))

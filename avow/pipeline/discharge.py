@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
@@ -27,16 +29,21 @@ from avow.pipeline.run_info import Run
 from avow.pipeline.work import LANGUAGE, Work, method_backend, method_job, planned_method
 from avow.tuning.bounds import CASES_KEPT
 
+Intact = Callable[[str, str], bool]
+
 
 def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obligation, ...]:
     """Those without a current record that still can be believed; in a fresh run, those without one of this run. What a
     method of the plan takes on it settles together, so that an answer does not depend on what else was open."""
     ledger = ledger_of(workspace.ledger(work.system.name))
-    found = tuple(o for o in work.obligations if not _is_settled(workspace, ledger, work, o, run))
+    intact = functools.cache(lambda path, sha: is_intact(workspace.root / path, sha))
+    found = tuple(o for o in work.obligations if not _is_settled(workspace, ledger, work, o, run, intact))
     return work.obligations if found and not work.is_engine else found
 
 
-def _is_settled(workspace: Workspace, ledger: Ledger, work: Work, obligation: Obligation, run: Run) -> bool:
+def _is_settled(
+    workspace: Workspace, ledger: Ledger, work: Work, obligation: Obligation, run: Run, intact: Intact
+) -> bool:
     refuted = ledger.refutations(obligation.id, obligation.digest, work.engine)
     found = [e for e in ledger.current(obligation.id, work.keys[obligation.id]) if not outlived(e, refuted)]
     records = [e.evidence for e in found if still_counts(e.evidence, workspace.root, work.system)]
@@ -45,7 +52,7 @@ def _is_settled(workspace: Workspace, ledger: Ledger, work: Work, obligation: Ob
     last = records[-1]
     if last.details.get(RETRY) and last.run != run.id:
         return False
-    return all(is_intact(workspace.root / path, sha) for path, sha in last.outputs.items())
+    return all(intact(path, sha) for path, sha in last.outputs.items())
 
 
 def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]:

@@ -18,6 +18,7 @@ from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest, digest_file
+from avow.base.remembered import by_identity
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import node_digest, sort_digest
 from avow.language.contract import Contract, Node
@@ -224,6 +225,7 @@ def method_job(system: System, node: Node, method: Method) -> Job:
     return Job(system, node, method, tuple(guarantee(system, node, name) for name in method.guarantees))
 
 
+@by_identity(50_000)
 def guarantee(system: System, node: Node, name: str) -> Obligation:
     """This node's implementation or model meets this guarantee, whenever its assumptions hold."""
     clause = node.clause(name)

@@ -12,6 +12,7 @@ from typing import Any
 from avow import __version__
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest, digest_file, write
+from avow.base.remembered import by_identity
 from avow.base.workspace import Workspace
 from avow.evidence.obligation import Obligation
 from avow.pipeline.work import Catalogue, Work, catalogue
@@ -57,17 +58,22 @@ def survey(folder: Path) -> Survey | Rejected:
 
 def write_obligations(workspace: Workspace, surveyed: Survey, dry: bool = False) -> bool:
     """artifacts/<system>/obligations.json: every claim, with its formula and who settles it. `dry`: is it current?"""
+    text = _listed(workspace, surveyed)
+    path = workspace.artifacts / surveyed.system.name / "obligations.json"
+    if dry:
+        return path.is_file() and path.read_bytes() == text.encode()
+    return write(path, text)
+
+
+@by_identity(1)
+def _listed(workspace: Workspace, surveyed: Survey) -> str:
     methods: dict[str, list[str]] = {}
     for work in surveyed.catalogue.works:
         for obligation in work.obligations:
             methods.setdefault(obligation.id, []).append(work.method)
     shown = functools.cache(lambda file: workspace.relative(Path(file)))
     listed = [obligation_json(shown, o, methods.get(o.id, [])) for o in surveyed.catalogue.obligations]
-    text = json.dumps({"system": surveyed.system.name, "obligations": listed}, indent=1, ensure_ascii=False) + "\n"
-    path = workspace.artifacts / surveyed.system.name / "obligations.json"
-    if dry:
-        return path.is_file() and path.read_bytes() == text.encode()
-    return write(path, text)
+    return json.dumps({"system": surveyed.system.name, "obligations": listed}, indent=1, ensure_ascii=False) + "\n"
 
 
 def obligation_json(shown: Callable[[str], str], obligation: Obligation, methods: list[str]) -> dict[str, Any]:

@@ -1,0 +1,94 @@
+"""What an edit of one clause costs beside a run with nothing to do.
+
+    python benchmarks/edit.py [NODES [GUARANTEES]]        # default: 50 nodes with 10 each
+
+Processor seconds through the real pipeline, the least of three rounds that take turns. What an edit costs is told
+apart: Avow's own work up to the gates, the report's formats, and the tools with the processes that they run in. The exit code
+is 1 where an edit of one clause runs more than one export, one sanity and one method.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+from scale.made import programs  # noqa: E402
+
+_CHILD = """
+import json, os, sys, time
+from pathlib import Path
+import avow.pipeline.tasks as tasks
+formats = 0.0
+if sys.argv[2] == "told":
+    import avow.report
+    whole = avow.report.render_all
+    def timed(*given):
+        global formats
+        start = time.thread_time()
+        try:
+            return whole(*given)
+        finally:
+            formats += time.thread_time() - start
+    avow.report.render_all = timed
+try:
+    tasks.execute(Path(sys.argv[1]), ["verify"])
+except SystemExit:
+    pass
+print("spent", json.dumps([time.process_time() - formats, formats]))
+"""
+
+
+def run(root: Path, kind: str) -> tuple[list[float], list[str]]:
+    """Processor seconds (own, formats, tools), and the stages that were run."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        [sys.executable, "-c", _CHILD, str(root), kind],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        check=True,
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    own, formats = json.loads(done.stdout.rpartition("spent")[2])
+    whole = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return [own, formats, whole - own - formats], sorted(
+        re.findall(r"^  (export|sanity|discharge|compose)\s", done.stdout, re.MULTILINE)
+    )
+
+
+def main(nodes: int, guarantees: int) -> int:
+    idle: list[float] = []
+    edits: list[list[float]] = []
+    several = False
+    with tempfile.TemporaryDirectory() as name:
+        root = Path(name)
+        contract = programs(root / "contracts" / "made", nodes, guarantees) / "system.rcl"
+        shutil.copy(ROOT / "dodo.py", root)
+        (own, formats, tools), _ = run(root, "told")
+        print(f"first run   {own:6.2f} s own, {formats:5.2f} s formats, {tools:6.2f} s tools", flush=True)
+        before = contract.read_text()
+        for k in range(3):
+            idle.append(sum(run(root, "idle")[0]))
+            contract.write_text(before.replace("in.x1 > 1 ->", f"in.x1 > {k + 2} ->"))
+            spent, stages = run(root, "told")
+            several |= stages != ["discharge", "export", "sanity"]
+            edits.append(spent)
+    own, formats, tools = min(edits)
+    print(f"nothing     {min(idle):6.2f} s")
+    times = own / min(idle)
+    print(f"one edit    {own:6.2f} s own, {formats:5.2f} s formats, {tools:6.2f} s tools; own {times:.1f} x nothing")
+    return int(several)
+
+
+if __name__ == "__main__":
+    sys.exit(main(*map(int, [*sys.argv[1:], *("50", "10")[len(sys.argv) - 1 :]])))
