@@ -3,8 +3,8 @@
     python benchmarks/edit.py [NODES [GUARANTEES]]        # default: 50 nodes with 10 each
 
 Processor seconds through the real pipeline, the least of three rounds that take turns. What an edit costs is told
-apart: Avow's own work up to the gates, the report's formats, and the tools with the processes that they run in. The exit code
-is 1 where an edit of one clause runs more than one export, one sanity and one method.
+apart: Avow's own work up to the gates, the report's formats, and the tools with the processes that they run in. The
+exit code is 1 where an edit of one clause runs more than one export, one sanity and one method.
 """
 
 from __future__ import annotations

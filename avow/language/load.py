@@ -150,9 +150,7 @@ def _as_read(source: Source) -> _Text:
 
 
 @functools.lru_cache(maxsize=8)
-def _checked(
-    texts: tuple[_Text, ...], off: frozenset[str], partial: bool
-) -> tuple[Contract, tuple[Diagnostic, ...]]:
+def _checked(texts: tuple[_Text, ...], off: frozenset[str], partial: bool) -> tuple[Contract, tuple[Diagnostic, ...]]:
     """Kept for a while: a run loads a contract, and then asks what there is to say of it."""
     sources = [Source(*text) for text in texts]
     parsed: list[tuple[FileSyntax, Reports]] = []
