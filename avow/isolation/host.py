@@ -75,6 +75,8 @@ def plain(data: Any) -> Any:
     match data:
         case {"q": [numerator, denominator]}:
             return Fraction(numerator, denominator)
+        case {"r": text}:
+            return float.fromhex(text)
         case {"t": items}:
             return tuple(plain(item) for item in items)
         case {"f": rows, "d": default}:

@@ -18,6 +18,11 @@ _SUBJECT = {
     "description": "file.py:function, relative to the system's folder",
 }
 _CASES = {"type": "integer", "minimum": 1, "maximum": 1_000_000, "default": 500, "description": "how many cases"}
+_NUMBERS = {
+    "enum": ["exact", "float64", "float64-with-nan"],
+    "default": "exact",
+    "description": "what a REAL is given as: a fraction; a double; a double, NaN and infinity among them",
+}
 
 
 class HypothesisBackend(Backend):
@@ -25,14 +30,14 @@ class HypothesisBackend(Backend):
 
     name = "hypothesis"
     title = "Property-based tests of a Python function, generated from the contract"
-    version = "5"
+    version = "6"
     strength = Verdict.TESTED
     uses_steps = False
     uses_wiring = False
     link = Link.GENERATED
     options_schema = {
         "type": "object",
-        "properties": {"subject": _SUBJECT, "cases": _CASES},
+        "properties": {"subject": _SUBJECT, "cases": _CASES, "numbers": _NUMBERS},
         "required": ["subject"],
         "additionalProperties": False,
     }

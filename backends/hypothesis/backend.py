@@ -26,6 +26,7 @@ from avow.language.contract import Clause, Node
 from avow.solving.questions import opaque_sorts
 
 from . import export, wire
+from .machine import ANY
 from .subject import subject
 from .tuning import CONFIDENCE, REJECTED_CASES
 
@@ -73,7 +74,10 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         return replace(Report.alike(job, verdict, why, "hypothesis", version), command=command, logs=logs)
     try:
         observed, isolation = from_json(answer.pop("observed")), Isolation(answer.pop("isolation"))
-        outcomes = tuple(_counted(_outcome(o, answer, limits.seed), job.clause(o), job.node) for o in job.obligations)
+        refuting = job.options.get("numbers") == ANY
+        outcomes = tuple(
+            _counted(_outcome(o, answer, limits.seed, refuting), job.clause(o), job.node) for o in job.obligations
+        )
     except (KeyError, ValueError, TypeError) as error:
         return Report.alike(job, Verdict.ERROR, f"the judge's answer is not one: {error!r}", "hypothesis", version)
     logs["result.json"] = json.dumps(answer, indent=1) + "\n"
@@ -110,7 +114,7 @@ def _silence(done: Completed | None, limits: Limits) -> str:
     return f"the test ended without a result (code {done.code}): {last[0][:300]}"
 
 
-def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Outcome:
+def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refuting: bool) -> Outcome:
     own = answer["guarantees"][obligation.name]
     valid, rejected, wanted = answer["valid"], answer["rejected"], answer["wanted"]
     bound: dict[str, object] = {"cases": valid, "edge_cases": answer["edges"], "rejected": rejected, "seed": seed}
@@ -129,6 +133,11 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int) -> Ou
         return replace(outcome, verdict=Verdict.ERROR, summary=str(why), counterexample=shown)
     if answer["fault"]:
         return replace(outcome, verdict=Verdict.ERROR, summary=str(answer["fault"]))
+    apart = [Counterexample(tuple((str(n), str(v)) for n, v in case), str(why)) for case, why in answer["apart"]]
+    if apart:
+        details["no numbers"] = [one.text() for one in apart]
+    if apart and refuting:
+        return replace(outcome, verdict=Verdict.REFUTED, summary=apart[0].text(), counterexample=apart[0])
     if answer["unsteady"] is not None:
         case = ", ".join(f"{name} = {value}" for name, value in answer["unsteady"])
         why = f"undeclared input: asked the same again from its start, another process answers otherwise ({case})"

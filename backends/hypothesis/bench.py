@@ -7,11 +7,14 @@ tables, and Z3 where that cannot answer; what neither can tell is counted as und
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
 import sys
 import time
 from collections.abc import Callable, Mapping
+from fractions import Fraction
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +28,7 @@ from avow.formulas.values import Value, show
 from avow.isolation import judge
 from avow.isolation.observed import to_json
 from avow.isolation.subject import Subject, SubjectFailed
-from avow.language.sorts import BoolSort, FunctionSort, Sort
+from avow.language.sorts import BoolSort, FunctionSort, RealSort, Sort
 from avow.tuning.running import SUBJECT_PATIENCE
 
 from . import wire
@@ -33,8 +36,9 @@ from .convention import Malformed, outputs, received, sent
 from .export import KEPT
 from .generate import Failing, Generator, Impossible, Inputs, Source
 from .judging import Trigger, blamed, guarantee, judged
+from .machine import EXACT, SPECIAL, as_double, rounded
 from .pools import constants, parse_cell, pools
-from .tuning import ASKED_AGAIN, BATCH, CASE_BYTES, SHRINKING_SECONDS
+from .tuning import APART, ASKED_AGAIN, BATCH, CASE_BYTES, SHRINKING_SECONDS
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
 # and only where it is not installed as a package: slow, of no use, and the same seed would draw other cases elsewhere.
@@ -43,6 +47,8 @@ if hasattr(providers, "is_local_module_file"):
 
 
 Case = tuple[Inputs, dict[str, Value]]
+Apart = tuple[list[tuple[str, str]], str]
+"""A case with an input that is no REAL, or the negative zero, in words, and what was wrong with the answer."""
 
 
 class OutOfTime(BaseException):
@@ -57,6 +63,7 @@ class Bench:
         self.node: str = data["node"]
         self.cases: int = data["cases"]
         self.seed: int = data["seed"]
+        self.doubles = data["numbers"] != EXACT
         self.inputs_sorts: dict[str, Sort] = {p["name"]: wire.decode(p["sort"]) for p in data["inputs"]}
         self.output_sorts: dict[str, Sort] = {p["name"]: wire.decode(p["sort"]) for p in data["outputs"]}
         self.assumptions = tuple(judged(c) for c in data["assumptions"])
@@ -74,6 +81,7 @@ class Bench:
         self.end: float | None = None
         self._said: list[tuple[Inputs, Any]] = []
         self.unsteady: Inputs | None = None
+        self.apart: list[Apart] = []
 
     @classmethod
     def load(cls, path: Path) -> Bench:
@@ -87,7 +95,13 @@ class Bench:
         """Inputs that meet the assumptions, mostly: `check` rejects the others."""
 
         text = st.binary(min_size=CASE_BYTES, max_size=CASE_BYTES)
-        return text.map(lambda data: self.generator.case(Source(data), self._blamed, self._aims))
+        return text.map(lambda data: self._given(self.generator.case(Source(data), self._blamed, self._aims)))
+
+    def _given(self, inputs: Inputs) -> Inputs:
+        return {name: rounded(value) for name, value in inputs.items()} if self.doubles else inputs
+
+    def _sent(self, inputs: Inputs) -> dict[str, Any]:
+        return as_double(_sent(inputs)) if self.doubles else _sent(inputs)
 
     def configured(self, test: Callable[..., None]) -> Callable[..., None]:
         """As many cases as the plan wants, from the plan's seed, without Hypothesis' own database or deadline."""
@@ -105,7 +119,7 @@ class Bench:
 
     def run(self, inputs: Inputs) -> dict[str, Value]:
         """The subject's outputs. Raises SubjectFailed."""
-        return self._outputs(self.subject.ask(_sent(inputs)))
+        return self._outputs(self.subject.ask(self._sent(inputs)))
 
     def _outputs(self, reply: Any) -> dict[str, Value]:
         if isinstance(reply, SubjectFailed):
@@ -136,6 +150,7 @@ class Bench:
                 self.crash = self._shrunk_crash()
             elif not self.subject.fault:
                 self.unsteady = self._asked_again()
+                self.apart = self._asked_apart() if self.doubles else []
         finally:
             fault = self.subject.close()
         judge.say(channel, {**self._report(stopped, smaller), "fault": fault})
@@ -201,21 +216,23 @@ class Bench:
 
     def _replay(self) -> None:
         """What refuted a guarantee once, before all else, however few cases are wanted."""
-        cases = [inputs for inputs in self._kept if self._assumed(inputs)]
+        cases = [inputs for inputs in map(self._given, self._kept) if self._assumed(inputs)]
         self.replayed = len(cases)
         for case in cases:
             self._try([case], edge=True)
         self.edges -= len(cases)
 
     def _edges(self) -> None:
-        """The cases at thresholds, before any is drawn; no more than are drawn."""
-        cases = [inputs for inputs in self.generator.edges(self._blamed) if self._assumed(inputs)]
-        for at in range(0, min(len(cases), self.cases), BATCH):
-            self._try(cases[at : min(at + BATCH, self.cases)], edge=True)
+        """The cases at thresholds, before any is drawn; no more than twice as many."""
+        made = map(self._given, self.generator.edges(self._blamed))
+        cases = [inputs for inputs in made if self._assumed(inputs)]
+        most = min(len(cases), 2 * self.cases)
+        for at in range(0, most, BATCH):
+            self._try(cases[at : min(at + BATCH, most)], edge=True)
 
     def _try(self, cases: list[Inputs], edge: bool = False) -> None:
         """Ask the subject, and judge each guarantee of each answer."""
-        for inputs, reply in zip(cases, self.subject.ask_all([*map(_sent, cases)]), strict=False):
+        for inputs, reply in zip(cases, self.subject.ask_all([*map(self._sent, cases)]), strict=False):
             if len(self._said) < ASKED_AGAIN:
                 self._said.append((inputs, reply))
             self._in_time()
@@ -239,7 +256,7 @@ class Bench:
                 if self.end is not None and time.monotonic() > self.end:
                     break
                 before = self._said[at : at + BATCH]
-                again = twin.ask_all([_sent(inputs) for inputs, _ in before])
+                again = twin.ask_all([self._sent(inputs) for inputs, _ in before])
                 for (inputs, reply), other in zip(before, again, strict=False):
                     if other != reply and self._differ(reply, other):
                         return inputs
@@ -248,6 +265,32 @@ class Bench:
         finally:
             twin.close()
         return None
+
+    def _asked_apart(self) -> list[Apart]:
+        """Each REAL input in its turn is what no REAL is, or the negative zero, beside a few cases' other inputs."""
+        twin = Subject(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
+        found: dict[str, Apart] = {}
+        try:
+            for inputs, _ in self._said[:: max(1, len(self._said) // APART)][:APART]:
+                for name, (word, text) in itertools.product(inputs, SPECIAL.items()):
+                    if isinstance(self.inputs_sorts[name], RealSort) and (self.end or inf) > time.monotonic():
+                        asked = {**inputs, name: Fraction(0)}
+                        why = self._wrong_apart(twin, asked, name, text) if self._assumed(asked) else ""
+                        case = [(n, word if n == f"in.{name}" else value) for n, value in _pairs(asked, {})]
+                        found.setdefault(why, (case, why))
+        finally:
+            twin.close()
+        return [one for why, one in found.items() if why]
+
+    def _wrong_apart(self, twin: Subject, asked: Inputs, name: str, text: str) -> str:
+        """Of an input that has no value no guarantee that speaks of it can be judged; the negative zero is zero."""
+        try:
+            values = valuation(asked, self._outputs(twin.ask({**self._sent(asked), name: {"r": text}})))
+        except SubjectFailed as error:
+            return str(error)
+        zero = text == SPECIAL["-0"]
+        about = [g for g in self.guarantees.values() if zero or name not in g.judged.ports]
+        return "; ".join(f"{g.judged.name} is broken" for g in about if g.judged.holds(values) is False)
 
     def _differ(self, one: Any, other: Any) -> bool:
         try:
@@ -335,6 +378,7 @@ class Bench:
             "stopped": stopped,
             "observed": to_json(self.subject.observed()),
             "isolation": self.subject.isolation.value,
+            "apart": self.apart,
             "unsteady": _pairs(self.unsteady, {}) if self.unsteady is not None else None,
             "crash": [_pairs(self.crash[0], {}), self.crash[1]] if self.crash else None,
             "guarantees": {

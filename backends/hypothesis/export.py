@@ -11,6 +11,7 @@ from avow.language.contract import Clause, Port
 from avow.language.printer import show_sort, show_term
 
 from . import wire
+from .machine import EXACT
 from .subject import SubjectFile
 
 DATA = "contract.json"
@@ -87,6 +88,7 @@ def _data(job: Job, subject: SubjectFile) -> str:
         "subject": {"file": subject.name, "function": subject.function},
         "cases": cases(job),
         "seed": job.seed,
+        "numbers": str(job.options.get("numbers", EXACT)),
         "inputs": [_port(port) for port in job.node.inputs],
         "outputs": [_port(port) for port in job.node.outputs],
         "assumptions": [_clause(clause) for clause in job.node.assumptions],

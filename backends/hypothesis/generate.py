@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from collections.abc import Sequence as Sized
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -128,6 +128,8 @@ class Generator:
                     chance = random.Random(length)
                     mixed = (self._value(Source(chance.randbytes(8)), item, {}, 1, True) for _ in range(length))
                     yield from (Sequence((plain,) * length), Sequence(tuple(mixed)))
+                    if length > COMMON_LENGTHS and isinstance(item, RealSort | IntegerSort | NaturalSort):
+                        yield from _odd_one_out(self.pools.edges.get(item, ()), length)
                 for value in self.pools.edges.get(item, ()):
                     simple = self._number(Source(b""), item, False) if item != STRING else value
                     yield from (Sequence((value,)), Sequence((simple, value)))
@@ -303,3 +305,12 @@ def table(rows: Sized[tuple[Value, ...]], sort: FunctionSort) -> FunctionValue:
         case EnumSort(members=members):
             other = next((Element(m) for m in members if Element(m) not in results), other)
     return FunctionValue({row[:-1]: row[-1] for row in rows}, other)
+
+
+def _odd_one_out(edges: Iterable[Value], length: int) -> Iterator[Value]:
+    """A long sequence whose last element alone is on the other side of every threshold."""
+    numbers = sorted(value for value in edges if isinstance(value, int | Fraction))
+    if numbers:
+        low, high = numbers[0], numbers[-1]
+        yield Sequence((*(low,) * (length - 1), high))
+        yield Sequence((*(high,) * (length - 1), low))

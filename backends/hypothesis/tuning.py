@@ -15,6 +15,9 @@ BATCH = 50
 ASKED_AGAIN = 200
 """The first questions, which are put to a second process too: most thresholds, at a fraction of the time."""
 
+APART = 4
+"""Cases in which NaN, the infinities and the negative zero are tried: a fault there rarely depends on other inputs."""
+
 ATTEMPTS = 6
 """Times that the inputs to blame for an unmet assumption are drawn again; a case that stays unmet is rejected and
 counted."""
