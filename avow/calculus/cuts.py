@@ -2,34 +2,26 @@
 
 An answer that the scenario leaves out may lead on to steps that nobody has looked at. The solver knows the contract
 without the scenario: if it finds an output beside the ones that were found, or cannot exclude one, the search is not
-exhaustive. Only outputs that are no functions or sequences are asked about.
+exhaustive. Functions and sequences are asked about at the points at which they were decided; relations, whose points
+the scenario gives, are not.
 """
 
 from __future__ import annotations
 
 from avow.calculus.choices import Values, by_variable
-from avow.calculus.node_outputs import Answerer, known_of
+from avow.calculus.node_outputs import Answerer, is_restricted, known_of
 from avow.calculus.open_values import is_open
-from avow.calculus.scenario import World
-from avow.evaluation.evaluate import finite_values
-from avow.formulas.values import show
+from avow.calculus.scenario import key
+from avow.formulas.values import Value, show
 from avow.language.contract import Port
-from avow.language.sorts import FunctionSort, OpaqueSort, SequenceSort
+from avow.language.sorts import FunctionSort
+from avow.language.terms import Term
 from avow.solving.checking import put
 from avow.solving.limits import spent
 from avow.solving.models import Model
 from avow.solving.translation import Translator, Unsupported
 from avow.solving.z3_module import z3
 from avow.tuning.effort import CUT_EFFORT
-
-
-def is_restricted(world: World, node: Answerer, port: Port) -> bool:
-    """Whether not every value of an output's sort is tried. Functions and sequences are not looked at."""
-    if isinstance(port.sort, FunctionSort | SequenceSort | OpaqueSort):
-        return False
-    everything = finite_values(port.sort)
-    tried = node.choices[f"out.{port.name}"].values
-    return everything is None or tried is None or not set(everything) <= set(tried)
 
 
 def first_cut(node: Answerer, deadline: float) -> str:
@@ -63,17 +55,44 @@ def _other(
         solver.add(*translator.background([p.variable for p in node.node.outputs]))
         if not free:
             solver.add(*(translator.term(clause.formula, meanings) for clause in node.node.guarantees))
-        constants = {port.name: translator.variable(port.variable) for port in ports}
-        for answer in {tuple((p.name, answer[p.name]) for p in ports): answer for answer in found}.values():
-            pairs = [constants[p.name] != translator.value(answer[p.name], p.sort) for p in ports]
-            solver.add(z3.Or(pairs))
-        answered = put(translator, solver, CUT_EFFORT).status
-        if answered == "unsat":
-            return None
-        if answered == "sat":
-            reader = Model(translator, solver.model())
-            shown = [f"{p.name} = {show(reader.read(constants[p.name], p.sort))}" for p in ports]
-            return f", {', '.join(shown)}"
+        return _beside(translator, solver, ports, found)
     except (Unsupported, z3.Z3Exception):
-        pass
-    return ", as far as the solver can tell"
+        return _UNDECIDED
+
+
+def another_first(node: Answerer, port: Port, condition: Term, inputs: Values, found: tuple[Value, ...]) -> bool:
+    """Whether an initial condition allows a value beside the ones found, as far as is known, its inputs being these."""
+    translator = Translator()
+    solver = z3.Solver(ctx=translator.context)
+    try:
+        known = by_variable(node.node, inputs)
+        meanings = {v: translator.value(value, v.sort) for v, value in known.items()}
+        solver.add(*translator.background([port.variable]), translator.term(condition, meanings))
+        return _beside(translator, solver, [port], tuple({port.name: value} for value in found)) is not None
+    except (Unsupported, z3.Z3Exception):
+        return True
+
+
+_UNDECIDED = ", as far as the solver can tell"
+
+
+def _beside(translator: Translator, solver: z3.Solver, ports: list[Port], found: tuple[Values, ...]) -> str | None:
+    """An output that the solver's facts allow beside the ones found, in words; None if there is none."""
+    for answer in {tuple((p.name, key(answer[p.name])) for p in ports): answer for answer in found}.values():
+        solver.add(z3.Or([z3.Not(z3.And(_known(translator, p, answer[p.name]))) for p in ports]))
+    answered = put(translator, solver, CUT_EFFORT).status
+    if answered == "unsat":
+        return None
+    if answered != "sat":
+        return _UNDECIDED
+    reader = Model(translator, solver.model())
+    plain = [p for p in ports if not isinstance(p.sort, FunctionSort)]
+    shown = [f"{p.name} = {show(reader.read(translator.variable(p.variable), p.sort))}" for p in plain]
+    return f", {', '.join(shown)}" if shown else f": {', '.join(p.name for p in ports)}"
+
+
+def _known(translator: Translator, port: Port, value: Value) -> list[object]:
+    """That an output has this value, as far as it is decided."""
+    if is_open(value) or isinstance(port.sort, FunctionSort):
+        return known_of(translator, port.variable, value)
+    return [translator.variable(port.variable) == translator.value(value, port.sort)]

@@ -113,6 +113,9 @@ class Choices:
     short: str = ""
     """In what way `shells` are not all there are."""
 
+    restricted: str = ""
+    """In what way `values`, of what has `shells`, are not all there are."""
+
     natural: bool = False
     """Whether it, or what it has at a point, is a natural number."""
 

@@ -13,12 +13,12 @@ from avow.calculus.choices import Values, by_variable, definition, search
 from avow.calculus.narrowing import Choices, Narrowing, Unknown, forcings
 from avow.calculus.open_values import ANY, Holds, Undecided, is_open, lazy_names, opened
 from avow.calculus.scenario import CannotRun, Point, World, key
-from avow.evaluation.evaluate import NotEvaluable, compile_term
+from avow.evaluation.evaluate import NotEvaluable, compile_term, finite_values
 from avow.formulas.formula import free_variables, substitute
 from avow.formulas.values import FunctionValue, Value, show
 from avow.formulas.values import Sequence as SequenceValue
 from avow.language.contract import Clause, Node, Port
-from avow.language.sorts import BOOL, FunctionSort, NaturalSort, SequenceSort, Sort
+from avow.language.sorts import BOOL, FunctionSort, NaturalSort, OpaqueSort, SequenceSort, Sort
 from avow.language.terms import Role, Term, Variable
 from avow.solving.checking import put
 from avow.solving.translation import Translator, Unsupported
@@ -95,21 +95,43 @@ def judge(world: World, formula: Term, *, finite: bool = False, doubts: Doubts |
 def possible(world: World, node: str, port: Port) -> Choices:
     """What an output that is no relation may be."""
     sort = port.sort
+    cut = f"{node}.{port.name} may have values at some point that the scenario's leave out"
     try:
         match sort:
-            case FunctionSort():
-                natural = isinstance(sort.result, NaturalSort)
-                return Choices(world.results(node, port), "", (FunctionValue({}, ANY),), natural=natural)
+            case FunctionSort(result=result):
+                natural = isinstance(result, NaturalSort)
+                values = world.results(node, port)
+                restricted = "" if _are_all(values, result) else cut
+                return Choices(values, "", (FunctionValue({}, ANY),), restricted=restricted, natural=natural)
             case SequenceSort(item=item) if world.domain(("out", node), port) is None and sort not in world.domains:
                 shells: tuple[Value, ...] = tuple(SequenceValue((ANY,) * n) for n in range(SEQUENCE_LENGTHS + 1))
                 unknown = f"the elements of {node}.{port.name} are not known"
                 short = f"sequences of more than {SEQUENCE_LENGTHS} elements are not tried for {node}.{port.name}"
-                return Choices(world.plain_values(item), unknown, shells, short)
+                items = world.plain_values(item)
+                restricted = cut if items is not None and not _are_all(items, item) else ""
+                return Choices(items, unknown, shells, short, restricted)
             case _:  # any sort whose values can be tried
                 return Choices(world.candidates(node, port), natural=isinstance(sort, NaturalSort))
     except CannotRun as reason:
         shells = (FunctionValue({}, ANY),) if isinstance(sort, FunctionSort) else None  # type: ignore[assignment]
         return Choices(None, str(reason), shells, natural=isinstance(_values_of(sort), NaturalSort))
+
+
+def _are_all(values: Sequence[Value], sort: Sort) -> bool:
+    """Whether the values tried are all that a sort has."""
+    everything = finite_values(sort)
+    return everything is not None and set(everything) <= set(values)
+
+
+def is_restricted(world: World, node: Answerer, port: Port) -> bool:
+    """Whether not every value of an output's sort is tried; of functions, and of sequences element by element, at some
+    point."""
+    choices = node.choices.get(f"out.{port.name}")
+    if choices is None or isinstance(port.sort, OpaqueSort):
+        return False
+    if choices.shells is not None:
+        return bool(choices.restricted)
+    return choices.values is None or not _are_all(choices.values, port.sort)
 
 
 class Answerer:
@@ -126,6 +148,8 @@ class Answerer:
             found = definition(node.guarantees, port)
             if found is None:
                 self.searched.append((port, points))
+                if world.domain(("out", node.name), port) is not None:
+                    doubts.incomplete.add(f"{node.name}.{port.name} may hold at points that the scenario leaves out")
             else:
                 variables, body = found
                 holds = judge(world, body, doubts=doubts, about=f"{node.name}.{port.name}")

@@ -14,15 +14,15 @@ from random import Random
 
 from avow.base.graphs import components, cycles_in
 from avow.calculus.choices import Values, by_variable, search
-from avow.calculus.cuts import first_cut, is_restricted
+from avow.calculus.cuts import another_first, first_cut
 from avow.calculus.narrowing import Narrowing, Unknown, forcings
-from avow.calculus.node_outputs import Answerer, Doubts, Stuck, judge, possible
+from avow.calculus.node_outputs import Answerer, Doubts, Stuck, is_restricted, judge, possible
 from avow.calculus.open_values import Holds, Undecided, decided
 from avow.calculus.scenario import CannotRun, World, key
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
-from avow.language.terms import Role, Term
+from avow.language.terms import TRUE, Role, Term
 from avow.solving.limits import spend
 from avow.system.formulas import initial_condition, ports_of
 from avow.system.plan import Endpoint
@@ -78,6 +78,8 @@ class Machine:
         self.remembered = (*self.constants, *map(str, self.memory))
         self.memories: dict[tuple[object, ...], Values] = {}
         self.stuck: dict[tuple[object, ...], Stuck] = {}
+        self._begun: list[tuple[Endpoint, Term | None, Values, tuple[Value, ...]]] = []
+        """Each output's initial values, as found for what its node's inputs are then."""
         self._first: tuple[tuple[object, ...], ...] | None = None
         self._given_first: dict[tuple[object, ...], tuple[Values, ...]] = {}
         self._steps: dict[tuple[object, ...], tuple[Step, ...]] = {}
@@ -101,10 +103,10 @@ class Machine:
             if cut:
                 self.incomplete.add(cut)
         self.incomplete.update(stuck.text() for stuck in self.stuck.values() if not stuck.genuine)
-        for endpoint in self.memory:
-            condition, _ = self._initially(endpoint)
-            port = self.frame.node(endpoint.node).output(endpoint.port)
-            if condition is None and is_restricted(self.world, self.nodes[endpoint.node], port):
+        self.initial()
+        for endpoint, condition, given, found in self._begun:
+            node, port = self.nodes[endpoint.node], self.frame.node(endpoint.node).output(endpoint.port)
+            if is_restricted(self.world, node, port) and another_first(node, port, condition or TRUE, given, found):
                 self.incomplete.add(f"before the first step {endpoint} may have other values than the scenario's")
 
     def _unspecified(self) -> Iterator[str]:
@@ -216,6 +218,7 @@ class Machine:
             self.doubts.incomplete.add(f"too many initial values of {endpoint}")
         if not found:
             raise CannotRun(f"no value of the scenario is an initial value of {endpoint}")
+        self._begun.append((endpoint, condition, given, found))
         return found
 
     def _remember(self, values: Values) -> tuple[object, ...]:
@@ -347,5 +350,7 @@ class Machine:
         choices = self.nodes[node].choices[f"out.{port}"]
         if choices.values is None:
             raise CannotRun(choices.why)
+        if choices.restricted:
+            self.incomplete.add(choices.restricted)
         chosen = choices.values if random is None else (random.choice(choices.values),)
         return [{**values, name: decided(values[name], point, value)} for value in reversed(chosen)]
