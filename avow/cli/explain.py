@@ -22,7 +22,8 @@ def command(name: str, as_json: bool) -> int:
     """Any name of a report. Of an obligation: its formula, where it stands, its evidence, how to run it again.
 
     ID is an obligation's id, whole (system/node/kind/name) or in part, a guarantee as node.name, or the name of a
-    requirement, a supposition (S1, or its key), a node, a gate, a weakening, a derivation, or a word such as argued.
+    requirement, a supposition (S1, or its key), a node, a gate, a weakening, a derivation, a method, an element of the
+    argument (G4), a digest, a file, a diagnostic's code, or a word such as argued.
     """
     from avow.assurance.codec import to_json
     from avow.base.workspace import workspace

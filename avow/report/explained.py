@@ -1,5 +1,5 @@
 """What a report's other names mean, in a few lines each: requirements, suppositions, nodes, gates, weakenings,
-derivations and words. Obligations have more to tell (`avow.report.terminal`)."""
+derivations and words; `avow.report.identified` tells marks, and `avow.report.terminal` obligations."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from avow.assurance.model import Case
 from avow.assurance.modules import requirement_modules
 from avow.assurance.naming import short
 from avow.report.answers_page import WORDS, full_reason, some
+from avow.report.identified import identified
 
 
 def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
@@ -50,6 +51,7 @@ def explained(case: Case, name: str) -> Iterator[tuple[str, list[str]]]:
         if d.derivation.name == name:
             lines = [*d.derivation.text.splitlines(), f"{d.status.word}: {d.derivation.conclusion}"]
             yield f"derivation {name} (rule {d.derivation.rule})", lines
-    for word, meaning in WORDS:
-        if name.casefold() in word.split(", "):
-            yield f"the word {word}", [meaning]
+    words = [(word, meaning) for word, meaning in WORDS if name.casefold() in word.split(", ")]
+    for word, meaning in words:
+        yield f"the word {word}", [meaning]
+    yield from (told for told in identified(case, name) if not (words and told[0].startswith("the word ")))

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import html
+import re
 from dataclasses import replace
 from io import StringIO
+from pathlib import Path
+from urllib.parse import unquote
 
-from assurance.sample import case, evidence, guarantee, obligation, system
+import pytest
+from assurance.sample import case, evidence, guarantee, obligation, rover_case, system
 from rich.console import Console
 
+from avow.assurance.codec import read_case
+from avow.assurance.model import Case
+from avow.assurance.naming import short
+from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Verdict
+from avow.cli.ledgers import find_claim
 from avow.evidence.obligation import Kind
+from avow.report import formats
+from avow.report.explained import explained
 from avow.report.terminal import show_obligation
 from avow.system.plan import Finding
+from report.test_answers_page import REPORTS
+
+PAGES = ("index.html", "claims.html", "traceability.html")
 
 
 def shown(name: str) -> str:
@@ -69,10 +84,6 @@ def test_a_run_too_wide_for_the_terminal_is_told_by_what_changes() -> None:
 
 
 def test_every_name_that_the_first_page_shows_is_known() -> None:
-    from assurance.sample import rover_case
-
-    from avow.report.explained import explained
-
     found = rover_case()
     names = [r.id for r in found.requirements] + [s.number for s in found.suppositions]
     names += [s.key for s in found.suppositions] + [node.title for node in found.nodes]
@@ -83,3 +94,52 @@ def test_every_name_that_the_first_page_shows_is_known() -> None:
         told = list(explained(found, name))
         assert told, name
         assert all(lines for _, lines in told)
+
+
+def marks(made: dict[str, str]) -> set[str]:
+    """The identifiers on the pages: digests, elements of the argument, codes, claims, status words, files read."""
+    found: set[str] = set()
+    for page in PAGES:
+        text = made[page]
+        body = text[text.index("<main") :]
+        found |= set(re.findall(r'<code class="digest" title="([0-9a-f]{64})"', body))
+        found |= {code for code in re.findall(r"<code>([^<\s]+)</code>", body) if re.match(r"[0-9a-f]{12,64}$", code)}
+        found |= set(re.findall(r"<code>((?:G|Sn|S|C|A|J)\d+)</code>", body))
+        found |= set(re.findall(r"\b(?:RCL|PLAN|MON|HOARE|AJPF|DFY|HYP|REV|EXP)\d{3}\b", body))
+        found |= set(
+            re.findall(r'class="chip (?:good|fair|open|bad)" title="[^"]*"><span[^>]*>[^<]*</span> ([^<]+)<', body)
+        )
+        found |= set(re.findall(r"<li>(?:read|left) <code>([^<]+)</code>", body))
+        found |= set(re.findall(r'<details class="ob" id="([^"]+)"', body))
+    return {html.unescape(mark) for mark in found}
+
+
+def unexplained(found: Case, made: dict[str, str]) -> set[str]:
+    def known(name: str) -> bool:
+        try:
+            return bool(list(explained(found, name)) or find_claim([found], name))
+        except Rejected:
+            return False
+
+    names = marks(made) | {short(v.id) for v in found.obligations} | {m.name for m in found.methods}
+    return {name for name in names if not known(unquote(name))}
+
+
+def test_every_mark_that_a_report_shows_is_known() -> None:
+    found = rover_case()
+    made = {name: text for name, text in formats(found) if isinstance(text, str)}
+    assert len(marks(made)) > 40
+    assert unexplained(found, made) == set()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("folder", REPORTS, ids=lambda folder: folder.name)
+def test_every_mark_of_the_shipped_systems_reports_is_known(folder: Path) -> None:
+    found = read_case(folder)
+    made = {name: text for name, text in formats(found) if isinstance(text, str)}
+    assert unexplained(found, made) == set()
+
+
+def test_a_mark_that_is_nowhere_is_not_explained() -> None:
+    found = rover_case()
+    assert unexplained(found, dict.fromkeys(PAGES, "<main><code>ffffffffffffffff</code>")) == {"f" * 16}
