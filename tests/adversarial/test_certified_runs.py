@@ -16,6 +16,12 @@ from calculus.make import make, outcomes
 
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
+from avow.calculus.certificates import Certificates, requirement_scope
+from avow.calculus.composition import compose
+from avow.calculus.discharge import Bounds
+from avow.calculus.finder import Hint
+from avow.kernel.certificate import Certificate, How
+from avow.kernel.statements import Kind
 
 Values = dict[str, bool]
 Formula = tuple[str, Callable[[Values], bool]]
@@ -53,7 +59,6 @@ class System:
         self.initial = {name: random.choice([True, False, None]) for name in self.nodes}
         self.assumed: dict[str, list[tuple[str, Callable[[Values], bool]]]] = {}
         self.promised: dict[str, list[tuple[str, Callable[[Values], bool]]]] = {}
-        text = ""
         for name in self.nodes:
             inputs = [f"i{k}{name}" for k in range(random.randint(1, 2))]
             for port in inputs:
@@ -63,12 +68,44 @@ class System:
             ins = [f"in.{port}" for port in inputs]
             self.assumed[name] = [formula(random, ins, 1) for _ in range(random.randint(0, 2))]
             self.promised[name] = [formula(random, [*ins, f"out.o{name}"]) for _ in range(random.randint(1, 2))]
-            clauses = [f"  assume a{k} ( {text_} )\n" for k, (text_, _) in enumerate(self.assumed[name])]
-            clauses += [f"  guarantee g{k} ( {text_} )\n" for k, (text_, _) in enumerate(self.promised[name])]
-            ports = ", ".join(f"{port} : BOOL" for port in inputs)
-            text += f"node {name} {{ inputs( {ports} ) outputs( o{name} : BOOL ) topics()\n{''.join(clauses)}}}\n"
         self.required = [formula(random, [f"{n}.o{n}" for n in self.nodes]) for _ in range(2)]
-        self.text, self.plan = text, self.planned(random)
+        self.names = ["g0", "g1"]
+        self.text, self.plan = self.written(), self.planned(random)
+
+    def written(self) -> str:
+        text = ""
+        for name in self.nodes:
+            clauses = [f"  assume a{k} ( {text_} )\n" for k, (text_, _) in enumerate(self.assumed[name])]
+            clauses += [
+                f"  guarantee {called} ( {text_} )\n"
+                for called, (text_, _) in zip(self.names, self.promised[name], strict=False)
+            ]
+            ports = ", ".join(f"{port} : BOOL" for node, port in self.wires if node == name)
+            text += f"node {name} {{ inputs( {ports} ) outputs( o{name} : BOOL ) topics()\n{''.join(clauses)}}}\n"
+        return text
+
+    def edited(self, random: Random) -> None:
+        """Another system, which has much of this one."""
+        for _ in range(random.randint(1, 2)):
+            name = random.choice(self.nodes)
+            ins = [f"in.{port}" for node, port in self.wires if node == name]
+            match random.randrange(6):
+                case 0:
+                    self.promised[name][0] = formula(random, [*ins, f"out.o{name}"])
+                case 1:
+                    self.assumed[name] = [formula(random, ins, 1)]
+                case 2:
+                    self.initial[name] = random.choice([True, False, None])
+                case 3:
+                    at = random.choice([at for at in self.wires if at[0] == name])
+                    self.wires[at] = random.choice(
+                        [None, *((n, random.random() < 0.5 or n == name) for n in self.nodes)]
+                    )
+                case 4:
+                    self.names.reverse()
+                case 5:
+                    self.required.reverse()
+        self.text, self.plan = self.written(), self.planned(random)
 
     def planned(self, random: Random) -> str:
         plan = "connections:\n"
@@ -145,6 +182,39 @@ def judged(folder: Path, seed: int) -> int:
         for name, holds_ in claims:
             assert holds_(before, now, outside), (seed, name, before, now, outside)
     return len(claims)
+
+
+def kept(folder: Path, seed: int) -> int:
+    """How many requirements of a system the kernel establishes from the certificates of the system that it was before
+    it was edited. Asserts that none is false on any run of what it is now."""
+    system, random = System(seed), Random(seed)
+    found = 0
+    made: dict[str, Certificate] = {}
+    for edit in range(4):
+        try:
+            composition = compose(make(folder / f"{seed}-{edit}", system.text, system.plan))
+        except Rejected:
+            return found
+        certificates = Certificates(composition, made)
+        for k, (_, holds) in enumerate(system.required):
+            claim = certificates.kept_for(requirement_scope(f"R{k}"), Kind.REQUIREMENT, f"R{k}")
+            if claim is not None and not any(need.kind is How.ENVIRONMENT for need in claim.hypotheses):
+                found += 1
+                for _, now, _ in system.steps():
+                    assert holds({f"{n}.o{n}": value for n, value in now.items()}), (seed, edit, k)
+            composition.certificates.requirement(f"R{k}", Hint(()), Bounds())
+        made = {**made, **composition.certificates.made}
+        system.edited(random)
+    return found
+
+
+def test_no_certificate_of_what_was_shows_what_is_false_now(tmp_path: Path) -> None:
+    assert sum(kept(tmp_path, seed) for seed in range(12)) > 0
+
+
+@pytest.mark.slow
+def test_no_certificate_of_what_was_shows_what_is_false_now_at_length(tmp_path: Path) -> None:
+    assert sum(kept(tmp_path, seed) for seed in range(100, 400)) > 20
 
 
 def _conditional(found: object, name: str) -> bool:
