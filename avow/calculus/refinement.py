@@ -15,7 +15,10 @@ from avow.base.diagnostics import Diagnostic
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
+from avow.calculus.refinement_certificate import established
 from avow.formulas.formula import rename, sort_digest, transform
+from avow.kernel.certificate import Certificate
+from avow.kernel.statements import Kind
 from avow.language.contract import Clause, Node, Port
 from avow.language.printer import show_type
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort, SequenceSort, Sort, TupleSort
@@ -52,6 +55,8 @@ class Refinement:
     demands: tuple[Demand, ...]
     unrealizable: Counterexample | None = None
     doubt: str = ""
+    certificate: Certificate | None = None
+    """What the kernel established it from."""
 
     @property
     def verdict(self) -> Verdict:
@@ -111,8 +116,35 @@ def refines(
     offered |= {f"{concrete.name}.{g.name}": recast(g.formula) for g in concrete.guarantees}
     for clause in abstract.guarantees:
         ask(abstract.name, clause, clause.formula, offered)
-    found = Refinement(concrete.name, abstract.name, (), tuple(demands))
+    found = _certified(Refinement(concrete.name, abstract.name, (), tuple(demands)), concrete, abstract, recast)
     return _kept_by_something(found, concrete, abstract, recast, bounds) if found.verdict is Verdict.PROVED else found
+
+
+def _certified(found: Refinement, concrete: Node, abstract: Node, recast: Callable[[Term], Term]) -> Refinement:
+    """A refinement as far as the kernel establishes it."""
+    if found.verdict is not Verdict.PROVED:
+        return found
+
+    def changed(clauses: tuple[Clause, ...]) -> tuple[Clause, ...]:
+        return tuple(replace(clause, formula=recast(clause.formula)) for clause in clauses)
+
+    outputs = tuple(replace(port, sort=recast(port.variable).sort) for port in concrete.outputs)
+    same = replace(
+        concrete,
+        outputs=outputs,
+        assumptions=changed(concrete.assumptions),
+        guarantees=changed(concrete.guarantees),
+    )
+    certificate, shown = established(same, abstract)
+    demands = []
+    for at, demand in enumerate(found.demands):
+        kind = Kind.ASSUMPTION if at < len(concrete.assumptions) else Kind.REQUIREMENT
+        one = shown.get((kind, demand.clause.name))
+        if one is None:
+            why = "the engine finds that it follows; the kernel could not establish it"
+            demand = replace(demand, verdict=Verdict.UNKNOWN, reason=why)
+        demands.append(demand)
+    return replace(found, demands=tuple(demands), certificate=certificate)
 
 
 def _kept_by_something(

@@ -133,6 +133,8 @@ def _renamed(texts: tuple[str, ...], nodes: list[Node]) -> Mapping[str, str]:
 
 
 def _data(result: Refinement) -> dict[str, object]:
+    from avow.calculus.certificate_json import to_json
+
     return {
         "concrete": result.concrete,
         "abstract": result.abstract,
@@ -151,6 +153,7 @@ def _data(result: Refinement) -> dict[str, object]:
             }
             for demand in result.demands
         ],
+        "certificate": to_json(result.certificate) if result.certificate is not None else None,
     }
 
 

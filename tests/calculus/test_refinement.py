@@ -9,10 +9,12 @@ import pytest
 
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
+from avow.calculus import refinement, refinement_certificate
 from avow.calculus.composition import compose
 from avow.calculus.export import derived_contract
 from avow.calculus.refinement import Demand, Refinement, refines
 from avow.cli.refines import command as refines_command
+from avow.kernel.certificate import How
 from avow.language.contract import Node
 from avow.language.load import check_text
 from avow.language.translate import to_rcl
@@ -244,3 +246,26 @@ def test_systems_are_compared_by_what_is_derived_of_them(tmp_path: Path) -> None
     code, output = invoke(refines_command, str(tmp_path / "open"), str(tmp_path / "open"))
     assert code == 1
     assert "its own derivation is refuted" in output, "a derived contract is worth what its derivation is"
+
+
+def test_what_is_proved_the_kernel_has_established(monkeypatch: pytest.MonkeyPatch) -> None:
+    stronger = BASE.replace("out.x >= in.r", "out.x >= in.r + 1")
+    found = refines(only(stronger), only(BASE))
+    assert found.verdict is Verdict.PROVED
+    assert found.certificate is not None
+    hows = {entry.how for entry in found.certificate.entries}
+    assert hows <= {How.SHOWN, How.GUARANTEE, How.ENVIRONMENT}
+    monkeypatch.setattr(refinement, "established", lambda *_: (found.certificate, {}))
+    assert refines(only(stronger), only(BASE)).verdict is Verdict.UNKNOWN
+
+
+def test_an_assumption_of_its_own_is_not_taken_for_the_environment_s() -> None:
+    """The kernel is asked of the refining node alone, whose inputs nobody provides."""
+    wants = only(node("n", "r : REAL", "x : REAL", "A: in.r > 0", "G: out.x > 0"))
+    gives = only(node("n", "r : REAL", "x : REAL", "G: out.x > 0"))
+    _, shown = refinement_certificate.established(wants, gives)
+    assert shown == {}
+    less = only(node("n", "r : REAL", "x : REAL", "A: in.r > 0", "G: out.x > 0 or in.r < 0"))
+    more = only(node("n", "r : REAL", "x : REAL", "A: in.r > 1", "G: out.x > 0"))
+    _, shown = refinement_certificate.established(less, more)
+    assert len(shown) == 2
