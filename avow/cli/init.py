@@ -34,6 +34,7 @@ _MONITOR = """\
       - rosmonitoring:                 # a recorded run; `avow monitor --help` tells how to make one of a bag
           ros_version: {}
           traces: [traces/morning.jsonl]
+          answers: {{by: arrival, because: "written by one process, each answer after its input"}}
           mapping: {{in.temperature: data, out.mode: data}}
 """
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from avow.ros.sources import message_files
 from avow.system.paths import inside
 
 from .codes import CODES
+from .coverage import coverage
 from .schema import SCHEMA
 from .tuning import VIOLATIONS_KEPT
 
@@ -179,19 +180,26 @@ class _Run:
         self.first: dict[str, Violation] = {}
         self.mapping_faults = 0
 
+    def note(self, violations: Iterable[Violation]) -> None:
+        from .engine import Fault
+
+        for violation in violations:
+            self.mapping_faults += violation.fault is Fault.MAPPING
+            self.first.setdefault(f"{violation.fault.name}/{violation.clause}", violation)
+            if len(self.violations) < VIOLATIONS_KEPT:
+                self.violations.append(violation)
+
     def log(self) -> str:
         lines = [f"trace {self.name}: {self.monitor.events} events, {self.monitor.relevant} of this node's topics"]
         lines.append(f"sha256 {self.digest}")
         lines += [line for line in (self.trouble, self.unknown) if line]
         lines += [v.text() for v in self.violations]
         for name, tally in self.monitor.tallies.items():
-            line = f"{name}: judged {tally.judged} times, broken {tally.broken} (excused {tally.excused})"
-            lines.append(line + (f", undecided {tally.undecided}" if tally.undecided else ""))
+            lines.append(f"{name}: {coverage(tally)}")
         return "\n".join(lines) + "\n"
 
 
 def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
-    from .engine import Fault
     from .options import origin, readable
     from .traces import digest_trace, read_trace
 
@@ -206,14 +214,11 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
         if wrong := readable(monitor.setup, path, where):
             raise Rejected(*wrong)
         for recorded in read_trace(path, where, monitor.listens):
-            for violation in monitor.step(recorded.event):
-                run.mapping_faults += violation.fault is Fault.MAPPING
-                run.first.setdefault(f"{violation.fault.name}/{violation.clause}", violation)
-                if len(run.violations) < VIOLATIONS_KEPT:
-                    run.violations.append(violation)
+            run.note(monitor.step(recorded.event))
             if recorded.index % 256 == 0 and time.monotonic() > deadline:
                 run.unknown = f"{name}: time was up after {monitor.events} events"
                 break
+        run.note(monitor.finish())
     except Rejected as error:
         # by the plan's name for it: where the folder lies on this machine is no part of what was found
         told = ((f"{name}, line {d.span.line}" if d.span else name, d.message) for d in error.diagnostics)
@@ -229,7 +234,14 @@ def _outcome(obligation: str, name: str, runs: list[_Run]) -> Outcome:
     tallies = [run.monitor.tallies[name] for run in runs]
     judged = sum(t.judged for t in tallies)
     events = sum(run.monitor.events for run in runs)
-    bound: dict[str, object] = {"events": events, "judged": judged, "traces": {run.name: run.digest for run in runs}}
+    published = sum(t.published for t in tallies)
+    bound: dict[str, object] = {
+        "events": events,
+        "judged": judged,
+        "published": published,
+        "traces": {run.name: run.digest for run in runs},
+    }
+    unpaired = any(t.unpaired for t in tallies)
     for run in runs:
         broken = run.first.get(f"{Fault.GUARANTEE.name}/{name}")
         if broken is not None:
@@ -237,6 +249,8 @@ def _outcome(obligation: str, name: str, runs: list[_Run]) -> Outcome:
             told = f"event {broken.index}{when} of {run.name}: {broken.explanation}"
             shown = Counterexample((*broken.bindings, *broken.values), told)
             summary = f"broken at event {broken.index} of {run.name}: {broken.explanation}"
+            if unpaired:
+                return Outcome(obligation, Verdict.UNKNOWN, f"{_UNPAIRED}: {summary}", shown, bound=bound)
             return Outcome(obligation, Verdict.REFUTED, summary, shown, bound=bound)
 
     def answer(verdict: Verdict, summary: str) -> Outcome:
@@ -255,13 +269,23 @@ def _outcome(obligation: str, name: str, runs: list[_Run]) -> Outcome:
         text = late or (f"undecided at {undecided} of {judged} judgements: {reason}" if undecided else reason)
         return answer(Verdict.UNKNOWN, f"not monitorable: {text}" if not undecided and not late else text)
     if not judged:
-        return answer(Verdict.UNKNOWN, f"the traces never gave all the values that it speaks of{_topics(runs)}")
+        open_ = "; ".join(dict.fromkeys(t.reason for t in tallies if t.reason))
+        text = f"the traces never gave all the values that it speaks of{_topics(runs)}"
+        return answer(Verdict.UNKNOWN, f"never decided: {open_}" if open_ else text)
+    decided = sum(t.decided for t in tallies)
+    lacking = "; ".join(dict.fromkeys(coverage(t) for t in tallies))
+    if decided < runs[0].monitor.setup.decided * published:
+        return answer(Verdict.UNKNOWN, f"unmonitored: {decided} of {published} publications were decided ({lacking})")
+    if unpaired:
+        return answer(Verdict.UNKNOWN, f"{_UNPAIRED}: held at all {judged} judgements over {events} events")
     excused = sum(t.excused for t in tallies)
     if excused == judged:
         return answer(Verdict.UNKNOWN, "every judgement fell while an assumption was broken")
     summary = f"held at all {judged} judgements over {events} events"
     if excused:
         summary = f"held at {judged - excused} of {judged} judgements; at the others an assumption was broken"
+    if decided < published:
+        summary += f" ({lacking})"
     vacuous = not any(t.triggered for t in tallies)
     if vacuous:
         summary += "; but its antecedent was never met"
@@ -275,6 +299,9 @@ def _topics(runs: list[_Run]) -> str:
     if not silent:
         return ""
     return f": no message on {', '.join(silent)}; the traces have {', '.join(heard[:12]) or 'no topic'}"
+
+
+_UNPAIRED = "no evidence, since the plan does not say which input an answer answered (`answers`)"
 
 
 def _traces(job: Job) -> list[str]:

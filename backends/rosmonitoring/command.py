@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .coverage import coverage
 from .tuning import VIOLATIONS_SHOWN
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from avow.system.plan import System
 
+    from .engine import Violation
     from .session import Session
     from .traces import Recorded
 
@@ -58,15 +60,14 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
     running = session(system, nodes, None if trace == "-" else Path(trace))
     shown: list[dict[str, Any]] = []
     count = 0
-    for recorded in _events(trace, running):
-        for violation in running.step(recorded.event):
-            count += 1
-            if not show_all and count > VIOLATIONS_SHOWN:
-                continue
-            if as_json:
-                shown.append({**violation_json(violation), "line": recorded.line})
-            else:
-                click.echo(violation.text())
+    for line, violation in _violations(running, trace):
+        count += 1
+        if not show_all and count > VIOLATIONS_SHOWN:
+            continue
+        if as_json:
+            shown.append({**violation_json(violation), "line": line})
+        else:
+            click.echo(violation.text())
     if as_json:
         digest = "" if trace == "-" else digest_trace(Path(trace))
         whole = {**running.summary(), "trace": trace, "sha256": digest, "violations": shown}
@@ -75,7 +76,18 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
         if not show_all and count > VIOLATIONS_SHOWN:
             click.echo(f"… and {count - VIOLATIONS_SHOWN} more (--all shows them)")
         _print_summary(running)
-    return 0 if running.clean and _anything_judged(running) else 1
+    return 0 if running.clean and _anything_judged(running) and not running.unmonitored() else 1
+
+
+def _violations(running: Session, trace: str) -> Iterator[tuple[int, Violation]]:
+    """With the line of the event at which each was found; the last line's where it took the whole run."""
+    line = 0
+    for recorded in _events(trace, running):
+        line = recorded.line
+        for violation in running.step(recorded.event):
+            yield line, violation
+    for violation in running.finish():
+        yield line, violation
 
 
 def _events(trace: str, running: Session) -> Iterator[Recorded]:
@@ -102,16 +114,16 @@ def _anything_judged(running: Session) -> bool:
 
 def _print_summary(running: Session) -> None:
     for monitor, name, kind, tally in running.clauses():
-        words = [f"judged {tally.judged} times"]
-        if tally.broken:
-            words.append(f"broken {tally.broken} times" + (f" ({tally.excused} excused)" if tally.excused else ""))
-        if tally.undecided:
-            words.append(f"undecided {tally.undecided} times")
+        words = [coverage(tally) if tally.published else f"judged {tally.judged} times"]
         if tally.judged and not tally.triggered:
             words.append("its antecedent was never met")
         if tally.reason:
             words.append(tally.reason)
-        click.echo(f"  {monitor.setup.node.name}.{name} ({kind}): {', '.join(words)}")
+        if tally.unpaired:
+            words.append("no evidence: the plan does not say which input an answer answered (`answers`)")
+        click.echo(f"  {monitor.setup.node.name}.{name} ({kind}): {'; '.join(words)}")
+    if unmonitored := running.unmonitored():
+        click.echo(f"unmonitored, since too little was decided: {', '.join(unmonitored)}")
     if running.unheard:
         told = ", ".join(f"{topic} ({count})" for topic, count in list(running.unheard.items())[:10])
         more = f" and {len(running.unheard) - 10} more" if len(running.unheard) > 10 else ""

@@ -15,14 +15,17 @@ from typing import Any
 
 from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
 from avow.evaluation.truth import judge
+from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.language.terms import Implies, Quantified, Quantifier, Role, Term, Variable
 from avow.tuning.effort import JUDGE_EFFORT
 
+from .coverage import Tally
 from .numbers import Decimal, NotANumber, exact
 from .options import Setup, same_topic
+from .pairing import EARLY, Asked, Pairing, time_of
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Hold, Previous
 from .tuning import TOPICS_KEPT
@@ -58,20 +61,6 @@ class Violation:
 
 
 @dataclass(slots=True)
-class Tally:
-    """What became of one clause over a trace."""
-
-    judged: int = 0
-    broken: int = 0
-    excused: int = 0
-    undecided: int = 0
-    triggered: bool = False
-    """Its antecedent held at least once (or it has none)."""
-    reason: str = ""
-    """Why it is not judged at all, or the first reason why it was once undecided."""
-
-
-@dataclass(slots=True)
 class _Watched:
     clause: Clause
     names: tuple[str, ...]
@@ -90,6 +79,14 @@ class _Watched:
     """The held values."""
     key: tuple[int, ...] | None = None
     truth: bool | None = None
+    paired: tuple[str, ...] = ()
+    """The observed inputs that an answer has to be paired with."""
+    counts: dict[str, int] = field(default_factory=dict)
+    """Publications of each variable that makes it judged."""
+
+    def published(self, name: str) -> None:
+        self.counts[name] = self.counts.get(name, 0) + 1
+        self.tally.published = max(self.tally.published, self.counts[name])
 
 
 @dataclass(slots=True)
@@ -112,11 +109,23 @@ class Monitor:
     _previous: list[tuple[str, str]] = field(default_factory=list)
     _clauses: dict[str, list[_Watched]] = field(default_factory=dict)
     _assumptions: list[_Watched] = field(default_factory=list)
+    _pairing: Pairing | None = None
+    _paired: frozenset[str] = frozenset()
+    """The observed inputs."""
+    _assumed: tuple[str, ...] = ()
+    """What the assumptions speak of."""
     _constant: list[_Watched] = field(default_factory=list)
     """Clauses that no message changes: judged once, at the first event."""
 
     def __post_init__(self) -> None:
         self._observe()
+        answers, rules = self.setup.answers, self.setup.rules.items()
+        observed = (n for n, rule in rules if isinstance(rule, Fields | Choice))
+        self._paired = frozenset(n for n in observed if n.startswith(f"{Role.INPUT}."))
+        if answers is not None and answers.by != "arrival":
+            self._pairing = Pairing(answers)
+            spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
+            self._assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
         wanted = None if self.guarantees is None else set(self.guarantees)
         node = self.setup.node
         for clause in node.clauses:
@@ -159,6 +168,9 @@ class Monitor:
             return []
         self.relevant += 1
         found: list[Violation] = []
+        pairing = self._pairing
+        if pairing is not None and pairing.waiting:
+            self._settle(pairing.ready(time_of(event)), found)
         updated: list[str] = []
         for name, read in readers:
             self._seen.add(name)
@@ -170,15 +182,25 @@ class Monitor:
                 # Its value is now unknown: what needs it waits for the next good message.
                 if getattr(self.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
                     self._forget(name)
+                    if pairing is not None and name in self._paired:
+                        pairing.saw(name, event, None)
+                for watched in self._clauses.get(name, ()):
+                    watched.published(name)
+                    watched.tally.unreadable += 1
                 continue
             updated.append(name)
+            if pairing is not None and name in self._paired:
+                pairing.saw(name, event, new)
             if old is None or new != old:
                 self.values[name] = new
                 self._versions[name] += 1
         while self._constant:
             self._judge(self._constant.pop(), event, found)
         for watched in self._due(updated):
-            self._judge(watched, event, found)
+            if watched.paired:
+                self._ask(watched, event)
+            else:
+                self._judge(watched, event, found)
             for name, source in watched.held:
                 watched.memory.pop(name, None)
                 if source in self.values:
@@ -193,11 +215,81 @@ class Monitor:
                 self._versions[name] += 1
         return found
 
+    def finish(self) -> list[Violation]:
+        """Judge what still waits, once the run is over."""
+        found: list[Violation] = []
+        if self._pairing is not None:
+            self._settle(self._pairing.ready(None), found)
+        return found
+
+    def _ask(self, watched: _Watched, event: Mapping[str, Any]) -> None:
+        """An answer, which will be judged once it is known what it may have answered."""
+        assert self._pairing is not None
+        values = {**self.values, **watched.memory} if watched.held else self.values
+        own = [n for n in (*watched.names, *self._assumed) if n not in self._paired]
+        if any(n not in values for n in watched.names if n not in self._paired):
+            watched.tally.early += 1
+            return
+        known = {n: values[n] for n in own if n in values}
+        inputs = tuple(dict.fromkeys((*watched.paired, *(n for n in self._assumed if n in self._paired))))
+        inputs = tuple(n for n in inputs if n in watched.paired or n in self._pairing.seen)
+        self._pairing.ask(watched, event, self.events, known, inputs)
+
+    def _settle(self, ready: Iterable[tuple[Asked, list[dict[str, Value]] | str]], found: list[Violation]) -> None:
+        for asked, cases in ready:
+            watched: _Watched = asked.about
+            tally = watched.tally
+            if isinstance(cases, str):
+                if cases == EARLY:
+                    tally.early += 1
+                else:
+                    tally.order += 1
+                    tally.reason = tally.reason or cases
+                continue
+            verdicts = {self._verdict(watched, values) for values in cases}
+            if len(verdicts) > 1:
+                tally.order += 1
+                tally.reason = tally.reason or "it depends on which of its inputs the answer answered"
+                continue
+            tally.judged += 1
+            if watched.trigger is not None and not tally.triggered:
+                tally.triggered = all(self._triggered(watched, values) for values in cases)
+            (verdict,) = verdicts
+            if verdict is None:
+                tally.undecided += 1
+            elif isinstance(verdict, Fault):
+                tally.broken += 1
+                tally.excused += verdict is Fault.EXCUSED
+                said = watched.clause.sentence or watched.clause.text or watched.clause.name
+                if verdict is Fault.EXCUSED:
+                    said += "; but an assumption does not hold"
+                name = watched.clause.name
+                found.append(self._violation(verdict, name, asked.event, said, watched, cases[0], asked.index))
+
+    def _verdict(self, watched: _Watched, values: Mapping[str, Value]) -> Fault | str | None:
+        truth = self._truth(watched, values)
+        if truth is None:
+            return None
+        if truth:
+            return _HELD
+        for assumed in self._assumptions:
+            if all(n in values for n in assumed.names) and self._truth(assumed, values) is False:
+                return Fault.EXCUSED
+        return Fault.GUARANTEE
+
+    def _triggered(self, watched: _Watched, values: Mapping[str, Value]) -> bool:
+        assert watched.trigger is not None
+        try:
+            return bool(watched.trigger(values))
+        except NotEvaluable:
+            return False
+
     def _due(self, updated: Iterable[str]) -> list[_Watched]:
         """The clauses to be judged now that these variables have new values."""
         due: dict[int, _Watched] = {}
         for name in updated:
             for watched in self._clauses.get(name, ()):
+                watched.published(name)
                 watched.fresh.add(name)
                 if watched.outputs <= watched.fresh:
                     due[id(watched)] = watched
@@ -219,7 +311,7 @@ class Monitor:
             names = tuple(sorted(free_names(clause.formula)))
             hidden = [self.setup.hidden[n] for n in names if n in self.setup.hidden]
             if hidden:
-                tally.reason = hidden[0]
+                tally.reason, tally.hidden = hidden[0], True
                 return
             trigger = _trigger(clause.formula)
             watched = _Watched(
@@ -240,6 +332,10 @@ class Monitor:
             if len(triggers) > 1:
                 watched.held = tuple((n, s) for n, s in self._previous if n in names and s in triggers)
                 self._hold(watched)
+        if any(n.startswith(f"{Role.OUTPUT}.") for n in triggers):
+            paired = tuple(n for n in names if n in self._paired)
+            tally.unpaired = bool(paired) and self.setup.answers is None
+            watched.paired = paired if self._pairing is not None else ()
         for name in triggers:
             self._clauses.setdefault(name, []).append(watched)
         if not triggers:
@@ -267,6 +363,7 @@ class Monitor:
             values = {**{n: v for n, v in values.items() if n not in held}, **watched.memory}
         for name in watched.names:
             if name not in values:
+                tally.early += 1
                 return
         key = tuple([versions[n] for n in watched.names])
         if key != watched.key or watched.held:
@@ -319,6 +416,7 @@ class Monitor:
         explanation: str,
         watched: _Watched | None = None,
         snapshot: Mapping[str, Value] | None = None,
+        index: int | None = None,
     ) -> Violation:
         bindings: dict[str, Value] = {}
         values: list[tuple[str, str]] = []
@@ -330,7 +428,12 @@ class Monitor:
             values = [(n, _shorten(show(snapshot[n]))) for n in watched.names]
         pairs = tuple((n, show(v)) for n, v in bindings.items())
         time = _time(event.get("time"))
-        return Violation(fault, self.setup.node.name, clause, self.events, time, tuple(values), pairs, explanation)
+        return Violation(
+            fault, self.setup.node.name, clause, index or self.events, time, tuple(values), pairs, explanation
+        )
+
+
+_HELD = "held"
 
 
 def _trigger(formula: Term) -> Term | None:

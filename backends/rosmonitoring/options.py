@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path as File
 from typing import Any
 
@@ -22,12 +23,15 @@ from avow.system.paths import inside
 from avow.system.plan import Located, System
 from avow.system.schema import suggest
 
+from . import observing
 from .bags import Origin, carried, conflicts, is_bag
 from .fitting import Undecided
 from .numbers import whole
 from .observing import Observed, Wrong, check_keys, literal, observe, table_of
+from .pairing import Answers
 from .reading import from_text, shown
 from .rules import NOTHING_KNOWN, Choice, Constant, Fields, Path, Previous, Rule
+from .tuning import DECIDED_SHARE
 from .wires import MappingError
 
 NAME = "rosmonitoring"
@@ -44,6 +48,10 @@ class Setup:
     """When a clause is judged: the option of that name."""
     known: Definitions = NOTHING_KNOWN
     """The message types."""
+    answers: Answers | None = None
+    """Which input an answer answered; None: nobody has said."""
+    decided: float = DECIDED_SHARE
+    """The share of what was published that has to be decided before a run is evidence."""
     named: tuple[tuple[str, str], ...] = ()
     """The contract's topics, by their whole names, and their types."""
 
@@ -75,7 +83,41 @@ def setup(
     work.shared_fields()
     data = options.data if options is not None and isinstance(options.data, Mapping) else {}
     named = tuple((resolved(system, node, topic.name), topic.ros_type) for topic in node.topics)
-    return Setup(node, work.rules, work.hidden, str(data.get("when", "outputs")), known, named), tuple(work.faults)
+    made = Setup(
+        node,
+        work.rules,
+        work.hidden,
+        str(data.get("when", "outputs")),
+        known,
+        _answers(data.get("answers")),
+        float(data.get("decided", DECIDED_SHARE)),
+        named,
+    )
+    return made, tuple(work.faults)
+
+
+def _answers(entry: Any) -> Answers | None:
+    if not isinstance(entry, Mapping):
+        return None
+    by = str(entry.get("by", "latency"))
+    stamp = ("header", "stamp")
+    return Answers(
+        by,
+        str(entry.get("because", "")),
+        observing.path(str(entry["input"])) if "input" in entry else stamp if by == "stamp" else (),
+        observing.path(str(entry["output"])) if "output" in entry else stamp if by == "stamp" else (),
+        duration(str(entry.get("latency", "0 s"))),
+        duration(str(entry.get("jitter", "0 s"))),
+    )
+
+
+_UNITS = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6), "min": Fraction(60)}
+
+
+def duration(text: str) -> Fraction:
+    """``200 ms`` in seconds; the schema has seen to its form."""
+    number = text.rstrip("abcdefghijklmnopqrstuvwxyz").strip()
+    return Fraction(number) * _UNITS[text[len(text.rstrip("abcdefghijklmnopqrstuvwxyz")) :]]
 
 
 def origin(system: System) -> Origin:

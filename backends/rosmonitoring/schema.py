@@ -5,6 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 _PATH = {"type": "string", "description": "a field of the message: pose.position.x, ranges[0]"}
+_DURATION = {
+    "type": "string",
+    "pattern": "^[0-9]+([.][0-9]+)? ?(us|ms|s|min)$",
+    "description": "a time: 200 ms",
+}
 _ARGUMENT = {
     "oneOf": [
         _PATH,
@@ -37,6 +42,46 @@ SCHEMA: dict[str, Any] = {
             "enum": ["outputs", "any", "every"],
             "description": "judge a clause when each of its outputs has been published since it was last judged "
             "(default), when any of them is, or at every event that changes one of its variables",
+        },
+        "answers": {
+            "description": "which input an answer answered: without it, verdicts are shown and are no evidence",
+            "oneOf": [
+                {
+                    "type": "object",
+                    "additionalProperties": False,
+                    "required": ["by", "because"],
+                    "properties": {"by": {"const": "arrival"}, "because": {"type": "string", "minLength": 1}},
+                },
+                {
+                    "type": "object",
+                    "additionalProperties": False,
+                    "required": ["by"],
+                    "properties": {"by": {"const": "stamp"}, "input": _PATH, "output": _PATH},
+                },
+                {
+                    "type": "object",
+                    "additionalProperties": False,
+                    "required": ["by", "input", "output"],
+                    "properties": {"by": {"const": "key"}, "input": _PATH, "output": _PATH},
+                },
+                {
+                    "type": "object",
+                    "additionalProperties": False,
+                    "required": ["latency", "jitter", "because"],
+                    "properties": {
+                        "by": {"const": "latency"},
+                        "latency": _DURATION,
+                        "jitter": _DURATION,
+                        "because": {"type": "string", "minLength": 1},
+                    },
+                },
+            ],
+        },
+        "decided": {
+            "type": "number",
+            "exclusiveMinimum": 0,
+            "maximum": 1,
+            "description": "the share of what was published that has to be decided (default 0.95)",
         },
         "ros_version": {"enum": ["ros1", "ros2"], "description": "for the generated configuration"},
         "silent": {"type": "boolean", "description": "whether the ROS monitor keeps its messages to itself"},

@@ -12,7 +12,8 @@ from avow.language.contract import ClauseKind
 from avow.system.plan import System
 from avow.system.schema import suggest
 
-from .engine import Fault, Monitor, Tally, Violation
+from .coverage import Tally
+from .engine import Fault, Monitor, Violation
 from .options import NAME, known_types, origin, readable, same_topic, setup
 
 
@@ -40,10 +41,29 @@ class Session:
                 self.counts[violation.fault] = self.counts.get(violation.fault, 0) + 1
                 yield violation
 
+    def finish(self) -> Iterator[Violation]:
+        """What is judged only once the run is over."""
+        for monitor in self.monitors:
+            for violation in monitor.finish():
+                self.counts[violation.fault] = self.counts.get(violation.fault, 0) + 1
+                yield violation
+
+    def unmonitored(self) -> list[str]:
+        """The clauses that could be judged, and of whose publications too few were decided."""
+        return [
+            f"{monitor.setup.node.name}.{name}"
+            for monitor, name, _, tally in self.clauses()
+            if not tally.hidden and (not tally.decided or tally.decided < monitor.setup.decided * tally.published)
+        ]
+
     @property
     def topics(self) -> tuple[str, ...]:
         """What the monitors listen to."""
-        return tuple(dict.fromkeys(topic for monitor in self.monitors for topic in monitor.setup.topics))
+        found: dict[str, str] = {}
+        for monitor in self.monitors:
+            for topic in monitor.setup.topics:
+                found.setdefault(same_topic(topic), topic)
+        return tuple(found.values())
 
     @property
     def clean(self) -> bool:
@@ -68,6 +88,13 @@ class Session:
                     "broken": tally.broken,
                     "excused": tally.excused,
                     "undecided": tally.undecided,
+                    "published": tally.published,
+                    "decided": tally.decided,
+                    "undecided_order": tally.order,
+                    "before_first": tally.early,
+                    "unreadable": tally.unreadable,
+                    "incomplete": max(0, tally.incomplete),
+                    "paired": not tally.unpaired,
                     "antecedent_met": tally.triggered,
                     "reason": tally.reason,
                 }
@@ -80,6 +107,7 @@ class Session:
             "system": self.system.name,
             "events": self.events,
             "clean": self.clean,
+            "unmonitored": self.unmonitored(),
             "faults": counts,
             "nodes": nodes,
             "listened": list(self.topics),

@@ -26,3 +26,12 @@ EVENT_CHARACTERS = 8_000_000
 
 CANDIDATES_SHOWN = 12
 """Fields that an error names as what may be meant; a message with more is looked up anyway."""
+
+COMBINATIONS = 64
+"""Combinations of inputs that one answer may have answered and that are judged: six inputs with two values each."""
+
+KEYS_KEPT = 1_000
+"""Messages of an input, and answers, that wait for their counterpart: ten seconds at 100 Hz."""
+
+DECIDED_SHARE = 0.95
+"""Of what was published, the share that has to be decided before a run is evidence, where the plan says no other."""

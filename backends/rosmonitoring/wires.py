@@ -79,7 +79,7 @@ def converter(sort: Sort, wire: Wire, names: Mapping[str, str], known: Definitio
         case RealSort(), Scalar(name="float32" | "float64" as name):
             return functools.partial(_float, wide=name == "float64", gaps=gaps)
         case RealSort(), Scalar(name="time" | "duration"):
-            return _seconds
+            return seconds
         case RealSort(), Scalar(name=name):
             return lambda raw: whole(_whole(raw, name))
         case ((IntegerSort() | NaturalSort()), Scalar(name=name)):
@@ -207,7 +207,7 @@ def _held(value: Fraction, *, wide: bool) -> Fraction:
     return Binary.held(value, digits.removesuffix(".0"))
 
 
-def _seconds(raw: Any) -> Fraction:
+def seconds(raw: Any) -> Fraction:
     """ROS 1 writes secs and nsecs, ROS 2 sec and nanosec."""
     if isinstance(raw, Mapping):
         for second, rest in (("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec")):

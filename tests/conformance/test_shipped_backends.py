@@ -130,13 +130,16 @@ def trace(*events: tuple[float, bool]) -> str:
     return "".join(json.dumps(line) + "\n" for line in lines)
 
 
+ARRIVAL = {"by": "arrival", "because": "one process writes the trace"}
+
+
 class TestRosMonitoring(Conformance):
     backend = ROSMONITORING
     seeded = (
         Seeded(
             "right",
             CONTRACT,
-            {"traces": ["run.jsonl"], "mapping": {"in.r": "data", "out.high": "data"}},
+            {"traces": ["run.jsonl"], "answers": ARRIVAL, "mapping": {"in.r": "data", "out.high": "data"}},
             both(Verdict.MONITORED),
             {"run.jsonl": trace((5, False), (50, True), (125, True))},
             SCENARIO,
@@ -144,7 +147,7 @@ class TestRosMonitoring(Conformance):
         Seeded(
             "wrong",
             CONTRACT,
-            {"traces": ["run.jsonl"], "mapping": {"in.r": "data", "out.high": "data"}},
+            {"traces": ["run.jsonl"], "answers": ARRIVAL, "mapping": {"in.r": "data", "out.high": "data"}},
             one_refuted(Verdict.MONITORED),
             {"run.jsonl": trace((5, False), (125, False))},
         ),

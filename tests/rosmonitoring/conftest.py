@@ -20,6 +20,7 @@ from avow.system.plan import System
 ROOT = Path(__file__).parents[2]
 CASE = ROOT / "contracts" / "remote_inspection"
 
+ARRIVAL = {"by": "arrival", "because": "one process writes the trace"}
 MAPPINGS: dict[str, dict[str, Any]] = {
     "localisation": {"out.position": ["posX", "posY"]},
     "navigation": {"in.position": ["posX", "posY"], "out.at": ["posX", "posY"]},
@@ -43,7 +44,7 @@ def write_case(folder: Path, traces: dict[str, list[str]] | None = None) -> Path
     text = (target / "plan.yaml").read_text(encoding="utf-8")
     plan = yaml.safe_load(re.sub(r"\bon:", '"on":', text))  # a key, and not the truth value of YAML 1.1
     for name, mapping in MAPPINGS.items():
-        options: dict[str, Any] = {"mapping": mapping}
+        options: dict[str, Any] = {"mapping": mapping, "answers": ARRIVAL, "decided": 0.9}
         if traces is not None:
             options["traces"] = traces.get(name, ["traces/nominal.jsonl"])
         plan["nodes"][name]["methods"] = [{"rosmonitoring": options}]
@@ -87,7 +88,7 @@ def make_system(tmp_path: Path) -> Callable[..., System]:
         if messages:
             plan_parts = {"messages": ["msgs"], **plan_parts}
         name = rcl.split("node", 1)[1].split("{", 1)[0].strip()
-        options = {**more, "mapping": mapping or {}}
+        options = {"answers": ARRIVAL, **more, "mapping": mapping or {}}
         plan = {"contract": "system.rcl", "nodes": {name: {"methods": [{"rosmonitoring": options}]}}, **plan_parts}
         (folder / "plan.yaml").write_text(json.dumps(plan), encoding="utf-8")
         return load_system(folder)

@@ -41,7 +41,7 @@ def test_nominal(case_folder: Path, traces: dict[str, Path]) -> None:
     done = avow(str(case_folder), str(traces["nominal"]))
     assert (done.returncode, done.stderr) == (0, "")
     assert "nothing broken" in done.stdout
-    assert "agent.next_waypoint (guarantee): judged 16 times" in done.stdout
+    assert "agent.next_waypoint (guarantee): published 17 times: held 16, before the first value 1" in done.stdout
 
 
 def test_topics_that_nobody_listens_to_are_told_with_those_that_are() -> None:

@@ -1,0 +1,219 @@
+"""Which input an answer answered: no verdict that another order of cause contradicts; every publication is counted."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from avow.backend_kit.protocol import Limits
+from avow.backends.rosmonitoring import BACKEND
+from avow.backends.rosmonitoring.coverage import Tally
+from avow.backends.rosmonitoring.engine import Fault, Monitor
+from avow.backends.rosmonitoring.options import setup
+from avow.backends.rosmonitoring.session import session
+from avow.base.verdict import Verdict
+from avow.system.plan import System
+
+from .conftest import job_for
+
+RCL = """
+context { Level : {low, high}; }
+node n {
+  inputs( r : REAL )
+  outputs( s : Level )
+  topics( m/R r matches(in.r), m/S s matches(out.s) )
+  assume positive ( in.r >= 0 )
+  guarantee low ( in.r < 10 -> out.s == low )
+  guarantee high ( in.r >= 10 -> out.s == high )
+}
+"""
+MAPPING = {"in.r": "value", "out.s": "level"}
+LATENCY = {"latency": "20 ms", "jitter": "5 ms", "because": "measured"}
+KEY = {"by": "key", "input": "id", "output": "id"}
+Event = dict[str, Any]
+
+
+def judge(system: System, events: list[Event]) -> tuple[list[Any], dict[str, Tally]]:
+    found, faults = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    assert faults == ()
+    monitor = Monitor(found)
+    violations = [v for event in events for v in monitor.step(event)] + monitor.finish()
+    return violations, monitor.tallies
+
+
+def run(rng: random.Random, wrong: frozenset[int] = frozenset(), count: int = 60) -> list[Event]:
+    """A node that answers every reading after 5 to 15 ms; each topic's messages are recorded up to 5 ms late."""
+    events: list[tuple[float, Event]] = []
+    for k in range(count):
+        at = k * 0.1
+        value = rng.choice((1, 5, 12, 40))
+        answer = at + rng.uniform(0.005, 0.015)
+        level = "high" if (value >= 10) is not (k in wrong) else "low"
+        for when, event in (
+            (at + rng.uniform(0, 0.005), {"topic": "r", "value": value, "id": k}),
+            (answer + rng.uniform(0, 0.005), {"topic": "s", "level": level, "id": k}),
+        ):
+            events.append((when, {**event, "time": round(when, 6)}))
+    return [event for _, event in sorted(events, key=lambda one: one[0])]
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("answers", [LATENCY, KEY])
+def test_a_correct_node_is_never_called_broken(
+    seed: int, answers: dict[str, Any], make_system: Callable[..., System]
+) -> None:
+    events = run(random.Random(seed))
+    violations, tallies = judge(make_system(RCL, MAPPING, answers=answers), events)
+    assert violations == []
+    if answers is KEY:
+        assert all(tally.decided == 60 for name, tally in tallies.items() if name != "positive")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_by_key_every_wrong_answer_is_found(seed: int, make_system: Callable[..., System]) -> None:
+    wrong = frozenset({3, 17, 44})
+    events = run(random.Random(seed), wrong)
+    random.Random(seed).shuffle(events)  # the order of arrival says nothing
+    violations, _ = judge(make_system(RCL, MAPPING, answers=KEY), events)
+    ids = {events[v.index - 1]["id"] for v in violations}
+    assert ids == wrong
+    assert {v.fault for v in violations} == {Fault.GUARANTEE}
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_by_latency_the_verdicts_are_those_of_all_combinations(seed: int, make_system: Callable[..., System]) -> None:
+    """Against brute force, with readings so frequent that windows hold several."""
+    rng = random.Random(seed)
+    events: list[Event] = []
+    at = 0.0
+    for _ in range(80):
+        at = round(at + rng.choice((0.001, 0.004, 0.01, 0.03)), 6)
+        topic = rng.choice("rrs")
+        body = {"value": rng.choice((1, 12))} if topic == "r" else {"level": rng.choice(("low", "high"))}
+        events.append({"topic": topic, "time": at, **body})
+    violations, tallies = judge(make_system(RCL, MAPPING, answers=LATENCY), events)
+    expected = {"held": 0, "broken": set(), "open": 0}
+    latency, jitter = Fraction("0.02"), Fraction("0.005")
+    for index, event in enumerate(events, start=1):
+        if event["topic"] != "s":
+            continue
+        when = Fraction(str(event["time"]))
+        values: list[int] = []
+        before = False
+        for other in events:
+            if other["topic"] == "r" and (t := Fraction(str(other["time"]))) <= when + jitter:
+                if t <= when - latency - jitter:
+                    values, before = [other["value"]], True
+                else:
+                    values.append(other["value"])
+        if not values or not before:
+            expected["open"] += 1
+            continue
+        verdicts = {v >= 10 or event["level"] == "low" for v in values}
+        if verdicts == {True}:
+            expected["held"] += 1
+        elif verdicts == {False}:
+            expected["broken"].add(index)
+        else:
+            expected["open"] += 1
+    low = tallies["low"]
+    assert {v.index for v in violations if v.clause == "low"} == expected["broken"]
+    assert low.decided - low.broken == expected["held"]
+    assert low.order + low.early == expected["open"]
+
+
+def test_by_stamp(make_system: Callable[..., System]) -> None:
+    def stamped(topic: str, seconds: int, **fields: Any) -> Event:
+        return {"topic": topic, "header": {"stamp": {"sec": seconds, "nanosec": 5}}, "time": 1, **fields}
+
+    events = [stamped("s", 1, level="high"), stamped("r", 2, value=1), stamped("r", 1, value=12)]
+    violations, tallies = judge(make_system(RCL, MAPPING, answers={"by": "stamp"}), events)
+    assert violations == []
+    assert (tallies["high"].decided, tallies["high"].order) == (1, 0)
+    events.append(stamped("s", 3, level="high"))
+    _, tallies = judge(make_system(RCL, MAPPING, answers={"by": "stamp"}), events)
+    assert (tallies["high"].decided, tallies["high"].order) == (1, 1)
+    assert "bears the answer's stamp" in tallies["high"].reason
+
+
+@given(st.lists(st.tuples(st.sampled_from("rsx"), st.sampled_from((1, 12, "?")), st.integers(0, 40)), max_size=40))
+def test_every_publication_is_counted_once(steps: list[tuple[str, Any, int]]) -> None:
+    events: list[Event] = []
+    at = 0
+    for topic, value, pause in steps:
+        at += pause
+        level = {1: "low", 12: "high", "?": "?"}[value]
+        events.append({"topic": topic, "time": at / 1000, "value": value, "level": level, "id": at})
+    for answers in (None, LATENCY, KEY):
+        system = _SYSTEMS[json.dumps(answers)]
+        _, tallies = judge(system, events)
+        published = sum(topic == "s" for topic, _, _ in steps)
+        for name in ("low", "high"):
+            t = tallies[name]
+            held = t.decided - t.broken
+            assert t.published == published
+            assert t.incomplete == 0
+            assert held + t.broken + t.undecided + t.order + t.early + t.unreadable == published
+
+
+_SYSTEMS: dict[str, System] = {}
+
+
+@pytest.fixture(autouse=True)
+def _systems(make_system: Callable[..., System], request: pytest.FixtureRequest) -> None:
+    if request.node.name == "test_every_publication_is_counted_once":
+        for answers in (None, LATENCY, KEY):
+            more = {} if answers is None else {"answers": answers}
+            _SYSTEMS[json.dumps(answers)] = make_system(RCL, MAPPING, **more)
+
+
+def discharge(system: System, tmp_path: Path) -> dict[str, Any]:
+    job = job_for(system, "n")
+    report = BACKEND.discharge(job, tmp_path, Limits())
+    return {o.name: outcome for o, outcome in zip(job.obligations, report.outcomes, strict=True)}
+
+
+def traced(make: Callable[..., System], events: list[Event], **more: Any) -> System:
+    system = make(RCL, MAPPING, traces=["t.jsonl"], **more)
+    text = "".join(json.dumps({"time": k, **event}) + "\n" for k, event in enumerate(events))
+    (system.plan.root / "t.jsonl").write_text(text, encoding="utf-8")
+    return system
+
+
+GOOD = [{"topic": "r", "value": 1}, {"topic": "s", "level": "low"}]
+BAD = [{"topic": "r", "value": 1}, {"topic": "s", "level": "high"}]
+
+
+def test_without_answers_nothing_is_evidence(make_system: Callable[..., System], tmp_path: Path) -> None:
+    for events in (GOOD, BAD):
+        found = discharge(traced(make_system, events, answers=None), tmp_path)
+        assert found["low"].verdict is Verdict.UNKNOWN
+        assert "which input an answer answered" in found["low"].summary
+    assert discharge(traced(make_system, GOOD), tmp_path)["low"].verdict is Verdict.MONITORED
+    assert discharge(traced(make_system, BAD), tmp_path)["low"].verdict is Verdict.REFUTED
+
+
+def test_a_run_of_which_little_was_decided_is_no_evidence(make_system: Callable[..., System], tmp_path: Path) -> None:
+    late = [{"topic": "s", "level": "low"}] * 200 + GOOD
+    found = discharge(traced(make_system, late), tmp_path)["low"]
+    assert found.verdict is Verdict.UNKNOWN
+    assert "1 of 201 publications" in found.summary
+    assert "before the first value 200" in found.summary
+    assert discharge(traced(make_system, late, decided=0.001), tmp_path)["low"].verdict is Verdict.MONITORED
+
+
+def test_the_command_says_what_was_not_monitored(make_system: Callable[..., System]) -> None:
+    system = make_system(RCL, MAPPING)
+    running = session(system)
+    for event in [{"topic": "s", "level": "low"}] * 200 + GOOD:
+        assert list(running.step(event)) == []
+    assert list(running.finish()) == []
+    assert running.unmonitored() == ["n.low", "n.high"]
