@@ -142,7 +142,7 @@ class RosMonitoringBackend(Backend):
             monitor = Monitor(found, [o.name for o in job.obligations])
             runs.append(_judge(job, name, monitor, deadline))
         logs = {f"trace-{k}.log": run.log() for k, run in enumerate(runs, start=1)}
-        outcomes = tuple(_outcome(o.id, o.name, runs) for o in job.obligations)
+        outcomes = tuple(_outcome(o.id, o.name, runs, _spoken(job, o)) for o in job.obligations)
         for obligation, outcome in zip(job.obligations, outcomes, strict=True):
             outcome.details["rml"] = refused.get(obligation.name, "translated")
         return Report(outcomes, "avow monitor", __version__, (), logs)
@@ -228,7 +228,8 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
     return run
 
 
-def _outcome(obligation: str, name: str, runs: list[_Run]) -> Outcome:
+def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]) -> Outcome:
+    """`names`: what the guarantee speaks of."""
     from .engine import Fault
 
     tallies = [run.monitor.tallies[name] for run in runs]
@@ -268,6 +269,11 @@ def _outcome(obligation: str, name: str, runs: list[_Run]) -> Outcome:
     if late or undecided or (reason and not judged):
         text = late or (f"undecided at {undecided} of {judged} judgements: {reason}" if undecided else reason)
         return answer(Verdict.UNKNOWN, f"not monitorable: {text}" if not undecided and not late else text)
+    silent = next(
+        (v for run in runs for v in run.first.values() if v.fault is Fault.SILENT and v.clause in names), None
+    )
+    if silent is not None:
+        return answer(Verdict.UNKNOWN, f"event {silent.index}: {silent.explanation}")
     if not judged:
         open_ = "; ".join(dict.fromkeys(t.reason for t in tallies if t.reason))
         text = f"the traces never gave all the values that it speaks of{_topics(runs)}"
@@ -299,6 +305,12 @@ def _topics(runs: list[_Run]) -> str:
     if not silent:
         return ""
     return f": no message on {', '.join(silent)}; the traces have {', '.join(heard[:12]) or 'no topic'}"
+
+
+def _spoken(job: Job, obligation: Obligation) -> frozenset[str]:
+    from avow.formulas.formula import free_variables
+
+    return frozenset(v.qualified for v in free_variables(job.clause(obligation).formula))
 
 
 _UNPAIRED = "no evidence, since the plan does not say which input an answer answered (`answers`)"

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from fractions import Fraction
 from typing import Any
 
 from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
@@ -38,6 +39,8 @@ class Fault(StrEnum):
     GUARANTEE = "guarantee broken: this node"
     EXCUSED = "guarantee not met, with an assumption broken: environment"
     ASSUMPTION = "assumption broken: environment"
+    PROVIDER = "assumption broken: by a node that provides it"
+    SILENT = "silent for longer than the plan allows"
     MAPPING = "message outside its mapping"
 
 
@@ -109,6 +112,8 @@ class Monitor:
     _previous: list[tuple[str, str]] = field(default_factory=list)
     _clauses: dict[str, list[_Watched]] = field(default_factory=dict)
     _assumptions: list[_Watched] = field(default_factory=list)
+    _heard: dict[str, tuple[Fraction, bool]] = field(default_factory=dict)
+    """When each variable with a deadline was last heard of, and whether its silence has been told."""
     _pairing: Pairing | None = None
     _paired: frozenset[str] = frozenset()
     """The observed inputs."""
@@ -164,10 +169,12 @@ class Monitor:
         readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
         if isinstance(topic, str) and len(self.heard) < TOPICS_KEPT:
             self.heard.add(same_topic(topic))
-        if readers is None:
-            return []
-        self.relevant += 1
         found: list[Violation] = []
+        if self.setup.fresh:
+            self._watch_silence(event, {name for name, _ in readers or ()}, found)
+        if readers is None:
+            return found
+        self.relevant += 1
         pairing = self._pairing
         if pairing is not None and pairing.waiting:
             self._settle(pairing.ready(time_of(event)), found)
@@ -214,6 +221,19 @@ class Monitor:
                 self.values[name] = value
                 self._versions[name] += 1
         return found
+
+    def _watch_silence(self, event: Mapping[str, Any], heard: set[str], found: list[Violation]) -> None:
+        """Deadlines pass with time, and not with the next message: each silence is told once, at the first event of the
+        run that comes later than it may last."""
+        now = time_of(event)
+        for name, limit in self.setup.fresh.items():
+            since, told = self._heard.setdefault(name, (now, False))
+            if not told and now > since + limit:
+                explanation = f"{name} was silent for {show(now - since)} s, and at most {show(limit)} s are allowed"
+                found.append(self._violation(Fault.SILENT, name, event, explanation))
+                self._heard[name] = (since, True)
+            if name in heard:
+                self._heard[name] = (now, False)
 
     def finish(self) -> list[Violation]:
         """Judge what still waits, once the run is over."""

@@ -54,6 +54,8 @@ class Setup:
     """The share of what was published that has to be decided before a run is evidence."""
     named: tuple[tuple[str, str], ...] = ()
     """The contract's topics, by their whole names, and their types."""
+    fresh: Mapping[str, Fraction] = field(default_factory=dict)
+    """How long each of these variables may be silent, in seconds."""
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -92,6 +94,7 @@ def setup(
         _answers(data.get("answers")),
         float(data.get("decided", DECIDED_SHARE)),
         named,
+        work.fresh(data.get("fresh")),
     )
     return made, tuple(work.faults)
 
@@ -185,6 +188,19 @@ class _Work:
         for name in self.mapping():
             if name not in known:
                 self.fault(f"{self.node.name} has no variable {name!r}", name, hint=suggest(name, sorted(known)))
+
+    def fresh(self, entry: Any) -> dict[str, Fraction]:
+        """The deadlines, of variables that messages carry."""
+        found: dict[str, Fraction] = {}
+        for name, limit in (entry or {}).items():
+            if isinstance(self.rules.get(name), Fields | Choice):
+                found[name] = duration(str(limit))
+            elif self.options is not None:
+                observed = sorted(n for n, rule in self.rules.items() if isinstance(rule, Fields | Choice))
+                text = f"fresh.{name}: no message that is observed carries it"
+                span = self.options.at("fresh", name)
+                self.faults.append(Diagnostic("MON101", text, span, hint=suggest(name, observed)))
+        return found
 
     def fault(self, message: str, *path: str | int, hint: str | None = None) -> None:
         span = self.options.at("mapping", *path) if self.options is not None else None

@@ -77,6 +77,11 @@ SCHEMA: dict[str, Any] = {
                 },
             ],
         },
+        "fresh": {
+            "type": "object",
+            "additionalProperties": _DURATION,
+            "description": "how long a variable may be silent: {in.r: 200 ms}",
+        },
         "decided": {
             "type": "number",
             "exclusiveMinimum": 0,

@@ -12,6 +12,7 @@ from avow.language.contract import ClauseKind
 from avow.system.plan import System
 from avow.system.schema import suggest
 
+from .blame import Blame
 from .coverage import Tally
 from .engine import Fault, Monitor, Violation
 from .options import NAME, known_types, origin, readable, same_topic, setup
@@ -27,6 +28,7 @@ class Session:
     counts: dict[Fault, int] = field(default_factory=dict)
     unheard: dict[str, int] = field(default_factory=dict)
     """Topics of the trace that no monitor listens to, and their events."""
+    _blame: Blame | None = None
 
     def listens(self, topic: str) -> bool:
         return any(monitor.listens(topic) for monitor in self.monitors)
@@ -36,17 +38,20 @@ class Session:
         topic = event.get("topic")
         if isinstance(topic, str) and same_topic(topic) not in map(same_topic, self.topics):
             self.unheard[topic] = self.unheard.get(topic, 0) + 1
-        for monitor in self.monitors:
-            for violation in monitor.step(event):
-                self.counts[violation.fault] = self.counts.get(violation.fault, 0) + 1
-                yield violation
+        yield from self._told([v for monitor in self.monitors for v in monitor.step(event)])
+
+    def _told(self, violations: list[Violation]) -> Iterator[Violation]:
+        if not violations:
+            return
+        if self._blame is None:
+            self._blame = Blame(self.system)
+        for violation in self._blame.told(violations, {m.setup.node.name: m for m in self.monitors}):
+            self.counts[violation.fault] = self.counts.get(violation.fault, 0) + 1
+            yield violation
 
     def finish(self) -> Iterator[Violation]:
         """What is judged only once the run is over."""
-        for monitor in self.monitors:
-            for violation in monitor.finish():
-                self.counts[violation.fault] = self.counts.get(violation.fault, 0) + 1
-                yield violation
+        yield from self._told([v for monitor in self.monitors for v in monitor.finish()])
 
     def unmonitored(self) -> list[str]:
         """The clauses that could be judged, and of whose publications too few were decided."""

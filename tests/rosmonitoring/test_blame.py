@@ -1,0 +1,124 @@
+"""A breach is followed to the first clause that broke; silence is a violation when its time has passed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from avow.backend_kit.protocol import Limits
+from avow.backends.rosmonitoring import BACKEND
+from avow.backends.rosmonitoring.engine import Fault, Violation
+from avow.backends.rosmonitoring.options import setup
+from avow.backends.rosmonitoring.session import session
+from avow.base.verdict import Verdict
+from avow.system.load import load_system
+from avow.system.plan import System
+
+from .conftest import ARRIVAL, job_for
+
+CHAIN = """
+node sensor {
+  inputs( r : REAL )
+  outputs( s : REAL )
+  topics( float64 r matches(in.r), float64 s matches(out.s) )
+  assume real ( in.r >= -10 )
+  guarantee nonneg ( out.s >= 0 )
+}
+node guard {
+  inputs( s : REAL )
+  outputs( t : REAL )
+  topics( float64 s matches(in.s), float64 t matches(out.t) )
+  assume nonneg ( in.s >= 0 )
+  guarantee twice ( out.t == in.s + in.s )
+}
+node motor {
+  inputs( t : REAL )
+  outputs( u : REAL )
+  topics( float64 t matches(in.t), float64 u matches(out.u) )
+  assume nonneg ( in.t >= 0 )
+  guarantee same ( out.u == in.t )
+}
+"""
+Event = dict[str, Any]
+
+
+def chain(folder: Path, connections: str = "[]") -> System:
+    (folder / "system.rcl").write_text(CHAIN, encoding="utf-8")
+    methods = {"methods": [{"rosmonitoring": {"answers": ARRIVAL, "mapping": {}}}]}
+    nodes = dict.fromkeys(("sensor", "guard", "motor"), methods)
+    plan = {"connections": json.loads(connections), "nodes": nodes}
+    (folder / "plan.yaml").write_text(json.dumps(plan), encoding="utf-8")
+    return load_system(folder)
+
+
+def judge(system: System, *events: tuple[str, float]) -> list[Violation]:
+    running = session(system)
+    return [v for topic, value in events for v in running.step({"topic": topic, "data": value, "time": 0})]
+
+
+def test_a_breach_is_followed_to_its_origin(tmp_path: Path) -> None:
+    system = chain(tmp_path)
+    found = judge(system, ("r", 1), ("s", 1), ("t", 2), ("u", 2), ("r", 2), ("s", -1), ("t", -2), ("u", -2))
+    assert [(v.node, v.clause, v.fault) for v in found] == [
+        ("sensor", "nonneg", Fault.GUARANTEE),
+        ("guard", "nonneg", Fault.PROVIDER),
+        ("motor", "nonneg", Fault.PROVIDER),
+    ]
+    assert "sensor.nonneg at event 6 caused guard.nonneg at event 6" in found[1].explanation
+    # the guard did what it had promised: it gave twice what it was given, which was wrong
+    assert "came from guard.t, of which no guarantee was seen broken" in found[2].explanation
+
+
+def test_what_was_mended_is_no_cause_any_more(tmp_path: Path) -> None:
+    found = judge(chain(tmp_path), ("s", -1), ("s", 1), ("t", -5))
+    assert [(v.clause, v.index) for v in found if v.fault is Fault.PROVIDER] == [("nonneg", 1), ("nonneg", 3)]
+    assert "guard.twice at event 3 caused motor.nonneg at event 3" in found[-1].explanation
+
+
+def test_the_environment_is_blamed_only_where_it_provides(tmp_path: Path) -> None:
+    found = judge(chain(tmp_path), ("r", -20), ("s", -1))
+    assert [v.fault for v in found] == [Fault.ASSUMPTION, Fault.EXCUSED, Fault.PROVIDER]
+    assert "sensor.real at event 1 (environment) caused guard.nonneg at event 2" in found[2].explanation
+
+
+SENSOR = """
+node n {
+  inputs( r : REAL )
+  outputs( o : BOOL )
+  topics( float64 r matches(in.r), bool o matches(out.o) )
+  guarantee g ( out.o <=> in.r > 0 )
+}
+"""
+
+
+def test_a_silent_sensor_is_told_when_its_time_has_passed(make_system: Callable[..., System], tmp_path: Path) -> None:
+    events = [{"topic": "r", "data": 1, "time": 0}]
+    events += [{"topic": "o", "data": True, "time": k / 10} for k in range(1, 20)]
+    for limit, at in (("500 ms", 7), ("1 s", 12), ("3 s", None)):
+        system = make_system(SENSOR, traces=["t.jsonl"], fresh={"in.r": limit})
+        running = session(system)
+        found = [v for e in events for v in running.step(e)]
+        assert [(v.fault, v.index) for v in found] == ([(Fault.SILENT, at)] if at else [])
+        text = "".join(json.dumps(e) + "\n" for e in events)
+        (system.plan.root / "t.jsonl").write_text(text, encoding="utf-8")
+        report = BACKEND.discharge(job_for(system, "n"), tmp_path, Limits())
+        assert report.outcomes[0].verdict is (Verdict.UNKNOWN if at else Verdict.MONITORED)
+
+
+def test_time_passes_with_other_topics_too(make_system: Callable[..., System]) -> None:
+    running = session(make_system(SENSOR, fresh={"in.r": "1 s", "out.o": "1 s"}))
+    found = [v for k in range(4) for v in running.step({"topic": "other", "time": k})]
+    assert [(v.clause, v.index) for v in found] == [("in.r", 3), ("out.o", 3)]
+
+
+@pytest.mark.parametrize("name", ["in.x", "r"])
+def test_a_deadline_of_nothing_is_a_fault(make_system: Callable[..., System], name: str) -> None:
+    system = make_system(SENSOR, fresh={name: "1 s"})
+    node = system.contract.node("n")
+    (fault,) = setup(system, node, system.plan.node("n").methods[0].options)[1]
+    assert "no message that is observed" in fault.message
+    assert fault.span is not None
