@@ -8,7 +8,7 @@ equation is written, `a > b` for `b < a`, `p == TRUE` for `p`, or the order in w
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import assert_never
 
 from avow.base.remembered import by_identity
@@ -142,16 +142,16 @@ def substitute(term: Term, mapping: Mapping[Variable, Term]) -> Term:
             return active.get(current, current)
         if isinstance(current, Quantified):
             inner = {v: t for v, t in active.items() if v not in current.variables}
-            fresh: list[Variable] = []
+            renewed: list[Variable] = []
             for variable in current.variables:
-                name = _fresh(variable.name, taken) if inner and variable.name in taken else variable.name
+                name = fresh(variable.name, taken) if inner and variable.name in taken else variable.name
                 renamed = Variable(Role.BOUND, name, variable.sort, variable.span)
                 if renamed != variable:
                     taken.add(name)
                     inner[variable] = renamed
-                fresh.append(renamed)
+                renewed.append(renamed)
             body: Term = yield steps(current.body, inner)
-            return Quantified(current.quantifier, tuple(fresh), body, current.span)
+            return Quantified(current.quantifier, tuple(renewed), body, current.span)
         parts: list[Term] = []
         for child in current.children:
             part: Term = yield steps(child, active)
@@ -166,11 +166,11 @@ def rename(term: Term, mapping: Mapping[Variable, Variable]) -> Term:
     return substitute(term, mapping)
 
 
-def _fresh(name: str, taken: set[str]) -> str:
-    candidate = f"{name}'"
-    while candidate in taken:
-        candidate += "'"
-    return candidate
+def fresh(name: str, taken: Collection[str]) -> str:
+    """The name, with as many primes as it needs to be none of those taken."""
+    while name in taken:
+        name += "'"
+    return name
 
 
 def has_nonlinear(term: Term) -> bool:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
+from avow.formulas.formula import free_variables, fresh
+from avow.formulas.traversal import Steps, run, subterms
 from avow.language.terms import Quantified, Role, Term, Variable
 
 
@@ -15,14 +17,7 @@ def map_children(term: Term, change: Callable[[Term], Term]) -> Term:
 
 def bound_names(term: Term) -> frozenset[str]:
     """The names of role BOUND that occur free in the term."""
-    if isinstance(term, Variable):
-        return frozenset((term.name,)) if term.role is Role.BOUND else frozenset()
-    found: frozenset[str] = frozenset()
-    for child in term.children:
-        found |= bound_names(child)
-    if isinstance(term, Quantified):
-        found -= {v.name for v in term.variables}
-    return found
+    return frozenset(v.name for v in free_variables(term) if v.role is Role.BOUND)
 
 
 def has_variables(term: Term) -> bool:
@@ -36,33 +31,28 @@ def has_variables(term: Term) -> bool:
     return False
 
 
-def rename_apart(term: Term) -> Term:
-    """The same meaning, with no bound name used by two quantifiers or both bound and free."""
-    used = set(bound_names(term))
+def rename_apart(term: Term, taken: Iterable[str] = ()) -> Term:
+    """The same meaning, with no bound name used by two quantifiers, both bound and free, or among those `taken`."""
+    if not any(isinstance(part, Quantified) for part in subterms(term)):
+        return term
+    used = {*bound_names(term), *taken}
 
-    def visit(part: Term, names: Mapping[str, str]) -> Term:
-        match part:
-            case Variable(role=Role.BOUND, name=name) if name in names:
-                return part if names[name] == name else dataclasses.replace(part, name=names[name])
-            case Quantified(variables=variables):
-                inner = dict(names)
-                for variable in variables:
-                    inner[variable.name] = _fresh(variable.name, used)
-                    used.add(inner[variable.name])
-                return dataclasses.replace(
-                    part,
-                    variables=tuple(dataclasses.replace(v, name=inner[v.name]) for v in variables),
-                    body=visit(part.body, inner),
-                )
-            case _:  # binds nothing
-                return map_children(part, lambda child: visit(child, names))
+    def steps(part: Term, names: Mapping[str, str]) -> Steps[Term]:
+        if isinstance(part, Variable):
+            name = names.get(part.name, part.name) if part.role is Role.BOUND else part.name
+            return part if name == part.name else dataclasses.replace(part, name=name)
+        if isinstance(part, Quantified):
+            names = dict(names)
+            for variable in part.variables:
+                names[variable.name] = fresh(variable.name, used)
+                used.add(names[variable.name])
+        children: list[Term] = []
+        for child in part.children:
+            changed: Term = yield steps(child, names)
+            children.append(changed)
+        if isinstance(part, Quantified):
+            variables = tuple(dataclasses.replace(v, name=names[v.name]) for v in part.variables)
+            return dataclasses.replace(part, variables=variables, body=children[0])
+        return part.rebuild(tuple(children)) if children else part
 
-    return visit(term, {})
-
-
-def _fresh(name: str, used: set[str]) -> str:
-    candidate, k = name, 1
-    while candidate in used:
-        k += 1
-        candidate = f"{name}~{k}"
-    return candidate
+    return run(steps(term, {}))

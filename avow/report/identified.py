@@ -14,13 +14,13 @@ from avow.evidence.ledger import Entry
 from avow.evidence.status import Status
 from avow.report.exchange import render_json
 from avow.report.wording import MEANINGS
+from avow.tuning.shown import RECORDS
 
 Told = tuple[str, list[str]]
 
 _DIGEST = re.compile(r"[0-9a-f]{12,64}\Z")
 _CODE = re.compile(r"[A-Z]{2,9}[0-9]{3}\Z")
 _PLACE = re.compile(r"(?P<path>[^:]+):(?P<line>[0-9]+)\Z")
-_SHOWN = 8
 
 
 def identified(case: Case, name: str) -> Iterator[Told]:
@@ -107,10 +107,10 @@ def _read_by(case: Case, path: str) -> Iterator[str]:
         ("read", [e for e in _entries(case) if path in e.evidence.inputs or inside in e.evidence.inputs]),
         ("left", [e for e in _entries(case) if path in e.evidence.outputs]),
     ):
-        for entry in entries[:_SHOWN]:
+        for entry in entries[:RECORDS]:
             yield f"{how} for {_line(entry)}"
-        if len(entries) > _SHOWN:
-            yield f"{how} for {len(entries) - _SHOWN} more records"
+        if len(entries) > RECORDS:
+            yield f"{how} for {len(entries) - RECORDS} more records"
 
 
 def _of_contract(case: Case, name: str) -> Iterator[Told]:

@@ -99,3 +99,6 @@ NODES_DRAWN = 200
 
 SUBSYSTEMS_DRAWN = 40
 """Subsystems of which the inside is drawn."""
+
+RECORDS = 8
+"""Records that `avow explain` lists of one file or digest; the ledger has all."""

@@ -7,12 +7,13 @@ between outputs and inputs two.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evidence.obligation import Obligation
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
+from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import Steps, run
 from avow.language.contract import Clause, Node
 from avow.language.sorts import INTEGER, NATURAL, FunctionSort
@@ -99,7 +100,7 @@ def triples(obligation: Obligation, clause: Clause, node: Node, checked: Checked
     of an output that the program has nothing for."""
     names = set(checked.program.names)
     assumed = [translate(a, checked.reading, names) for a in node.assumptions]
-    parts = tuple(_split(rename_bound(clause.formula, names)))
+    parts = tuple(_split(rename_apart(clause.formula, names)))
     found: dict[tuple[Term, Term, Stated], None] = {}
     for outer, conditions, consequent in parts:
         goal = translate_formula(consequent, checked.reading, clause)
@@ -171,39 +172,12 @@ def _is_input(term: Term) -> bool:
     return all(v.role is not Role.OUTPUT for v in free_variables(term))
 
 
-def rename_bound(term: Term, taken: Iterable[str]) -> Term:
-    """The same meaning, with every bound name different from the taken ones and from each other."""
-    used = set(taken)
-
-    def steps(current: Term, names: dict[Variable, Variable]) -> Steps[Term]:
-        if isinstance(current, Variable):
-            return names.get(current, current)
-        inner = names
-        if isinstance(current, Quantified):
-            inner = dict(names)
-            for bound in current.variables:
-                name = bound.name
-                while name in used:
-                    name += "'"
-                used.add(name)
-                inner[bound] = variable(name, bound.sort)
-        parts: list[Term] = []
-        for child in current.children:
-            part: Term = yield steps(child, inner)
-            parts.append(part)
-        if isinstance(current, Quantified):
-            return Quantified(current.quantifier, tuple(inner[v] for v in current.variables), parts[0], current.span)
-        return current.rebuild(tuple(parts)) if parts else current
-
-    return run(steps(term, {}))
-
-
 # -- the contract's words in the program's -----------------------------------------------------------------------------
 
 
 def translate(clause: Clause, reading: Reading, names: set[str]) -> Term:
     """A clause over the program's variables. Raises Rejected."""
-    return translate_formula(rename_bound(clause.formula, names), reading, clause)
+    return translate_formula(rename_apart(clause.formula, names), reading, clause)
 
 
 def translate_formula(formula: Term, reading: Reading, clause: Clause) -> Term:

@@ -12,6 +12,7 @@ from fractions import Fraction
 
 from avow.base.diagnostics import Span
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import subterms, transform
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SequenceSort, Sort, TupleSort
 from avow.language.terms import (
@@ -37,7 +38,7 @@ from avow.language.terms import (
 )
 
 from .program import Assign, Block, If, Match, Skip, Statement, Update, While, statements, variable
-from .triples import Triple, rename_bound
+from .triples import Triple
 from .tuning import FORMULA_NODES
 
 
@@ -204,7 +205,7 @@ def updated(post: Term, target: Variable, arguments: tuple[Term, ...], value: Te
     """The postcondition before ``target[arguments] := value``: each atom split by whether it looks at that point."""
     names = {v.name for t in (post, value, *arguments) for v in free_variables(t)}
     after = variable(f"{target.name}~after", target.sort)
-    renamed = substitute(rename_bound(post, names), {target: after})
+    renamed = substitute(rename_apart(post, names), {target: after})
     update = Update(target, arguments, value, Span("", 0, 0, 0, 0))
     return transform(renamed, lambda part: _looked_up(part, after, update))
 

@@ -43,10 +43,10 @@ def stands(composition: Composition) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", range(10))
+@pytest.mark.parametrize("block", range(5))
 def test_no_grouping_derives_what_enumeration_refutes(tmp_path: Path, block: int) -> None:
     stood = grouped = 0
-    for seed in range(block * SYSTEMS // 10, (block + 1) * SYSTEMS // 10):
+    for seed in range(block * SYSTEMS // 5, (block + 1) * SYSTEMS // 5):
         text, plan = random_system(seed)
         groups = random_groups(seed, [f"n{k}" for k in range(text.count("node "))])
         composition = compose(make(tmp_path / str(seed), text, f"{plan}subsystems:\n{groups}" if groups else plan))

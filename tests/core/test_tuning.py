@@ -35,6 +35,7 @@ NOT_TUNED = {
     ("avow/solving/z3_sorts.py", "_MAX_CHARACTER"),
     ("avow/system/graph_svg.py", "_MARGIN"),
     ("avow/system/graph_svg.py", "_LANE"),
+    ("backends/ajpf/kept.py", "_FORM"),  # of a file
     ("backends/ajpf/mind.py", "NONE"),
     ("backends/review/record.py", "FORMAT"),  # of a file
 }

@@ -173,7 +173,7 @@ def test_hypothesis_says_what_the_oracle_says(tmp_path: Path) -> None:
 @pytest.mark.needs_dafny
 def test_dafny_proves_nothing_that_the_oracle_breaks(tmp_path: Path) -> None:
     found = many(range(3, 6), tmp_path, "dafny", DAFNY)
-    assert found[Verdict.PROVED] > 4
+    assert found[Verdict.PROVED] > 2
     assert Verdict.ERROR not in found
 
 
