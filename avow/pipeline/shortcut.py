@@ -109,8 +109,21 @@ def _sources(workspace: Workspace) -> str:
     signed = (workspace.signed,) if workspace.signed.is_dir() else ()  # most workspaces have none
     _add_files(digest, workspace.contracts, *signed, *_CODE)
     for name in dict.fromkeys([*os.environ.get("PATH", "").split(os.pathsep), *sys.path]):
-        digest.update(f"{name} {_mark(name) if Path(name).is_dir() else ''}\n".encode("utf-8", "surrogateescape"))
+        digest.update(f"{name} {_searched(name, workspace)}\n".encode("utf-8", "surrogateescape"))
     return digest.hexdigest()
+
+
+def _searched(name: str, workspace: Workspace) -> str:
+    """A folder in which tools and modules are looked for. In the workspace itself a run leaves folders of its own and
+    others' caches, which are nobody's input."""
+    if not Path(name).is_dir():
+        return ""
+    if not Path(name).samefile(workspace.root):
+        return _mark(name)
+    ours = (workspace.artifacts.name, workspace.reports.name, "__pycache__")
+    with os.scandir(name) as entries:
+        there = sorted((e for e in entries if e.name not in ours and e.name[:1] != "."), key=lambda e: e.name)
+        return json.dumps([[e.name, "" if e.is_dir() else _mark(e.path)] for e in there])
 
 
 def _add_files(digest: hashlib._Hash, *folders: Path) -> None:

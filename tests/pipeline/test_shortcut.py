@@ -84,6 +84,22 @@ def test_a_tool_that_appears_on_the_path_is_seen(
     assert Shortcut(settled).nothing_to_do(("verify",)) is None
 
 
+def test_what_a_run_leaves_in_a_workspace_that_modules_are_looked_for_in_does_not_disturb_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace = Workspace(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "contracts").mkdir()
+    shortcut = Shortcut(workspace)
+    assert shortcut.nothing_to_do(("verify",)) is None
+    for name in (".hypothesis", "__pycache__", "artifacts", "reports"):
+        (tmp_path / name).mkdir()
+    shortcut.keep([RESULT])
+    assert Shortcut(workspace).nothing_to_do(("verify",)) == (RESULT,)
+    (tmp_path / "z3.py").write_text("")
+    assert Shortcut(workspace).nothing_to_do(("verify",)) is None
+
+
 def test_a_link_that_leads_elsewhere_is_never_short(tmp_path: Path, settled: Workspace) -> None:
     elsewhere = tmp_path.parent / f"{tmp_path.name}-elsewhere"
     elsewhere.mkdir()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import os
@@ -12,9 +13,11 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from helpers import some
@@ -60,6 +63,11 @@ def recorded(place: Workspace) -> list[object]:
         for name in ("started", "seconds", "run"):
             del record[name]
     return sorted(json.loads(json.dumps(records, default=str)), key=lambda r: (r["obligation"], r["method"]))
+
+
+def verdicts(records: list[Any]) -> dict[str, str]:
+    """Of the newest record of each obligation."""
+    return {record["obligation"]: record["verdict"] for record in records}
 
 
 def settle(place: Workspace) -> list[object]:
@@ -241,8 +249,18 @@ class Machines:
 
     def worker(self) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", "avow.cli", "worker", "--on", self.url, "--slots", "1"]
-        self.processes.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
+        marked = {**os.environ, "AVOW_TEST_CLUSTER": self.url}
+        self.processes.append(subprocess.Popen(command, stderr=subprocess.DEVNULL, env=marked))
         return self.processes[-1]
+
+    def left(self) -> list[str]:
+        """What runs of all that the workers started, and they themselves."""
+        found = []
+        for entry in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                if f"AVOW_TEST_CLUSTER={self.url}".encode() in (entry / "environ").read_bytes().split(b"\0"):
+                    found.append(entry.name)
+        return found
 
     def close(self) -> None:
         for process in reversed(self.processes):
@@ -278,6 +296,46 @@ def test_a_cluster_records_the_same_also_where_a_worker_is_killed(place: Workspa
         assert recorded(place) == here
     finally:
         cluster.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_workers_killed_at_any_time_lose_nothing_and_leave_nothing(
+    place: Workspace, machines: Machines, seed: int
+) -> None:
+    from avow.pipeline.cluster import Address, Cluster
+
+    rng = random.Random(seed)
+    here = settle(place)
+    workers = [machines.worker(), machines.worker()]
+    cluster = Cluster(Address.read(machines.url))
+    over = threading.Event()
+
+    def trouble() -> None:
+        while not over.wait(0.5 + 2 * rng.random()):
+            if len(cluster.offers()) == 2:  # a work that loses three workers is an error that the next run asks again
+                workers.pop(rng.randrange(2)).send_signal(signal.SIGKILL)
+                workers.append(machines.worker())
+
+    try:
+        until(lambda: len(cluster.offers()) == 2)
+        asking.use(cluster)
+        place.ledger("made").unlink()
+        ledger_of.cache_clear()
+        threading.Thread(target=trouble, daemon=True).start()
+        for run in "abcd":  # what was lost three times is asked again
+            for work in works(place):
+                discharge(place, work, Run(run, False))
+        assert verdicts(recorded(place)) == verdicts(here)
+    finally:
+        over.set()
+        cluster.close()
+    for worker in workers:
+        worker.send_signal(signal.SIGKILL)
+    for process in machines.processes:
+        process.kill()
+        process.wait()
+    until(lambda: not machines.left(), 5)
 
 
 @pytest.mark.slow
