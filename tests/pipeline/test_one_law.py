@@ -19,6 +19,7 @@ AVOW = str(Path(sys.executable).with_name("avow"))
 RCL = """node n {{ inputs( x : REAL ) outputs( y : REAL ) topics()
   assume some ( in.x >= {least} )
   guarantee small ( out.y <= {most} )
+  guarantee large ( out.y >= {low} )
 }}
 """
 PLAN = """system: s
@@ -44,7 +45,7 @@ class World:
         (root / "dodo.py").write_text("")
         (self.folder / "lib" / "limit.py").write_text("TOP = 5\n")
         (self.folder / "top.txt").write_text("5")
-        self.told = {"least": 0, "most": 10, "cases": 20, "seed": 0, "file": "m.py"}
+        self.told = {"least": 0, "most": 10, "low": -100, "cases": 20, "seed": 0, "file": "m.py"}
         self.subject = "right"
         self.kept: list[Path] = []
         self.rolled_back = False
@@ -58,7 +59,7 @@ class World:
         (self.folder / str(self.told["file"])).write_text(SUBJECTS[self.subject])
 
     def option(self) -> None:
-        name = self.rng.choice(["least", "most", "cases", "seed"])
+        name = self.rng.choice(["least", "most", "low", "cases", "seed"])
         self.told[name] = self.rng.choice({"cases": [5, 20], "seed": [0, 1, 2]}.get(name, [-1, 0, 4, 10]))
         self.write()
 
