@@ -1,4 +1,4 @@
-"""Derived claims: what follows when claims rest on claims, with hypotheses, weakest links and circles refused.
+"""Derived claims: what follows when claims rest on claims, with hypotheses, the weakest below them and circles refused.
 
 A claim stands on its own evidence (`own`), on other claims (`rests_on`, all of them needed), or on both. Nothing is
 kept between calls: deleting an item of evidence and judging again is the same as never having had it.

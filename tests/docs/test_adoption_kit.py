@@ -1,0 +1,167 @@
+"""The files for other tools, as far as a machine without those services can try them: shapes, and every shell line."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[2]
+KIT = ROOT / "docs/adoption"
+MARK = "<!-- avow rover -->"
+
+GH = """\
+#!/usr/bin/env bash
+printf '%s\\n' "$*" >> "$CALLS"
+case "$*" in *--paginate*) echo "$KNOWN";; esac
+"""
+"""Stands in for GitHub's client: it notes how it is called, and knows the comment `KNOWN`."""
+
+
+def steps() -> list[dict[str, Any]]:
+    text = (KIT / "github.yaml").read_text()
+    workflow = yaml.safe_load(text)
+    assert set(workflow) >= {"name", "jobs", "permissions", "env", True}  # YAML 1.1 reads `on` as true
+    (job,) = workflow["jobs"].values()
+    assert job["runs-on"]
+    found: list[dict[str, Any]] = job["steps"]
+    return found
+
+
+def named(name: str) -> str:
+    (script,) = (step["run"] for step in steps() if step.get("name") == name)
+    assert isinstance(script, str)
+    return script
+
+
+def run(script: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    path = f"{folder}{os.pathsep}{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    command = ["bash", "-eo", "pipefail", "-c", script]  # as GitHub's runner starts it
+    env = {**os.environ, "PATH": path, **environment}
+    return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_each_step_uses_an_action_of_a_version_or_runs_a_shell_line() -> None:
+    for step in steps():
+        assert ("uses" in step) is not ("run" in step)
+        if "uses" in step:
+            assert step["uses"].rpartition("@")[2].startswith("v"), step
+        else:
+            assert subprocess.run(["bash", "-n", "-c", step["run"]], check=False).returncode == 0, step
+            assert "${{" not in step["run"], "what others write comes in through the environment, never as shell"
+    lines = [step["run"] for step in steps() if "run" in step]
+    assert 'pip install "$AVOW"' in lines
+    assert "avow verify" in lines
+
+
+@pytest.mark.parametrize("known", ["", "4711"])
+def test_the_comment_is_made_once_and_then_changed(known: str, tmp_path: Path) -> None:
+    (tmp_path / "reports/rover").mkdir(parents=True)
+    (tmp_path / "reports/rover/comment.md").write_text(f"{MARK}\n**fine** $(touch pwned) `x`\n")
+    (tmp_path / "gh").write_text(GH)
+    (tmp_path / "gh").chmod(0o755)
+    calls = tmp_path / "calls"
+    done = run(named("comment"), tmp_path, CALLS=str(calls), KNOWN=known, PR="3", GITHUB_REPOSITORY="o/r", GH_TOKEN="t")
+    assert done.returncode == 0, done.stderr
+    asked, told = calls.read_text().splitlines()
+    assert MARK in asked
+    wanted = "api -X PATCH repos/o/r/issues/comments/4711" if known else "api repos/o/r/issues/3/comments"
+    assert told == f"{wanted} -F body=@reports/rover/comment.md"
+    assert not (tmp_path / "pwned").exists()
+
+
+def test_findings_are_collected_one_file_for_a_system(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / "reports" / name).mkdir(parents=True)
+        (tmp_path / "reports" / name / "findings.sarif").write_text(name)
+        (tmp_path / "reports" / name / "report.sarif").write_text("all of it")
+    assert run(named("findings"), tmp_path).returncode == 0
+    assert {path.name: path.read_text() for path in (tmp_path / "findings").iterdir()} == {
+        "a.sarif": "a",
+        "b.sarif": "b",
+    }
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    assert run(named("findings"), empty).returncode == 0
+
+
+def test_gitlab_runs_the_same() -> None:
+    (job,) = yaml.safe_load((KIT / "gitlab.yaml").read_text()).values()
+    assert job["script"] == ['pip install "$AVOW"', "avow verify"]
+    assert job["artifacts"]["when"] == "always"
+    assert job["artifacts"]["reports"]["junit"] == "reports/*/junit.xml"
+
+
+def test_the_hooks_take_the_files_that_they_are_given(tmp_path: Path) -> None:
+    assert run("avow init robot", tmp_path).returncode == 0
+    place = tmp_path / "robot"
+    files = "contracts/thermostat/system.rcl contracts/thermostat/plan.yaml"
+    for hook in yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text()):
+        assert {"id", "name", "entry", "language", "files"} <= set(hook)
+        given = files if "plan" in hook["files"] else files.split()[0]
+        done = run(f"{hook['entry']} {given}", place)
+        assert done.returncode == 0, done.stdout + done.stderr
+    (place / "contracts/thermostat/system.rcl").write_text("node {")
+    assert run(f"avow check {files}", place).returncode == 2
+
+
+def test_the_editors_package_names_files_that_are_there() -> None:
+    place = KIT / "vscode"
+    package = json.loads((place / "package.json").read_text())
+    assert {"name", "version", "publisher", "engines", "main", "contributes"} <= set(package)
+    (language,), (grammar,) = package["contributes"]["languages"], package["contributes"]["grammars"]
+    for path in (package["main"], language["configuration"], grammar["path"]):
+        assert (place / path).is_file(), path
+    assert json.loads((place / grammar["path"]).read_text())["scopeName"] == grammar["scopeName"]
+    assert language["id"] == grammar["language"]
+    assert "avow.command" in package["contributes"]["configuration"]["properties"]
+    main = (place / package["main"]).read_text()
+    assert "avow.command" in main or 'get("command"' in main
+
+
+def test_the_ros_package_is_of_format_3() -> None:
+    root = ElementTree.parse(KIT / "ros/package.xml").getroot()
+    assert (root.tag, root.get("format")) == ("package", "3")
+    assert [child.tag for child in root][:5] == ["name", "version", "description", "maintainer", "license"]
+    maintainer = root.find("maintainer")
+    assert maintainer is not None
+    assert maintainer.get("email")
+    lists = (KIT / "ros/CMakeLists.txt").read_text()
+    assert f"project({root.findtext('name')} NONE)" in lists
+    assert lists.count("avow verify") == 3  # in the comment, for ROS 1 and for ROS 2
+    assert lists.count("(") == lists.count(")")
+
+
+STUBS = {
+    "catkin": "macro(catkin_package)\nendmacro()\nset(CATKIN_ENABLE_TESTING ON)\nenable_testing()\n",
+    "ament_cmake": "macro(ament_package)\nendmacro()\nset(BUILD_TESTING ON)\nenable_testing()\n",
+    "ament_cmake_test": "function(ament_add_test name)\n"
+    '  cmake_parse_arguments(A "GENERATE_RESULT_FOR_RETURN_CODE_ZERO" "WORKING_DIRECTORY;TIMEOUT" "COMMAND" ${ARGN})\n'
+    "  add_test(NAME ${name} COMMAND ${A_COMMAND} WORKING_DIRECTORY ${A_WORKING_DIRECTORY})\nendfunction()\n",
+}
+"""What stands in for ROS's own packages: that a test is declared, and how it is run."""
+
+
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="cmake is not on this machine")
+@pytest.mark.parametrize("version", ["1", "2"])
+def test_the_ros_package_builds_and_its_test_runs_avow(version: str, tmp_path: Path) -> None:
+    place = tmp_path / "robot"
+    assert run(f"avow init robot --template ros{version}", tmp_path).returncode == 0
+    for name, text in STUBS.items():
+        (tmp_path / "stubs" / name).mkdir(parents=True)
+        (tmp_path / "stubs" / name / f"{name}Config.cmake").write_text(text)
+    (tmp_path / "avow").write_text('#!/usr/bin/env bash\necho "$PWD: $*" > "$CALLS"\n')
+    (tmp_path / "avow").chmod(0o755)
+    calls = tmp_path / "calls"
+    script = f"cmake -S {place} -B build -DCMAKE_PREFIX_PATH={tmp_path / 'stubs'} && ctest --test-dir build"
+    done = run(script, tmp_path, ROS_VERSION=version, CALLS=str(calls))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert calls.read_text() == f"{place}: verify\n"
