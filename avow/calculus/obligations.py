@@ -7,7 +7,7 @@ Pure generation here (`composition_obligations`, `requirement_obligations`); the
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Protocol
 
@@ -31,7 +31,7 @@ from avow.kernel.check import Established
 from avow.kernel.statements import Kind as Claimed
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
-from avow.solving.limits import from_seconds
+from avow.solving.limits import from_seconds, told
 from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint, Requirement, System
 
@@ -91,7 +91,7 @@ def settle_all(composition: Composition, obligations: Sequence[Obligation], limi
         answer = task.ask(composition, bounds)
         goal = getattr(task.ask, "goal", None) if obligation.kind is Kind.COMPOSITION else None
         outcomes.append(answer.outcome(obligation.id, resting.behind(answer, goal)))
-    return tuple(outcomes)
+    return tuple(replace(o, details={**o.details, **told(bounds.effort)}) for o in outcomes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,6 +53,11 @@ def steps(effort: float) -> int:
     return max(1, min(int(effort * STEPS), MOST_STEPS))
 
 
+def told(effort: float) -> dict[str, object]:
+    """For the details of evidence: the steps that a question was allowed, and whose they are."""
+    return {"budget": {"steps": steps(effort), "of": "Z3's rlimit"}}
+
+
 @contextlib.contextmanager
 def budget(effort: float) -> Iterator[None]:
     """All questions asked within the block share this much effort, however much each may take by itself; a block within

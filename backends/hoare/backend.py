@@ -19,6 +19,7 @@ from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.values import show as show_value
 from avow.language.terms import FALSE, TRUE, Not, Role, Variable
 from avow.solving.limits import from_seconds, spent
+from avow.solving.limits import told as told_effort
 from avow.solving.questions import Entailment, entails, z3_version
 from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
@@ -205,6 +206,8 @@ def settle(job: Job, limits: Limits) -> Report:
         else:
             worse = set(GIVEN) if running.verdict is not Verdict.PROVED else set()
         outcomes = tuple(_stopped(o, running, work) if o.verdict in worse else _total(o) for o in outcomes)
+    allowed = told_effort(from_seconds(limits.seconds))
+    outcomes = tuple(replace(o, details={**o.details, **allowed}) for o in outcomes)
     return Report(outcomes, "weakest preconditions", version, logs=logs)
 
 
