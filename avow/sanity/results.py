@@ -75,6 +75,7 @@ def as_outcome(identity: str, node: str, name: str, result: SanityResult | None)
     if result is None:
         return Outcome(identity, Verdict.ERROR, f"{node} has no sanity claim named {name}")
     details: dict[str, object] = {"severity": str(result.severity), "clauses": list(result.clauses)}
+    details["solver"] = result.engine
     if result.because:
         details["because"] = result.because
     if result.conflicts:

@@ -1,7 +1,7 @@
-"""cvc5 in a process of its own: ``python -m avow.solving.cvc5_process MILLISECONDS``, the script on standard input, the
+"""cvc5 in a process of its own: ``python -m avow.solving.cvc5_process STEPS``, the script on standard input, the
 answer on standard output.
 
-There are scripts on which cvc5 does not keep its own time limit (seen: sequences of tuples), and a call into a library
+There are scripts on which cvc5 does not keep its own limits (seen: sequences of tuples), and a call into a library
 cannot be ended from Python.
 """
 
@@ -10,13 +10,14 @@ from __future__ import annotations
 import sys
 
 
-def answer(script: str, effort: int) -> str | None:
-    """``sat``, ``unsat`` or ``unknown``; None where cvc5 cannot read the script."""
+def answer(script: str, limit: int, option: str = "tlimit-per") -> str | None:
+    """``sat``, ``unsat`` or ``unknown``; None where cvc5 cannot read the script. `option` says what the limit is of:
+    milliseconds, or its own steps (``rlimit-per``)."""
     import cvc5
 
     terms = cvc5.TermManager()
     solver = cvc5.Solver(terms)
-    solver.setOption("tlimit-per", str(effort))
+    solver.setOption(option, str(limit))
     solver.setOption("full-saturate-quant", "true")
     parser = cvc5.InputParser(solver)
     parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, script, "query")
@@ -37,4 +38,4 @@ def answer(script: str, effort: int) -> str | None:
 
 
 if __name__ == "__main__":
-    print(answer(sys.stdin.read(), int(sys.argv[1])) or "")
+    print(answer(sys.stdin.read(), int(sys.argv[1]), "rlimit-per") or "")

@@ -14,9 +14,10 @@ from itertools import pairwise
 from avow.base import process
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
+from avow.solving.limits import net
 from avow.solving.translation import Translator
 from avow.solving.z3_module import z3
-from avow.tuning.effort import CVC5_START_SECONDS
+from avow.tuning.effort import CVC5_START_SECONDS, CVC5_STEPS, QUESTION_EFFORT
 
 
 def export(formulas: Mapping[str, Term] | Iterable[Term], *, comment: str = "") -> str:
@@ -72,13 +73,13 @@ def _harmless(text: str) -> str:
     return "".join(c if c.isprintable() and c not in "|\\" else "?" for c in text)
 
 
-def ask_cvc5(script: str, *, effort: int = 10_000) -> str | None:
-    """cvc5's answer to a script (``unknown`` where it takes longer), or None where the package is not installed or
-    cannot read the script."""
+def ask_cvc5(script: str, *, effort: int = QUESTION_EFFORT) -> str | None:
+    """cvc5's answer to a script (``unknown`` where it takes more effort), or None where the package is not installed or
+    cannot read the script. Its own steps are counted, as Z3's are; the clock only ends what hangs."""
     if importlib.util.find_spec("cvc5") is None:
         return None
-    command = (sys.executable, "-P", "-m", "avow.solving.cvc5_process", str(effort))
-    done = process.run(command, seconds=effort / 1000 + CVC5_START_SECONDS, stdin=script)
+    command = (sys.executable, "-P", "-m", "avow.solving.cvc5_process", str(max(1, effort * CVC5_STEPS)))
+    done = process.run(command, seconds=net(effort) + CVC5_START_SECONDS, stdin=script)
     if done.timed_out:
         return "unknown"
     return done.stdout.strip() or None

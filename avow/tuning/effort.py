@@ -57,11 +57,15 @@ ANOTHER_SOLVER_EFFORT = 1_500
 """From this much effort on, another solver is worth the start of its process."""
 
 SECOND_OPINION_EFFORT = 1_000
-"""How long cvc5 may look for values that Z3 says there are not: where it finds them it mostly does so at once."""
+"""Effort of cvc5 to look for values that Z3 says there are not: where it finds them it mostly does so at once."""
 
 KERNEL_SECOND_MS = 5_000
 """For the second solver's answer to one question of the kernel: cvc5 counts no steps that mean the same on every
 version."""
+
+CVC5_STEPS = 20
+"""cvc5's steps in a unit of effort: it takes 7 to 80 of them in a millisecond, fewest where there are
+quantifiers."""
 
 CVC5_START_SECONDS = 2.0
 """Seconds that cvc5's process may take beyond the limit of the question: to begin, and to read the script."""
