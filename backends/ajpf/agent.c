@@ -68,7 +68,7 @@ static void gw_choose(S *s) {
     for (i = 0; i < NPLANS; i++) {
         short b[MAXVARS];
         if (plans[i].drop != f->drop || plans[i].isgoal != f->isgoal ||
-            (f->isgoal && plans[i].kind >= 0 && plans[i].kind != f->kind))
+            (f->isgoal && !plans[i].loose && plans[i].kind >= 0 && plans[i].kind != f->kind))
             continue;
         gw_unbound(b);
         if (!gw_match(plans[i].trigger, f->event, b) || !gw_holds(s, plans[i].guard, plans[i].nguard, b, 0)) continue;
@@ -79,6 +79,7 @@ static void gw_choose(S *s) {
             s->planned = x.n > 0;
             return;
         }
+        if (f->isgoal && plans[i].loose) f->kind = plans[i].kind > 0; /* AIL goes on with the plan's kind */
         f->plan = i;
         f->fresh = 1;
         memcpy(f->b, b, sizeof b);

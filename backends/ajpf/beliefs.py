@@ -18,6 +18,7 @@ from .syntax import (
     Var,
     apply,
     is_ground,
+    name_of,
     plain,
     rename,
     unify,
@@ -156,12 +157,31 @@ class Reasoner:
                 if (condition.goal is None or g.kind is condition.goal)
                 and (u := unify(condition.term, g.term, bindings)) is not None
             )
+        elif isinstance(condition.term, Struct) and condition.term.functor == SENT:
+            ways = _sent(beliefs, condition.term, bindings)
         else:
             ways = self.believes(beliefs, condition.term, bindings, depth)
         if condition.positive:
             yield from ways
         elif next(ways, None) is None:
             yield bindings
+
+
+def _sent(beliefs: Beliefs, term: Struct, bindings: Bindings) -> Iterator[Bindings]:
+    """The messages sent that are meant. A variable for an agent's name comes to be a text, as in AIL: no belief about
+    the agent has it then."""
+    meant = apply(term, bindings)
+    assert isinstance(meant, Struct)
+    for message in beliefs.index.get((SENT, 4), ()):
+        names = zip(meant.args[:2], message.args[:2], strict=True)
+        told = tuple(name if name_of(wanted) == wanted and is_ground(wanted) else _text(name) for wanted, name in names)
+        found = unify(meant, Struct(SENT, (*told, *message.args[2:])), bindings)
+        if found is not None:
+            yield found
+
+
+def _text(name: Term) -> Struct:
+    return Struct(f'"{plain(name)}"')
 
 
 def renamed_rule(rule: Rule, suffix: str) -> Rule:

@@ -87,6 +87,14 @@ def value_of(term: Term) -> float | None:
     return number(term)
 
 
+def computed(term: Term) -> Term:
+    """The term with the values of the arithmetic expressions in it, as far as they have one."""
+    if isinstance(term, Var) or not term.args:
+        return term
+    value = value_of(term)
+    return Struct(shown(value)) if value is not None else Struct(term.functor, tuple(map(computed, term.args)))
+
+
 def number(term: Term) -> float | None:
     """The value of a number; None for anything else."""
     if isinstance(term, Var) or term.args or not term.functor[-1:].isdigit():

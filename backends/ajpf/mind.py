@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from .beliefs import Beliefs, Reasoner, apart, renamed_condition
-from .builtin import COMPUTING, Crash, compute
+from .builtin import COMPUTING, Crash, compute, computed
 from .intentions import (
     EMPTY,
     PERCEPTION,
@@ -33,6 +33,8 @@ from .syntax import (
     Struct,
     Term,
     Var,
+    is_ground,
+    name_of,
     plain,
     rename,
     unify,
@@ -97,7 +99,8 @@ class Mind:
         event, below = intention.frames[-1].event, intention.frames[:-1]
         suffix = f"^{len(intention.frames)}"
         for plan in self._triggers.get(_key(event), ()):
-            if plan.event.goal not in (None, event.goal):
+            kind = _kind_met(plan.event, event) if event.is_goal else None
+            if event.is_goal and kind is None:
                 continue
             bindings = unify(_own(plan.event.term, suffix), event.term, {})
             if bindings is None:
@@ -111,7 +114,7 @@ class Mind:
                 gone = goal_of(event) if event.sign is Sign.ADD else None
                 return self.number(left), self.without(goals, gone)
             deeds = tuple(replace(d, term=_own(d.term, suffix)) if d.args else d for d in plan.deeds)
-            top = Frame(event, deeds, fresh=True)
+            top = Frame(replace(event, goal=kind), deeds, fresh=True)
             return self.number(bind(replace(intention, frames=(*below, top)), met)), goals
         if not below and not (event.is_goal and event.sign is Sign.DROP):
             return self.empty, goals
@@ -128,11 +131,11 @@ class Mind:
         if not top.deeds:  # an event -!g that no plan takes up
             return Done(base, goals, number)
         deed, beliefs = top.deeds[0], self.beliefs.items[base]
-        term = deed.term
+        term = computed(deed.term)
         match deed.kind:
             case DeedKind.SEND:
                 to, force, content = term.args if isinstance(term, Struct) else ()
-                sent = Struct(SENT, (to, Struct(self.program.name), force, content))
+                sent = Struct(SENT, (name_of(to), Struct(self.program.name), force, content))
                 action = self.actions.number(Struct("send", (content, to)))
                 base = self.base(beliefs.own | {sent}, beliefs.perceived)
                 event = self.intentions.number(of_event(Event(Sign.ADD, sent)))
@@ -250,6 +253,15 @@ class Mind:
 
     def _wanted(self, goals: int) -> tuple[Goal, ...]:
         return tuple(sorted(self.goals.items[goals], key=lambda g: plain(g.term))) if self.uses_goals else ()
+
+
+def _kind_met(trigger: Event, event: Event) -> GoalKind | None:
+    """The kind that the event's goal has for a plan with this trigger; None if the plan is none for it. AIL matches a
+    ground event against a trigger with variables term by term, whatever their kinds, and goes on with the plan's. A
+    trigger without a kind is one to perform, then one to achieve."""
+    if is_ground(event.term) and not is_ground(trigger.term):
+        return trigger.goal or GoalKind.PERFORM
+    return event.goal if trigger.goal in (None, event.goal) else None
 
 
 def _key(event: Event) -> tuple[Sign, bool, str, int]:

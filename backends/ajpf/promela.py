@@ -92,7 +92,9 @@ def header(program: Program, environment: Environment, wanted: Sequence[Atom], *
             term = -1 if bare else tables.pattern(deed.term, scope)
             deeds.append(f"{{{_DEEDS[deed.kind]}, {term}, {_kind(deed.goal)}}}")
         parts.append(f"static const Deed deeds_{at}[] = {_table(deeds, '{0, 0, 0}')};")
-        event = f"{int(plan.event.sign == '-')}, {int(plan.event.is_goal)}, {_kind(plan.event.goal)}, {trigger}"
+        loose = int(not is_ground(plan.event.term))
+        kind = f"{_kind(plan.event.goal)}, {loose}"
+        event = f"{int(plan.event.sign == '-')}, {int(plan.event.is_goal)}, {kind}, {trigger}"
         plans.append(f"{{{event}, {len(plan.guard)}, {len(deeds)}, guard_{at}, deeds_{at}}}")
     percepts, rows = _environment(tables, environment)
     said = []
@@ -134,7 +136,7 @@ def header(program: Program, environment: Environment, wanted: Sequence[Atom], *
             "typedef struct { int pat, positive, isgoal, kind; } Cond;",
             "typedef struct { int what, pat, kind; } Deed;",
             "typedef struct { int head, n; const Cond *body; } Rule;",
-            "typedef struct { int drop, isgoal, kind, trigger, nguard, n;",
+            "typedef struct { int drop, isgoal, kind, loose, trigger, nguard, n;",
             "  const Cond *guard; const Deed *deeds; } Plan;",
             "typedef struct { int what, pat; } Said;",
             "typedef struct { short nb, bel[MAXBEL], ng, goal[MAXGOALS], nq, q[MAXQUEUE], cur, last, now[NGROUPS];",

@@ -44,11 +44,15 @@ def expected(graph: Graph, lasso: Lasso) -> tuple[tuple[Moment, ...], Script]:
     system = graph.system
     path = [*lasso.path, *lasso.path[lasso.loop :], lasso.path[lasso.loop]]
     moments, draws, turns = [], [], []
+    first = graph.states[path[0]]
+    if first.drawn:
+        moments.append(_told(system, first, "start"))
+        draws.append(system.world.choices.items[first.choice])
     for at in range(len(path) - 1):
         before, after = graph.states[path[at]], graph.states[path[at + 1]]
         if before.over or (after.over and not after.drawn):
             break
-        if len(system.agents) > 1 and (before.changed or not any(before.awake)):
+        if len(system.agents) > 1 and (before.changed or not any(before.awake)) and (before.begun or not system.probed):
             turns.append(system.agents[after.turn].program.name)
         moment = _moment(system, before, after)
         if moment is not None:

@@ -15,7 +15,7 @@ from .environment import Environment
 from .intentions import of_event
 from .interpreter import PRINT, Agent, Semantics, State
 from .mind import NONE, Table
-from .syntax import RECEIVED, DeedKind, Event, Program, Sign, Struct, plain
+from .syntax import RECEIVED, DeedKind, Event, Program, Sign, Struct, name_of, plain
 from .world import World
 
 T = TypeVar("T")
@@ -73,27 +73,39 @@ class Society:
         return self.world.offers(state.choice)
 
     def start(self) -> tuple[Common, ...]:
+        first = self._first()
+        looks = self._looks(first)
+        return looks if len(looks) == 1 else (first,)
+
+    def _looks(self, state: Common) -> tuple[Common, ...]:
+        """Where properties ask for percepts, AJPF looks at the environment before the first turn: that is the first
+        draw. If there is no choice in it, the first state is the one after it."""
+        if state.begun or not self.probed:
+            return ()
+        return tuple(state._replace(choice=draw, begun=True, drawn=True) for draw in self.world.first())
+
+    def _first(self) -> Common:
         everybody = range(len(self.agents))
-        return (
-            Common(
-                minds=tuple(self._keep(place, self.agents[place].first()) for place in everybody),
-                mail=((),) * len(self.agents),
-                awake=(True,) * len(self.agents),
-                turn=0,
-                changed=True,
-                last=NONE,
-                choice=self.world.before,
-                begun=not self.environment.at_start,
-                waited=False,
-                over=False,
-                drawn=False,
-            ),
+        return Common(
+            minds=tuple(self._keep(place, self.agents[place].first()) for place in everybody),
+            mail=((),) * len(self.agents),
+            awake=(True,) * len(self.agents),
+            turn=0,
+            changed=True,
+            last=NONE,
+            choice=self.world.before,
+            begun=not self.environment.at_start,
+            waited=False,
+            over=False,
+            drawn=False,
         )
 
     def successors(self, state: Common) -> tuple[Common, ...]:
         """Never empty: a run that has ended stays where it is."""
         if state.over:
             return (state,)
+        if looks := self._looks(state):
+            return looks
         if not any(state.awake):
             return tuple(dict.fromkeys(self._idle(state._replace(drawn=False))))
         turns = [place for place, up in enumerate(state.awake) if up] if state.changed else [state.turn]
@@ -109,9 +121,8 @@ class Society:
             yield self._cycle(state)
         else:
             for draw in self.world.first():
-                drawn = state._replace(choice=draw, begun=True, drawn=True)
-                after = self._cycle(drawn, again=not self.probed)
-                yield after._replace(changed=after.changed or (not self.probed and bool(self.world.offers(draw))))
+                after = self._cycle(state._replace(choice=draw, begun=True, drawn=True), again=True)
+                yield after._replace(changed=after.changed or bool(self.world.offers(draw)))
 
     def _cycle(self, state: Common, *, again: bool = False) -> Common:
         """Perceive, read messages, select an intention, choose a plan."""
@@ -196,7 +207,7 @@ class Society:
         assert isinstance(message, Struct)
         to, force, content = message.args
         state = state._replace(changed=True)
-        place = self._places.get(to.functor.strip("\"'")) if isinstance(to, Struct) and not to.args else None
+        place = self._places.get(plain(name_of(to)))
         if place is None:
             return state
         agent = self.agents[place]

@@ -180,6 +180,12 @@ RECEIVED, SENT = ".received", ".sent"
 those that it sent, ``.sent(to, from, tell, content)``."""
 
 
+def name_of(agent: Term) -> Term:
+    """The agent that a message is for: AIL takes a text for a name, too."""
+    text = isinstance(agent, Struct) and not agent.args and agent.functor[:1] in ("'", '"')
+    return Struct(agent.functor[1:-1]) if isinstance(agent, Struct) and text else agent
+
+
 def show_event(event: Event) -> str:
     if isinstance(event.term, Struct) and event.term.functor in (RECEIVED, SENT):
         _, _, force, content = event.term.args

@@ -129,6 +129,21 @@ def test_comparisons_bind_and_rules_cut(plans, beliefs, rules, expected):
     assert actions(run(plans, ["p"], beliefs=beliefs, rules=rules)) == [expected]
 
 
+@pytest.mark.parametrize(
+    ("goal", "trigger", "answered"),
+    [
+        ("k(1) [achieve]", "k(1) [perform]", False),
+        ("k(1) [achieve]", "k(X) [perform]", True),
+        ("k(1) [perform]", "k(X) [achieve]", True),
+        ("k(1) [perform]", "k(X)", True),
+    ],
+)
+def test_kinds_of_goals_count_where_the_trigger_has_no_variable(goal, trigger, answered):
+    """AJPF's answers: it matches a goal without variables term by term."""
+    said = run(f"+!{trigger} : {{ True }} <- act, done;", goals=goal)
+    assert ("done" in actions(said)) is answered
+
+
 def test_lists_unify_by_head_and_tail():
     plans = "+p : { B route([H|T]) } <- -route(_), +route(T), go(H); +route([X|R]) : { B p } <- then(X);"
     assert "then(b)" in actions(run(plans, ["p"], beliefs="route([a, b])"))

@@ -10,7 +10,7 @@ from small_societies import society
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND, spin
-from avow.backends.ajpf.checker import Checker, Property
+from avow.backends.ajpf.checker import Checker, Property, asks_for_percepts
 from avow.backends.ajpf.command import command
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
@@ -33,9 +33,12 @@ def holds(tmp_path):
     def check(formula: str, *agents: str, environment: str = QUIET) -> bool:
         (tmp_path / "e.yaml").write_text(environment)
         programs = parse_system("GWENDOLEN\n" + "".join(agents), "s.gwen")
-        graph = explore(system(programs, read_environment(tmp_path / "e.yaml"), Semantics.MCAPL), states=20_000)
-        assert graph.unfinished is None
         wanted = Property("f", instantiate(parse_psl(formula), {}))
+        agents = system(
+            programs, read_environment(tmp_path / "e.yaml"), Semantics.MCAPL, probed=asks_for_percepts(wanted)
+        )
+        graph = explore(agents, states=20_000)
+        assert graph.unfinished is None
         return Checker(graph, (wanted,)).check(wanted).holds
 
     return check
@@ -111,6 +114,34 @@ def test_what_one_sends_itself_comes(holds):
         "g [perform]",
     )
     assert holds("<> B(one, done)", one, agent("two", "+a : { True } <- act;"))
+
+
+def test_arithmetic_in_a_message_is_computed(holds):
+    one = agent(
+        "one", "+!g [perform] : { B cash(C) } <- .send(two, :tell, bid((C + 3), one));", "g [perform]", "cash(5)"
+    )
+    two = agent("two", "+.received(:tell, bid(X, A)) : { True } <- +bid(X);")
+    assert holds("<> (B(two, bid(8)) & D(one, send(bid(8, one), two)))", one, two)
+
+
+def test_a_name_that_comes_from_what_was_sent_is_a_text(holds):
+    """AJPF's answer: the variable of `.sent` is bound to a text, which no belief about the agent has."""
+    plans = (
+        "+!g [perform] : { True } <- .send(two, :tell, hello), +!h [perform];"
+        "+!h [perform] : { .sent(Ag, :tell, hello), B friend(Ag) } <- +known;"
+        "+!h [perform] : { .sent(Ag, :tell, hello) } <- +stranger, .send(Ag, :tell, again);"
+    )
+    one, two = agent("one", plans, "g [perform]", "friend(two)"), agent("two", "+.received(:tell, B) : { True } <- +B;")
+    assert holds("<> (B(one, stranger) & B(two, again))", one, two)
+    assert holds("[] ((~B(one, known)) & (~D(one, send(again, two))))", one, two)
+
+
+@pytest.mark.parametrize(("percepts", "at_once"), [("[p]", True), ("[p, nothing]", False)])
+def test_what_there_is_to_perceive_before_the_first_turn(holds, percepts, at_once):
+    """AJPF's answer: it looks before the first turn, and sees the first draw at once if there is no choice in it."""
+    draws = f"draws: {{at_start: true, at_quiescence: never}}\npercepts: {{x: {percepts}}}\n"
+    agents = [agent(name, "+p : { True } <- +seen;") for name in ("one", "two")]
+    assert holds("P(p)", *agents, environment=draws) is at_once
 
 
 def test_programs_are_printed_and_read_again():

@@ -1,10 +1,13 @@
 """What the real AJPF says of small agents: our engine says the same of every one of them.
 
-The programs are our own. AJPF (MCAPL of December 2025, Java 11) ran each with an environment that offers what NAME.yaml
-lists. Those in `golden/verdicts` were written for one question each or told readings of the semantics apart; those in
-`golden/random` were drawn by `small_agents`. A remark says where AJPF errs: its answer is not what follows from
-the model that it writes down itself, and ours is; or, where the model was not written down, the program's first state
-alone breaks a property that AJPF says holds, and the remark says by what.
+The programs are our own. AJPF (MCAPL of December 2025, Java 11) ran each with an environment that offers what
+NAME.yaml lists. Those in `golden/verdicts` were written for one question each or told readings of the semantics
+apart; those in `golden/random` were drawn by `small_agents`. Those in `golden/societies`, drawn by `small_societies`,
+are systems of two or three agents with AJPF's default scheduler: for each of them AJPF wrote down its whole model,
+which has the same runs (up to stuttering, in all that the properties speak of) as ours, and the verdicts are those of
+its model. A remark says where AJPF errs: its answer is not what follows from the model that it writes down itself,
+and ours is; or, where the model was not written down, the program's first state alone breaks a property that AJPF
+says holds, and the remark says by what.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ def _rows(folder: str) -> list[dict[str, str]]:
         return list(csv.DictReader(table))
 
 
-ROWS = {folder: _rows(folder) for folder in ("verdicts", "random")}
+ROWS = {folder: _rows(folder) for folder in ("verdicts", "random", "societies")}
 PROGRAMS = [(folder, name) for folder, rows in ROWS.items() for name in dict.fromkeys(row["program"] for row in rows)]
 
 
