@@ -130,7 +130,8 @@ class Kernel:
             case How.GUARANTEE:
                 # it holds while *all* its node's assumptions have held so far: none may be left out
                 conds = frozenset(entries[c].digest for c in entry.conds)
-                if any(c >= i for c in entry.conds) or conds != self.known.assumptions.get(entry.node):
+                late = any(c >= i or entries[c].node != entry.node for c in entry.conds)
+                if late or conds != self.known.assumptions.get(entry.node):
                     raise Refused(f"{claim.called}: its conditions are not the assumptions of its node, before it")
             case How.ENVIRONMENT if claim.nodes:
                 raise Refused(f"{claim.called} is called the environment's, but a node provides a value in it")

@@ -1,5 +1,4 @@
-"""A question put to Z3 within a budget that does not depend on the machine, and to a second solver where there is one.
-Each question has a context of its own, so that none can see another's declarations."""
+"""A question put to Z3 within a budget that does not depend on the machine, and to a second solver if there is one."""
 
 from __future__ import annotations
 
@@ -28,7 +27,7 @@ def ask_z3(script: str, budget: int) -> Said:
     import z3
 
     try:
-        solver = z3.Solver(ctx=z3.Context())
+        solver = z3.Solver(ctx=z3.Context())  # of its own: it sees no other question's declarations
         solver.set(rlimit=budget, timeout=NET_MS)
         solver.set("smt.arith.nl.grobner", False)  # of non-linear integer terms: they cannot be interrupted
         solver.from_string(script)
