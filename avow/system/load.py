@@ -64,7 +64,8 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System]) -> 
     faults += more
     if any(fault.is_error for fault in more):
         raise Rejected(*faults)
-    plan, contract = heard(plan, contract)
+    plan, contract, more = heard(plan, contract)
+    faults += more
     wrong = check_subsystems(plan, contract)
     faults += (*wrong, *check_names(plan, root, contract))
     if not wrong:
@@ -88,7 +89,10 @@ def load_bare(files: Sequence[Path], name: str | None = None) -> System:
     if contract is None:
         raise Rejected(*faults)
     plan = bare_plan(name or (files[0].stem if files else "system"), tuple(files))
-    return System(*heard(plan, contract))
+    plan, contract, wrong = heard(plan, contract)
+    if wrong:
+        raise Rejected(*wrong)
+    return System(plan, contract)
 
 
 def load_path(path: Path) -> System:

@@ -100,18 +100,31 @@ def unlinked(target: Endpoint, carrier: Carrier, source: Endpoint, other: Carrie
 # -- several publishers ------------------------------------------------------------------------------------------------
 
 
-def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract]:
-    """The system with a node for each input whose topic several nodes publish (or one node and the input's own)."""
+def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnostic, ...]]:
+    """The system with a node for each input whose topic several nodes publish; and who else publishes a topic without
+    its being said what the input hears of it. None is left out: what it says would be heard all the same."""
     found = ends(contract.nodes, plan.ros.names)
     connections = list(plan.connections)
     nodes: list[Node] = []
     taken = {node.name for node in contract.nodes}
+    faults: list[Diagnostic] = []
     for node in contract.nodes:
         for port in node.inputs:
             target = Endpoint(node.name, port.name)
             carrier = found.inputs.get(target)
-            sources = _sources(target, port, found, connections) if carrier is not None else ()
-            if carrier is None or len({source.node for source, _ in sources}) < 2:
+            if carrier is None:
+                continue
+            sources, unclear = _sources(target, port, found, connections)
+            if len(sources) + len(unclear) < 2:
+                continue
+            for publisher in unclear:
+                message = (
+                    f"{publisher} publishes {carrier.topic} too, and which of its outputs {target} hears is not said, "
+                    f"or none is of the type {port.type_name}"
+                )
+                hint = f"connections: {{from: {publisher}.…, to: {target}}}, or remap one of them"
+                faults.append(Diagnostic("ROS115", message, carrier.span, hint=hint))
+            if unclear:
                 continue
             name = _free(f"topic_{carrier.topic.strip('/').replace('/', '_')}", taken)
             relay = _relay(name, node.name, port, carrier, sources)
@@ -123,25 +136,31 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract]:
                 connections.append(replace(given, target=Endpoint(name, inner.name)))
             connections.append(Connection(Endpoint(name, port.name), target, span=carrier.span))
     if not nodes:
-        return plan, contract
-    return replace(plan, connections=tuple(connections)), replace(contract, nodes=(*contract.nodes, *nodes))
+        return plan, contract, tuple(faults)
+    whole = replace(contract, nodes=(*contract.nodes, *nodes))
+    return replace(plan, connections=tuple(connections)), whole, tuple(faults)
 
 
 def _sources(
     target: Endpoint, port: Port, found: Ends, connections: Sequence[Connection]
-) -> tuple[tuple[Endpoint, Port], ...]:
-    """Every output that reaches an input by its topic: of each node the one that carries the input's value."""
+) -> tuple[tuple[tuple[Endpoint, Port], ...], tuple[str, ...]]:
+    """Every output that reaches an input by its topic: of each node the one that carries the input's value; and the
+    nodes of which that cannot be told."""
     by_node: dict[str, list[tuple[Endpoint, Port]]] = defaultdict(list)
     for at, output in found.published.get(found.inputs[target].topic, ()):
         by_node[at.node].append((at, output))
     named = {c.source for c in connections if c.target == target}
     chosen: list[tuple[Endpoint, Port]] = []
-    for several in by_node.values():
+    unclear: list[str] = []
+    for publisher, several in by_node.items():
         fitting = [(at, output) for at, output in several if at in named]
         fitting = fitting or [(at, o) for at, o in several if o.name == port.name and o.sort == port.sort]
         fitting = fitting or [(at, o) for at, o in several if o.sort == port.sort]
-        chosen += fitting[:1] if len(fitting) == 1 else ()
-    return tuple(chosen)
+        if len(fitting) == 1:
+            chosen += fitting
+        else:
+            unclear.append(publisher)
+    return tuple(chosen), tuple(unclear)
 
 
 def _free(name: str, taken: set[str]) -> str:

@@ -28,6 +28,8 @@ class Session:
     counts: dict[Fault, int] = field(default_factory=dict)
     unheard: dict[str, int] = field(default_factory=dict)
     """Topics of the trace that no monitor listens to, and their events."""
+    asked: frozenset[str] = frozenset()
+    """The nodes that are to be monitored: those named, else those with such a method in the plan, else all."""
     _blame: Blame | None = None
 
     def listens(self, topic: str) -> bool:
@@ -36,7 +38,7 @@ class Session:
     def step(self, event: Mapping[str, Any]) -> Iterator[Violation]:
         self.events += 1
         topic = event.get("topic")
-        if isinstance(topic, str) and same_topic(topic) not in map(same_topic, self.topics):
+        if isinstance(topic, str) and not self.listens(topic):
             self.unheard[topic] = self.unheard.get(topic, 0) + 1
         yield from self._told([v for monitor in self.monitors for v in monitor.step(event)])
 
@@ -54,11 +56,13 @@ class Session:
         yield from self._told([v for monitor in self.monitors for v in monitor.finish()])
 
     def unmonitored(self) -> list[str]:
-        """The clauses that could be judged, and of whose publications too few were decided."""
+        """The clauses, of the nodes that are to be monitored, of whose publications too few were decided."""
         return [
             f"{monitor.setup.node.name}.{name}"
             for monitor, name, _, tally in self.clauses()
-            if not tally.hidden and (not tally.decided or tally.decided < monitor.setup.decided * tally.published)
+            if monitor.setup.node.name in self.asked
+            and not tally.hidden
+            and (not tally.decided or tally.decided < monitor.setup.decided * tally.published)
         ]
 
     @property
@@ -138,7 +142,8 @@ def session(system: System, nodes: Sequence[str] = (), trace: Path | None = None
             monitors.append(Monitor(found))
     if faults:
         raise Rejected(*faults)
-    return Session(system, tuple(monitors))
+    planned = [n.node for n in system.plan.nodes if any(m.backend == NAME for m in n.methods)]
+    return Session(system, tuple(monitors), asked=frozenset(nodes or planned or known))
 
 
 def violation_json(violation: Violation) -> dict[str, Any]:

@@ -152,10 +152,27 @@ def test_relations_are_heard_whole(tmp_path: Path) -> None:
     assert len(getattr(clause.formula, "items", ())) == 2
 
 
-def test_a_publisher_without_the_port_is_no_publisher_of_it(tmp_path: Path) -> None:
-    """The type of the port has to fit: a topic of one variable cannot be two."""
-    text = node("joy", "", "v : REAL", "float64 cmd matches(out.v)") + node(
-        "auto", "", "v : BOOL", "float64 cmd matches(out.v)"
-    )
-    text += node("wheels", "v : REAL", "", "float64 cmd matches(in.v)")
-    assert "PLAN122" in told(tmp_path, text) or "PLAN121" in told(tmp_path, text)
+@pytest.mark.parametrize(
+    ("outputs", "topics"),
+    [
+        ("w : BOOL", "float64 cmd matches(out.w)"),
+        ("w : INTEGER", "float64 cmd matches(out.w)"),
+        ("w : REAL, x : REAL", "float64 cmd matches(out.w), float64 cmd matches(out.x)"),
+    ],
+)
+@pytest.mark.parametrize("plan", ["{}", "connections: [{from: joy.v, to: wheels.u}]"])
+def test_no_publisher_is_left_out(tmp_path: Path, outputs: str, topics: str, plan: str) -> None:
+    """Not even where a connection names another: what it publishes is heard all the same."""
+    text = node("joy", "", "v : REAL", "float64 cmd matches(out.v)") + node("auto", "", outputs, topics)
+    text += node("wheels", "u : REAL", "", "float64 cmd matches(in.u)")
+    assert "ROS115" in told(tmp_path, text, plan)
+
+
+def test_a_connection_to_one_publisher_does_not_silence_the_other(tmp_path: Path) -> None:
+    plan = "connections: [{from: joy.v, to: wheels.u, delayed: true, initial: 0}]"
+    found = set(edges(make(tmp_path, two("out.w <= 0"), plan)))
+    assert found == {
+        "joy.v → topic_cmd.joy_v (delayed)",
+        "auto.w → topic_cmd.auto_w",
+        "topic_cmd.u → wheels.u",
+    }
