@@ -82,13 +82,10 @@ class _OutlineReader:
         at = self.at + ahead
         return self.tokens[at].type if at < len(self.tokens) else "$END"
 
-    def end_of_text(self) -> int:
-        return self.tokens[-1].end if self.tokens else 0
-
     def found(self, at: int) -> tuple[str, int, int]:
         """The token at a position in words, and its place."""
         if at >= len(self.tokens):
-            end = self.end_of_text()
+            end = self.tokens[-1].end if self.tokens else 0
             return "the end of the file", end, end
         token = self.tokens[at]
         return f"`{token.text[:40]}`", token.start, token.end
@@ -100,6 +97,9 @@ class _OutlineReader:
             return  # something stands here that could not be read, which has been said
         self.complained = start
         self.reports.error(code, message.replace("%", words, 1), start, end, hint=hint)
+
+    def no_clause(self, hint: str) -> None:
+        self.complain("RCL111", f"`{self.tokens[self.at].text}` is not a clause of RCL", self.at, hint)
 
     # --- the file ----------------------------------------------------------------------------------------------------
 
@@ -117,21 +117,19 @@ class _OutlineReader:
             elif self.kind() == "NODE":
                 self.node()
             elif self.kind() == "NAME" and self.tokens[self.at].text.lower() in ("context", "contexts"):
-                word = self.tokens[self.at].text
-                self.complain("RCL111", f"`{word}` is not a clause of RCL", self.at, "write `context`")
+                self.no_clause("write `context`")
                 self.at += 1
                 self.context()
             elif self.kind() == "NAME" and (
                 self.tokens[self.at].text.lower() == "node" or (self.kind(1) == "NAME" and self.kind(2) == "LBRACE")
             ):
-                word = self.tokens[self.at].text
-                self.complain("RCL111", f"`{word}` is not a clause of RCL", self.at, "write `node`")
+                self.no_clause("write `node`")
                 self.node()
             elif self.kind() == "NAME" and self.kind(1) == "LBRACE":
                 word = self.tokens[self.at].text
                 if word in ("types", "constants", "type", "constant"):
                     hint = "types (`Name : type;`) and constants (`Name = value;`) both belong in one `context { … }`"
-                    self.complain("RCL111", f"`{word}` is not a clause of RCL", self.at, hint)
+                    self.no_clause(hint)
                     self.at += 1
                     self.context()
                 else:
@@ -171,11 +169,8 @@ class _OutlineReader:
             self.at += 1
             return self.tokens[self.at - 1]
         words, _, _ = self.found(self.at)
-        hint = (
-            "names are made of letters, digits and `_`"
-            if words in ("`-`", "`.`", "`/`")
-            else f"write `{{` after {what}"
-        )
+        no_name = words in ("`-`", "`.`", "`/`")
+        hint = "names are made of letters, digits and `_`" if no_name else f"write `{{` after {what}"
         self.complain("RCL113", f"expected `{{` after {what} and not %", self.at, hint)
         for ahead in range(1, 5):  # what is left of a name that is none
             if self.kind(ahead) in _SECTIONS or (self.kind(ahead) in _TOP and self.kind(ahead - 1) != "MINUS"):
