@@ -134,6 +134,7 @@ def formulas(leaves):
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(formulas(ATOMS))
 def test_what_is_printed_is_read_back(formula):

@@ -163,6 +163,7 @@ def test_a_substitute_is_never_called_ajpf(lift, tmp_path, monkeypatch):
     assert "AJPF" not in said
 
 
+@pytest.mark.slow
 @pytest.mark.needs_spin
 def test_spin_agrees(lift, tmp_path):
     extra = {

@@ -70,6 +70,7 @@ def statements(draw: st.DrawFn) -> list[Statement]:
 LAW = settings(max_examples=120, deadline=None)
 
 
+@pytest.mark.slow
 @LAW
 @given(records(), statements(), st.booleans(), st.data())
 def test_lost_evidence_never_improves_the_colour(
@@ -85,6 +86,7 @@ def test_lost_evidence_never_improves_the_colour(
     assert after.answers.tone.rank <= before.answers.tone.rank
 
 
+@pytest.mark.slow
 @LAW
 @given(records(), statements(), st.booleans(), st.data())
 def test_a_new_supposition_never_improves_the_colour(

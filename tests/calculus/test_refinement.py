@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from helpers import some
 
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
@@ -80,11 +81,14 @@ def test_of_a_contract_that_nothing_can_keep_it_says_so(guarantees: tuple[str, .
 
 @pytest.mark.parametrize(
     "wanted",
-    [
-        "forall(i in NATURAL | in.f(i) < out.y)",
-        "out.y > in.f(3)",
-        "exists(m in REAL | forall(i in NATURAL | in.f(i) < m))",
-    ],
+    some(
+        [
+            "forall(i in NATURAL | in.f(i) < out.y)",
+            "out.y > in.f(3)",
+            "exists(m in REAL | forall(i in NATURAL | in.f(i) < m))",
+        ],
+        1,
+    ),
 )
 def test_where_it_is_not_decided_whether_anything_can_keep_it_nothing_is_proved(wanted: str, tmp_path: Path) -> None:
     """No number lies above all values of an unbounded function: `unknown` or `vacuous`, and never `proved`."""

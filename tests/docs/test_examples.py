@@ -36,6 +36,7 @@ def test_every_example_is_in_the_gallery() -> None:
     assert all(f"[{name}]({name}/system.rcl)" in page for name in folders)
 
 
+@pytest.mark.slow
 def test_the_draft_has_a_conflict_and_the_rest_no_fault() -> None:
     done = avow("sanity", "docs/examples/ventilator/conflict.rcl", cwd=ROOT)
     assert done.returncode == 1

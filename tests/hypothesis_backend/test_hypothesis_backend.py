@@ -174,6 +174,7 @@ def test_a_crash_is_shown_with_its_smallest_input(tmp_path: Path) -> None:
     assert "s.py, line 3" in low.summary
 
 
+@pytest.mark.slow
 def test_an_assumption_without_a_value_is_said_to_be_one(tmp_path: Path) -> None:
     rcl = "node n {{ inputs( a : REAL, b : REAL ) outputs( y : REAL ) topics() {} guarantee g ( out.y == in.a ) }}"
     text = "def step(a): return a"

@@ -46,6 +46,7 @@ def made() -> list[tuple[str, tuple[str, ...], Contract]]:
     return found
 
 
+@pytest.mark.slow
 def test_layout_keeps_everything() -> None:
     for text, comments, contract in made():
         formatted = format_text(text, "f")

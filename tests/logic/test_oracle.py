@@ -80,6 +80,7 @@ def tally(seeds: Iterable[int]) -> Tally:
     return found
 
 
+@pytest.mark.slow
 def test_a_few_contracts() -> None:
     found = tally(QUICK)
     assert not found.wrong, "\n".join(found.wrong)

@@ -285,6 +285,7 @@ def test_a_scenario_gives_bounded_answers_only_where_needed() -> None:
     assert answer.bounded == (answer.verdict is Verdict.CHECKED)
 
 
+@pytest.mark.slow
 def test_a_chain_of_equivalences_does_not_double_the_work_with_every_link() -> None:
     """Each `<=>` is read four ways when outputs are looked for: bounded, or 26 of them would take for ever."""
     import time

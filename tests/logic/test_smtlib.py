@@ -51,6 +51,7 @@ def test_cvc5_never_contradicts_z3(term: Term) -> None:
     assert other in {answer, "unknown"}
 
 
+@pytest.mark.slow
 @pytest.mark.needs_cvc5
 @pytest.mark.parametrize("system", ["remote_inspection", "remote_inspection_published"])
 def test_the_case_study_s_clauses_export(system: str) -> None:

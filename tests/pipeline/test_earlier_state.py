@@ -122,6 +122,7 @@ def test_verify_signs_its_attestations_where_there_is_a_key(workspace: Path, mon
     assert place.read_text() == plain
 
 
+@pytest.mark.slow
 def test_attestations_are_envelopes_where_a_key_signs(workspace: Path) -> None:
     pytest.importorskip("cryptography")
     public = new_key_pair(workspace / "key")

@@ -91,6 +91,7 @@ def test_again_nothing_is_run(robot: Path) -> None:
     assert (robot / "reports" / "thermostat" / "index.html").stat().st_mtime_ns == before
 
 
+@pytest.mark.slow
 def test_a_comment_reruns_nothing_below_the_check(robot: Path) -> None:
     edit(robot, "Low = 18;", "Low = 18; // a cold room\n")
     records = len(ledger(robot))
@@ -220,6 +221,7 @@ BAD = [
 """File, text in it, the slip in its place, where it is to be located, and a word of the message."""
 
 
+@pytest.mark.slow
 def test_every_bad_input_is_located_in_one_run(made: Path, tmp_path: Path) -> None:
     shutil.copy(made / "dodo.py", tmp_path)
     for number, (name, old, new, _, _) in enumerate(BAD):

@@ -159,6 +159,7 @@ def hold(root: Path, seed: int, steps: int, seconds: float) -> None:
         assert said == world.verify(), (seed, done)
 
 
+@pytest.mark.slow
 def test_the_law_on_a_short_walk(tmp_path: Path) -> None:
     hold(tmp_path / "w", 1, 1, 60)
 

@@ -65,6 +65,7 @@ def test_a_case_is_tried_first_whatever_the_plan_asks_for(place: Workspace) -> N
     assert ask(place, rare) is Verdict.REFUTED, "another threshold is another claim, but the case is tried"
 
 
+@pytest.mark.slow
 def test_what_was_good_before_the_refutation_is_asked_again(place: Workspace) -> None:
     assert ask(place, GOOD) is Verdict.TESTED
     assert not open_obligations(place, work(place), RUN)

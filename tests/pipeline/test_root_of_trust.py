@@ -64,6 +64,7 @@ def test_no_edit_of_what_is_kept_changes_the_verdict(refuted: Path) -> None:
     assert "edited by hand" not in (refuted / "reports" / "index.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_note_of_a_good_run_does_not_fit_a_bad_one(refuted: Path) -> None:
     """A run that ends well, its notes kept; then the wrong program again, with these notes."""
     subject = refuted / "contracts" / "s" / "m.py"

@@ -388,6 +388,7 @@ def test_addresses_that_are_refused(text: str) -> None:
         Address.read(text)
 
 
+@pytest.mark.slow
 def test_without_certificates_there_is_no_tls(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     from avow.base.diagnostics import Rejected

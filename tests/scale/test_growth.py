@@ -33,10 +33,9 @@ def compose(system: System) -> None:
     assert all(name.endswith(("one-output", "environment.root.a0")) for name in open_), open_
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [chain, fan])
-@pytest.mark.parametrize(
-    ("work", "few"), [(catalogue, 50), pytest.param(compose, 30, marks=pytest.mark.slow)], ids=["catalogue", "compose"]
-)
+@pytest.mark.parametrize(("work", "few"), [(catalogue, 50), (compose, 30)], ids=["catalogue", "compose"])
 def test_four_times_the_nodes_cost_at_most_five_times(
     tmp_path: Path, shape: Callable[[int], str], work: Callable[[System], object], few: int
 ) -> None:
