@@ -49,10 +49,12 @@ class World:
         self.subject = "right"
         self.kept: list[Path] = []
         self.rolled_back = False
+        self.contract = "s.rcl"
+        self.environment = dict(os.environ)
         self.write()
 
     def write(self) -> None:
-        (self.folder / "s.rcl").write_text(RCL.format(**self.told))
+        (self.folder / self.contract).write_text(RCL.format(**self.told))
         (self.folder / "plan.yaml").write_text(PLAN.format(**self.told))
         for old in self.folder.glob("m*.py"):
             old.unlink()
@@ -76,6 +78,16 @@ class World:
         number = self.rng.choice([3, 5, 50])
         path.write_text(str(number) if path.suffix == ".txt" else f"TOP = {number}\n")
 
+    def move(self) -> None:
+        """The contract's file has another name."""
+        old = next(self.folder.glob("*.rcl"))
+        self.contract = self.rng.choice(["s.rcl", "a.rcl"])
+        old.rename(self.folder / self.contract)
+
+    def sandbox(self) -> None:
+        """From now on programs are sealed, or not."""
+        self.environment["AVOW_SANDBOX"] = self.rng.choice(["off", ""])
+
     def missing(self) -> None:
         path = self.folder / "top.txt"
         if path.exists():
@@ -84,7 +96,7 @@ class World:
             path.write_text("5")
 
     def comment(self) -> None:
-        path = self.folder / "s.rcl"
+        path = self.folder / self.contract
         path.write_text(path.read_text() + f"// {self.rng.random()}\n")
 
     def edit_notes(self) -> None:
@@ -118,7 +130,8 @@ class World:
             self.rolled_back = True
 
     def killed(self) -> None:
-        run = subprocess.Popen([AVOW, "verify"], cwd=self.root, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        run = subprocess.Popen([AVOW, "verify"], cwd=self.root, env=self.environment, **quiet)
         time.sleep(self.rng.random() * 2)
         run.send_signal(signal.SIGKILL)
         run.wait()
@@ -126,12 +139,13 @@ class World:
     def happenings(self) -> list[Callable[[], None]]:
         return [
             *(self.option, self.rename, self.swap, self.data, self.missing, self.comment),
-            *(self.edit_notes, self.keep, self.restore, self.roll_back, self.killed),
+            *(self.edit_notes, self.keep, self.restore, self.roll_back, self.killed, self.move, self.sandbox),
         ]
 
     def verify(self, *options: str) -> tuple[int, dict[str, str]]:
+        command = [AVOW, "verify", *options]
         done = subprocess.run(
-            [AVOW, "verify", *options], cwd=self.root, capture_output=True, text=True, timeout=120, check=False
+            command, cwd=self.root, capture_output=True, text=True, timeout=120, check=False, env=self.environment
         )
         assert "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
         case = json.loads((self.root / "reports" / "s" / "report.json").read_text())
