@@ -250,7 +250,9 @@ def _wants_a_reason(view: ObligationView) -> bool:
 def _reason_wanted(name: str) -> str:
     goal, _, key = name.rpartition(".")
     if name.startswith("environment."):
-        return "say in the plan's `environment:` what is assumed of the input (assume), and why it may be (because)"
+        about = name.removeprefix("environment.")
+        key = about if about.startswith("in.") else f"{about.partition('.')[0]}.INPUT"
+        return f"say what is assumed of the input, and why: `environment: {{{key}: {{assume: …, because: …}}}}`"
     return f"give a reason in the plan: `compose: {{{goal}: {{{key.replace('-', '_')}: {{because: …}}}}}}`"
 
 

@@ -63,9 +63,9 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
             out.print(
                 "  [dim]proof outline:[/]\n" + "\n".join(f"    {escape(line)}" for line in outline(e).splitlines())
             )
-        out.print(f"  again: {escape(rerun(view, e))}")
+        out.print(f"  again: {escape(rerun(view, e))}", soft_wrap=True)  # to be copied: no line may break
         if tool_command(e):
-            out.print(f"  [dim]tool: {escape(tool_command(e))}[/]")
+            out.print(f"  [dim]tool: {escape(tool_command(e))}[/]", soft_wrap=True)
     if not view.counting:
         planned = ", ".join(method for method, _ in view.planned)
         out.print(f"\nno evidence that counts; planned: {escape(planned) or 'nothing'}")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -75,8 +77,10 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
     try:
         observed, isolation = from_json(answer.pop("observed")), Isolation(answer.pop("isolation"))
         refuting = job.options.get("numbers") == ANY
+        exact = job.options.get("numbers", "exact") == "exact"
         outcomes = tuple(
-            _counted(_outcome(o, answer, limits.seed, refuting), job.clause(o), job.node) for o in job.obligations
+            _counted(_outcome(o, answer, limits.seed, refuting, exact), job.clause(o), job.node)
+            for o in job.obligations
         )
     except (KeyError, ValueError, TypeError) as error:
         return Report.alike(job, Verdict.ERROR, f"the judge's answer is not one: {error!r}", "hypothesis", version)
@@ -114,7 +118,7 @@ def _silence(done: Completed | None, limits: Limits) -> str:
     return f"the test ended without a result (code {done.code}): {last[0][:300]}"
 
 
-def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refuting: bool) -> Outcome:
+def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refuting: bool, exact: bool) -> Outcome:
     own = answer["guarantees"][obligation.name]
     valid, rejected, wanted = answer["valid"], answer["rejected"], answer["wanted"]
     bound: dict[str, object] = {"cases": valid, "edge_cases": answer["edges"], "rejected": rejected, "seed": seed}
@@ -124,7 +128,8 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refut
     outcome = Outcome(obligation.id, Verdict.UNKNOWN, "", bound=bound, details=details)
     if own["failure"] is not None:
         values = tuple((str(name), str(value)) for name, value in own["failure"])
-        shown = Counterexample(values, f"guarantee {obligation.name} does not hold of these")
+        told = f"guarantee {obligation.name} does not hold of these{_inexact(values) if exact else ''}"
+        shown = Counterexample(values, told)
         details[CASE] = own["case"]
         return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
     if answer["crash"] is not None:
@@ -199,3 +204,11 @@ def failure_bound(cases: int) -> float:
     """With 95 % confidence, no more than this part of such cases fails, none of so many having failed (1 - 0.05^(1/n);
     "rule of three": about 3/n)."""
     return 1.0 if cases == 0 else 1 - math.pow(1 - CONFIDENCE, 1 / cases)
+
+
+def _inexact(values: Sequence[tuple[str, str]]) -> str:
+    """A number of which Python's own float is another: what a subject compares with it, it may take for greater."""
+    for name, text in values:
+        if name.startswith("in.") and re.fullmatch(r"-?[0-9]+\.[0-9]+", text) and Fraction(text) != float(text):
+            return f"; {name} is exactly {text}, and the float {text} is another number: see `numbers:`"
+    return ""

@@ -458,3 +458,11 @@ def test_what_was_exported_runs_as_its_command_is_printed(tmp_path: Path, old: s
     assert done.stderr == ""
     assert ("high is broken" in done.stdout) == bool(code)
     assert "low: no case breaks it" in done.stdout
+
+
+def test_a_threshold_that_no_float_is_is_called_so() -> None:
+    from avow.backends.hypothesis.backend import _inexact
+
+    told = _inexact((("in.green", "0.6"), ("out.weed", "TRUE")))
+    assert told == "; in.green is exactly 0.6, and the float 0.6 is another number: see `numbers:`"
+    assert _inexact((("in.green", "0.5"), ("in.on", "TRUE"), ("out.x", "0.6"))) == ""
