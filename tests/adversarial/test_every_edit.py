@@ -135,6 +135,9 @@ def test_every_edit_changes_nothing_or_is_told(whole: Path, tmp_path: Path) -> N
             again, fresh = said(root), said(root, "--fresh")
             if not first == again == fresh:
                 wrong.append((name, edit, "not alike", first, again, fresh))
+            elif edit == "a folder" and name.startswith("artifacts/ledger/"):
+                if first[0] == 0:  # nothing can be kept there: a message, and no answer
+                    wrong.append((name, edit, "passes", first))
             elif first != before and first != (1, {**before[1], "gate integrity": "False"}):
                 wrong.append((name, edit, "another answer", first))
             elif first == before and name == "artifacts/ledger/s.jsonl":
