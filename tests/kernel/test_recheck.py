@@ -5,12 +5,18 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from calculus.make import make
+import pytest
+from calculus.make import CONTRACTS, Limits, make
 from calculus.test_commands import invoke
 
 from avow.base.diagnostics import Rejected
+from avow.base.verdict import Verdict
 from avow.calculus.certificate_json import to_json
+from avow.calculus.certificates import Certificates
+from avow.calculus.composition import compose
+from avow.calculus.obligations import composition_obligations, reestablished, settle_all
 from avow.cli.recheck import command
+from avow.system.load import load_system
 from kernel.test_kernel import LOOP, PLAN, made
 
 
@@ -53,3 +59,17 @@ def test_nothing_to_establish_and_wrong_labels_are_no_success(tmp_path: Path) ->
         code, told = recheck({label: data})
         assert code == 1, label
         assert "label" in told
+
+
+@pytest.mark.parametrize("name", ["remote_inspection", "remote_inspection_delayed", "remote_inspection_published"])
+def test_everything_that_is_proved_of_a_shipped_composition_has_a_certificate(name: str) -> None:
+    system = load_system(CONTRACTS / name)
+    composition = compose(system)
+    obligations = composition_obligations(system)
+    proved = [o for o in settle_all(composition, obligations, Limits()) if o.verdict is Verdict.PROVED]
+    assert proved
+    again = Certificates(composition, composition.certificates.made)
+    for outcome in proved:
+        found = reestablished(again, outcome.obligation)
+        assert found is not None, outcome.obligation
+        assert outcome.details["certificate"]["key"] == found.key  # type: ignore[index]
