@@ -44,6 +44,7 @@ _SAID = {
     "SIGN_ADD": "'+'",
     "SIGN_DROP": "'-'",
     "KIND": "'perform' or 'achieve'",
+    "FORCE": "':tell', ':perform' or ':achieve'",
     "$END": "the end",
 }
 

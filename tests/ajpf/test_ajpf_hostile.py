@@ -85,6 +85,15 @@ def test_a_third_of_an_agent_is_located():
     assert caught.value.diagnostics[0].span.line == 7
 
 
+def test_a_force_that_there_is_not_is_told():
+    with pytest.raises(Rejected) as caught:
+        parse_system(
+            "GWENDOLEN\n:name: a\n:Initial Beliefs:\n:Initial Goals:\n:Plans:\n+p : { True } <- .send(b, :shout, x);",
+            "f",
+        )
+    assert caught.value.diagnostics[0].hint == "expected ':tell', ':perform' or ':achieve'"
+
+
 def test_a_machine_without_java_or_spin_gives_the_same_verdicts(lift, tmp_path, monkeypatch):
     """What is installed adds second opinions; it changes no verdict."""
     with_tools = BACKEND.discharge(lift(), tmp_path, Limits(seconds=120))
