@@ -251,7 +251,10 @@ def compare(tmp_path: Path, seed: int, told: Counter[str]) -> None:
     if any(name.startswith("start.") and outcome.verdict is Verdict.REFUTED for name, outcome in found.items()):
         return
     always, trusting = truth.always(trusting=False), truth.always(trusting=True)
-    assert found["ALWAYS"].verdict is (Verdict.CHECKED if always else Verdict.REFUTED), about + found["ALWAYS"].summary
+    # of sequences the enumeration, too, knows the scenario's only: where a contract allows others, runs are cut off
+    cut = always and ": Row" in text and "the scenario's" in found["ALWAYS"].summary
+    expected = Verdict.REFUTED if not always else Verdict.TESTED if cut else Verdict.CHECKED
+    assert found["ALWAYS"].verdict is expected, about + found["ALWAYS"].summary
     match found["R"].verdict:
         case Verdict.PROVED:
             assert trusting, about
