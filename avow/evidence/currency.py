@@ -48,6 +48,11 @@ def as_of_now(ledger: Ledger, root: Path) -> tuple[Entry, ...]:
     )
 
 
+def not_established(entry: Entry) -> Entry:
+    """The entry of a proof that the kernel does not establish any more: with a key that is nobody's."""
+    return replace(entry, evidence=replace(entry.evidence, key=digest(f"not established: {entry.hash}")))
+
+
 def refutations(ledger: Ledger, entry: Entry) -> tuple[Entry, ...]:
     """By a case, of the same claim and by the same backend."""
     record = entry.evidence

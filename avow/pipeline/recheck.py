@@ -11,7 +11,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from avow.assurance.certification import KernelRun
@@ -23,7 +23,7 @@ from avow.calculus.certificate_json import from_json, to_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import Reestablished, reestablished
-from avow.evidence.currency import as_of_now, stands
+from avow.evidence.currency import as_of_now, not_established, stands
 from avow.evidence.ledger import Entry, Ledger
 from avow.evidence.record import Evidence
 from avow.kernel.certificate import Certificate
@@ -50,9 +50,7 @@ def still_counts(record: Evidence, root: Path, system: System) -> bool:
 def counting_now(ledger: Ledger, root: Path, system: System) -> tuple[Entry, ...]:
     """The entries; those that do not count any more with a key that is nobody's."""
     return tuple(
-        entry
-        if _established(entry.evidence, root, system)
-        else replace(entry, evidence=replace(entry.evidence, key=digest(f"not established: {entry.hash}")))
+        entry if _established(entry.evidence, root, system) else not_established(entry)
         for entry in as_of_now(ledger, root)
     )
 

@@ -21,10 +21,12 @@ from avow.assurance.signed import KEYS
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest, digest_file
+from avow.base.verdict import Verdict
 from avow.calculus.certificate_json import from_json as certificate
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import reestablished
+from avow.evidence.currency import not_established
 from avow.evidence.envelope import unseal_lines
 from avow.evidence.ledger import Ledger
 from avow.report import ATTESTATION, LeftOut, formats
@@ -128,7 +130,10 @@ def _ledger(case: Case, ledger: Ledger) -> Iterable[str]:
         where = f"record {entry.number + 1} ({entry.evidence.obligation}, {entry.evidence.method})"
         if mark not in known:
             yield f"the report quotes {where}, which the ledger does not hold"
-        elif known[mark] != entry:
+        elif known[mark] != entry and not (
+            # a proof that counts no more makes nothing look better
+            entry.evidence.verdict is Verdict.PROVED and entry == not_established(known[mark])
+        ):
             yield f"the report quotes {where} otherwise than the ledger has it"
     newer = [entry for mark, entry in known.items() if mark not in quoted]
     if newer:

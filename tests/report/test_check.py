@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from assurance.sample import case, evidence, rover_parts
 from helpers import some
 
+from avow.assurance.codec import from_json
 from avow.base.verdict import Verdict
+from avow.evidence.currency import not_established
 from avow.evidence.ledger import Ledger
 from avow.report import render_all
-from avow.report.check import check
+from avow.report.check import _ledger, check
 
 
 @pytest.fixture(scope="module")
@@ -140,3 +143,17 @@ def test_a_fact_that_no_other_format_shows_cannot_be_edited_either(place: Path) 
     path.write_text(text.replace('["low", "TRUE"]', '["low", "FALSE"]', 1))
     assert path.read_text() != text
     assert any("index.html" in line for line in found(place))
+
+
+def test_a_proof_that_counts_no_more_is_quoted_so_and_a_refutation_is_not(made: Path) -> None:
+    """Of a proof that the kernel does not establish any more the report says so; nothing else may be told away."""
+    ledger = Ledger(made / "rover.jsonl")
+    honest = from_json(json.loads((made / "report/report.json").read_text()))
+    for entry in ledger.records():
+        views = tuple(
+            replace(v, evidence=tuple(replace(i, entry=not_established(entry)) for i in v.evidence if i.entry == entry))
+            for v in honest.obligations
+        )
+        told = [line for line in _ledger(replace(honest, obligations=views), ledger) if "otherwise" in line]
+        quoted = any(i.entry == entry for v in honest.obligations for i in v.evidence)
+        assert bool(told) == (quoted and entry.evidence.verdict is not Verdict.PROVED)
