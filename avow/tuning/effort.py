@@ -11,7 +11,7 @@ systems took 1,500 to 4,000, in all of Z3's engines)."""
 MOST_STEPS = 4_000_000_000
 """Z3's limit is a number of 32 bits: some 25 minutes."""
 
-QUESTION_STEPS = 4_000
+QUESTION_STEPS = 1_000
 """Steps that a question counts for beside those of its answer: writing it down takes time too, and a loop of questions
 comes to an end."""
 
