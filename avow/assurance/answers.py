@@ -44,6 +44,15 @@ class How(StrEnum):
     """Refuted, missing or stale, or resting on something that is; or on a supposition that has expired."""
 
 
+MEANINGS = {
+    How.DERIVED: "concluded by a tool from the guarantees",
+    How.BOUNDED: "concluded by a tool within a finite scenario",
+    How.ARGUED: "a person says that the guarantees amount to it",
+    How.OPEN: "not shown, or what it rests on is not",
+}
+"""How a requirement stands, for who meets the word for the first time."""
+
+
 class Sort(StrEnum):
     """What a supposition is about."""
 
@@ -147,6 +156,11 @@ class SupposedLine:
     says: str
     number: str
 
+    @property
+    def more(self) -> str:
+        """``and 1 more``: the others of the sort; empty where there is no other."""
+        return f"and {self.count - 1} more" if self.count > 1 else ""
+
 
 @dataclass(frozen=True, slots=True)
 class Baseline:
@@ -230,6 +244,11 @@ class Answers:
     """What a signature says."""
     warned: str = field(default="", metadata=LATER)
     """``WARNED: 13 findings known``, beside the verdict; empty where nothing is known to be bad."""
+
+    @property
+    def legend(self) -> str:
+        """What the words in the column *how it stands* mean, of those that are used."""
+        return "; ".join(f"{how}: {MEANINGS[how]}" for how, _ in self.by_how)
 
     @property
     def beside(self) -> str:

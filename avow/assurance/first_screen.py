@@ -122,7 +122,7 @@ def answers(
         more_nodes=f"and {count(len(basis) - NODES, 'node')} on no less" if len(basis) > NODES else "",
         weakest=weakest,
         next_weakest=f"{following.title}, {following.words}" if following else "",
-        refuted=_refuted(requirements, views),
+        refuted=_refuted(requirements, views, nodes),
         supposed=tuple(_lines(suppositions)),
         owned=f"{owned} of {len(suppositions)}" if suppositions else "",
         changed_against=f"Against the report signed by {changes.against}:" if changes.against else "",
@@ -201,16 +201,20 @@ def _mark(view: ObligationView, relied: Mapping[str, Relied]) -> tuple[str, Tone
     return word(found.status), Tone.GREEN if found.status in EXHAUSTIVE else Tone.AMBER
 
 
-def _refuted(requirements: Sequence[RequirementView], views: Sequence[ObligationView]) -> str:
-    """What is refuted, said by the requirements that it takes down; empty where nothing is."""
+def _refuted(
+    requirements: Sequence[RequirementView], views: Sequence[ObligationView], nodes: Sequence[NodeView]
+) -> str:
+    """What is refuted, and the requirements that are open; a node's guarantee before what rests on it. Empty where
+    nothing is refuted."""
     wrong = [v for v in views if v.status in (Status.REFUTED, Status.CONTRADICTORY) and not v.advice]
     if not wrong:
         return ""
     felled = [r.id for r in requirements if r.how is How.OPEN]
-    first = wrong[0].obligation.claim.rstrip(".")
+    first = min(wrong, key=lambda v: v.obligation.kind is not Kind.GUARANTEE).obligation
+    where = next((f"{node.title}: " for node in nodes if node.name == first.node), "")
     more = f", and {count(len(wrong) - 1, 'more claim')}" if len(wrong) > 1 else ""
-    takes = f" With it {_some(felled)} {'is' if len(felled) == 1 else 'are'} open." if felled else ""
-    return f"Refuted: “{first}”{more}.{takes}"
+    takes = f" Open: {_some(felled)}." if felled else ""
+    return f"Refuted: {where}“{first.claim.rstrip('.')}”{more}.{takes}"
 
 
 def _some(names: Sequence[str], most: int = 6) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from avow.assurance.answers import How, Supposition
+from avow.assurance.answers import How, Supposition, WeakestEvidence
 from avow.assurance.closure import Closed
 from avow.assurance.facts import Facts
 from avow.assurance.first_screen import tone_of, weakest_of
@@ -15,6 +15,7 @@ from avow.assurance.relied import EVIDENCE, Relied
 from avow.assurance.summary import worst_first
 from avow.assurance.support import Names, requirement_support
 from avow.evidence.claims import Standing
+from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.system.plan import Requirement
 
@@ -74,9 +75,23 @@ def held(
         tone=tone_of(how, under, mine),
         closure=closed.claims,
         failing=closed.failing,
-        weakest_evidence=weakest_of(closed.claims, by_id, relied, titles),
+        weakest_evidence=(_failing_of(closed, by_id, titles) if how is How.OPEN else None)
+        or weakest_of(closed.claims, by_id, relied, titles),
         supposes=tuple(s.key for s in mine),
     )
+
+
+def _failing_of(
+    closed: Closed, views: Mapping[str, ObligationView], titles: Mapping[str, str]
+) -> WeakestEvidence | None:
+    """What fails under an open requirement stands where the weakest evidence else stands; of several a guarantee first,
+    then the worst."""
+    statuses = {name: views[name].status for name in closed.failing if name in views}
+    own = [name for name in statuses if views[name].obligation.kind is Kind.GUARANTEE]
+    for name in worst_first(own or statuses, statuses)[:1]:
+        o, status = views[name].obligation, statuses[name].value
+        return WeakestEvidence(name, o.node, titles.get(o.node, "the whole"), status, o.claim.rstrip("."), status)
+    return None
 
 
 def _word(status: Status | None) -> str:

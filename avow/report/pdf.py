@@ -154,11 +154,12 @@ def _first(case: Case) -> dict[str, Any]:
             ]
             for r in listed
         ],
+        "legend": a.legend,
         "based_on": [[b.title, [[letter, tone.value] for letter, tone in b.squares], b.words] for b in a.based_on],
         "more_nodes": a.more_nodes,
         "weakest": a.refuted or _weakest(case),
-        "next": f"Next: {a.next_weakest}." if a.next_weakest and not a.refuted else "",
-        "supposed": [[f"{line.count} of {line.sort}", line.says] for line in a.supposed],
+        "next": f"Next weakest: {a.next_weakest}." if a.next_weakest and not a.refuted else "",
+        "supposed": [[f"{line.count} of {line.sort}", f"{line.says} {line.more}".strip()] for line in a.supposed],
         "owned": f"{a.owned} with owner and date" if a.owned else "Nothing.",
         "changed_against": a.changed_against,
         "changed": [f"{mark} {words}".strip() for mark, words in a.changed],

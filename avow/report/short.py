@@ -74,6 +74,7 @@ def markdown_head(case: Case) -> Iterator[str]:
     ]
     head = "| requirement | how it stands | weakest evidence | supposes |\n| --- | --- | --- | --- |\n"
     yield head + "\n".join(rows) if rows else "No requirement is named."
+    yield _md(a.legend)
     yield "## 2 What is it based on?"
     yield "\n".join(f"- {_md(b.title)}: {_md(b.words)}" for b in a.bases) or "Nothing."
     yield "## 3 What is the weakest evidence?"
@@ -107,7 +108,7 @@ def _weakest_words(case: Case) -> str:
         return a.refuted
     if a.weakest is None:
         return "There is none."
-    following = f" Next: {a.next_weakest}." if a.next_weakest else ""
+    following = f" Next weakest: {a.next_weakest}." if a.next_weakest else ""
     return f"{a.weakest.title}: “{a.weakest.quote}”: {a.weakest.words}.{following}"
 
 
