@@ -28,13 +28,13 @@ def alive(pid: int) -> bool:
 
 
 def some(cases: Iterable[Any], always: int) -> list[Any]:
-    """Parameters of a test: so many of them, evenly spread, run always, and the others with `-m slow`."""
+    """Parameters of a test: so many of them, evenly spread, run always, and the others with `-m nightly`."""
     listed = list(cases)
     chosen = {k * len(listed) // always for k in range(always)}
-    return [case if k in chosen else _slow(case) for k, case in enumerate(listed)]
+    return [case if k in chosen else _nightly(case) for k, case in enumerate(listed)]
 
 
-def _slow(case: Any) -> Any:
+def _nightly(case: Any) -> Any:
     if isinstance(case, ParameterSet):
-        return pytest.param(*case.values, marks=[*case.marks, pytest.mark.slow], id=case.id)
-    return pytest.param(*case if isinstance(case, tuple) else (case,), marks=pytest.mark.slow)
+        return pytest.param(*case.values, marks=[*case.marks, pytest.mark.nightly], id=case.id)
+    return pytest.param(*case if isinstance(case, tuple) else (case,), marks=pytest.mark.nightly)
