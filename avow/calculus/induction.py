@@ -18,7 +18,7 @@ from avow.formulas.formula import free_variables, rename
 from avow.formulas.values import Value, show
 from avow.language.sorts import FunctionSort
 from avow.language.terms import Role, Term, Variable
-from avow.solving.limits import spent
+from avow.solving.limits import spent, until
 from avow.solving.questions import Entailment
 from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_UNROLLING
 from avow.tuning.effort import QUICK_EFFORT
@@ -89,7 +89,7 @@ def steps(
 def deeper(asked: Steps, effort: int, seed: int = 0, claim_name: str = "the claim") -> Deeper:
     """Unroll, and induct over more steps, in turn, with so much effort. The claim must have been
     proved at the first step."""
-    end = spent() + effort
+    end = until(effort)
     sure = 1  # so many steps from the beginning the claim is proved
 
     def ask(hypotheses: Mapping[str, Term]) -> Entailment | None:

@@ -27,7 +27,7 @@ from avow.calculus.variables import Frame, system_term
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
 from avow.language.terms import Term
-from avow.solving.limits import spent
+from avow.solving.limits import spent, until
 from avow.system.temporal import Operator, Property, State, Temporal, states_of
 from avow.tuning.bounds import RUN_LENGTH, RUNS_TRIED, STATES_CHECKED
 from avow.tuning.shown import STEP_VARIABLES
@@ -121,7 +121,7 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
         return Answer(verdict, told, Counterexample(explanation=told), bound=_bound(explored))
     within = restrictions(explored.machine.world)
     if done and not machine.short:
-        machine.look_for_cuts(spent() + bounds.effort)
+        machine.look_for_cuts(until(bounds.effort))
     if done and not machine.short:
         return Answer(
             Verdict.CHECKED,
@@ -147,7 +147,7 @@ def refuting_run(machine: Machine, name: str, claim: Term, bounds: Bounds) -> tu
     clause was evaluated exactly at every step. Else, in words, how far it was looked for."""
     doubts = Doubts()
     holds = judge_formula(machine.world, claim, doubts=doubts, about=name)
-    end = spent() + bounds.effort
+    end = until(bounds.effort)
     before: dict[_Memory, tuple[_Memory, Step] | None] = {}
     try:
         before |= dict.fromkeys(machine.initial())
@@ -191,7 +191,7 @@ def _false_at_the_end(machine: Machine, name: str, claim: Term, steps: list[Step
 def _tried(machine: Machine, frame: Frame, name: str, formula: Property, bounds: Bounds) -> Answer | None:
     """Some runs at random: most systems that break a property do so soon, and a search need not even begin."""
     random = Random(bounds.seed)
-    deadline = spent() + bounds.effort / 4
+    deadline = until(bounds.effort / 4)
     judges = _judges(machine, frame, formula)
     best: tuple[Walk, int | None] | None = None  # a run that gets stuck tells more than one that goes round
     for _ in range(RUNS_TRIED):
@@ -248,7 +248,7 @@ def _begin(machine: Machine, frame: Frame, formula: Property) -> Explored:
 
 def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | tuple[int, ...] | bool:
     """Breadth first; looks for a violation now and then. True: nothing is left to look at."""
-    deadline = spent() + bounds.effort
+    deadline = until(bounds.effort)
     scenario = explored.machine.world.scenario
     deepest = scenario.steps
     next_look, stuck_seen, cut = 64, 0, False
@@ -290,7 +290,7 @@ def _violation(explored: Explored, formula: Property, deadline: float) -> Lasso 
 
 def _prefix(explored: Explored, formula: Property, bounds: Bounds) -> tuple[int, ...] | None:
     """A beginning of a run that breaks the property however it goes on: such a run need not close."""
-    truth, deadline = explored.truth, spent() + bounds.effort / 4
+    truth, deadline = explored.truth, until(bounds.effort / 4)
     try:
         return refuted_prefix(
             formula, explored.initial, explored.successors, lambda k, state: truth[k][state], deadline

@@ -36,7 +36,7 @@ from avow.language.terms import (
     Variable,
     Widen,
 )
-from avow.solving.limits import spent
+from avow.solving.limits import spent, until
 from avow.solving.quantifier_elimination import eliminable, remedy
 from avow.solving.questions import entails, solve
 from avow.system.plan import Endpoint
@@ -94,7 +94,7 @@ def offers(
     frame: Frame, hypotheses: Mapping[str, Term], goal: Term, places: Iterable[Place], effort: int = OFFERS_EFFORT
 ) -> tuple[Offer, ...]:
     """What would make the hypotheses imply the goal, at most one offer for each place."""
-    end = spent() + effort
+    end = until(effort)
     found: dict[tuple[str, str], Offer] = {}
     for number, place in enumerate(places):
         if number >= OFFER_PLACES or spent() > end:

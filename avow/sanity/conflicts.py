@@ -18,7 +18,7 @@ from avow.language.sorts import DataSort, FunctionSort
 from avow.language.terms import Compare, Construct, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.realizability import Formulas, Given, Group, Search
 from avow.solving.counterexample import show_values
-from avow.solving.limits import spent
+from avow.solving.limits import spent, until
 from avow.solving.questions import Unsupported, solve
 from avow.solving.z3_module import z3
 from avow.tuning.bounds import CONFLICTS
@@ -48,7 +48,7 @@ def conflicts(
     seed: int = 0,
 ) -> tuple[Conflict, ...]:
     """The conflicts among a group's guarantees: those at the input `first`, and others found within the time."""
-    deadline = spent() + effort
+    deadline = until(effort)
     found: dict[frozenset[str], Mapping[Variable, Value]] = {}
 
     def learn(at: Mapping[Variable, Value]) -> None:
@@ -86,7 +86,7 @@ def contradictions(
     """The minimal sets of formulas that cannot hold together, `first` before the others that are found within the time
     (eight at most): a set other than these lacks a formula of each of them (Reiter, "A theory of diagnosis from first
     principles", 1987)."""
-    deadline = spent() + effort
+    deadline = until(effort)
     found = [frozenset(first)]
     waiting: list[frozenset[str]] = [frozenset()]
     for without in waiting:  # which grows

@@ -16,7 +16,7 @@ from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.proofs import Proof
 from avow.sanity.witness_candidates import Definition, candidates
 from avow.sanity.witnesses import Cases, Fixed, Witness, instantiate, meanings_of, witnesses
-from avow.solving.limits import NO_ANSWER, spend, spent
+from avow.solving.limits import NO_ANSWER, allowed, spend, spent, until
 from avow.solving.questions import Translator, Unsupported, check, entails, replay, search_tables, solve
 from avow.solving.translation import Expr, Meaning
 from avow.solving.z3_module import z3
@@ -81,7 +81,7 @@ class Search:
         self.assumptions = assumptions
         self.given = given
         self.inputs = tuple(v for v in inputs if v not in given)
-        self.deadline = spent() + effort
+        self.deadline = until(effort)
         self.seed = seed
         self.found = candidates(group.outputs, assumptions.values(), group.guarantees.values())
         self.witnesses: list[Witness] = witnesses(self.found)
@@ -108,11 +108,11 @@ class Search:
             methods.insert(1 if doubtful else 3, self._refute)
         for limit in (1_000, 4_000) if doubtful else (300, 1_000, 4_000, 10_000):
             for method in methods:
+                if self.left() <= 0:
+                    return Realizability(Verdict.UNKNOWN, reason=self.reason or NO_ANSWER)
                 answer = method(max(50, min(limit, self.left())))
                 if answer is not None:
                     return answer
-                if self.left() <= 0:
-                    return Realizability(Verdict.UNKNOWN, reason=self.reason or NO_ANSWER)
         return Realizability(Verdict.UNKNOWN, reason=self.reason or NO_ANSWER)
 
     def _without_outputs(self) -> Realizability:
@@ -176,6 +176,8 @@ class Search:
         return None
 
     def _prove(self, guarantees: Sequence[Term], limit: int, few: int | None = None) -> Realizability | None:
+        if not allowed(limit):
+            return None
         translator = Translator()
         fixed = self._fixed(translator)
         facts = self._defeated(translator, guarantees, fixed, few, limit)
@@ -200,7 +202,7 @@ class Search:
     ) -> list[Expr]:
         """That the constants are as chosen, and no witness meets the guarantees (of those read off the contract, only
         the first `few` are asked, and no more than can be written down with so much effort)."""
-        end = spent() + limit
+        end = until(limit)
         guarantees = list(guarantees)
         asked = self._asked(few)
         facts = [translator.term(axiom, meanings) for axiom in self._axioms(asked, guarantees)]
@@ -241,7 +243,7 @@ class Search:
     def refute(self, possible: Sequence[Formulas], limit: int, few: int | None = None) -> Realizability | None:
         """Inputs without an output, at which each of the `possible` sets of guarantees could be met by itself; None
         if none are found with so much effort. `few`: only so many witnesses are to be defeated from the start."""
-        end = spent() + limit
+        end = until(limit)
         known = len(self.witnesses)
         while spent() < end and (few is None or len(self.witnesses) < known + WITNESS_REFUTATIONS):
             inputs = self._defeat(self.group.guarantees, possible, int(end - spent()), few)

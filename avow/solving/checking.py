@@ -99,6 +99,7 @@ def _ask(
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
     effort = allowed(effort)
     if effort <= 0:
+        spend(QUESTION_STEPS)  # it was written down all the same: a loop of refused questions comes to an end
         return "unknown", None, (), NO_ANSWER
     if engine == "qsat":
         return _ask_qsat(translator, assertions, tracked, effort)

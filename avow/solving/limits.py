@@ -43,6 +43,13 @@ def spent() -> float:
     return _spent.steps / STEPS
 
 
+def until(effort: float) -> float:
+    """When so much effort more is used up, or the budget before it: a deadline, as `spent` counts. Every search has its
+    deadline from here: with nothing left of the budget, its questions are refused, and it would only write them down.
+    """
+    return min(spent() + effort, _spent.end)
+
+
 def from_seconds(seconds: float) -> int:
     """The effort that a person's limit in seconds stands for; never 0."""
     return max(1, int(seconds * 1000))
@@ -63,7 +70,7 @@ def budget(effort: float) -> Iterator[None]:
     """All questions asked within the block share this much effort, however much each may take by itself; a block within
     a block cannot extend it."""
     before = _spent.end
-    _spent.end = min(before, spent() + effort)
+    _spent.end = until(effort)
     try:
         yield
     finally:

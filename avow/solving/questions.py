@@ -31,7 +31,7 @@ from avow.language.sorts import (
 from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
 from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers, z3_version
 from avow.solving.counterexample import show_values
-from avow.solving.limits import NO_ANSWER, allowed, budget, spent
+from avow.solving.limits import NO_ANSWER, allowed, budget, spent, until
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
@@ -106,6 +106,8 @@ def solve(
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
     free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
     with budget(effort * QUESTION_SHARE):
+        if not allowed(effort):
+            return Solution("unknown", reason=NO_ANSWER)
         try:
             solution = _within_bounds(labelled, free, given or {}, effort, seed) or _solve(
                 Translator(), labelled, free, given or {}, effort, seed
@@ -173,6 +175,8 @@ def replay(
     sort has the elements that the values name, and up to three more if the formulas hold only then. A translator of the
     same formulas, if there is one, lends its context.
     """
+    if not allowed(effort):
+        return None
     formulas = tuple(formulas)
     unspecified = sorted({sort for f in formulas for sort in opaque_sorts(f)}, key=lambda sort: sort.name)
     try:
@@ -370,7 +374,7 @@ def search_tables(
     """Values of the variables for which what `build` makes of the functions' meanings is satisfiable, with functions
     that are tables of few entries. A best effort: None proves nothing, and what is found wants replaying."""
     ordinary, functions = tuple(ordinary), sorted(functions, key=lambda v: v.qualified)
-    deadline = spent() + effort
+    deadline = until(effort)
     for tried, (size, sparse) in enumerate(_TABLES if functions else _TABLES[:1]):
         left = deadline - spent()
         if left < 1:

@@ -18,7 +18,7 @@ from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.values import show as show_value
 from avow.language.terms import FALSE, TRUE, Not, Role, Variable
-from avow.solving.limits import from_seconds, spent
+from avow.solving.limits import from_seconds, spent, until
 from avow.solving.limits import told as told_effort
 from avow.solving.questions import Entailment, entails, z3_version
 from avow.solving.second import CONTRADICTED, contradicted
@@ -227,7 +227,7 @@ class Settled:
 def _obligation(
     obligation: Obligation, found: Sequence[Triple], work: Work, limits: Limits, logs: dict[str, str]
 ) -> Outcome:
-    deadline = spent() + from_seconds(limits.seconds)
+    deadline = until(from_seconds(limits.seconds))
     settled = [_guarded(triple, work, limits, deadline) for triple in found]
     log = [f"{s.triple.name}: {s.verdict} - {s.why}{f' ({s.vacuous})' if s.vacuous else ''}" for s in settled]
     logs[f"{_stem(found[0])}.log" if found else f"{obligation.digest[:12]}.log"] = "\n".join(log) + "\n"
@@ -280,7 +280,7 @@ def _obligation(
 def _every_run(work: Work, limits: Limits) -> Settled:
     """Whether the program runs to its end on every input that is allowed. Where a loop has no variant, or one that is
     not shown to fall, an input on which it never ends is looked for: that is none to be content with either."""
-    triple, deadline = work.every_run, spent() + from_seconds(limits.seconds)
+    triple, deadline = work.every_run, until(from_seconds(limits.seconds))
     program = work.checked.program
     unfaithful = _unfaithful(triple, work.settler, deadline)
     if unfaithful is Verdict.REFUTED:

@@ -16,7 +16,7 @@ from avow.formulas.formula import conjunction, negation
 from avow.formulas.values import Element, Value
 from avow.language.sorts import INTEGER, REAL, EnumSort, Sort
 from avow.language.terms import TRUE, Arithmetic, Compare, EnumValue, Literal, Or, Term, Variable, Widen
-from avow.solving.limits import spent
+from avow.solving.limits import spent, until
 from avow.solving.questions import entails, solve
 
 from .guesses import NUMERIC, filled, guesses, starting_from
@@ -30,7 +30,7 @@ from .wp import Conditions, TooLarge, defined, weakest
 
 def endless_run(triple: Triple, program: Program, effort: int) -> Breach | None:
     """A run from the precondition that provably never ends, or None where none was found."""
-    deadline = spent() + effort
+    deadline = until(effort)
     machine, given_up = Machine(), 0
     wanted = starting_from(triple, program)
     for values in _candidates(triple, program, wanted):

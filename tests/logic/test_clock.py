@@ -8,12 +8,16 @@ import sys
 import threading
 import time
 import weakref
+from pathlib import Path
 
 import pytest
 
+from avow.base.verdict import Verdict
+from avow.sanity.analysis import Bounds, analyse
 from avow.solving.checking import check
-from avow.solving.limits import allowed, budget, from_seconds, spend, steps, watchdog
+from avow.solving.limits import allowed, budget, from_seconds, spend, spent, steps, until, watchdog
 from avow.solving.translation import Translator
+from avow.system.load import load_path
 from avow.tuning.effort import MOST_STEPS, STEPS
 
 
@@ -115,6 +119,31 @@ def test_without_effort_left_nothing_is_asked() -> None:
     with budget(0):
         assert check(translator, [translator.true()]).status == "unknown"
     assert check(translator, [translator.true()]).status == "sat"
+
+
+def test_a_deadline_is_never_later_than_the_budget() -> None:
+    with budget(100):
+        assert until(60_000) == until(100)
+        spend(150 * STEPS)
+        assert until(60_000) < spent()
+
+
+def test_a_loop_of_refused_questions_comes_to_an_end() -> None:
+    translator, before = Translator(), spent()
+    with budget(0):
+        check(translator, [translator.true()])
+    assert spent() > before
+
+
+@pytest.mark.parametrize("effort", [2, 10])
+def test_with_next_to_no_effort_the_analysis_of_a_node_ends_at_once(effort: int, root: Path) -> None:
+    """Seen: minutes of writing down questions that were refused, in searches that began when all was used up."""
+    contract = load_path(root / "contracts" / "remote_inspection").contract
+    agent = next(node for node in contract.nodes if node.name == "agent")
+    before = spent()
+    results = analyse(agent, contract, bounds=Bounds(effort))
+    assert spent() - before < 400
+    assert {r.verdict for r in results if r.name == "realizable"} == {Verdict.UNKNOWN}
 
 
 def test_a_limit_is_never_none_at_all() -> None:
