@@ -30,10 +30,14 @@ _NEEDS = {
 
 
 def pytest_configure() -> None:
-    """Plans of the tests may name plug-ins of the tests."""
+    """Plans of the tests may name plug-ins of the tests; on a busy machine an example may take its time."""
+    from hypothesis import HealthCheck, settings
+
     from avow.backend_kit.registry import trust_plugins
 
     trust_plugins()
+    settings.register_profile("avow", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    settings.load_profile("avow")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
