@@ -5,7 +5,7 @@ inputs, and, at the first step, a condition on an initial value: each the weakes
 where the formulas allow that (`avow.solving.quantifier_elimination`), or by trying all values where they are few. Where
 neither does, a place that can speak of all that the goal speaks of (by other names, where equations say so) gets the
 goal itself. An offer is checked: with it the goal is proved; it does not contradict what else is known; and of a
-guarantee it is not known that the node could not keep it. The search is bounded in time: that nothing is offered says
+guarantee it is not known that the node could not keep it. The search is bounded in steps: that nothing is offered says
 nothing.
 """
 

@@ -157,11 +157,14 @@ def configured(solver: Any, effort: int, seed: int) -> None:
         solver.set("smt.arith.nl.grobner", False)
 
 
-def charge(translator: Sorts, solver: Any = None) -> None:
-    """Count what was done in the translator's context since it was last asked; any solver of the context can tell."""
+def charge(translator: Sorts, solver: Any = None) -> int:
+    """Count what was done in the translator's context since it was last asked; any solver of the context can tell. How
+    many steps that were."""
     before = translator.steps
     translator.steps = _steps_of(solver or z3.Solver(ctx=translator.context))
-    spend(QUESTION_STEPS + max(0, translator.steps - before))
+    used = max(0, translator.steps - before)
+    spend(QUESTION_STEPS + used)
+    return used
 
 
 def _steps_of(solver: Any) -> int:

@@ -47,7 +47,7 @@ from avow.solving.limits import watchdog
 from avow.solving.questions import entails, solve
 from avow.solving.translation import Expr, Translator, Unsupported
 from avow.solving.z3_module import z3
-from avow.tuning.effort import ELIMINATION_SECONDS
+from avow.tuning.effort import ELIMINATION_SECONDS, ELIMINATION_STEPS
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,9 +109,10 @@ def _eliminate(formula: Term) -> Term | None:
         z3.Tactic("ctx-simplify", ctx=translator.context),
         ctx=translator.context,
     )
-    with watchdog(ELIMINATION_SECONDS, translator.context.interrupt):  # it keeps no limit of steps
+    with watchdog(ELIMINATION_SECONDS, translator.context.interrupt):
         result = chain.apply(goal)
-    charge(translator)
+    if charge(translator) > ELIMINATION_STEPS:  # it counts its steps, but keeps no limit
+        return None
     free = {v.qualified: v for v in free_variables(formula)}
     reader = _TermReader(translator, free)
     options = [conjunction(reader.formula(expr) for expr in subgoal) for subgoal in result]

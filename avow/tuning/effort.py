@@ -97,9 +97,12 @@ OFFERS_EFFORT = 3_000
 OFFER_STEP_EFFORT = 500
 """For one question of an offer: six of them fit into the time for all."""
 
+ELIMINATION_STEPS = 100_000
+"""Z3's steps to eliminate variables for an offer; the tests' offers took 4,000 at most. Z3 counts there, but keeps no
+limit: what took more is thrown away, so that no machine decides what is offered."""
+
 ELIMINATION_SECONDS = 4.0
-"""Processor time to eliminate variables for an offer: Z3 counts no steps there; it mostly takes a hundredth of this, or
-never ends."""
+"""Processor time after which an elimination hangs: its steps allowed take a tenth of this at most."""
 
 CONSISTENT_EFFORT = 300
 """Whether a contract is consistent is asked for so long; then, whether it is realizable, which says more."""

@@ -65,3 +65,12 @@ def test_it_reads_back_what_it_shows() -> None:
     assert found is not None
     assert isinstance(found.assumption, And)
     assert entails([say(show_term(found.assumption, "rcl"))], found.assumption).verdict is Verdict.PROVED
+
+
+def test_what_takes_too_many_steps_is_thrown_away_on_every_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Z3 finished, but what a fast machine finishes in time is not to be told apart from what a slow one does not."""
+    known = {"h": say("out.o >= in.r"), "k": say("out.o <= 2 * in.r")}
+    goal = say("out.o <= 10")
+    assert remedy(known, goal, INPUTS) is not None
+    monkeypatch.setattr("avow.solving.quantifier_elimination.ELIMINATION_STEPS", 10)
+    assert remedy(known, goal, INPUTS) is None
