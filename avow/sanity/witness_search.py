@@ -16,7 +16,7 @@ from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.proofs import Proof
 from avow.sanity.witness_candidates import Definition, candidates
 from avow.sanity.witnesses import Cases, Fixed, Witness, instantiate, meanings_of, witnesses
-from avow.solving.limits import NO_ANSWER, allowed, spend, spent, until
+from avow.solving.limits import allowed, spend, spent, tried, until
 from avow.solving.questions import Translator, Unsupported, check, entails, replay, search_tables, solve
 from avow.solving.translation import Expr, Meaning
 from avow.solving.z3_module import z3
@@ -81,6 +81,7 @@ class Search:
         self.assumptions = assumptions
         self.given = given
         self.inputs = tuple(v for v in inputs if v not in given)
+        self.granted = allowed(effort)
         self.deadline = until(effort)
         self.seed = seed
         self.found = candidates(group.outputs, assumptions.values(), group.guarantees.values())
@@ -109,11 +110,11 @@ class Search:
         for limit in (1_000, 4_000) if doubtful else (300, 1_000, 4_000, 10_000):
             for method in methods:
                 if self.left() <= 0:
-                    return Realizability(Verdict.UNKNOWN, reason=self.reason or NO_ANSWER)
+                    return Realizability(Verdict.UNKNOWN, reason=tried(self.reason, self.granted))
                 answer = method(max(50, min(limit, self.left())))
                 if answer is not None:
                     return answer
-        return Realizability(Verdict.UNKNOWN, reason=self.reason or NO_ANSWER)
+        return Realizability(Verdict.UNKNOWN, reason=tried(self.reason, self.granted))
 
     def _without_outputs(self) -> Realizability:
         goal = conjunction(self.group.guarantees.values())

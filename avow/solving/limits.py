@@ -20,7 +20,8 @@ from dataclasses import dataclass, field
 
 from avow.tuning.effort import HANGS, HANGS_SECONDS, MOST_STEPS, STEPS, WALL_CLOCK
 
-NO_ANSWER = "no answer with the effort allowed"
+_NO_ANSWER = "no answer with"
+NO_ANSWER = f"{_NO_ANSWER} the effort allowed"
 
 
 class _Spent(threading.local):
@@ -63,6 +64,12 @@ def steps(effort: float) -> int:
 def told(effort: float) -> dict[str, object]:
     """For the details of evidence: the steps that a question was allowed, and whose they are."""
     return {"budget": {"steps": steps(effort), "of": "Z3's rlimit"}}
+
+
+def tried(reason: str, effort: int) -> str:
+    """Why there is no answer, for people; where effort was used up, how many steps of it the whole question had."""
+    used_up = not reason or reason.startswith(_NO_ANSWER)
+    return f"{_NO_ANSWER} {steps(effort):,} steps of effort" if used_up and effort > 0 else reason or NO_ANSWER
 
 
 @contextlib.contextmanager

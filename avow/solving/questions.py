@@ -31,7 +31,7 @@ from avow.language.sorts import (
 from avow.language.terms import Apply, Arithmetic, Quantified, Term, Variable
 from avow.solving.checking import Answer, Engine, Status, check, with_small_numbers, z3_version
 from avow.solving.counterexample import show_values
-from avow.solving.limits import NO_ANSWER, allowed, budget, spent, until
+from avow.solving.limits import NO_ANSWER, allowed, budget, spent, tried, until
 from avow.solving.models import Model
 from avow.solving.translation import Expr, Meaning, Translator, Unsupported
 from avow.solving.z3_module import z3
@@ -105,6 +105,7 @@ def solve(
     start = time.monotonic()
     labelled = dict(formulas) if isinstance(formulas, Mapping) else {str(k): f for k, f in enumerate(formulas)}
     free = frozenset(chain(variables, *(free_variables(f) for f in labelled.values())))
+    granted = allowed(effort)
     with budget(effort * QUESTION_SHARE):
         if not allowed(effort):
             return Solution("unknown", reason=NO_ANSWER)
@@ -125,7 +126,7 @@ def solve(
         solution.status,
         solution.values,
         solution.core,
-        solution.reason,
+        tried(solution.reason, granted) if solution.status == "unknown" else solution.reason,
         solution.engine,
         time.monotonic() - start,
     )
@@ -375,11 +376,11 @@ def search_tables(
     that are tables of few entries. A best effort: None proves nothing, and what is found wants replaying."""
     ordinary, functions = tuple(ordinary), sorted(functions, key=lambda v: v.qualified)
     deadline = until(effort)
-    for tried, (size, sparse) in enumerate(_TABLES if functions else _TABLES[:1]):
+    for number, (size, sparse) in enumerate(_TABLES if functions else _TABLES[:1]):
         left = deadline - spent()
         if left < 1:
             return None
-        limit = max(min(120, max(50, effort)), int(left / min(3, len(_TABLES) - tried)))
+        limit = max(min(120, max(50, effort)), int(left / min(3, len(_TABLES) - number)))
         values = _with_tables(translator, build, ordinary, functions, size, sparse, limit, seed)
         if values is not None:
             return values

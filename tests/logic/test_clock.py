@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -15,7 +16,18 @@ import pytest
 from avow.base.verdict import Verdict
 from avow.sanity.analysis import Bounds, analyse
 from avow.solving.checking import check
-from avow.solving.limits import allowed, budget, from_seconds, spend, spent, steps, until, watchdog
+from avow.solving.limits import (
+    NO_ANSWER,
+    allowed,
+    budget,
+    from_seconds,
+    spend,
+    spent,
+    steps,
+    tried,
+    until,
+    watchdog,
+)
 from avow.solving.translation import Translator
 from avow.system.load import load_path
 from avow.tuning.effort import MOST_STEPS, STEPS
@@ -143,7 +155,16 @@ def test_with_next_to_no_effort_the_analysis_of_a_node_ends_at_once(effort: int,
     before = spent()
     results = analyse(agent, contract, bounds=Bounds(effort))
     assert spent() - before < 400
-    assert {r.verdict for r in results if r.name == "realizable"} == {Verdict.UNKNOWN}
+    realizable = next(r for r in results if r.name == "realizable")
+    assert realizable.verdict is Verdict.UNKNOWN
+    assert re.fullmatch(r"no answer with [0-9,]+ steps of effort", realizable.explanation)
+
+
+def test_where_effort_is_used_up_the_reason_says_how_much_it_was() -> None:
+    assert tried(NO_ANSWER, 300) == "no answer with 1,200,000 steps of effort"
+    assert tried(tried("", 100), 300) == tried("", 300), "of the whole question, not of its last attempt"
+    assert tried("the solver gave up: incomplete", 300) == "the solver gave up: incomplete"
+    assert tried(NO_ANSWER, 0) == NO_ANSWER
 
 
 def test_a_limit_is_never_none_at_all() -> None:
