@@ -118,8 +118,8 @@ PLAN_CODES: dict[str, Code] = {
         Code(
             "PLAN122",
             "several providers",
-            "More than one output could feed an input: a connection has to say which.",
-            remedy="Say under `connections` which output it is.",
+            "More than one output could feed an input, by name or by topic: none is left out without a word.",
+            remedy="Say under `connections` which output it is, or give both ends their topics.",
         ),
         Code(
             "PLAN123",

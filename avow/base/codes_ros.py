@@ -32,8 +32,9 @@ ROS_CODES = register(
     declare(
         "ROS112",
         "connection against the topics",
-        "The plan connects ports whose topics have different names when the robot runs.",
-        "Say under `ros` what remaps one of them, or take the connection out.",
+        "The plan connects ports whose topics have different names when the robot runs, or an output without a topic "
+        "to an input that hears others on its topic.",
+        "Say under `ros` what remaps one of them, give the output its topic, or take the connection out.",
     ),
     declare(
         "ROS113",

@@ -64,6 +64,8 @@ class Node:
     assumptions: tuple[Clause, ...]
     guarantees: tuple[Clause, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
+    relay: bool = field(default=False, compare=False, repr=False)
+    """Made of what several outputs say to one input; no contract has it."""
 
     @property
     def clauses(self) -> tuple[Clause, ...]:

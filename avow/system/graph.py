@@ -9,7 +9,7 @@ lets a node feed itself; an input named by a connection takes that source and no
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
@@ -17,7 +17,7 @@ from avow.base.graphs import components, cycles_in
 from avow.language.contract import Node, Port
 from avow.language.sorts import INTEGER, NATURAL, Sort
 from avow.system.plan import Connection, Endpoint, System
-from avow.system.topics import Carrier, Ends, contradicted, ends, unlinked, wrong_types
+from avow.system.topics import Carrier, Ends, contradicted, ends, unheard, unlinked, wrong_types
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +76,16 @@ def dataflow(system: System) -> Graph:
     """The graph of a system. Never raises: what is wrong with it stands in `findings`."""
     nodes = system.contract.nodes
     found = ends(nodes, system.plan.ros.names)
-    faults: list[Diagnostic] = [*wrong_types(found), *contradicted(system.plan.connections, found)]
+    relays = {node.name for node in nodes if node.relay}
+    faults: list[Diagnostic] = [*wrong_types(found), *contradicted(system.plan.connections, found, relays)]
     edges = _declared(system, faults)
-    taken = {edge.target for edge in edges}
+    taken = {edge.target: edge for edge in edges}
     edges += _by_topics(nodes, taken, found, faults)
-    taken = {edge.target for edge in edges}
+    taken = {edge.target: edge for edge in edges}
     edges += _by_names(nodes, taken, found, faults)
+    for edge in edges:
+        if edge.target.node not in relays:
+            faults += unheard(edge.source, edge.target, found, edge.span)
     edges = [replace(e, topic=_topic(e, found)) for e in edges]
     return wired(nodes, edges, faults, {node.name: node.span for node in nodes})
 
@@ -167,24 +171,27 @@ def _ports(system: System, connection: Connection) -> tuple[Port, Port] | None:
 
 
 def _topic(edge: Edge, found: Ends) -> str:
-    carrier = found.outputs.get(edge.source)
-    return carrier.topic if carrier is not None and edge.target in found.inputs else ""
+    heard = {carrier.topic for carrier in found.inputs.get(edge.target, ())}
+    carriers = found.outputs.get(edge.source, ())
+    return next((c.topic for c in carriers if c.topic in heard), carriers[0].topic if carriers and heard else "")
 
 
-def _by_topics(nodes: Sequence[Node], taken: set[Endpoint], found: Ends, faults: list[Diagnostic]) -> list[Edge]:
+def _by_topics(nodes: Sequence[Node], taken: Collection[Endpoint], found: Ends, faults: list[Diagnostic]) -> list[Edge]:
     """What one topic carries from a node that publishes it to one that listens to it. Of a topic that carries several
     variables, those of one name belong together; otherwise there has to be one at either end."""
     listening: dict[tuple[str, str], int] = defaultdict(int)
-    for at, carrier in found.inputs.items():
-        listening[at.node, carrier.topic] += 1
+    for at, carriers in found.inputs.items():
+        for topic in {carrier.topic for carrier in carriers}:
+            listening[at.node, topic] += 1
     edges: list[Edge] = []
     for node in nodes:
         for port in node.inputs:
             target = Endpoint(node.name, port.name)
             if target in taken or target not in found.inputs:
                 continue
-            carrier = found.inputs[target]
-            sources = found.published.get(carrier.topic, ())
+            sources = found.reaching(target)
+            carriers = found.inputs[target]
+            carrier = next((c for c in carriers if found.published.get(c.topic)), carriers[0])
             others = [(at, output) for at, output in sources if at.node != node.name]
             if sources and not others:
                 faults.append(_own_topic(target, sources[0][0], carrier))
@@ -223,25 +230,34 @@ def _which(target: Endpoint, others: Sequence[tuple[Endpoint, Port]], carrier: C
     return Diagnostic("ROS115", message, carrier.span, hint=hint)
 
 
-def _by_names(nodes: Sequence[Node], taken: set[Endpoint], found: Ends, faults: list[Diagnostic]) -> list[Edge]:
+def _by_names(
+    nodes: Sequence[Node], taken: Mapping[Endpoint, Edge], found: Ends, faults: list[Diagnostic]
+) -> list[Edge]:
     outputs: dict[str, list[tuple[str, Port]]] = defaultdict(list)
+    relays = {node.name for node in nodes if node.relay}
     for node in nodes:
-        for port in node.outputs:
+        for port in () if node.relay else node.outputs:
             outputs[port.name].append((node.name, port))
     edges: list[Edge] = []
     for node in nodes:
         for port in node.inputs:
             target = Endpoint(node.name, port.name)
-            if target in taken or port.name not in outputs:
+            if port.name not in outputs or node.relay:
                 continue
-            carrier = found.inputs.get(target)
             others = [(name, output) for name, output in outputs[port.name] if name != node.name]
+            if target in taken:
+                edge = taken[target]
+                if not edge.declared or edge.source.node in relays:  # heard on a topic: no connection chose it
+                    also = [Endpoint(name, o.name) for name, o in others if fits(o.sort, port.sort)]
+                    faults += [_beside(edge, at, port) for at in also if at not in found.outputs]
+                continue
+            carrier = found.inputs.get(target, (None,))[0]
             if carrier is not None:  # an output with a topic is linked by it, or not at all
                 apart = [Endpoint(name, o.name) for name, o in others if Endpoint(name, o.name) in found.outputs]
                 others = [(name, o) for name, o in others if Endpoint(name, o.name) not in found.outputs]
                 if apart and not others:
-                    other = found.outputs[apart[0]]
-                    if other.topic != carrier.topic:
+                    other = found.outputs[apart[0]][0]
+                    if apart[0] not in dict(found.reaching(target)):
                         faults.append(unlinked(target, carrier, apart[0], other, port.span))
                     continue
             fitting = [(name, output) for name, output in others if fits(output.sort, port.sort)]
@@ -264,6 +280,12 @@ def _by_names(nodes: Sequence[Node], taken: set[Endpoint], found: Ends, faults: 
                 hint = f"connections: {{from: {target}, to: {target}, delayed: true, initial: …}}"
                 faults.append(Diagnostic("PLAN124", message, port.span, Severity.WARNING, hint))
     return edges
+
+
+def _beside(edge: Edge, other: Endpoint, port: Port) -> Diagnostic:
+    message = f"{edge.target} has several providers: {edge.source} by its topic, and {other}, without a topic, by name"
+    hint = f"give {other} its topic in the contract, or another name"
+    return Diagnostic("PLAN122", message, port.span, hint=hint)
 
 
 def _several(target: Endpoint, names: list[str], port: Port) -> Diagnostic:

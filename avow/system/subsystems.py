@@ -17,7 +17,7 @@ def check_subsystems(plan: Plan, contract: Contract) -> tuple[Diagnostic, ...]:
     """Unknown members, clashes of names, parts that overlap, subsystems that contain one another. Each located."""
     nodes = [node.name for node in contract.nodes]
     groups = {subsystem.name: subsystem for subsystem in plan.subsystems}
-    goals = {goal.name: goal.span for goal in plan.compose}
+    goals: dict[str, Span | None] = {goal.name: goal.span for goal in plan.compose}
     faults: list[Diagnostic] = []
     home: dict[str, tuple[str, Span | None]] = {}
     for subsystem in plan.subsystems:
@@ -44,6 +44,14 @@ def check_subsystems(plan: Plan, contract: Contract) -> tuple[Diagnostic, ...]:
                 faults.append(Diagnostic("PLAN110", message, span, notes=(("first here", first),)))
             else:
                 home[member] = (name, span)
+    for what, names in (
+        ("compose", goals),
+        ("requirements", {requirement.id: requirement.span for requirement in plan.requirements}),
+    ):
+        for name, place in names.items():
+            if name in nodes:
+                message = f"{what}: {name!r} is also a node of the contract: `supported_by` could mean either"
+                faults.append(Diagnostic("PLAN110", message, place, hint="give it a name of its own"))
     faults += _circles(groups)
     return (*faults, *(() if faults else _selections(plan)))
 

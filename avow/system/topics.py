@@ -9,7 +9,7 @@ assumes has then to follow from each publisher's contract.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
@@ -32,17 +32,28 @@ class Carrier:
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """Who publishes and who listens, by topic. `outputs` and `inputs`: each port's topic, where it has one."""
+    """Who publishes and who listens, by topic. `outputs` and `inputs`: each port's topics, where it has any."""
 
-    outputs: Mapping[Endpoint, Carrier]
-    inputs: Mapping[Endpoint, Carrier]
+    outputs: Mapping[Endpoint, tuple[Carrier, ...]]
+    inputs: Mapping[Endpoint, tuple[Carrier, ...]]
     published: Mapping[str, tuple[tuple[Endpoint, Port], ...]]
+
+    def reaching(self, target: Endpoint) -> tuple[tuple[Endpoint, Port], ...]:
+        """Every output on a topic that an input listens to, each once."""
+        found = {at: port for c in self.inputs.get(target, ()) for at, port in self.published.get(c.topic, ())}
+        return tuple(found.items())
+
+    def beside(self, source: Endpoint) -> tuple[Endpoint, ...]:
+        """The outputs of other nodes on the topics of an output."""
+        carriers = self.outputs.get(source, ())
+        found = (at for c in carriers for at, _ in self.published[c.topic] if at.node != source.node)
+        return tuple(dict.fromkeys(found))
 
 
 def ends(nodes: Sequence[Node], names: Resolver) -> Ends:
-    """The topics of the nodes' ports; of a port with several, the first listed."""
-    outputs: dict[Endpoint, Carrier] = {}
-    inputs: dict[Endpoint, Carrier] = {}
+    """The topics of the nodes' ports."""
+    outputs: dict[Endpoint, tuple[Carrier, ...]] = {}
+    inputs: dict[Endpoint, tuple[Carrier, ...]] = {}
     published: dict[str, list[tuple[Endpoint, Port]]] = defaultdict(list)
     for node in nodes:
         for topic in node.topics:
@@ -51,9 +62,9 @@ def ends(nodes: Sequence[Node], names: Resolver) -> Ends:
             at = Endpoint(node.name, topic.port.name)
             carrier = Carrier(names.topic(node.name, topic.name), canonical(topic.ros_type), topic.span)
             if topic.port.role is Role.INPUT:
-                inputs.setdefault(at, carrier)
-            elif at not in outputs:
-                outputs[at] = carrier
+                inputs[at] = (*inputs.get(at, ()), carrier)
+            else:
+                outputs[at] = (*outputs.get(at, ()), carrier)
                 published[carrier.topic].append((at, topic.port))
     return Ends(outputs, inputs, {name: tuple(found) for name, found in published.items()})
 
@@ -61,7 +72,8 @@ def ends(nodes: Sequence[Node], names: Resolver) -> Ends:
 def wrong_types(found: Ends) -> Iterator[Diagnostic]:
     """Topics whose ends are of different message types: in ROS they never meet."""
     first: dict[str, tuple[Endpoint, Carrier]] = {}
-    for at, carrier in (*found.outputs.items(), *found.inputs.items()):
+    every = (*found.outputs.items(), *found.inputs.items())
+    for at, carrier in ((at, carrier) for at, carriers in every for carrier in carriers):
         known = first.setdefault(carrier.topic, (at, carrier))
         if known[1].kind != carrier.kind:
             message = f"{carrier.topic} is {carrier.kind} at {at}, and {known[1].kind} at {known[0]}"
@@ -70,16 +82,40 @@ def wrong_types(found: Ends) -> Iterator[Diagnostic]:
             yield Diagnostic("ROS111", message, carrier.span, hint=hint, notes=notes)
 
 
-def contradicted(connections: Sequence[Connection], found: Ends) -> Iterator[Diagnostic]:
-    """Connections whose ends have topics of different names."""
+def contradicted(connections: Sequence[Connection], found: Ends, relays: Collection[str]) -> Iterator[Diagnostic]:
+    """Connections whose ends have topics of different names, and those beside which an input hears its topic."""
     for connection in connections:
-        one, other = found.outputs.get(connection.source), found.inputs.get(connection.target)
-        if one is not None and other is not None and one.topic != other.topic:
+        source, target = connection.source, connection.target
+        if source.node in relays:
+            continue
+        ones, others = found.outputs.get(source, ()), found.inputs.get(target, ())
+        apart = not {c.topic for c in ones} & {c.topic for c in others}
+        if ones and others and apart:
+            one, other = ones[0], others[0]
             message = (
-                f"{connection.source} is published on {one.topic}, and {connection.target} listens to {other.topic}: "
+                f"{source} is published on {one.topic}, and {target} listens to {other.topic}: "
                 "the connection contradicts the topics"
             )
-            yield Diagnostic("ROS112", message, connection.span, hint=remap_hint(connection.target.node, other, one))
+            yield Diagnostic("ROS112", message, connection.span, hint=remap_hint(target.node, other, one))
+        elif others and apart and (publishers := found.reaching(target)):
+            topic = next(c for c in others if found.published.get(c.topic)).topic
+            message = (
+                f"{source} has no topic, and {target} listens to {topic}, which {publishers[0][0]} publishes: the "
+                "connection would silence it"
+            )
+            hint = f"give {source} its topic in the contract, or remap {topic} for {target.node} under `ros`"
+            yield Diagnostic("ROS112", message, connection.span, hint=hint)
+
+
+def unheard(source: Endpoint, target: Endpoint, found: Ends, span: Span | None) -> Iterator[Diagnostic]:
+    """A link to an input of which no topic is told, from an output whose topic others publish too."""
+    if source.node == target.node:
+        return  # its own memory, said by a connection
+    if source in found.outputs and target not in found.inputs and (others := found.beside(source)):
+        topic = next(c for c in found.outputs[source] if any(at == others[0] for at, _ in found.published[c.topic]))
+        message = f"{target} has several providers: {source}, and {others[0]} on the same topic {topic.topic}"
+        hint = f"give {target} its topic in the contract: it hears both, or listens to another"
+        yield Diagnostic("PLAN122", message, span, hint=hint)
 
 
 def remap_hint(node: str, carrier: Carrier, meant: Carrier) -> str:
@@ -108,18 +144,19 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
     nodes: list[Node] = []
     taken = {node.name for node in contract.nodes}
     faults: list[Diagnostic] = []
+    relays = {node.name for node in contract.nodes if node.relay}
     for node in contract.nodes:
         for port in node.inputs:
             target = Endpoint(node.name, port.name)
-            carrier = found.inputs.get(target)
-            if carrier is None:
+            if target not in found.inputs:
                 continue
+            carrier = found.inputs[target][0]
             sources, unclear = _sources(target, port, found, connections)
             if len(sources) + len(unclear) < 2:
                 continue
-            for publisher in unclear:
+            for publisher, topic in unclear:
                 message = (
-                    f"{publisher} publishes {carrier.topic} too, and which of its outputs {target} hears is not said, "
+                    f"{publisher} publishes {topic} too, and which of its outputs {target} hears is not said, "
                     f"or none is of the type {port.type_name}"
                 )
                 hint = f"connections: {{from: {publisher}.…, to: {target}}}, or remap one of them"
@@ -130,7 +167,10 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
             relay = _relay(name, node.name, port, carrier, sources)
             nodes.append(relay)
             mine = [c for c in connections if c.target == target]
-            connections = [c for c in connections if c.target != target]
+            known = {source for source, _ in sources}
+            connections = [
+                c for c in connections if c.target != target or not (c.source in known or c.source.node in relays)
+            ]  # another source contradicts the topics, which `contradicted` tells
             for (source, _), inner in zip(sources, relay.inputs, strict=True):
                 given = next((c for c in mine if c.source == source), Connection(source, target, span=carrier.span))
                 connections.append(replace(given, target=Endpoint(name, inner.name)))
@@ -143,24 +183,25 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
 
 def _sources(
     target: Endpoint, port: Port, found: Ends, connections: Sequence[Connection]
-) -> tuple[tuple[tuple[Endpoint, Port], ...], tuple[str, ...]]:
-    """Every output that reaches an input by its topic: of each node the one that carries the input's value; and the
-    nodes of which that cannot be told."""
-    by_node: dict[str, list[tuple[Endpoint, Port]]] = defaultdict(list)
-    for at, output in found.published.get(found.inputs[target].topic, ()):
-        by_node[at.node].append((at, output))
+) -> tuple[tuple[tuple[Endpoint, Port], ...], tuple[tuple[str, str], ...]]:
+    """Every output that reaches an input by one of its topics: of each node on each topic the one that carries the
+    input's value; and the nodes, with the topic, of which that cannot be told."""
+    by_node: dict[tuple[str, str], list[tuple[Endpoint, Port]]] = defaultdict(list)
+    for topic in dict.fromkeys(carrier.topic for carrier in found.inputs[target]):
+        for at, output in found.published.get(topic, ()):
+            by_node[at.node, topic].append((at, output))
     named = {c.source for c in connections if c.target == target}
-    chosen: list[tuple[Endpoint, Port]] = []
-    unclear: list[str] = []
+    chosen: dict[Endpoint, Port] = {}
+    unclear: list[tuple[str, str]] = []
     for publisher, several in by_node.items():
         fitting = [(at, output) for at, output in several if at in named]
         fitting = fitting or [(at, o) for at, o in several if o.name == port.name and o.sort == port.sort]
         fitting = fitting or [(at, o) for at, o in several if o.sort == port.sort]
         if len(fitting) == 1:
-            chosen += fitting
+            chosen.update(fitting)
         else:
             unclear.append(publisher)
-    return tuple(chosen), tuple(unclear)
+    return tuple(chosen.items()), tuple(unclear)
 
 
 def _free(name: str, taken: set[str]) -> str:
@@ -190,7 +231,7 @@ def _relay(name: str, listener: str, port: Port, carrier: Carrier, sources: Sequ
         text,
         carrier.span,
     )
-    return Node(name, inputs, (output,), (), (), (clause,), carrier.span)
+    return Node(name, inputs, (output,), (), (), (clause,), carrier.span, relay=True)
 
 
 def _same(one: Variable, other: Variable) -> Term:
