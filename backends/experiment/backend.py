@@ -13,7 +13,7 @@ from avow.base.verdict import Link, Outcome, Verdict
 
 from .codes import CODES
 from .figures import Figures, read_figures
-from .judge import Judgement, judge_figures, judge_runs
+from .judge import Judgement, exceeds, judge_figures, judge_runs
 from .options import SCHEMA, Experiment, read
 from .quantity import show
 from .runs import Runs, read_runs
@@ -24,7 +24,7 @@ class ExperimentBackend(Backend):
 
     name = "experiment"
     title = "measured runs, judged by exact binomial statistics"
-    version = "1"
+    version = "2"
     strength = Verdict.TESTED
     uses_scenario = False
     uses_wiring = False
@@ -61,6 +61,7 @@ class ExperimentBackend(Backend):
             "source": source.relative_to(job.root.resolve()).as_posix() if source else "",
             "measure": experiment.measure.text if experiment.measure else "",
             "within": str(experiment.within),
+            "strict": experiment.strict,
             "unit": experiment.unit,
             "confidence": str(experiment.confidence),
             "at_least": str(experiment.at_least) if experiment.at_least is not None else None,
@@ -103,7 +104,7 @@ def _settle(job: Job) -> tuple[Judgement, dict[str, str]]:
     if material.warnings:
         judgement.details["warnings"] = [told(job, [d]) for d in material.warnings[:20]]
     lines = [
-        f"{run.name}\t{show(run.measure.low, 9)}\t{'failed' if run.measure.low > experiment.within else 'ok'}"
+        f"{run.name}\t{show(run.measure.low, 9)}\t{'failed' if exceeds(run, experiment) else 'ok'}"
         for run in material.runs
     ]
     return judgement, {"measures.tsv": "\n".join(["run\tmeasure\tverdict", *lines]) + "\n"}

@@ -32,15 +32,15 @@ CODES = register(
     ),
     declare(
         "EXP106",
-        "numbers in the measure",
-        "A number in the measure, or a factor that is the same in every run, moves what is held against the tolerance.",
-        "Measure what the guarantee speaks of; convert units by `unit` and by a unit in `within`.",
+        "measure that may flatter",
+        "The measure is more than columns, differences of two columns, and `abs`, `hypot` and `max` of these.",
+        "Measure what the guarantee speaks of; `docs/backends/experiment.md` has every form.",
     ),
     declare(
         "EXP107",
         "not the contract's tolerance",
-        "The guarantee compares with numbers of its own, and the tolerance is none of them.",
-        "Give one of the guarantee's numbers, or the constant that it names.",
+        "The guarantee compares with numbers, and the tolerance is not the least that the whole of it bounds by.",
+        "Give T where the guarantee says `quantity <= T`, without a unit that changes it.",
     ),
     declare(
         "EXP111",
@@ -63,14 +63,14 @@ CODES = register(
     declare(
         "EXP114",
         "measure without value",
-        "For this run the measure divides by zero, is out of range, or is negative where it cannot be.",
+        "For this run the measure, or a part of it, is negative where it cannot be.",
         "Correct the run's cells, or the measure.",
     ),
     declare(
         "EXP115",
         "copied run",
-        "Two runs agree in every cell but the name, as copied lines do and measurements rarely.",
-        "Look whether the run was entered twice.",
+        "Two runs agree in every cell that the measure reads, as copied lines do and measurements rarely.",
+        "Equal runs that succeed count once: record more digits, or what was measured, apart.",
         warning=True,
     ),
     declare(

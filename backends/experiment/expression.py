@@ -1,10 +1,13 @@
 """A tiny language for what is measured: ``hypot(x - goal_x, y - goal_y)`` over the columns of a data set.
 
-Own grammar, own evaluator: text from a plan is never Python. Arithmetic is exact; a square root is enclosed between
-two fractions that are 10^-12 apart, and the enclosure is carried along, so a comparison is decided or known not to be.
+Own grammar, own evaluator: text from a plan is never Python. Nothing can be written down that is the same in every run
+or less than what was measured: no numbers, no products, no column held against itself.
 
-    sum: product (("+" | "-") product)*     product: factor (("*" | "/") factor)*     factor: "-" factor | atom
-    atom: number | column | function "(" sum ("," sum)* ")" | "(" sum ")"
+    part: ("abs" | "hypot" | "max") "(" part ("," part)* ")" | column | column "-" column | half a width
+    half a width: (column | "max" "(" column "," column ")") "-" "mean" "(" column "," column ")", of the same two
+
+Arithmetic is exact; a square root is enclosed between two fractions that are 10^-12 apart, and the enclosure is carried
+along, so a comparison is decided or known not to be.
 """
 
 from __future__ import annotations
@@ -18,15 +21,17 @@ from .statistics import root
 from .tuning import EXPRESSION_DEPTH, EXPRESSION_LENGTH
 
 _TOKEN = re.compile(r"\s*(?:(\d{1,40}(?:\.\d{1,40})?)|([^\W\d]\w*)|([-+*/(),]))")
+ALLOWED = "a measure is a column, the difference of two columns, or abs, hypot or max of these"
 
 
 class Malformed(Exception):  # noqa: N818 - it names what the text is
-    """Not an expression: `position` counts characters from 0."""
+    """Not a measure: `position` counts characters from 0; `code` is EXP106 where it could flatter."""
 
-    def __init__(self, message: str, position: int) -> None:
+    def __init__(self, message: str, position: int, code: str = "EXP103") -> None:
         super().__init__(message)
         self.message = message
         self.position = position
+        self.code = code
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +53,9 @@ class Expression:
     text: str
     columns: tuple[str, ...]
     evaluate: Callable[[Mapping[str, Fraction]], Interval]
-    """Raises ZeroDivisionError, and ValueError for a root of a negative number."""
-    numbers: tuple[str, ...] = ()
-    """Those that stand in it: a factor or an offset moves the tolerance."""
-    scales: tuple[str, ...] = ()
-    """The columns that multiply or divide: one that is the same in every run is a factor, too."""
+    """Raises ValueError where a part of a `max` is negative, which would be hidden."""
+    halves: bool
+    """Whether it takes half a width, the distance from a centre that is free."""
 
 
 def parse(text: str) -> Expression:
@@ -60,36 +63,20 @@ def parse(text: str) -> Expression:
     if len(text) > EXPRESSION_LENGTH:
         raise Malformed(f"longer than {EXPRESSION_LENGTH} characters", 0)
     parser = _Parser(text)
-    value = parser.sum(0)
+    value = parser.part(0)
     parser.end()
-    columns, scales = dict.fromkeys(parser.columns), dict.fromkeys(parser.scales)
-    return Expression(text, tuple(columns), value, tuple(parser.numbers), tuple(scales))
+    return Expression(text, tuple(dict.fromkeys(parser.columns)), value, parser.halves)
 
 
 _Eval = Callable[[Mapping[str, Fraction]], Interval]
-
-
-def _negative(a: Interval) -> Interval:
-    return Interval(-a.high, -a.low)
-
-
-def _plus(a: Interval, b: Interval) -> Interval:
-    return Interval(a.low + b.low, a.high + b.high)
 
 
 def _minus(a: Interval, b: Interval) -> Interval:
     return Interval(a.low - b.high, a.high - b.low)
 
 
-def _times(a: Interval, b: Interval) -> Interval:
-    corners = (a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high)
-    return Interval(min(corners), max(corners))
-
-
-def _over(a: Interval, b: Interval) -> Interval:
-    if b.low <= 0 <= b.high:
-        raise ZeroDivisionError
-    return _times(a, Interval(1 / b.high, 1 / b.low))
+def _negative(a: Interval) -> Interval:
+    return Interval(-a.high, -a.low)
 
 
 def _abs(a: Interval) -> Interval:
@@ -112,32 +99,25 @@ def _hypot(*items: Interval) -> Interval:
     return _sqrt(Interval(sum((s.low for s in squares), Fraction(0)), sum((s.high for s in squares), Fraction(0))))
 
 
-def _mean(*items: Interval) -> Interval:
-    return Interval(
-        sum((i.low for i in items), Fraction(0)) / len(items), sum((i.high for i in items), Fraction(0)) / len(items)
-    )
-
-
 def _max(*items: Interval) -> Interval:
+    if any(i.low < 0 for i in items):
+        raise ValueError("a part of 'max' is negative; use abs(…)")
     return Interval(max(i.low for i in items), max(i.high for i in items))
 
 
-FUNCTIONS: Mapping[str, tuple[Callable[..., Interval], int, int]] = {
-    "abs": (_abs, 1, 1),
-    "sqrt": (_sqrt, 1, 1),
-    "hypot": (_hypot, 1, 8),
-    "max": (_max, 1, 8),
-    "mean": (_mean, 1, 8),
+FUNCTIONS: Mapping[str, tuple[Callable[..., Interval], int]] = {
+    "abs": (_abs, 1),
+    "hypot": (_hypot, 8),
+    "max": (_max, 8),
 }
-"""Name → function, least and greatest number of arguments. No `min`: a measure that is cut off lets any run succeed."""
+"""Name → function, greatest number of arguments. No `min`, `sqrt` or `mean`: they make less of what was measured."""
 
 
 class _Parser:
     def __init__(self, text: str) -> None:
         self.text = text
         self.columns: list[str] = []
-        self.numbers: list[str] = []
-        self.scales: list[str] = []
+        self.halves = False
         self.tokens: list[tuple[str, str, int]] = []
         position = 0
         while text[position:].strip():
@@ -168,66 +148,65 @@ class _Parser:
     def expect(self, sign: str) -> None:
         if self.accept(sign) is None:
             _, text, position = self.peek()
-            raise Malformed(f"expected '{sign}', found {text!r}" if text else f"expected '{sign}' at the end", position)
+            found = f"expected '{sign}', found {text!r}: {ALLOWED}" if text else f"expected '{sign}' at the end"
+            raise Malformed(found, position, "EXP106" if text in "+-*/" and text else "EXP103")
 
     def end(self) -> None:
         kind, text, position = self.peek()
         if kind != "end":
-            raise Malformed(f"unexpected {text!r}", position)
+            raise Malformed(f"unexpected {text!r}: {ALLOWED}", position, "EXP106")
 
-    def sum(self, depth: int) -> _Eval:
-        value = self.product(depth)
-        while sign := self.accept("+", "-"):
-            value = _both(_plus if sign == "+" else _minus, value, self.product(depth))
-        return value
-
-    def product(self, depth: int) -> _Eval:
-        first = len(self.columns)
-        value = self.factor(depth)
-        while sign := self.accept("*", "/"):
-            value = _both(_times if sign == "*" else _over, value, self.factor(depth))
-            self.scales += self.columns[first:]
-        return value
-
-    def factor(self, depth: int) -> _Eval:
+    def part(self, depth: int) -> _Eval:
         if depth > EXPRESSION_DEPTH:
             raise Malformed(f"nested deeper than {EXPRESSION_DEPTH} levels", self.peek()[2])
-        if self.accept("-"):
-            return _each(_negative, (self.factor(depth + 1),))
-        if self.accept("("):
-            inner = self.sum(depth + 1)
-            self.expect(")")
-            return inner
-        kind, text, position = self.take()
-        if kind == "number":
-            constant = Interval.of(Fraction(text))
-            self.numbers.append(text)
-            return lambda _row: constant
-        if kind != "name":
-            found = repr(text) if text else "the end"
-            raise Malformed(f"expected a number, a column or '(', found {found}", position)
-        if self.accept("("):
-            return self.call(text, position, depth)
-        self.columns.append(text)
-        return lambda row: Interval.of(row[text])
-
-    def call(self, name: str, position: int, depth: int) -> _Eval:
+        name, position = self.name()
+        if not self.accept("("):
+            self.columns.append(name)
+            return self.difference(name, lambda row: Interval.of(row[name]), {name}, position)
         if name not in FUNCTIONS:
-            raise Malformed(f"no function '{name}'; there are {', '.join(sorted(FUNCTIONS))}", position)
-        arguments = [self.sum(depth + 1)]
+            raise Malformed(f"no function '{name}'; there are {', '.join(sorted(FUNCTIONS))}", position, "EXP106")
+        first = self.next
+        arguments = [self.part(depth + 1)]
         while self.accept(","):
-            arguments.append(self.sum(depth + 1))
+            arguments.append(self.part(depth + 1))
+        read = {text for kind, text, _ in self.tokens[first : self.next] if kind == "name"}
+        plain = self.next - first == 3  # column, comma, column
         self.expect(")")
-        function, least, greatest = FUNCTIONS[name]
-        if not least <= len(arguments) <= greatest:
-            wanted = str(least) if least == greatest else f"{least} to {greatest}"
-            raise Malformed(f"'{name}' takes {wanted} arguments, not {len(arguments)}", position)
-        return _each(function, tuple(arguments))
+        function, greatest = FUNCTIONS[name]
+        if len(arguments) > greatest:
+            raise Malformed(f"'{name}' takes at most {greatest} arguments, not {len(arguments)}", position)
+        value: _Eval = lambda row: function(*(argument(row) for argument in arguments))  # noqa: E731 - as the others
+        return self.difference("", value, read if name == "max" and plain else set(), position)
 
+    def difference(self, column: str, left: _Eval, read: set[str], position: int) -> _Eval:
+        """What follows a column, or a `max`: nothing, another column, or the mean of two columns, each of them read."""
+        if not self.accept("-"):
+            return left
+        other, at = self.name()
+        if not self.accept("("):
+            if not column:
+                raise Malformed(f"a difference is of two columns: {ALLOWED}", position, "EXP106")
+            if column == other:
+                raise Malformed(f"'{column} - {other}' is 0 in every run", position, "EXP106")
+            self.columns.append(other)
+            return lambda row: Interval.of(row[column] - row[other])
+        if other != "mean":
+            raise Malformed(f"a difference is of two columns: {ALLOWED}", at, "EXP106")
+        one, _ = self.name()
+        self.expect(",")
+        two, _ = self.name()
+        self.expect(")")
+        if one == two or not read or not read <= {one, two}:
+            raise Malformed("half a width is max(a, b) - mean(a, b), of two different columns", position, "EXP106")
+        self.columns += [one, two]
+        self.halves = True
+        return lambda row: _minus(left(row), Interval.of((row[one] + row[two]) / 2))
 
-def _both(function: Callable[[Interval, Interval], Interval], left: _Eval, right: _Eval) -> _Eval:
-    return lambda row: function(left(row), right(row))
-
-
-def _each(function: Callable[..., Interval], arguments: tuple[_Eval, ...]) -> _Eval:
-    return lambda row: function(*(argument(row) for argument in arguments))
+    def name(self) -> tuple[str, int]:
+        kind, text, position = self.take()
+        if kind == "name":
+            return text, position
+        if kind == "end":
+            raise Malformed("expected a column, found the end", position)
+        code = "EXP106" if kind == "number" or text in "-(" else "EXP103"
+        raise Malformed(f"expected a column, found {text!r}: {ALLOWED}", position, code)

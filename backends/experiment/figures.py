@@ -119,21 +119,21 @@ def contradictions(figures: Figures) -> tuple[str, ...]:
     return tuple(found)
 
 
-def failures(figures: Figures, within: Fraction) -> tuple[int, int]:
-    """The least and the greatest number of runs that may have exceeded the tolerance."""
+def failures(figures: Figures, within: Fraction, strict: bool) -> tuple[int, int]:
+    """The least and the greatest number of runs that may have exceeded the tolerance, or reached it where `strict`."""
     n, mean, least, greatest = figures.runs, figures.mean, figures.least, figures.greatest
     fewest = 0
     if (greatest and greatest.low > within) or (mean and mean.low > within):
         fewest = 1
     if least and least.low > within:
         fewest = n
-    if greatest and greatest.high <= within:
+    if greatest and (greatest.high < within or (greatest.high == within and not strict)):
         return fewest, fewest
     most = n
     if mean and least and within > least.low and mean.high < within:
         # k runs above the tolerance and n - k no less than the minimum have at least this sum
         most = min(n, int(n * (mean.high - least.low) / (within - least.low)))
-    if least and least.high <= within:
+    if least and (least.high < within or (least.high == within and not strict)):
         most = min(most, n - 1)
     return fewest, max(most, fewest)
 

@@ -28,9 +28,9 @@ class Judgement:
 
 def judge_runs(runs: Sequence[Run], experiment: Experiment) -> Judgement:
     """Whether the runs show the claim: no failure at all, or (with `at_least`) few enough of them."""
-    limit = experiment.within
-    undecided = [run for run in runs if run.measure.low <= limit < run.measure.high]
-    failed = [run for run in runs if run.measure.low > limit]
+    failed = [run for run in runs if exceeds(run, experiment)]
+    runs = _counted(runs, experiment)
+    undecided = [run for run in runs if not exceeds(run, experiment) and not _within(run, experiment)]
     details = _statistics(runs, experiment)
     if undecided:
         return Judgement(
@@ -42,10 +42,28 @@ def judge_runs(runs: Sequence[Run], experiment: Experiment) -> Judgement:
     return _verdict(len(failed), len(runs), experiment, details, _counterexample(failed, experiment))
 
 
+def exceeds(run: Run, experiment: Experiment) -> bool:
+    """Whether a run certainly fails: beyond the tolerance, or at it where the guarantee is strict."""
+    return run.measure.low > experiment.within or (experiment.strict and run.measure.low == experiment.within)
+
+
+def _within(run: Run, experiment: Experiment) -> bool:
+    return run.measure.high < experiment.within or (not experiment.strict and run.measure.high == experiment.within)
+
+
+def _counted(runs: Sequence[Run], experiment: Experiment) -> tuple[Run, ...]:
+    """Every failing run, and of the others those that measured something new: a copied line shows nothing, whatever its
+    other cells say."""
+    new: dict[object, Run] = {}
+    for run in runs:
+        new.setdefault(run.line if exceeds(run, experiment) else run.measured, run)
+    return tuple(new.values())
+
+
 def judge_figures(figures: Figures, experiment: Experiment) -> Judgement:
     """Whether printed figures are possible at all, and whether they show the claim."""
     wrong = contradictions(figures)
-    fewest, most = failures(figures, experiment.within)
+    fewest, most = failures(figures, experiment.within, experiment.strict)
     unit = _unit(figures.unit)
     tolerance = f"{show(experiment.within)}{unit}"
     details: dict[str, object] = {"figures": dict(figures.printed), "contradictions": list(wrong)}

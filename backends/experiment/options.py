@@ -10,10 +10,11 @@ from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic
-from avow.language.sorts import IntegerSort, NaturalSort, RealSort
-from avow.language.terms import Compare, In, Literal, Negative, Role, Term, Variable, Widen, subterms
+from avow.formulas.negation_normal_form import push_negations
+from avow.language.terms import Compare, In, Quantified, Quantifier, Role, Term, Variable, subterms
 from avow.system.paths import inside
 
+from .bound import Bound, constant, upper_bound
 from .expression import Expression, Malformed, parse
 from .quantity import conversion, decimal, figure, show
 
@@ -27,7 +28,7 @@ SCHEMA: dict[str, Any] = {
         "within": {
             "type": ["number", "string"],
             "description": "the greatest measure of a run that succeeds: the contract's number, as in the guarantee or "
-            "as a constant's name, with a unit where the measure has another",
+            "as a constant's name",
         },
         "unit": {"type": "string", "description": "the unit of the measure and of numbers without one"},
         "run_column": {"type": "string", "description": "the column that names a run (default: run, or id)"},
@@ -59,6 +60,8 @@ class Experiment:
     summary: Path | None
     measure: Expression | None
     within: Fraction
+    strict: bool
+    """Whether a run that measures exactly `within` fails: the guarantee says `<`."""
     unit: str
     id_column: str | None
     confidence: Fraction
@@ -122,7 +125,18 @@ def read(job: Job) -> tuple[Experiment | None, tuple[Diagnostic, ...]]:
     protocol = " ".join(protocol.split())
     supposed = "" if within.contracts else f"a tolerance of {within.text} is what the guarantee allows"
     return Experiment(
-        data, summary, measure, within.value, unit, id_column, confidence, at_least, floor, protocol, supposed
+        data,
+        summary,
+        measure,
+        within.value,
+        within.strict,
+        unit,
+        id_column,
+        confidence,
+        at_least,
+        floor,
+        protocol,
+        supposed,
     ), ()
 
 
@@ -164,16 +178,23 @@ def _measure(problems: Problems, wanted: bool) -> Expression | None:
         return None
     try:
         found = parse(text)
-        if not found.columns:
-            problems.add("measure", "the measure reads no column: it is the same for every run", code="EXP103")
-        elif found.numbers:
-            told = ", ".join(found.numbers)
-            hint = "half a width is max(a, b) - mean(a, b); units are converted by 'unit'"
-            problems.add("measure", f"the measure has {told} in it: that moves the tolerance", hint, "EXP106")
-        return found
     except Malformed as error:
-        problems.add("measure", f"character {error.position + 1} of the measure: {error.message}", code="EXP103")
+        problems.add("measure", f"character {error.position + 1} of the measure: {error.message}", code=error.code)
         return None
+    for obligation in problems.job.obligations if found.halves else ():
+        if not _centre_is_free(problems.job.node.clause(obligation.name).formula):
+            message = f"half a width is no measure of {obligation.name}: it says of no place that there is one"
+            hint = (
+                "`x - mean(…)` goes with `exists(a in REAL | … a - T <= x <= a + T)`; elsewhere it halves the distance"
+            )
+            problems.add("measure", message, hint, "EXP106")
+    return found
+
+
+def _centre_is_free(formula: Term) -> bool:
+    return any(
+        isinstance(p, Quantified) and p.quantifier is Quantifier.EXISTS for p in subterms(push_negations(formula))
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,6 +202,7 @@ class _Tolerance:
     value: Fraction
     """In the measure's unit."""
     text: str
+    strict: bool
     contracts: bool
     """Whether it is a number of the contract."""
 
@@ -192,21 +214,32 @@ def _within(problems: Problems, unit: str) -> _Tolerance | None:
     if written is None:
         problems.add(None, "an experiment needs 'within': the greatest measure of a run that succeeds")
         return None
-    constants = {n: v for n, t in problems.job.contract.constants if (v := _constant(t)) is not None}
+    constants = {n: v for n, t in problems.job.contract.constants if (v := constant(t)) is not None}
     found = _read_tolerance(problems, written, unit, constants)
     if found is None:
         return None
     value, number = found
     if value < 0:
         problems.add("within", "the tolerance is negative: no run could succeed")
-    numbers = [_reals(problems.job.node.clause(o.name).formula) for o in problems.job.obligations]
-    for obligation, known in zip(problems.job.obligations, numbers, strict=True):
-        if known and number not in known:
-            told = ", ".join(show(n) for n in sorted(known))
-            message = f"{obligation.name} compares with {told}: {written} is not its tolerance"
-            hint = "a constant with a unit, as in `Tolerance m`, is converted into the measure's"
-            problems.add("within", message, hint, "EXP107")
-    return _Tolerance(value, f"{written}", all(numbers) or number in constants.values())
+    if value != number:
+        message = f"'{written}' is another number in {unit} than in the contract, so it is not its tolerance"
+        hint = "the contract's numbers have no units: measure in the unit that they are meant in"
+        problems.add("within", message, hint, "EXP107")
+    formulas = [(o.name, problems.job.node.clause(o.name).formula) for o in problems.job.obligations]
+    bounds = [(name, upper_bound(formula)) for name, formula in formulas if _numbers(formula)]
+    for name, bound in bounds:
+        match bound:
+            case Bound(value=most) if most == number:
+                continue
+            case Bound(value=most):
+                why = f"{name} allows no more than {show(most)}: {written} is not its tolerance"
+            case reason:
+                why = f"{written} is not its tolerance: of {name}, {reason}"
+        hint = "a tolerance is the least number T for which the whole guarantee says `quantity <= T` or `< T`"
+        problems.add("within", why, hint, "EXP107")
+    strict = any(bound.strict for _, bound in bounds if isinstance(bound, Bound))
+    contracts = len(bounds) == len(formulas) or number in constants.values()
+    return _Tolerance(value, f"{written}", strict, contracts)
 
 
 def _read_tolerance(
@@ -238,30 +271,16 @@ def _read_tolerance(
     return None
 
 
-def _reals(formula: Term) -> frozenset[Fraction]:
-    """The real numbers that a guarantee compares with, constants by their values; what only inputs are compared with
-    says when it applies, and zero says which side."""
-    found = set()
+def _numbers(formula: Term) -> bool:
+    """Whether a guarantee compares with numbers, constants by their values; what only inputs are compared with says
+    when it applies."""
     for comparison in subterms(formula):
         if isinstance(comparison, Compare | In):
             parts = [*subterms(comparison)]
             roles = {part.role for part in parts if isinstance(part, Variable)}
-            if roles != {Role.INPUT}:
-                found |= {abs(v) for p in parts if isinstance(p.sort, RealSort) and (v := _constant(p))}
-    return frozenset(found)
-
-
-def _constant(term: Term) -> Fraction | None:
-    match term:
-        case Literal(value=value, sort=RealSort() | IntegerSort() | NaturalSort()) if not isinstance(value, str | bool):
-            return Fraction(value)
-        case Widen(term=inner):
-            return _constant(inner)
-        case Negative(term=inner):
-            value_ = _constant(inner)
-            return None if value_ is None else -value_
-        case _:  # no number that is written down
-            return None
+            if roles != {Role.INPUT} and any(constant(part) is not None for part in parts):
+                return True
+    return False
 
 
 def _probability(problems: Problems, key: str, default: Fraction | None) -> Fraction | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -24,6 +25,11 @@ class Run:
     line: int
     values: tuple[tuple[str, str], ...]
     measure: Interval
+
+    @property
+    def measured(self) -> tuple[Fraction | None, ...]:
+        """The numbers that the measure reads: where two runs agree in them, nothing says that they are two."""
+        return tuple(decimal(text) for _, text in self.values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +62,9 @@ class _RunsReader:
             raise self.fail(first[0], "EXP111", "the file has no runs, only the names of its columns")
         names: dict[str, int] = {}
         runs = [run for line, cells in others if (run := self.run(line, cells, columns, names)) is not None]
-        self.factors(first[0], others, columns)
         if self.problems:
             raise Rejected(*self.problems)
-        return Runs(tuple(runs), tuple(self.copies(others, columns)))
+        return Runs(tuple(runs), tuple(self.copies(runs)))
 
     def rows(self) -> list[tuple[int, list[str]]]:
         try:
@@ -115,9 +120,6 @@ class _RunsReader:
             return None
         try:
             measured = self.measure.evaluate(numbers)
-        except ZeroDivisionError:
-            self.add(line, "EXP114", "the measure divides by zero in this run")
-            return None
         except ValueError as error:
             self.add(line, "EXP114", f"the measure cannot be computed for this run: {error}")
             return None
@@ -135,29 +137,18 @@ class _RunsReader:
             self.add(line, "EXP113", f"column '{column}': {shown} is not a number", hint)
         return number
 
-    def factors(self, line: int, rows: list[tuple[int, list[str]]], columns: list[str]) -> None:
-        """A column that multiplies or divides and is the same in every run."""
-        for name in self.measure.scales:
-            at = columns.index(name)
-            values = {decimal(cells[at]) for _, cells in rows if len(cells) == len(columns)}
-            if len(rows) > 1 and len(values) == 1:
-                message = f"the column '{name}' scales the measure by the same number in every run"
-                self.add(line, "EXP106", message, "measure what the guarantee speaks of")
-
-    def copies(self, rows: list[tuple[int, list[str]]], columns: list[str]) -> list[Diagnostic]:
-        """Runs that agree in every cell but the name: measured runs rarely do, copied lines always."""
-        at = columns.index(self.id_column) if self.id_column else -1
-        seen: dict[tuple[Fraction | str, ...], int] = {}
+    def copies(self, runs: Sequence[Run]) -> list[Diagnostic]:
+        """Runs that agree in all that is measured: measured runs rarely do, copied lines always."""
+        seen: dict[object, int] = {}
         found = []
-        for line, cells in rows:
-            key = tuple(decimal(cell) or cell for i, cell in enumerate(cells) if i != at)
-            if key in seen:
-                message = f"this run agrees with the one in line {seen[key]} in every cell: is it a copy?"
-                found.append(Diagnostic("EXP115", message, self.place(line), Severity.WARNING))
-            seen.setdefault(key, line)
-        if len(columns) < 4 and len(found) > 1:  # few columns agree by chance now and then: told, but once
-            message = f"{len(found)} runs agree with another in every cell: are they copies?"
-            return [replace(found[0], message=message)]
+        for run in runs:
+            if run.measured in seen:
+                message = f"this run agrees with the one in line {seen[run.measured]} in all that is measured"
+                hint = "equal runs count once; where they are no copies, record more digits, or what was measured apart"
+                found.append(Diagnostic("EXP115", message, self.place(run.line), Severity.WARNING, hint=hint))
+            seen.setdefault(run.measured, run.line)
+        if len(found) > 3:
+            return [replace(found[0], message=f"{found[0].message}; so do {len(found) - 1} more with another")]
         return found
 
     def place(self, line: int) -> Span:

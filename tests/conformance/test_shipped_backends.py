@@ -162,7 +162,7 @@ class TestExperiment(Conformance):
             CONTRACT,
             {"data": "runs.csv", "measure": "late", "within": "5", "at_least": 0.9},
             both(Verdict.TESTED),
-            {"runs.csv": "late\n" + "1\n" * 40},
+            {"runs.csv": "late\n" + "".join(f"1.{n:02}\n" for n in range(40))},
             SCENARIO,
         ),
         Seeded(
@@ -170,7 +170,7 @@ class TestExperiment(Conformance):
             CONTRACT,
             {"data": "runs.csv", "measure": "late", "within": "5"},
             both(Verdict.REFUTED),
-            {"runs.csv": "late\n" + "1\n" * 40 + "6\n"},
+            {"runs.csv": "late\n" + "".join(f"1.{n:02}\n" for n in range(40)) + "6\n"},
         ),
     )
 
