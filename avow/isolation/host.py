@@ -8,20 +8,15 @@ Values of the contract are given to the subject as plain Python: an element of a
 
 from __future__ import annotations
 
-import _posixsubprocess
-import datetime
 import enum
-import functools
 import importlib.machinery
 import importlib.util
 import inspect
 import json
 import os
 import posix
-import random
 import sys
 import tempfile
-import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from decimal import Decimal
@@ -167,6 +162,16 @@ _NETWORK = ("socket.", "urllib.", "http.", "ftplib.", "smtplib.", "telnetlib.", 
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
+def _senses() -> Any:
+    """The module beside this one, which is no package's here."""
+    place = os.path.join(os.path.dirname(__file__), "senses.py")  # noqa: PTH118, PTH120
+    loader = importlib.machinery.SourceFileLoader("avow_senses", place)
+    spec = importlib.util.spec_from_loader("avow_senses", loader)
+    module = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
+    loader.exec_module(module)
+    return module
+
+
 def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Callable[[], None]]:
     """What it looks at, as [event, path], growing as it runs, and what is to be called at the end. What no subject may
     do ends the process by `end`, before it is done: nothing can catch that, or have it forgotten. A hook cannot be
@@ -239,146 +244,12 @@ def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Ca
         elif event.startswith(_NETWORK):
             told("outside", "the network")
 
+    drawn = _senses().watch_all(told)
     sys.addaudithook(hook)
-    _look_out(told)
-    return seen, watch_chance(told)
+    return seen, drawn
 
 
 _HARMLESS = ("self", "thread-self", "cpuinfo", "meminfo", "stat", "version", "filesystems", "mounts", "sys")
-
-
-def _look_out(told: Callable[[str, Any], None]) -> None:
-    """No audit event tells of a file that is looked at without being opened, nor of a program started by hand."""
-
-    def outer(inner: Callable[..., Any], event: str, what: str | None = None) -> Callable[..., Any]:
-        def call(*arguments: Any, **named: Any) -> Any:
-            told(event, what or (arguments or (None,))[0])
-            return inner(*arguments, **named)
-
-        return functools.wraps(inner)(call)
-
-    for name in ("stat", "lstat", "access", "readlink"):
-        setattr(os, name, outer(getattr(os, name), "state"))
-    _posixsubprocess.fork_exec = outer(_posixsubprocess.fork_exec, "program", "a program")
-
-
-# -- clock and chance ----------------------------------------------------------------------------------------------
-
-_CLOCKS = ("time", "monotonic", "perf_counter", "process_time", "thread_time")
-_NOW = {"localtime": 0, "gmtime": 0, "ctime": 0, "asctime": 0, "strftime": 1}
-"""Functions of `time` that take now where they are given no more than so many arguments."""
-
-_STDLIB = os.path.dirname(os.__file__) + os.sep  # noqa: PTH120
-_OWN_USE: tuple[str, ...] = (
-    "tempfile.py",
-    "logging/",
-    "threading.py",
-    "queue.py",
-    "asyncio/",
-    "selectors.py",
-    "subprocess.py",
-)
-_OWN_USE += ("socket.py", "concurrent/", "multiprocessing/", "warnings.py", "unittest/", "importlib/")
-"""Parts of the library that look at the clock, or draw names, for their own business."""
-
-
-def _asked() -> bool:
-    """Whether it is the subject that asks for a clock or a random number: no module that is just imported, and not the
-    library for its own business."""
-    frame: Any = sys._getframe(2)
-    while frame is not None:
-        file = frame.f_code.co_filename
-        inner = file.removeprefix(_STDLIB)
-        if file.startswith("<frozen importlib") or (inner != file and inner.startswith(_OWN_USE)):
-            return False
-        if file != __file__ and (inner == file or "-packages" in inner):
-            return True
-        frame = frame.f_back
-    return False
-
-
-def watch_chance(told: Callable[[str, Any], None]) -> Callable[[], None]:
-    """Tells when the subject reads a clock or draws what nobody seeded, as far as Python does it; returns what is to be
-    asked once more at the end."""
-
-    def outer(inner: Callable[..., Any], what: str, most: int | None = None) -> Callable[..., Any]:
-        def call(*arguments: Any, **named: Any) -> Any:
-            if (most is None or len([a for a in arguments if a is not None]) <= most) and _asked():
-                told("outside", what)
-            return inner(*arguments, **named)
-
-        return functools.wraps(inner)(call)
-
-    clock, chance = "the clock", "random numbers"
-    for name in _CLOCKS:
-        setattr(time, name, outer(getattr(time, name), clock))
-        setattr(time, f"{name}_ns", outer(getattr(time, f"{name}_ns"), clock))
-    for name, most in _NOW.items():
-        setattr(time, name, outer(getattr(time, name), clock, most))
-    for name in ("clock_gettime", "clock_gettime_ns"):
-        setattr(time, name, outer(getattr(time, name), clock))
-    _watch_dates(lambda: told("outside", clock))
-    for module, names in ((os, ("urandom", "getrandom")), (posix, ("urandom", "getrandom")), (random, ("_urandom",))):
-        for name in names:
-            setattr(module, name, outer(getattr(module, name), chance))
-    for name in ("times", "getloadavg"):
-        setattr(os, name, outer(getattr(os, name), clock))
-    seed, set_state = random.Random.seed, random.Random.setstate
-    shared = random._inst
-    started: list[Any] = [random.Random.getstate(shared)]
-
-    def drawn() -> None:
-        if started and random.Random.getstate(shared) != started[0]:
-            told("outside", chance)
-
-    def seeded(own: random.Random, a: Any = None, version: int = 2) -> None:
-        if a is None and _asked():
-            told("outside", chance)
-        if own is shared and a is not None:
-            drawn()
-            started.clear()
-        seed(own, a, version)
-
-    def restored(own: random.Random, state: Any) -> None:
-        if own is shared:
-            drawn()
-            started.clear()
-        set_state(own, state)
-
-    for name, function in (("seed", seeded), ("setstate", restored)):
-        setattr(random.Random, name, function)
-        setattr(random, name, getattr(shared, name))
-    return drawn
-
-
-def _watch_dates(told: Callable[[], None]) -> None:
-    """`datetime.now` asks the system by itself; a class in its place tells, and stands for it wherever one looks."""
-    real: Any = datetime.datetime
-
-    class Meta(type):
-        def __instancecheck__(cls, instance: Any) -> bool:
-            return isinstance(instance, real)
-
-        def __subclasscheck__(cls, subclass: type) -> bool:
-            return issubclass(subclass, real)
-
-    class Watched(real, metaclass=Meta):  # type: ignore[misc]
-        __slots__ = ()
-
-        @classmethod
-        def now(cls, tz: Any = None) -> Any:
-            if _asked():
-                told()
-            return super().now(tz)
-
-        @classmethod
-        def utcnow(cls) -> Any:
-            if _asked():
-                told()
-            return super().utcnow()
-
-    Watched.__name__, Watched.__qualname__, Watched.__module__ = "datetime", "datetime", "datetime"
-    datetime.datetime = Watched  # type: ignore[misc]
 
 
 def accepted(function: Any) -> frozenset[str] | None:
@@ -413,6 +284,7 @@ def _told(error: BaseException) -> str:
 def main() -> None:
     path, function, root, level = sys.argv[1:5]
     source, sink, mark = int(sys.argv[5]), int(sys.argv[6]), sys.argv[7]
+    sys.argv[:], sys.orig_argv[:] = [path], [sys.executable, path]  # the same at every run
     look = posix.access  # without an audit event: for whoever traces system calls
     with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
         read_sources_only(os.path.realpath(root))

@@ -30,7 +30,9 @@ class Seen(StrEnum):
     LISTING = "listing"
     """A folder; the digest is of the names in it."""
     STATE = "state"
-    """Looked at, not opened: whether it is there, its size and whether it is a folder."""
+    """Looked at, not opened: besides its kind, its size and its mode."""
+    KIND = "kind"
+    """Whether it is there, whether it is a file, a folder or a link, and where a link points to."""
     OUTSIDE = "outside"
     """Something whose content cannot be recorded: the network, another program, a device. The digest is empty."""
 
@@ -58,11 +60,21 @@ def look(kind: Seen, path: str) -> str:
                 return digest(json.dumps(sorted(n for n in os.listdir(path) if n != "__pycache__")))  # noqa: PTH208
             case Seen.STATE:
                 size = "" if stat.S_ISDIR(info.st_mode) else str(info.st_size)
-                return digest(f"{stat.S_IFMT(info.st_mode)} {size}")
+                return digest(f"{info.st_mode} {size} {_link(path)}")
+            case Seen.KIND:
+                return digest(f"{stat.S_IFMT(info.st_mode)} {_link(path)}")
             case Seen.OUTSIDE:
                 return ""
     except (OSError, ValueError):
-        return "" if kind in (Seen.MISSING, Seen.OUTSIDE) else "gone"
+        return _link(path) if kind in (Seen.MISSING, Seen.OUTSIDE) else "gone"
+
+
+def _link(path: str) -> str:
+    """Where a link points to; empty: it is none."""
+    try:
+        return digest(os.fsencode(os.readlink(path)).hex())  # noqa: PTH115
+    except (OSError, ValueError):
+        return ""
 
 
 def recorded(events: Iterable[tuple[str, str]]) -> tuple[Observed, ...]:
@@ -81,15 +93,17 @@ def _kind(event: str, path: str) -> Seen | None:
     if _of_python(path):
         return None
     if f"{path}/".startswith(("/proc/", "/sys/")):
-        return None if event == "state" else Seen.OUTSIDE
+        return None if event in ("state", "kind") else Seen.OUTSIDE
     try:
         mode = os.stat(path).st_mode  # noqa: PTH116
     except (OSError, ValueError):
         return Seen.MISSING
     if stat.S_ISDIR(mode):
-        return Seen.LISTING if event in ("read", "list") else Seen.STATE
+        return Seen.LISTING if event in ("read", "list") else Seen.STATE if event == "state" else Seen.KIND
     if event == "state":
         return Seen.STATE
+    if event in ("kind", "link"):
+        return Seen.KIND
     if stat.S_ISREG(mode):
         return Seen.READ
     return None if path in _EMPTY else Seen.OUTSIDE

@@ -56,6 +56,9 @@ if (here / "boost").exists():
 extra = sum(1 for name in os.listdir(here / "plugins"))
 later = len(glob.glob(str(here / "many" / "*.txt")))
 size = os.path.getsize(here / "size.bin")
+sizes = [entry.stat().st_size for entry in os.scandir(here / "sized")]
+allowed = os.access(here / "mode.txt", os.X_OK), (here / "mode2.txt").stat().st_mode
+chosen = os.path.realpath(here / "chosen"), os.readlink(here / "dangling")
 import sys
 sys.path.insert(0, str(here / "vendor"))
 import vendored
@@ -78,6 +81,9 @@ FILES = {
     "models/plugins/a.py": "",
     "models/many/a.txt": "",
     "models/size.bin": "xx",
+    "models/sized/a": "xx",
+    "models/mode.txt": "",
+    "models/mode2.txt": "",
     "models/vendor/vendored.py": "ON = True\n",
 }
 
@@ -94,12 +100,16 @@ CHANGES = {
     "a listed folder": ("models/plugins/b.py", ""),
     "a globbed folder": ("models/many/b.txt", ""),
     "a file's size": ("models/size.bin", "xxx"),
+    "the size of an entry": ("models/sized/a", "xxx"),
     "a folder put on the path": ("models/vendor/vendored.py", "ON = False\n"),
     "a module that comes first": ("models/json.py", "def loads(text): return {'top': 0}\n"),
     "a package in place of a namespace": ("models/space/__init__.py", "ON = False\n"),
     "a file outside": ("../../outside.txt", "other"),
     "the subject": ("models/limiter.py", "def step(wish): return 0\n"),
 }
+
+
+LINKS = {"models/chosen": "mode.txt", "models/dangling": "nowhere"}
 
 
 @pytest.fixture(scope="module")
@@ -112,6 +122,8 @@ def settled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Workspace, Work]:
     for name, text in {**FILES, "models/limiter.py": subject}.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
+    for name, target in LINKS.items():
+        (folder / name).symlink_to(target)
     work = method(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(SANDBOX, "off")  # a sealed one would not see the file outside, which lies under /tmp
@@ -142,6 +154,30 @@ def test_a_change_of_it_makes_stale_and_the_old_state_is_known_again(
     finally:
         path.unlink() if before is None else path.write_text(before)
     assert not open_obligations(workspace, method(folder), Run("fourth", False))
+
+
+@pytest.mark.parametrize("name", ["models/mode.txt", "models/mode2.txt"])
+def test_another_mode_makes_stale(settled: tuple[Workspace, Work], name: str) -> None:
+    workspace, _ = settled
+    folder = workspace.contracts / "robot"
+    mode = (folder / name).stat().st_mode
+    (folder / name).chmod(mode ^ 0o100)
+    assert open_obligations(workspace, method(folder), Run("third", False))
+    (folder / name).chmod(mode)
+    assert not open_obligations(workspace, method(folder), Run("fourth", False))
+
+
+@pytest.mark.parametrize("name", LINKS)
+def test_another_target_of_a_link_makes_stale(settled: tuple[Workspace, Work], name: str) -> None:
+    """Of one with the same content, and of one that is not there."""
+    workspace, _ = settled
+    path = workspace.contracts / "robot" / name
+    path.unlink()
+    path.symlink_to("mode2.txt" if name == "models/chosen" else "elsewhere")
+    assert open_obligations(workspace, method(workspace.contracts / "robot"), Run("third", False))
+    path.unlink()
+    path.symlink_to(LINKS[name])
+    assert not open_obligations(workspace, method(workspace.contracts / "robot"), Run("fourth", False))
 
 
 def test_a_file_that_goes_makes_stale(settled: tuple[Workspace, Work]) -> None:
@@ -231,6 +267,34 @@ UNRECORDABLE = {
     "the network": "import socket\nsocket.socket(socket.AF_UNIX).close()\ntop = 10\n",
     "a library": "import ctypes\nctypes.CDLL(None).getpid()\ntop = 10\n",
     "a device": "open('/dev/full', 'rb').close()\nopen('/proc/self/stat').close()\ntop = 10\n",
+    "SQLite's clock": "import sqlite3\n"
+    "sqlite3.connect(':memory:').execute(\"select strftime('%s','now')\")\ntop = 10\n",
+    "the clock of a log": "import logging\nlogging.LogRecord('a', 1, 'b', 1, 'm', (), None).created\ntop = 10\n",
+    "the time of a file of its own": "import os, tempfile\np = tempfile.mkstemp()[1]\nos.stat(p).st_mtime\ntop = 10\n",
+    "the time of an open file": "import os\nf = open(__file__)\nos.fstat(f.fileno())[8]\ntop = 10\n",
+    "the time of an entry": "import os\n[e.stat().st_mtime_ns for e in os.scandir('.')]\ntop = 10\n",
+    "the time by path": "import os\nos.path.getmtime(__file__)\ntop = 10\n",
+    "the time of a process": "import pathlib\npathlib.Path('/proc/self').stat().st_ctime\ntop = 10\n",
+    **{
+        call: f"import os, platform, posix, pwd, resource, shutil, uuid\n{call}\ntop = 10\n"
+        for call in (
+            "os.uname().nodename",
+            "posix.uname()",
+            "platform.node()",
+            "os.statvfs('/')",
+            "shutil.disk_usage('.')",
+            "os.getpid()",
+            "os.sched_getaffinity(0)",
+            "os.cpu_count()",
+            "os.nice(0)",
+            "os.umask(0o22)",
+            "os.getuid()",
+            "os.listxattr('.')",
+            "pwd.getpwuid(0)",
+            "resource.getrlimit(resource.RLIMIT_NOFILE)",
+            "resource.getrusage(0)",
+        )
+    },
     "a pipe": "import os\nos.close(os.open('pipe', os.O_RDONLY | os.O_NONBLOCK))\ntop = 10\n",
 }
 
@@ -260,6 +324,11 @@ SEEN_THROUGH = {
     "times that are given": "import time\ntop = 10 if time.strftime('%Y', time.gmtime(0)) == '1970' else 1000\n",
     "days that are given": "import datetime\nd = datetime.datetime(2020, 1, 1)\n"
     "assert isinstance(d, datetime.datetime)\nassert isinstance(d + datetime.timedelta(1), datetime.date)\ntop = 10\n",
+    "what the library knows of a file": "import os, pathlib, shutil, tempfile, linecache, platform, sys\n"
+    "assert isinstance(os.stat('.'), os.stat_result) and len(os.stat('.')) == 10 and sys.argv == [__file__]\n"
+    "d = tempfile.mkdtemp()\nshutil.copy2(__file__, d)\nassert os.path.samefile(d, d)\n"
+    "assert [n for _, _, n in os.walk(d)] and list(pathlib.Path(d).rglob('*.py')) and os.path.ismount('/')\n"
+    "linecache.checkcache()\nlinecache.getlines(__file__)\nassert platform.system()\ntop = 10\n",
     "what the library does for itself": "import logging, tempfile, threading, queue, uuid, random\n"
     "logging.getLogger().warning('x')\ntempfile.TemporaryFile().close()\n"
     "t = threading.Thread(target=queue.Queue().put, args=(1,))\nt.start()\nt.join(5)\ntop = 10\n",
