@@ -6,7 +6,7 @@ The engine's proofs are hints for `avow.calculus.finder`; certificates kept from
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -110,6 +110,25 @@ class Certificates:
         ]
         established = [one for one in found if one is not None]
         return established if established and len(established) == len(found) else None
+
+    def beginnings(self, nodes: Collection[str]) -> tuple[str, ...]:
+        """What the environment is assumed to be where the outputs of some nodes have first values only so: none, where
+        they have them whatever its constant inputs are. Raises Refused where even then they may have none."""
+        known = self.known.every
+        initials = (s for s in known if s.kind is Kind.INITIAL and s.node in nodes)
+        marks = tuple(s.digest for s in initials if any(place.node is None for place in s.places.values()))
+        given = [s for s in known if s.kind is Kind.ENVIRONMENT]
+        for assumed in ([], given) if given else ([],):
+            entries = tuple(Entry(How.ENVIRONMENT, s.node, s.digest) for s in assumed)
+            kernel = Kernel(self.known, Certificate("beginning", entries), self.solvers)
+            try:
+                tuple(kernel.begins(Question(tuple(Use(k) for k in range(len(entries))), marks), 1))
+            except Refused:
+                if assumed or not given:
+                    raise
+            else:
+                return tuple(s.called for s in assumed)
+        return ()
 
     def parts(self, name: str) -> list[list[Statement]]:
         """The claims of an obligation that something is possible: of each part, those of which one is enough."""

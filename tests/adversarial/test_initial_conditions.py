@@ -97,3 +97,21 @@ def test_two_of_one_output_are_taken_together(tmp_path: Path) -> None:
     entry = Entry(How.SHOWN, "", claim.digest, (), (Question((), marks),), Question((Use(0, 1),)))
     with pytest.raises(Refused, match="first value"):
         Kernel(known, Certificate("requirement R", (entry,)), certificates.solvers).establish(0)
+
+
+@pytest.mark.parametrize(
+    ("initial", "assume", "verdict"),
+    [
+        ("out.d < in.k", "", Verdict.UNKNOWN),
+        ("out.d < in.k", "in.k > 0", Verdict.PROVED),
+        ("out.d == in.k", "", Verdict.PROVED),
+    ],
+)
+def test_a_loop_starts_whatever_the_constants_are(tmp_path: Path, initial: str, assume: str, verdict: Verdict) -> None:
+    text = node("n", "k : NATURAL, u : NATURAL", "d : NATURAL", "G: out.d == in.u")
+    plan = f"connections: [{{from: n.d, to: n.u, delayed: true, initial: '{initial}'}}]\n"
+    assumed = f", assume: '{assume}'" if assume else ""
+    plan += f"environment: {{n.k: {{constant: true, because: a setting{assumed}}}}}\n"
+    found = outcomes(make(tmp_path, text, plan))["start.n"]
+    assert found.verdict is verdict
+    assert bool(found.hypotheses) is bool(assume)
