@@ -164,6 +164,7 @@ class Subject:
             "PYTHONPATH": process.python_path(),
             "PYTHONHASHSEED": "0",
             "LANG": "C.UTF-8",
+            "TZ": "UTC",
         }
         if self.isolation is Isolation.SEALED:
             environment["TMPDIR"] = _SCRATCH
