@@ -212,7 +212,7 @@ def test_no_certificate_of_what_was_shows_what_is_false_now(tmp_path: Path) -> N
     assert sum(kept(tmp_path, seed) for seed in range(12)) > 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_certificate_of_what_was_shows_what_is_false_now_at_length(tmp_path: Path) -> None:
     assert sum(kept(tmp_path, seed) for seed in range(100, 400)) > 20
 
@@ -226,6 +226,6 @@ def test_nothing_proved_is_false(tmp_path: Path) -> None:
     assert sum(judged(tmp_path, seed) for seed in range(5)) > 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_nothing_proved_is_false_at_length(tmp_path: Path) -> None:
     assert sum(judged(tmp_path, seed) for seed in range(100, 280)) > 12

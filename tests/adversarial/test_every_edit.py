@@ -120,7 +120,7 @@ def every(root: Path) -> list[tuple[str, str]]:
     return random.Random(0).sample(found, min(TIMES, len(found)))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_edit_changes_nothing_or_is_told(whole: Path, tmp_path: Path) -> None:
     before = said(whole)
     wrong = []

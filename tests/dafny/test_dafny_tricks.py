@@ -132,7 +132,7 @@ TRICKS = {
 
 
 @pytest.mark.needs_dafny
-@pytest.mark.slow  # each costs some seconds of Dafny; what the scanner says of each is tested for all, below
+@pytest.mark.nightly  # each costs some seconds of Dafny; what the scanner says of each is tested for all, below
 @pytest.mark.parametrize("name", TRICKS)
 def test_no_trick_is_proved(make_job: MakeJob, tmp_path: Path, name: str) -> None:
     outcomes = settle(make_job, tmp_path, TRICKS[name])
@@ -216,7 +216,7 @@ DECOYS = {
 @pytest.mark.needs_dafny
 @pytest.mark.parametrize(
     "name",
-    [n if n == "a clause" else pytest.param(n, marks=pytest.mark.slow) for n in DECOYS],
+    [n if n == "a clause" else pytest.param(n, marks=pytest.mark.nightly) for n in DECOYS],
 )
 def test_no_decoy_hides_what_env_adds(make_job: MakeJob, tmp_path: Path, name: str) -> None:
     """`high` is false of this lamp; it can be proved only under the real Env, and then that is a hypothesis."""

@@ -65,7 +65,7 @@ def test_generated_contracts(written: Callable[[int], str]) -> None:
     assert told["no text"] < told.total() / 10
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs_cvc5
 @pytest.mark.parametrize("written", [lambda seed: Contracts(seed).text(), random_contract], ids=["types", "cases"])
 def test_generated_contracts_at_length(written: Callable[[int], str]) -> None:

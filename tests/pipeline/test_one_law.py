@@ -192,7 +192,7 @@ def test_the_law_after_a_ledger_was_rolled_back(tmp_path: Path) -> None:
     assert said == world.verify("--fresh") == world.verify()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(int(os.environ.get("AVOW_WALKS", "2"))))
 def test_the_law_on_random_walks(tmp_path: Path, seed: int) -> None:
     hold(tmp_path / "w", 100 + seed, 6, float(os.environ.get("AVOW_WALK_SECONDS", "90")))

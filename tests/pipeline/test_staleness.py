@@ -442,7 +442,7 @@ FILES: dict[str, tuple[str, str]] = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_each_file_of_the_case_study_reruns_who_looks_at_it(tmp_path: Path) -> None:
     """Programs, data of experiments, review records and what was reviewed, traces: each method of exactly those."""
     folder = copied(SHIPPED, tmp_path)

@@ -132,7 +132,7 @@ def test_every_mark_that_a_report_shows_is_known() -> None:
     assert unexplained(found, made) == set()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("folder", REPORTS, ids=lambda folder: folder.name)
 def test_every_mark_of_the_shipped_systems_reports_is_known(folder: Path) -> None:
     found = read_case(folder)

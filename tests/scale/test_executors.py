@@ -298,7 +298,7 @@ def test_a_cluster_records_the_same_also_where_a_worker_is_killed(place: Workspa
         cluster.close()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(3))
 def test_workers_killed_at_any_time_lose_nothing_and_leave_nothing(
     place: Workspace, machines: Machines, seed: int

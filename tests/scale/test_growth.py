@@ -33,7 +33,7 @@ def compose(system: System) -> None:
     assert all(name.endswith(("one-output", "environment.root.a0")) for name in open_), open_
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("shape", [chain, fan])
 @pytest.mark.parametrize(("work", "few"), [(catalogue, 50), (compose, 30)], ids=["catalogue", "compose"])
 def test_four_times_the_nodes_cost_at_most_five_times(

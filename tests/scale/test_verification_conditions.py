@@ -28,7 +28,7 @@ def jobs(folder: Path) -> list[Job]:
     return [method_job(system, system.contract.node(w.node), planned_method(w)) for w in works]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_condition_takes_three_checks_and_little_more_than_z3_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -173,7 +173,7 @@ SMALL = ("in.count: 7", "in.count: 2")
 PUBLISHED = (SHIPPED_R1_4, PUBLISHED_R1_4)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["R1", "R1_kept"])
 def test_with_the_published_margin_avow_finds_the_run_to_an_empty_battery(tmp_path: Path, name: str) -> None:
     """The solver builds no map; the search over the plan's scenario needs none built."""
@@ -201,7 +201,7 @@ def test_the_charges_of_the_scenario_are_a_step_apart() -> None:
         assert tuple(int(row["cell"]) for row in csv.DictReader(file)) == MISSION
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_step_on_the_grid_is_looked_at() -> None:
     """But of the charges that the contract allows only those of the table: so it is no exhaustive check."""
     for name in ("R1_grid", "PLANS_grid"):
@@ -223,7 +223,7 @@ FREE_MOVES = "(in.step(out.planC(k), out.planC(k + 1)) and in.free(out.planC(k))
 SHORTEST = "in.away(out.planC(k), in.charger) + k == out.lengthC"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "faults"),
     [
