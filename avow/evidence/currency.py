@@ -43,9 +43,15 @@ def as_of_now(ledger: Ledger, root: Path) -> tuple[Entry, ...]:
     return tuple(
         entry
         if stands(entry.evidence, root) and not outlived(entry, refutations(ledger, entry))
-        else replace(entry, evidence=replace(entry.evidence, key=digest(f"changed since: {entry.hash}")))
+        else changed_since(entry)
         for entry in ledger.records()
     )
+
+
+def changed_since(entry: Entry) -> Entry:
+    """The entry of a record whose inputs are others now, or that a later refutation outlived: with a key that is
+    nobody's."""
+    return replace(entry, evidence=replace(entry.evidence, key=digest(f"changed since: {entry.hash}")))
 
 
 def not_established(entry: Entry) -> Entry:

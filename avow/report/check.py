@@ -21,12 +21,11 @@ from avow.assurance.signed import KEYS
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Rejected
 from avow.base.files import digest, digest_file
-from avow.base.verdict import Verdict
 from avow.calculus.certificate_json import from_json as certificate
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import reestablished
-from avow.evidence.currency import not_established
+from avow.evidence.currency import as_of_now, changed_since, not_established
 from avow.evidence.envelope import unseal_lines
 from avow.evidence.ledger import Ledger
 from avow.report import ATTESTATION, LeftOut, formats
@@ -48,7 +47,7 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
         return (f"report.json is no case: {error}",)
     keys = sorted((root / "signed" / KEYS).glob("*.pub")) if root is not None else []
     found = [*_conclusions(case), *_texts(case), *_formats(case, folder, keys)]
-    found += ["there is no ledger to compare with"] if ledger is None else _ledger(case, ledger)
+    found += ["there is no ledger to compare with"] if ledger is None else _ledger(case, ledger, root)
     if root is not None:
         found += [*_sources(case, root), *_kernel(case, root)]
     elif case.kernel.established:
@@ -115,7 +114,7 @@ def _formats(case: Case, folder: Path, keys: Sequence[Path]) -> Iterable[str]:
             yield f"{name} is not what the case in report.json renders to"
 
 
-def _ledger(case: Case, ledger: Ledger) -> Iterable[str]:
+def _ledger(case: Case, ledger: Ledger, root: Path | None) -> Iterable[str]:
     try:
         entries = ledger.records()
     except OSError as error:
@@ -124,15 +123,16 @@ def _ledger(case: Case, ledger: Ledger) -> Iterable[str]:
     for damage in ledger.damage:
         yield f"ledger line {damage.line} {damage.reason}"
     known = {entry.hash: entry for entry in entries}
+    now = {entry.hash: entry for entry in (as_of_now(ledger, root) if root is not None else entries)}
     quoted = {item.entry.hash: item.entry for view in case.obligations for item in view.evidence}
     quoted |= {entry.hash: entry for entry in case.orphans}
     for mark, entry in quoted.items():
         where = f"record {entry.number + 1} ({entry.evidence.obligation}, {entry.evidence.method})"
         if mark not in known:
             yield f"the report quotes {where}, which the ledger does not hold"
-        elif known[mark] != entry and not (
-            # a proof that counts no more makes nothing look better
-            entry.evidence.verdict is Verdict.PROVED and entry == not_established(known[mark])
+        elif entry not in (known[mark], now[mark]) and not (
+            # what supports and counts no more makes nothing look better
+            entry.evidence.verdict.supports and entry in (not_established(known[mark]), changed_since(known[mark]))
         ):
             yield f"the report quotes {where} otherwise than the ledger has it"
     newer = [entry for mark, entry in known.items() if mark not in quoted]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +13,8 @@ from helpers import some
 
 from avow.assurance.codec import from_json
 from avow.base.verdict import Verdict
-from avow.evidence.currency import not_established
-from avow.evidence.ledger import Ledger
+from avow.evidence.currency import changed_since, not_established
+from avow.evidence.ledger import Entry, Ledger
 from avow.report import render_all
 from avow.report.check import _ledger, check
 
@@ -145,15 +146,19 @@ def test_a_fact_that_no_other_format_shows_cannot_be_edited_either(place: Path) 
     assert any("index.html" in line for line in found(place))
 
 
-def test_a_proof_that_counts_no_more_is_quoted_so_and_a_refutation_is_not(made: Path) -> None:
-    """Of a proof that the kernel does not establish any more the report says so; nothing else may be told away."""
+@pytest.mark.parametrize("no_more", [not_established, changed_since])
+def test_what_counts_no_more_is_quoted_so_and_a_refutation_is_not(
+    made: Path, no_more: Callable[[Entry], Entry]
+) -> None:
+    """Of a proof that the kernel does not establish any more, and of evidence whose inputs are others now, the report
+    says so; a refutation may not be told away."""
     ledger = Ledger(made / "rover.jsonl")
     honest = from_json(json.loads((made / "report/report.json").read_text()))
     for entry in ledger.records():
         views = tuple(
-            replace(v, evidence=tuple(replace(i, entry=not_established(entry)) for i in v.evidence if i.entry == entry))
+            replace(v, evidence=tuple(replace(i, entry=no_more(entry)) for i in v.evidence if i.entry == entry))
             for v in honest.obligations
         )
-        told = [line for line in _ledger(replace(honest, obligations=views), ledger) if "otherwise" in line]
+        told = [line for line in _ledger(replace(honest, obligations=views), ledger, made) if "otherwise" in line]
         quoted = any(i.entry == entry for v in honest.obligations for i in v.evidence)
-        assert bool(told) == (quoted and entry.evidence.verdict is not Verdict.PROVED)
+        assert bool(told) == (quoted and not entry.evidence.verdict.supports)
