@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
-import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from datetime import date
+from itertools import combinations
 
 from avow.assurance.facts import Facts
 from avow.assurance.model import Currency, EvidenceView, MethodInfo, ObligationView, Suggestion
 from avow.assurance.policy import Demand, Policy, asked_of, costs
 from avow.base.graphs import components
+from avow.base.persons import one_person
 from avow.base.verdict import Link, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.record import SIGNED_BY, Evidence
@@ -31,7 +31,7 @@ def shortfall(view: ObligationView, demand: Demand, policy: Policy, today: date)
     for item in evidence:
         reason = _disregarded(item, demand, policy, today)
         if reason is None and effective(item) is Verdict.REVIEWED and len(persons) < demand.reviewers > 1:
-            reason = f"reviewed by {len(persons)}, {demand.reviewers} reviewers are asked"
+            reason = f"reviewed by {len(persons)}, {demand.reviewers} reviewers are asked{_taken_for_one(persons)}"
         if reason is None:
             kept.append(item)
         elif weigh(item).support is not None:
@@ -82,33 +82,27 @@ def reviewers(evidence: Evidence) -> tuple[str, ...]:
     return ()
 
 
-def person(name: str) -> str:
-    """One spelling of a name: case, accents, punctuation and the order of its parts make no other person; neither does
-    an initial in place of a first name, so that of several first names only initials count."""
-    plain = "".join(c for c in unicodedata.normalize("NFKD", name.casefold()) if not unicodedata.combining(c))
-    family, comma, given = plain.partition(",")
-    words = re.findall(r"\w+", f"{given} {family}" if comma else plain)
-    return " ".join((words[0][:1], words[-1])) if len(words) > 1 else " ".join(words)
-
-
-def _persons(evidence: Iterable[Evidence], demand: Demand, policy: Policy, today: date) -> set[str]:
-    """Whoever reviewed the claim, in one record or in several that each count; a name is one however it is spelled, and
-    a key is one person's whatever names it signs."""
+def _persons(evidence: Iterable[Evidence], demand: Demand, policy: Policy, today: date) -> list[list[str]]:
+    """Whoever reviewed the claim, in one record or in several that each count, each under all names taken for one; a
+    key is one person's whatever names it signs."""
     reviews = [
         item
         for item in evidence
         if weigh(item).support is Status.REVIEWED and _disregarded(item, demand, policy, today) is None
     ]
-    names = {person(name) for item in reviews for name in reviewers(item)}
-    keys = {str(item.details[SIGNED_BY]) for item in reviews if SIGNED_BY in item.details}
-    held = [
-        (person(name), str(item.details[SIGNED_BY]))
-        for item in reviews
-        if SIGNED_BY in item.details
-        for name in reviewers(item)
-    ]
-    arcs = [*held, *((key, name) for name, key in held)]
-    return {min(names & set(one)) for one in components([*names, *keys], arcs) if names & set(one)}
+    held = [(name, str(item.details.get(SIGNED_BY, ""))) for item in reviews for name in reviewers(item)]
+    names, keys = {name for name, _ in held}, {key for _, key in held if key}
+    arcs = [(name, f"key {key}") for name, key in held if key]
+    arcs += [pair for pair in combinations(sorted(names), 2) if one_person(*pair)]
+    both = [*arcs, *((b, a) for a, b in arcs)]
+    found = components([*names, *(f"key {key}" for key in keys)], both)
+    return [sorted(names & set(one)) for one in found if names & set(one)]
+
+
+def _taken_for_one(persons: list[list[str]]) -> str:
+    several = [" and ".join(f"'{name}'" for name in names) for names in persons if len(names) > 1]
+    told = ", ".join(several)
+    return f": {told} are taken for one person; where they are not, write full names that differ" if several else ""
 
 
 def age_days(evidence: Evidence, today: date) -> int | None:

@@ -90,4 +90,10 @@ CODES = register(
         "The signature of a record cannot be written beside it.",
         "Make the folder writable, or sign a copy elsewhere.",
     ),
+    declare(
+        "REV124",
+        "name that looks like another",
+        "A reviewer's name holds an invisible character, mixes scripts, or has no letters.",
+        "Write it in the letters of one script.",
+    ),
 )

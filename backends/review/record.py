@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.persons import unreadable
 from avow.system.schema import suggest
 from avow.system.strict_yaml import Piece, read_yaml
 
@@ -112,6 +113,9 @@ class _RecordReader:
             raise Rejected(Diagnostic("REV111", f"format {form.text} is not known here; this is {FORMAT}", form.span))
         system, node = self.text("system", top, ""), self.text("node", top, "")
         reviewer, role = self.text("reviewer", top), self.text("role", top)
+        if reviewer and (why := unreadable(reviewer)):
+            hint = "write the name in the letters of one script"
+            self.add("REV124", f"nobody can tell this reviewer's name: {why}", top["reviewer"].span, hint)
         date, valid_until = self.date("date", top), self.date("valid_until", top, optional=True)
         if date and valid_until and valid_until < date:
             self.add("REV112", "the review expires before its own date", top["valid_until"].span)
