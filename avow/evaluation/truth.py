@@ -26,6 +26,17 @@ def judge(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) ->
     return replay([term], {v: valuation[v.qualified] for v in sorts.values()}, effort=effort)
 
 
+def judge_open(term: Term, valuation: Mapping[str, Value], *, effort: int = 5_000) -> bool | None:
+    """Whether the formula holds of the values, whatever those are that the valuation leaves out; None where that
+    depends on them, or where Z3 cannot tell."""
+    from avow.solving.questions import opaque_sorts, replay
+
+    if opaque_sorts(term):  # how many elements they have is not known
+        return None
+    known = {v: valuation[v.qualified] for v in _free_sorts(term).values() if v.qualified in valuation}
+    return replay([term], known, effort=effort)
+
+
 def _free_sorts(term: Term) -> dict[str, Variable]:
     """The inputs and outputs that a formula mentions, by qualified name."""
     found: dict[str, Variable] = {}

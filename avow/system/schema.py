@@ -171,8 +171,12 @@ def _explain(error: Any, root: Piece, whole: str) -> Iterator[Diagnostic]:
             hint = None
             if isinstance(error.instance, str) and "boolean" in kinds:
                 hint = "write true or false (yes, no, on and off are plain words here)"
-            elif isinstance(error.instance, int | float | bool) and "string" in kinds:
+            elif isinstance(error.instance, int | float | bool) and "string" in kinds and "pattern" not in error.schema:
                 hint = "put it in quotes"
+            if "pattern" in error.schema and about:
+                message = f"{where}: {about} is wanted, not {_show(error.instance)}"
+                yield Diagnostic("PLAN105", message, piece.span)
+                return
             yield Diagnostic(
                 "PLAN105", f"{where}: {names} is wanted, not {_show(error.instance)}{wanted}", piece.span, hint=hint
             )
@@ -183,6 +187,7 @@ def _explain(error: Any, root: Piece, whole: str) -> Iterator[Diagnostic]:
         case "oneOf" | "anyOf":
             ways = _alternatives(error.validator_value)
             fitting = [e for e in error.context if not _another_kind(e, error)]
+            fitting = _nearest(fitting, error)
             if not error.context:
                 yield Diagnostic("PLAN105", f"{where}: either {ways} is wanted, not both{wanted}", piece.span)
             elif not fitting:
@@ -205,6 +210,18 @@ def _another_kind(inner: Any, outer: Any) -> bool:
     alternative = outer.validator_value[at]
     kinds = alternative.get("type", []) if isinstance(alternative, dict) else []
     return inner.validator == "type" and list(inner.absolute_path) == list(outer.absolute_path) and bool(kinds)
+
+
+def _nearest(errors: list[Any], outer: Any) -> list[Any]:
+    """What is wrong with the alternative that all the keys fit which are written, where there is just one."""
+
+    def at(inner: Any) -> Any:
+        return list(inner.absolute_schema_path)[len(list(outer.absolute_schema_path))]
+
+    own = [e for e in errors if list(e.absolute_path) == list(outer.absolute_path)]
+    strange = {at(e) for e in own if e.validator in ("additionalProperties", "required")}
+    near = [e for e in errors if at(e) not in strange]
+    return near if len({at(e) for e in near}) == 1 else errors
 
 
 def _alternatives(schemas: Iterable[Any]) -> str:

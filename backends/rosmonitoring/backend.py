@@ -25,8 +25,9 @@ if TYPE_CHECKING:
     from avow.language.contract import Node
     from avow.system.plan import System
 
-    from .engine import Monitor, Violation
+    from .engine import Monitor
     from .options import Setup
+    from .watched import Violation
 
 
 class RosMonitoringBackend(Backend):
@@ -181,7 +182,7 @@ class _Run:
         self.mapping_faults = 0
 
     def note(self, violations: Iterable[Violation]) -> None:
-        from .engine import Fault
+        from .watched import Fault
 
         for violation in violations:
             self.mapping_faults += violation.fault is Fault.MAPPING
@@ -230,7 +231,7 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
 
 def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]) -> Outcome:
     """`names`: what the guarantee speaks of."""
-    from .engine import Fault
+    from .watched import Fault
 
     tallies = [run.monitor.tallies[name] for run in runs]
     judged = sum(t.judged for t in tallies)
@@ -243,6 +244,7 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
         "traces": {run.name: run.digest for run in runs},
     }
     unpaired = any(t.unpaired for t in tallies)
+    backwards = next((f"{run.name}: {run.monitor.backwards}" for run in runs if run.monitor.backwards), "")
     for run in runs:
         broken = run.first.get(f"{Fault.GUARANTEE.name}/{name}")
         if broken is not None:
@@ -250,8 +252,9 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
             told = f"event {broken.index}{when} of {run.name}: {broken.explanation}"
             shown = Counterexample((*broken.bindings, *broken.values), told)
             summary = f"broken at event {broken.index} of {run.name}: {broken.explanation}"
-            if unpaired:
-                return Outcome(obligation, Verdict.UNKNOWN, f"{_UNPAIRED}: {summary}", shown, bound=bound)
+            if unpaired or backwards:
+                text = f"{backwards or _UNPAIRED}: {summary}"
+                return Outcome(obligation, Verdict.UNKNOWN, text, shown, bound=bound)
             return Outcome(obligation, Verdict.REFUTED, summary, shown, bound=bound)
 
     def answer(verdict: Verdict, summary: str) -> Outcome:
@@ -260,6 +263,8 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
     trouble = next((run.trouble for run in runs if run.trouble), "")
     if trouble:
         return answer(Verdict.ERROR, trouble)
+    if backwards:
+        return answer(Verdict.UNKNOWN, f"no evidence: {backwards}")
     unreadable = next((v for run in runs for v in run.violations if v.fault is Fault.MAPPING), None)
     if unreadable is not None:
         return answer(Verdict.UNKNOWN, f"a message could not be read: {unreadable.text()}")
@@ -280,8 +285,11 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
         return answer(Verdict.UNKNOWN, f"never decided: {open_}" if open_ else text)
     decided = sum(t.decided for t in tallies)
     lacking = "; ".join(dict.fromkeys(coverage(t) for t in tallies))
-    if decided < runs[0].monitor.setup.decided * published:
-        return answer(Verdict.UNKNOWN, f"unmonitored: {decided} of {published} publications were decided ({lacking})")
+    asked = sum(t.asked for t in tallies)
+    if decided < runs[0].monitor.setup.decided * asked:
+        open_ = "; ".join(dict.fromkeys(t.reason for t in tallies if t.reason))
+        text = f"unmonitored: {decided} of {asked} publications were decided ({lacking})"
+        return answer(Verdict.UNKNOWN, f"{text}: {open_}" if open_ else text)
     if unpaired:
         return answer(Verdict.UNKNOWN, f"{_UNPAIRED}: held at all {judged} judgements over {events} events")
     excused = sum(t.excused for t in tallies)

@@ -16,7 +16,8 @@ from avow.system.graph import Edge, dataflow
 from avow.system.plan import System
 
 from .coverage import Tally
-from .engine import Fault, Monitor, Violation
+from .engine import Monitor
+from .watched import Fault, Violation
 
 
 @dataclass(frozen=True, slots=True)

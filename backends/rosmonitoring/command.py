@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     from avow.system.plan import System
 
-    from .engine import Violation
     from .session import Session
     from .traces import Recorded
+    from .watched import Violation
 
 
 @click.command()
@@ -119,6 +119,8 @@ def _print_summary(running: Session) -> None:
             words.append("its antecedent was never met")
         if tally.reason:
             words.append(tally.reason)
+        if monitor.backwards:
+            words.append(f"no evidence: {monitor.backwards}")
         if tally.unpaired:
             words.append("no evidence: the plan does not say which input an answer answered (`answers`)")
         click.echo(f"  {monitor.setup.node.name}.{name} ({kind}): {'; '.join(words)}")

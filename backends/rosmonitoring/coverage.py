@@ -20,8 +20,12 @@ class Tally:
     """Answers before everything that it speaks of had a value."""
     unreadable: int = 0
     """Messages with one of its outputs that could not be read."""
+    partial: int = 0
+    """Answers that were never whole, and that their parts alone do not decide."""
+    supposed: int = 0
+    """Answers that held by an initial value of the plan, before any message: neither for nor against."""
     published: int = 0
-    """Publications of its outputs: of several, of the one that was published most."""
+    """Answers: publications of its outputs, those that make one answer counted once."""
     triggered: bool = False
     """Its antecedent held at least once (or it has none)."""
 
@@ -37,12 +41,12 @@ class Tally:
     @property
     def share(self) -> float:
         """The share of what was published that was decided."""
-        return self.decided / self.published if self.published else 0.0
+        return self.decided / self.asked if self.asked else 0.0
 
     @property
-    def incomplete(self) -> int:
-        """Publications that were never part of a whole answer."""
-        return self.published - self.judged - self.order - self.early - self.unreadable
+    def asked(self) -> int:
+        """Answers that were to be decided."""
+        return self.published - self.supposed
 
     reason: str = ""
     """Why it is not judged at all, or the first reason why it was once undecided."""
@@ -58,7 +62,8 @@ def coverage(tally: Tally) -> str:
         (tally.order, "undecided which input was answered {}"),
         (tally.early, "before the first value {}"),
         (tally.unreadable, "unreadable {}"),
-        (max(0, tally.incomplete), "not part of a whole answer {}"),
+        (tally.partial, "not part of a whole answer {}"),
+        (tally.supposed, "held by the plan's initial value, before any message {}"),
     ]
     told = ", ".join(words.format(count) for count, words in parts if count)
     return f"published {tally.published} times" + (f": {told}" if told else "")

@@ -8,88 +8,28 @@ environment's door, not the node's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from fractions import Fraction
 from typing import Any
 
 from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
-from avow.evaluation.truth import judge
+from avow.evaluation.truth import judge, judge_open
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
-from avow.language.terms import Implies, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import Role
 from avow.tuning.effort import JUDGE_EFFORT
 
 from .coverage import Tally
-from .numbers import Decimal, NotANumber, exact
 from .options import Setup, same_topic
 from .pairing import EARLY, Asked, Pairing, time_of
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Hold, Previous
-from .tuning import TOPICS_KEPT
+from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
+from .watched import Fault, Violation, Watched, shorten, time_text, trigger_of
 from .wires import MappingError
-
-
-class Fault(StrEnum):
-    """What an event showed to be wrong."""
-
-    GUARANTEE = "guarantee broken: this node"
-    EXCUSED = "guarantee not met, with an assumption broken: environment"
-    ASSUMPTION = "assumption broken: environment"
-    PROVIDER = "assumption broken: by a node that provides it"
-    SILENT = "silent for longer than the plan allows"
-    MAPPING = "message outside its mapping"
-
-
-@dataclass(frozen=True, slots=True)
-class Violation:
-    """One judgement against the trace. `index` counts events from 1; `time` is the event's own, as text."""
-
-    fault: Fault
-    node: str
-    clause: str
-    index: int
-    time: str
-    values: tuple[tuple[str, str], ...]
-    bindings: tuple[tuple[str, str], ...]
-    explanation: str
-
-    def text(self) -> str:
-        about = ", ".join(f"{n} = {v}" for n, v in (*self.bindings, *self.values))
-        at = f"event {self.index}" + (f" (t = {self.time})" if self.time else "")
-        return f"{at}: {self.fault}: {self.node}.{self.clause}: {self.explanation}" + (f" [{about}]" if about else "")
-
-
-@dataclass(slots=True)
-class _Watched:
-    clause: Clause
-    names: tuple[str, ...]
-    holds: Callable[[Mapping[str, Value]], Value]
-    trigger: Callable[[Mapping[str, Value]], Value] | None
-    witness: Callable[[Mapping[str, Value]], dict[str, Value] | None]
-    tally: Tally
-    outputs: frozenset[str] = frozenset()
-    """Those that must all be published anew before it is judged: they are the parts of one answer."""
-    fresh: set[str] = field(default_factory=set)
-    """Those that have been, since it was last judged."""
-    held: tuple[tuple[str, str], ...] = ()
-    """(previous value, its source): of one of several outputs, it is the value that the answer before had, whichever
-    of the outputs comes first in this one."""
-    memory: dict[str, Value] = field(default_factory=dict)
-    """The held values."""
-    key: tuple[int, ...] | None = None
-    truth: bool | None = None
-    paired: tuple[str, ...] = ()
-    """The observed inputs that an answer has to be paired with."""
-    counts: dict[str, int] = field(default_factory=dict)
-    """Publications of each variable that makes it judged."""
-
-    def published(self, name: str) -> None:
-        self.counts[name] = self.counts.get(name, 0) + 1
-        self.tally.published = max(self.tally.published, self.counts[name])
 
 
 @dataclass(slots=True)
@@ -110,8 +50,8 @@ class Monitor:
     _versions: dict[str, int] = field(default_factory=dict)
     _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
     _previous: list[tuple[str, str]] = field(default_factory=list)
-    _clauses: dict[str, list[_Watched]] = field(default_factory=dict)
-    _assumptions: list[_Watched] = field(default_factory=list)
+    _clauses: dict[str, list[Watched]] = field(default_factory=dict)
+    _assumptions: list[Watched] = field(default_factory=list)
     _heard: dict[str, tuple[Fraction, bool]] = field(default_factory=dict)
     """When each variable with a deadline was last heard of, and whether its silence has been told."""
     _pairing: Pairing | None = None
@@ -119,7 +59,13 @@ class Monitor:
     """The observed inputs."""
     _assumed: tuple[str, ...] = ()
     """What the assumptions speak of."""
-    _constant: list[_Watched] = field(default_factory=list)
+    backwards: str = ""
+    """Where the events' times contradict the order in which they came, though the plan goes by that order."""
+    _latest: Fraction | None = None
+    _supposed: set[str] = field(default_factory=set)
+    """What has an initial value of the plan, and no message yet."""
+    _questions: int = OPEN_QUESTIONS
+    _constant: list[Watched] = field(default_factory=list)
     """Clauses that no message changes: judged once, at the first event."""
 
     def __post_init__(self) -> None:
@@ -149,6 +95,8 @@ class Monitor:
                 case Fields() | Choice():
                     self._readers.setdefault(same_topic(rule.topic), []).append((name, reader(rule)))
                     self._start(name, rule.initial)
+                    if rule.initial is not None and getattr(rule, "hold", Hold.LATEST) is Hold.LATEST:
+                        self._supposed.add(name)  # of tuples seen so far, none is what was seen
         for name, source in self._previous:
             if name not in self.values and source in self.values:
                 self.values[name] = self.values[source]
@@ -175,10 +123,12 @@ class Monitor:
         if readers is None:
             return found
         self.relevant += 1
+        self._watch_order(event)
         pairing = self._pairing
         if pairing is not None and pairing.waiting:
             self._settle(pairing.ready(time_of(event)), found)
         updated: list[str] = []
+        unreadable: dict[int, Watched] = {}
         for name, read in readers:
             self._seen.add(name)
             old = self.values.get(name)
@@ -191,10 +141,9 @@ class Monitor:
                     self._forget(name)
                     if pairing is not None and name in self._paired:
                         pairing.saw(name, event, None)
-                for watched in self._clauses.get(name, ()):
-                    watched.published(name)
-                    watched.tally.unreadable += 1
+                unreadable |= {id(watched): watched for watched in self._clauses.get(name, ())}
                 continue
+            self._supposed.discard(name)
             updated.append(name)
             if pairing is not None and name in self._paired:
                 pairing.saw(name, event, new)
@@ -203,7 +152,10 @@ class Monitor:
                 self._versions[name] += 1
         while self._constant:
             self._judge(self._constant.pop(), event, found)
-        for watched in self._due(updated):
+        for watched in unreadable.values():
+            watched.tally.published += 1
+            watched.tally.unreadable += 1
+        for watched in self._due(updated, event, found):
             if watched.paired:
                 self._ask(watched, event)
             else:
@@ -221,6 +173,19 @@ class Monitor:
                 self.values[name] = value
                 self._versions[name] += 1
         return found
+
+    def _watch_order(self, event: Mapping[str, Any]) -> None:
+        """By arrival, the order of the events is that of cause: times that run backwards say otherwise."""
+        answers = self.setup.answers
+        if answers is None or answers.by != "arrival" or self.backwards or "time" not in event:
+            return
+        now = time_of(event)
+        if self._latest is not None and now < self._latest:
+            self.backwards = (
+                f"event {self.events} has the time {show(now)} and an earlier one {show(self._latest)}: this is not "
+                "the order of cause (`answers: {by: arrival}`)"
+            )
+        self._latest = now
 
     def _watch_silence(self, event: Mapping[str, Any], heard: set[str], found: list[Violation]) -> None:
         """Deadlines pass with time, and not with the next message: each silence is told once, at the first event of the
@@ -240,14 +205,21 @@ class Monitor:
         found: list[Violation] = []
         if self._pairing is not None:
             self._settle(self._pairing.ready(None), found)
+        for watched in {id(w): w for all_ in self._clauses.values() for w in all_}.values():
+            if watched.fresh:
+                values = {n: v for part in watched.fresh.values() for n, v in part.items()}
+                watched.fresh.clear()
+                self._judge_part(watched, values, {}, found)
+            if any(self._source(name) not in self._seen for name in watched.names if self._source(name)):
+                watched.only_supposed()
         return found
 
-    def _ask(self, watched: _Watched, event: Mapping[str, Any]) -> None:
+    def _ask(self, watched: Watched, event: Mapping[str, Any]) -> None:
         """An answer, which will be judged once it is known what it may have answered."""
         assert self._pairing is not None
         values = {**self.values, **watched.memory} if watched.held else self.values
         own = [n for n in (*watched.names, *self._assumed) if n not in self._paired]
-        if any(n not in values for n in watched.names if n not in self._paired):
+        if any(n not in values or self._unheard(n) for n in watched.names if n not in self._paired):
             watched.tally.early += 1
             return
         known = {n: values[n] for n in own if n in values}
@@ -257,7 +229,7 @@ class Monitor:
 
     def _settle(self, ready: Iterable[tuple[Asked, list[dict[str, Value]] | str]], found: list[Violation]) -> None:
         for asked, cases in ready:
-            watched: _Watched = asked.about
+            watched: Watched = asked.about
             tally = watched.tally
             if isinstance(cases, str):
                 if cases == EARLY:
@@ -286,7 +258,7 @@ class Monitor:
                 name = watched.clause.name
                 found.append(self._violation(verdict, name, asked.event, said, watched, cases[0], asked.index))
 
-    def _verdict(self, watched: _Watched, values: Mapping[str, Value]) -> Fault | str | None:
+    def _verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
         truth = self._truth(watched, values)
         if truth is None:
             return None
@@ -297,25 +269,93 @@ class Monitor:
                 return Fault.EXCUSED
         return Fault.GUARANTEE
 
-    def _triggered(self, watched: _Watched, values: Mapping[str, Value]) -> bool:
+    def _triggered(self, watched: Watched, values: Mapping[str, Value]) -> bool:
         assert watched.trigger is not None
         try:
             return bool(watched.trigger(values))
         except NotEvaluable:
             return False
 
-    def _due(self, updated: Iterable[str]) -> list[_Watched]:
-        """The clauses to be judged now that these variables have new values."""
-        due: dict[int, _Watched] = {}
+    def _due(self, updated: Iterable[str], event: Mapping[str, Any], found: list[Violation]) -> list[Watched]:
+        """The clauses to be judged now that these variables have new values. A part of an answer that is published
+        anew before the answer is whole is judged by itself."""
+        touched: dict[int, tuple[Watched, list[str]]] = {}
         for name in updated:
             for watched in self._clauses.get(name, ()):
-                watched.published(name)
-                watched.fresh.add(name)
-                if watched.outputs <= watched.fresh:
-                    due[id(watched)] = watched
-        for watched in due.values():
-            watched.fresh.clear()
-        return list(due.values())
+                touched.setdefault(id(watched), (watched, []))[1].append(name)
+        due: list[Watched] = []
+        for watched, names in touched.values():
+            if not watched.outputs:
+                watched.tally.published += 1
+                due.append(watched)
+                continue
+            watched.tally.published += not watched.fresh
+            for name in names:
+                if name in watched.fresh:
+                    watched.tally.published += 1
+                    self._judge_part(watched, watched.fresh[name], event, found)
+                watched.fresh[name] = self._part(watched, name) if len(watched.outputs) > 1 else {}
+            if watched.outputs <= watched.fresh.keys():
+                watched.fresh.clear()
+                due.append(watched)
+        return due
+
+    def _part(self, watched: Watched, name: str) -> dict[str, Value]:
+        """One output, and all that is known but the other outputs of the answer."""
+        values = {**self.values, **watched.memory}
+        held = {n for n, _ in watched.held}
+        paired = self._paired if self._pairing is not None else frozenset()
+        spoken = (*watched.names, *(n for assumed in self._assumptions for n in assumed.names))
+        return {
+            n: values[n]
+            for n in spoken
+            if n in values
+            and (n == name or n not in watched.outputs)
+            and (n not in held or n in watched.memory)
+            and n not in paired
+            and not self._unheard(n)
+        }
+
+    def _source(self, name: str) -> str:
+        """The variable whose messages give a value; empty for what the scenario gives."""
+        match self.setup.rules[name]:
+            case Previous(source=source):
+                return source
+            case rule:
+                return "" if isinstance(rule, Constant) else name
+
+    def _unheard(self, name: str) -> bool:
+        """Whether the value is the plan's, and not a message's."""
+        return name in self._supposed
+
+    def _judge_part(
+        self, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any], found: list[Violation]
+    ) -> None:
+        """Judge what is known of an answer that never was whole: it is decided where the rest does not matter."""
+        tally = watched.tally
+        truth = self._open(watched, values)
+        if truth is None:
+            tally.partial += 1
+            return
+        tally.judged += 1
+        if not truth:
+            tally.broken += 1
+            said = watched.clause.sentence or watched.clause.text or show_term(watched.clause.formula, "unicode")
+            said += ", whatever the rest of the answer was"
+            found.append(self._violation(Fault.GUARANTEE, watched.clause.name, event, said, watched, values))
+
+    def _open(self, watched: Watched, values: Mapping[str, Value]) -> bool | None:
+        """Whether a guarantee holds whatever is not known; None where that matters, or nobody can tell. Broken it is
+        only where all assumptions are known to hold."""
+        if not self.solver or not self._questions or watched.clause.kind is ClauseKind.ASSUMPTION:
+            return None
+        self._questions -= 1
+        truth = judge_open(watched.clause.formula, values, effort=JUDGE_EFFORT)
+        if truth is False:
+            for assumed in self._assumptions:
+                if any(n not in values for n in assumed.names) or self._truth(assumed, values) is not True:
+                    return None
+        return truth
 
     def _forget(self, name: str) -> None:
         self._versions[name] += 1
@@ -333,8 +373,8 @@ class Monitor:
             if hidden:
                 tally.reason, tally.hidden = hidden[0], True
                 return
-            trigger = _trigger(clause.formula)
-            watched = _Watched(
+            trigger = trigger_of(clause.formula)
+            watched = Watched(
                 clause,
                 names,
                 compile_term(clause.formula),
@@ -363,7 +403,7 @@ class Monitor:
         if clause.kind is ClauseKind.ASSUMPTION:
             self._assumptions.append(watched)
 
-    def _hold(self, watched: _Watched) -> None:
+    def _hold(self, watched: Watched) -> None:
         """Before the first answer: the initial values."""
         watched.memory = {n: self.values[n] for n, _ in watched.held if n in self.values}
 
@@ -376,20 +416,24 @@ class Monitor:
             return outputs
         return direct or sources
 
-    def _judge(self, watched: _Watched, event: Mapping[str, Any], found: list[Violation]) -> None:
+    def _judge(self, watched: Watched, event: Mapping[str, Any], found: list[Violation]) -> None:
         values, versions, tally = self.values, self._versions, watched.tally
         if watched.held:
             held = {n for n, _ in watched.held}
             values = {**{n: v for n, v in values.items() if n not in held}, **watched.memory}
-        for name in watched.names:
-            if name not in values:
-                tally.early += 1
-                return
-        key = tuple([versions[n] for n in watched.names])
+        if any(name not in values for name in watched.names):
+            tally.early += 1
+            return
+        supposed = any(self._unheard(name) for name in watched.names)
+        key = (*[versions[n] for n in watched.names], supposed)
         if key != watched.key or watched.held:
             watched.key = key
             watched.truth = self._truth(watched, values)
-            self._note_trigger(watched, values)
+            if not supposed:
+                self._note_trigger(watched, values)
+        if supposed and watched.truth is not False:
+            tally.supposed += 1
+            return
         tally.judged += 1
         if watched.truth:
             return
@@ -402,7 +446,7 @@ class Monitor:
             tally.excused += 1
         found.append(self._violation(fault, watched.clause.name, event, why, watched, values))
 
-    def _truth(self, watched: _Watched, values: Mapping[str, Value]) -> bool | None:
+    def _truth(self, watched: Watched, values: Mapping[str, Value]) -> bool | None:
         try:
             return bool(watched.holds(values))
         except NotEvaluable as error:
@@ -411,7 +455,7 @@ class Monitor:
                 watched.tally.reason = error.reason
             return answer
 
-    def _note_trigger(self, watched: _Watched, values: Mapping[str, Value]) -> None:
+    def _note_trigger(self, watched: Watched, values: Mapping[str, Value]) -> None:
         if watched.tally.triggered or watched.trigger is None:
             return
         try:
@@ -434,7 +478,7 @@ class Monitor:
         clause: str,
         event: Mapping[str, Any],
         explanation: str,
-        watched: _Watched | None = None,
+        watched: Watched | None = None,
         snapshot: Mapping[str, Value] | None = None,
         index: int | None = None,
     ) -> Violation:
@@ -442,39 +486,15 @@ class Monitor:
         values: list[tuple[str, str]] = []
         if watched is not None and snapshot is not None:
             try:
-                bindings = watched.witness(snapshot) or {}
+                bindings = (watched.witness(snapshot) or {}) if snapshot.keys() >= set(watched.names) else {}
             except NotEvaluable:
                 bindings = {}
-            values = [(n, _shorten(show(snapshot[n]))) for n in watched.names]
+            values = [(n, shorten(show(snapshot[n]))) for n in watched.names if n in snapshot]
         pairs = tuple((n, show(v)) for n, v in bindings.items())
-        time = _time(event.get("time"))
+        time = time_text(event.get("time"))
         return Violation(
             fault, self.setup.node.name, clause, index or self.events, time, tuple(values), pairs, explanation
         )
 
 
 _HELD = "held"
-
-
-def _trigger(formula: Term) -> Term | None:
-    """What must hold somewhere for the formula to say anything: the antecedent, over all its variables."""
-    variables: list[Variable] = []
-    while isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL:
-        variables.extend(formula.variables)
-        formula = formula.body
-    if not isinstance(formula, Implies):
-        return None
-    return Quantified(Quantifier.EXISTS, tuple(variables), formula.left) if variables else formula.left
-
-
-def _time(raw: Any) -> str:
-    if isinstance(raw, int | float | Decimal) and not isinstance(raw, bool):
-        try:
-            return show(exact(raw))
-        except NotANumber:
-            return ""
-    return ""
-
-
-def _shorten(text: str) -> str:
-    return text if len(text) <= 200 else text[:199] + "…"

@@ -91,7 +91,7 @@ def setup(
         work.hidden,
         str(data.get("when", "outputs")),
         known,
-        _answers(data.get("answers")),
+        work.answers(data.get("answers")),
         float(data.get("decided", DECIDED_SHARE)),
         named,
         work.fresh(data.get("fresh")),
@@ -99,20 +99,7 @@ def setup(
     return made, tuple(work.faults)
 
 
-def _answers(entry: Any) -> Answers | None:
-    if not isinstance(entry, Mapping):
-        return None
-    by = str(entry.get("by", "latency"))
-    stamp = ("header", "stamp")
-    return Answers(
-        by,
-        str(entry.get("because", "")),
-        observing.path(str(entry["input"])) if "input" in entry else stamp if by == "stamp" else (),
-        observing.path(str(entry["output"])) if "output" in entry else stamp if by == "stamp" else (),
-        duration(str(entry.get("latency", "0 s"))),
-        duration(str(entry.get("jitter", "0 s"))),
-    )
-
+NO_TIME = "a time with a unit is wanted, such as 50 ms"
 
 _UNITS = {"s": Fraction(1), "ms": Fraction(1, 1000), "us": Fraction(1, 10**6), "min": Fraction(60)}
 
@@ -189,12 +176,35 @@ class _Work:
             if name not in known:
                 self.fault(f"{self.node.name} has no variable {name!r}", name, hint=suggest(name, sorted(known)))
 
+    def duration(self, place: str, written: Any) -> Fraction:
+        """A time of the options, in seconds; 0 with a fault where it is none."""
+        try:
+            return duration(str(written))
+        except (ValueError, KeyError):
+            span = self.options.at(*place.split(".", 1)) if self.options is not None else None
+            self.faults.append(Diagnostic("MON101", f"{place}: {NO_TIME}, not {written}", span))
+            return Fraction(0)
+
+    def answers(self, entry: Any) -> Answers | None:
+        if not isinstance(entry, Mapping):
+            return None
+        by = str(entry.get("by", "latency"))
+        stamp = ("header", "stamp")
+        return Answers(
+            by,
+            str(entry.get("because", "")),
+            observing.path(str(entry["input"])) if "input" in entry else stamp if by == "stamp" else (),
+            observing.path(str(entry["output"])) if "output" in entry else stamp if by == "stamp" else (),
+            self.duration("answers.latency", entry.get("latency", "0 s")),
+            self.duration("answers.jitter", entry.get("jitter", "0 s")),
+        )
+
     def fresh(self, entry: Any) -> dict[str, Fraction]:
         """The deadlines, of variables that messages carry."""
         found: dict[str, Fraction] = {}
         for name, limit in (entry or {}).items():
             if isinstance(self.rules.get(name), Fields | Choice):
-                found[name] = duration(str(limit))
+                found[name] = self.duration(f"fresh.{name}", limit)
             elif self.options is not None:
                 observed = sorted(n for n, rule in self.rules.items() if isinstance(rule, Fields | Choice))
                 text = f"fresh.{name}: no message that is observed carries it"

@@ -8,7 +8,7 @@ _PATH = {"type": "string", "description": "a field of the message: pose.position
 _DURATION = {
     "type": "string",
     "pattern": "^[0-9]+([.][0-9]+)? ?(us|ms|s|min)$",
-    "description": "a time: 200 ms",
+    "description": "a time with a unit, such as 50 ms",
 }
 _ARGUMENT = {
     "oneOf": [
@@ -86,7 +86,7 @@ SCHEMA: dict[str, Any] = {
             "type": "number",
             "exclusiveMinimum": 0,
             "maximum": 1,
-            "description": "the share of what was published that has to be decided (default 0.95)",
+            "description": "the share of what was published that has to be decided (default 1)",
         },
         "ros_version": {"enum": ["ros1", "ros2"], "description": "for the generated configuration"},
         "silent": {"type": "boolean", "description": "whether the ROS monitor keeps its messages to itself"},

@@ -14,8 +14,9 @@ from avow.system.schema import suggest
 
 from .blame import Blame
 from .coverage import Tally
-from .engine import Fault, Monitor, Violation
+from .engine import Monitor
 from .options import NAME, known_types, origin, readable, same_topic, setup
+from .watched import Fault, Violation
 
 
 @dataclass(slots=True)
@@ -59,10 +60,10 @@ class Session:
         """The clauses, of the nodes that are to be monitored, of whose publications too few were decided."""
         return [
             f"{monitor.setup.node.name}.{name}"
-            for monitor, name, _, tally in self.clauses()
+            for monitor, name, kind, tally in self.clauses()
             if monitor.setup.node.name in self.asked
             and not tally.hidden
-            and (not tally.decided or tally.decided < monitor.setup.decided * tally.published)
+            and (not tally.decided or monitor.backwards or tally.decided < monitor.setup.decided * _asked(kind, tally))
         ]
 
     @property
@@ -102,10 +103,11 @@ class Session:
                     "undecided_order": tally.order,
                     "before_first": tally.early,
                     "unreadable": tally.unreadable,
-                    "incomplete": max(0, tally.incomplete),
+                    "incomplete": tally.partial,
+                    "by_initial_value": tally.supposed,
                     "paired": not tally.unpaired,
                     "antecedent_met": tally.triggered,
-                    "reason": tally.reason,
+                    "reason": tally.reason or monitor.backwards,
                 }
                 for clause in monitor.setup.node.clauses
                 if (tally := monitor.tallies.get(clause.name)) is not None
@@ -122,6 +124,11 @@ class Session:
             "listened": list(self.topics),
             "unknown_topics": dict(self.unheard),
         }
+
+
+def _asked(kind: ClauseKind, tally: Tally) -> int:
+    """An assumption is no evidence: before its first value it need not be decided."""
+    return tally.asked - (tally.early if kind is ClauseKind.ASSUMPTION else 0)
 
 
 def session(system: System, nodes: Sequence[str] = (), trace: Path | None = None) -> Session:

@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 
@@ -24,7 +25,17 @@ class Recorded:
     event: Event
 
 
-_decoder = json.JSONDecoder(parse_float=Decimal)
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object each of whose keys stands once: readers of JSON differ in which value of a repeated one they take."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        keys = [key for key, _ in pairs]
+        double = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {json.dumps(double[:60])} stands twice in one object")
+    return found
+
+
+_decoder = json.JSONDecoder(parse_float=Decimal, object_pairs_hook=_once)
 
 
 def parse_event(text: str) -> Event:

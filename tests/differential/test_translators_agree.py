@@ -24,9 +24,10 @@ from avow.backend_kit.protocol import Job, Limits
 from avow.backends.dafny import BACKEND as DAFNY
 from avow.backends.hoare import BACKEND as HOARE
 from avow.backends.hypothesis import BACKEND as HYPOTHESIS
-from avow.backends.rosmonitoring.engine import Fault, Monitor
+from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.traces import parse_event
+from avow.backends.rosmonitoring.watched import Fault
 from avow.base.verdict import Verdict
 from avow.language.load import check_text
 from differential.contracts import Contract, Writer

@@ -11,9 +11,9 @@ import pytest
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.rosmonitoring import BACKEND
-from avow.backends.rosmonitoring.engine import Fault, Violation
 from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.session import session
+from avow.backends.rosmonitoring.watched import Fault, Violation
 from avow.base.verdict import Verdict
 from avow.system.load import load_system
 from avow.system.plan import System

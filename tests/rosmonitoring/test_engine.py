@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
-from avow.backends.rosmonitoring.engine import Fault, Monitor, Violation
+from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.session import session
+from avow.backends.rosmonitoring.watched import Fault, Violation
 from avow.system.plan import System
 
 from .conftest import CASE

@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 from avow.backend_kit.protocol import Limits
 from avow.backends.rosmonitoring import BACKEND
 from avow.backends.rosmonitoring.coverage import Tally
-from avow.backends.rosmonitoring.engine import Fault, Monitor
+from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
 from avow.backends.rosmonitoring.session import session
+from avow.backends.rosmonitoring.watched import Fault
 from avow.base.verdict import Verdict
 from avow.system.plan import System
 
@@ -160,7 +161,7 @@ def test_every_publication_is_counted_once(steps: list[tuple[str, Any, int]]) ->
             t = tallies[name]
             held = t.decided - t.broken
             assert t.published == published
-            assert t.incomplete == 0
+            assert t.partial == 0
             assert held + t.broken + t.undecided + t.order + t.early + t.unreadable == published
 
 

@@ -1,0 +1,100 @@
+"""A clause under watch, and what is told of an event that shows something wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from avow.formulas.values import Value, show
+from avow.language.contract import Clause
+from avow.language.terms import Implies, Quantified, Quantifier, Term, Variable
+
+from .coverage import Tally
+from .numbers import Decimal, NotANumber, exact
+
+
+class Fault(StrEnum):
+    """What an event showed to be wrong."""
+
+    GUARANTEE = "guarantee broken: this node"
+    EXCUSED = "guarantee not met, with an assumption broken: environment"
+    ASSUMPTION = "assumption broken: environment"
+    PROVIDER = "assumption broken: by a node that provides it"
+    SILENT = "silent for longer than the plan allows"
+    MAPPING = "message outside its mapping"
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """One judgement against the trace. `index` counts events from 1; `time` is the event's own, as text."""
+
+    fault: Fault
+    node: str
+    clause: str
+    index: int
+    time: str
+    values: tuple[tuple[str, str], ...]
+    bindings: tuple[tuple[str, str], ...]
+    explanation: str
+
+    def text(self) -> str:
+        about = ", ".join(f"{n} = {v}" for n, v in (*self.bindings, *self.values))
+        at = f"event {self.index}" + (f" (t = {self.time})" if self.time else "")
+        return f"{at}: {self.fault}: {self.node}.{self.clause}: {self.explanation}" + (f" [{about}]" if about else "")
+
+
+@dataclass(slots=True)
+class Watched:
+    clause: Clause
+    names: tuple[str, ...]
+    holds: Callable[[Mapping[str, Value]], Value]
+    trigger: Callable[[Mapping[str, Value]], Value] | None
+    witness: Callable[[Mapping[str, Value]], dict[str, Value] | None]
+    tally: Tally
+    outputs: frozenset[str] = frozenset()
+    """Those that must all be published anew before it is judged: they are the parts of one answer."""
+    fresh: dict[str, dict[str, Value]] = field(default_factory=dict)
+    """Those that have been, since it was last judged: the part, and what it was published for."""
+    held: tuple[tuple[str, str], ...] = ()
+    """(previous value, its source): of one of several outputs, it is the value that the answer before had, whichever
+    of the outputs comes first in this one."""
+    memory: dict[str, Value] = field(default_factory=dict)
+    """The held values."""
+    key: tuple[int, ...] | None = None
+    truth: bool | None = None
+    paired: tuple[str, ...] = ()
+    """The observed inputs that an answer has to be paired with."""
+
+    def only_supposed(self) -> None:
+        """Nothing was ever heard of what the step before is to have given: its initial value is no observation."""
+        tally = self.tally
+        held = tally.decided - tally.broken
+        tally.supposed += held
+        tally.judged -= held
+        tally.triggered = self.trigger is None
+
+
+def trigger_of(formula: Term) -> Term | None:
+    """What must hold somewhere for the formula to say anything: the antecedent, over all its variables."""
+    variables: list[Variable] = []
+    while isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL:
+        variables.extend(formula.variables)
+        formula = formula.body
+    if not isinstance(formula, Implies):
+        return None
+    return Quantified(Quantifier.EXISTS, tuple(variables), formula.left) if variables else formula.left
+
+
+def time_text(raw: Any) -> str:
+    if isinstance(raw, int | float | Decimal) and not isinstance(raw, bool):
+        try:
+            return show(exact(raw))
+        except NotANumber:
+            return ""
+    return ""
+
+
+def shorten(text: str) -> str:
+    return text if len(text) <= 200 else text[:199] + "…"

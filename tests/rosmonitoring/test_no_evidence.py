@@ -1,0 +1,153 @@
+"""What a trace leaves open is no evidence: unheard inputs, answers that never were whole, orders that contradict."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from avow.backend_kit.protocol import Limits
+from avow.backends.rosmonitoring import BACKEND
+from avow.backends.rosmonitoring.traces import parse_event
+from avow.base.diagnostics import Rejected
+from avow.base.verdict import Outcome, Verdict
+from avow.system.plan import System
+
+from .conftest import job_for
+
+ONE = """
+node n {
+  inputs( r : REAL )
+  outputs( v : REAL )
+  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 v matches(out.v) )
+  guarantee g ( in.r >= 120 -> out.v == 0 )
+}
+"""
+TWO = """
+node n {{
+  inputs( r : REAL )
+  outputs( v : REAL, w : REAL )
+  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 v matches(out.v), std_msgs/Float64 w matches(out.w) )
+  guarantee g ( in.r >= 120 -> (out.v == 0 {} out.w == 0) )
+}}
+"""
+Make = Callable[..., System]
+
+
+def events(*steps: tuple[str, float], times: tuple[float, ...] = ()) -> list[dict[str, Any]]:
+    return [
+        {"topic": topic, "time": times[k] if times else float(k), "data": value, "header": {"stamp": k // 2}}
+        for k, (topic, value) in enumerate(steps)
+    ]
+
+
+def judged(make: Make, folder: Path, rcl: str, trace: list[dict[str, Any]], **more: Any) -> Outcome:
+    system = make(rcl, more.pop("mapping", {}), traces=["t.jsonl"], **more)
+    (system.plan.root / "t.jsonl").write_text("".join(json.dumps(e) + "\n" for e in trace), encoding="utf-8")
+    (outcome,) = BACKEND.discharge(job_for(system, "n"), folder, Limits()).outcomes
+    return outcome
+
+
+GOOD = (("r", 130.0), ("v", 0.0)) * 30
+
+
+def test_the_good_run_is_evidence(make_system: Make, tmp_path: Path) -> None:
+    assert judged(make_system, tmp_path, ONE, events(*GOOD)).verdict is Verdict.MONITORED
+
+
+@pytest.mark.parametrize("rule", [{"initial": 130}, {"initial": 130, "topic": "elsewhere"}])
+def test_an_initial_value_is_no_observation(make_system: Make, tmp_path: Path, rule: dict[str, Any]) -> None:
+    trace = events(*[("v", 0.0)] * 30)
+    found = judged(make_system, tmp_path, ONE, trace, mapping={"in.r": {"field": "data", **rule}})
+    assert found.verdict is Verdict.UNKNOWN
+    late = judged(
+        make_system,
+        tmp_path,
+        ONE,
+        [*trace, *events(("r", 1.0), ("v", 5.0), times=(40.0, 41.0))],
+        mapping={"in.r": {"field": "data", "initial": 130}},
+    )
+    assert (late.verdict, late.vacuous, late.bound["judged"]) == (Verdict.MONITORED, True, 1)
+    broken = judged(make_system, tmp_path, ONE, events(("v", 1.0)), mapping={"in.r": {"field": "data", "initial": 130}})
+    assert broken.verdict is Verdict.REFUTED
+
+
+WHOLE = (("r", 130.0), ("v", 0.0), ("w", 0.0)) * 30
+
+
+@pytest.mark.parametrize("tail", [(("v", 1.0),), (("v", 1.0), ("v", 0.0), ("w", 0.0))])
+def test_a_part_that_breaks_whatever_the_rest_was_is_broken(
+    make_system: Make, tmp_path: Path, tail: tuple[tuple[str, float], ...]
+) -> None:
+    found = judged(make_system, tmp_path, TWO.format("and"), events(*WHOLE, *tail))
+    assert (found.verdict, found.bound["published"] - found.bound["judged"]) == (Verdict.REFUTED, 0)
+    found = judged(make_system, tmp_path, TWO.format("or"), events(*WHOLE, *tail))
+    assert found.verdict is Verdict.UNKNOWN
+    assert "not part of a whole answer 1" in found.summary
+    found = judged(make_system, tmp_path, TWO.format("or"), events(*WHOLE, *tail), decided=0.9)
+    assert found.verdict is Verdict.MONITORED
+    assert "not part of a whole answer 1" in found.summary
+    quiet = judged(make_system, tmp_path, TWO.format("and"), events(*WHOLE, ("r", 1.0), *tail))
+    assert quiet.verdict is Verdict.MONITORED
+
+
+@pytest.mark.parametrize("fault", ["no stamp", "two inputs"])
+def test_one_answer_that_is_not_paired_leaves_it_unknown(make_system: Make, tmp_path: Path, fault: str) -> None:
+    trace = events(*GOOD, ("r", 130.0), ("v", 1.0))
+    if fault == "no stamp":
+        del trace[-1]["header"]
+    else:
+        trace.insert(-1, {**trace[-2], "data": 1.0})
+    found = judged(make_system, tmp_path, ONE, trace, answers={"by": "stamp"})
+    assert found.verdict is Verdict.UNKNOWN
+    assert "undecided which input was answered 1" in found.summary
+
+
+@pytest.mark.parametrize("last", [0.0, 1.0])
+def test_times_that_run_backwards_contradict_the_order_of_arrival(
+    make_system: Make, tmp_path: Path, last: float
+) -> None:
+    trace = events(("v", last), ("r", 130.0), ("v", last), times=(3.0, 2.0, 4.0))
+    found = judged(make_system, tmp_path, ONE, trace, decided=0.1)
+    assert found.verdict is Verdict.UNKNOWN
+    assert "has the time 2 and an earlier one 3" in found.summary
+
+
+@pytest.mark.parametrize("text", ['{"topic": "v", "data": 1, "data": 0}', '{"topic": "v", "a": {"b": 1, "b": 0}}'])
+def test_a_key_stands_once(text: str) -> None:
+    with pytest.raises(ValueError, match="stands twice"):
+        parse_event(text)
+
+
+@pytest.mark.parametrize(
+    ("options", "count"),
+    [
+        ({"answers": {"latency": 50, "jitter": "5 ms", "because": "x"}}, 1),
+        ({"answers": {"latency": "50", "jitter": 4, "because": "x"}}, 2),
+        ({"fresh": {"in.r": 2}}, 1),
+    ],
+)
+def test_a_time_without_a_unit_is_one_fault(make_system: Make, options: dict[str, Any], count: int) -> None:
+    from avow.backends.rosmonitoring.session import session
+
+    with pytest.raises(Rejected) as caught:
+        session(make_system(ONE, {}, **options))
+    assert [d.code for d in caught.value.diagnostics] == ["MON101"] * count
+    assert all("a time with a unit is wanted, such as 50 ms" in d.message for d in caught.value.diagnostics)
+
+
+def test_a_step_before_that_nothing_showed_is_no_observation(make_system: Make, tmp_path: Path) -> None:
+    rcl = (
+        TWO.format("and")
+        .replace("r : REAL", "r : REAL, last : REAL")
+        .replace("in.r >= 120 -> (", "in.last >= 120 -> (")
+    )
+    rcl = rcl.replace(" and out.w == 0", "")
+    mapping = {"in.last": {"previous": "out.w", "initial": 130}}
+    trace = events(*[("v", 0.0)] * 9)
+    assert judged(make_system, tmp_path, rcl, trace, mapping=mapping).verdict is Verdict.UNKNOWN
+    heard = judged(make_system, tmp_path, rcl, [*trace, *events(("w", 1.0), times=(20.0,))], mapping=mapping)
+    assert heard.verdict is Verdict.MONITORED
