@@ -164,7 +164,7 @@ def _summands(term: Term, sign: int) -> Iterator[tuple[int, Term]]:
             yield from _summands(inner, -sign)
         case Widen(term=inner):
             yield from _summands(inner, sign)
-        case _:
+        case _:  # one summand
             yield sign, term
 
 
