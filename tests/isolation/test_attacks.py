@@ -152,6 +152,8 @@ def test_no_attack_is_believed(tmp_path: Path, name: str, level: str, monkeypatc
     bad = {Verdict.ERROR, Verdict.REFUTED}
     if name == "writes at a signal":
         bad |= {Verdict.UNKNOWN}  # when it strikes is chance: it may be only that it does not answer alike twice
+        if found["high"] is Verdict.REFUTED:  # what it wrote reached nothing, and its answers were judged: `low` is
+            found.pop("low")  # true of a step that always says green
     if any(o.kind is Seen.OUTSIDE for o in report.observed):
         bad |= {Verdict.TESTED}  # which the core does not let count: see test_observed
     assert {*found.values()} <= bad, [o.summary for o in report.outcomes]
