@@ -106,6 +106,7 @@ _SHOWN = {
     ("EnvironmentInput", "taken_in"),
     ("MethodSlice", "node"),
     ("MethodSlice", "method"),
+    ("Node", "relay"),  # how the graph was wired, which no engine of one node sees
 }
 """What is only shown, or where the same fault is found in another way: no answer depends on it."""
 
