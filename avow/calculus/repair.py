@@ -19,6 +19,7 @@ from avow.base.verdict import Verdict
 from avow.calculus.enumeration import enumerated
 from avow.calculus.variables import Frame
 from avow.formulas.formula import conjunction, disjunction, free_variables, rename, substitute
+from avow.language.operators import OPPOSITE
 from avow.language.printer import show_term
 from avow.language.terms import (
     TRUE,
@@ -176,9 +177,6 @@ def _rewritten(known: Mapping[str, Term], goal: Term, place: Place) -> Term | No
     return term if solve(together, effort=OFFER_STEP_EFFORT).status == "sat" else None
 
 
-_OPPOSITE = {"<": ">=", ">=": "<", ">": "<=", "<=": ">", "==": "!=", "!=": "=="}
-
-
 def _is_whole(value: object) -> bool:
     return not isinstance(value, bool | str) and isinstance(value, int | Fraction) and value == int(value) >= 0
 
@@ -186,8 +184,8 @@ def _is_whole(value: object) -> bool:
 def _tidy(term: Term) -> Term:
     """``not x >= 1`` as ``x < 1``, and ``k > 2.0`` of an integer as ``k > 2``: elimination leaves the first."""
     match term:
-        case Not(body=Compare(operator=operator, left=left, right=right)) if operator in _OPPOSITE:
-            return _tidy(Compare(_OPPOSITE[operator], left, right))
+        case Not(body=Compare(operator=operator, left=left, right=right)):
+            return _tidy(Compare(OPPOSITE[operator], left, right))
         case Compare(left=Widen(term=left), right=Literal(value=value)) if _is_whole(value):
             return Compare(term.operator, left, Literal(int(value), left.sort))
         case And(items=items):

@@ -16,6 +16,7 @@ from avow.evaluation.disjunctions import Part, conjunction
 from avow.evaluation.linear import Constraint, Linear, TooMany, satisfy
 from avow.formulas.renaming import bound_names, has_variables
 from avow.formulas.traversal import subterms
+from avow.language.operators import OPPOSITE
 from avow.language.sorts import RealSort
 from avow.language.terms import (
     And,
@@ -124,7 +125,7 @@ def _comparison(compiler: Compiler, term: Compare, positive: bool, unknown: froz
     left, right = _linear(compiler, term.left, unknown), _linear(compiler, term.right, unknown)
     if left is None or right is None:
         return None
-    operator = term.operator if positive else _NEGATED[term.operator]
+    operator = term.operator if positive else OPPOSITE[term.operator]
     if operator in (">", ">="):
         left, right, operator = right, left, operator.replace(">", "<")
     one, other = left.constant, right.constant
@@ -140,9 +141,6 @@ def _comparison(compiler: Compiler, term: Compare, positive: bool, unknown: froz
         return [(below,), (Constraint(Linear(turned, -constant), "<"),)]
 
     return run
-
-
-_NEGATED = {"==": "!=", "!=": "==", "<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from avow.evaluation.disjunctions import Part, alternatives, branches, conjuncti
 from avow.evaluation.patterns import pattern, patterns
 from avow.evaluation.unrestricted_variables import leftover_steps
 from avow.formulas.renaming import bound_names
+from avow.language.operators import FLIPPED, OPPOSITE
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort
 from avow.language.terms import (
     Apply,
@@ -456,19 +457,15 @@ def _one_of(compiler: Compiler, variable: Variable, finite: Sequence[Any]) -> St
     return Step(3, frozenset((variable.name,)), run)
 
 
-_NEGATED = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
-_TURNED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
-
-
 def _bound(part: Part, name: str) -> tuple[str, Term] | None:
     """``("<", t)`` where the part says that the variable is less than t."""
-    if not isinstance(part.term, Compare) or part.term.operator not in _NEGATED:
+    if not isinstance(part.term, Compare) or part.term.operator not in FLIPPED:
         return None
-    operator = part.term.operator if part.positive else _NEGATED[part.term.operator]
+    operator = part.term.operator if part.positive else OPPOSITE[part.term.operator]
     if _is(part.term.left, name):
         return operator, part.term.right
     if _is(part.term.right, name):
-        return _TURNED[operator], part.term.left
+        return FLIPPED[operator], part.term.left
     return None
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
+from avow.language.operators import FLIPPED, OPPOSITE
 from avow.language.sorts import BoolSort
 from avow.language.terms import (
     Arithmetic,
@@ -21,11 +22,6 @@ from avow.language.terms import (
     Term,
     Widen,
 )
-
-OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
-"""What holds where a comparison does not."""
-FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
-"""The same comparison with its sides exchanged."""
 
 
 @dataclass(frozen=True, slots=True)

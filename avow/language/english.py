@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from avow.language.bounds import FLIPPED, OPPOSITE
+from avow.language.operators import FLIPPED, OPPOSITE
 
 _LESS = r"(?:less|fewer|smaller|lower|shorter|earlier|sooner|closer|nearer|slower|colder|cooler|lighter)"
 _MORE = r"(?:greater|more|larger|higher|longer|bigger|later|farther|further|faster|hotter|warmer|heavier)"

@@ -21,6 +21,11 @@ from avow.language.conversions import NUMERIC, WHOLE, common, joined
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SetSort, Sort
 from avow.language.terms import Builtin, Compare, Conditional, Iff, Literal, Negative, Not, Operation, Term
 
+OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
+"""The comparison that holds where one does not."""
+FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+"""A comparison of order with its sides exchanged."""
+
 
 class Level(IntEnum):
     """How tightly a form binds; a part is put in parentheses where it binds less tightly than its place demands."""

@@ -14,6 +14,7 @@ from fractions import Fraction
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
 from avow.formulas.negation_normal_form import push_negations
+from avow.language.operators import FLIPPED
 from avow.language.sorts import (
     BOOL,
     INTEGER,
@@ -190,7 +191,7 @@ class _TermReader:
         if isinstance(left.sort, RealSort) != isinstance(right.sort, RealSort):
             left, right = _widened(left), _widened(right)
         if isinstance(right, Variable) and not isinstance(left, Variable):
-            left, right, operator = right, left, _MIRRORED.get(operator, operator)
+            left, right, operator = right, left, FLIPPED.get(operator, operator)
         return Compare(operator, left, right)
 
     def term(self, expr: Expr) -> Term:
@@ -214,9 +215,6 @@ class _TermReader:
                     first = _arithmetic(operator, first, part, sort)
                 return first
         raise Unsupported(f"the term {expr}")
-
-
-_MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 
 def _arithmetic(operator: str, left: Term, right: Term, sort: RealSort | IntegerSort) -> Term:

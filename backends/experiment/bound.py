@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from avow.formulas.negation_normal_form import push_negations
-from avow.language.sorts import IntegerSort, NaturalSort, RealSort
+from avow.language.bounds import constant
+from avow.language.operators import FLIPPED, OPPOSITE
 from avow.language.terms import (
     And,
     Apply,
     Arithmetic,
     Compare,
-    Literal,
     Negative,
     Not,
     Or,
@@ -32,8 +32,6 @@ from avow.language.terms import (
 )
 
 from .statistics import root
-
-_FLIPPED = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,35 +56,6 @@ def upper_bound(formula: Term) -> Bound | str:
     return min(found, key=lambda b: (b.value, not b.strict))
 
 
-def constant(term: Term) -> Fraction | None:
-    """The value of a term in which only numbers stand; None for any other."""
-    match term:
-        case Literal(value=value, sort=RealSort() | IntegerSort() | NaturalSort()) if not isinstance(value, str | bool):
-            return Fraction(value)
-        case Widen(term=inner):
-            return constant(inner)
-        case Negative(term=inner):
-            value_ = constant(inner)
-            return None if value_ is None else -value_
-        case Arithmetic(operator=operator, left=left, right=right):
-            a, b = constant(left), constant(right)
-            if a is None or b is None:
-                return None
-            match operator:
-                case "+":
-                    return a + b
-                case "-":
-                    return a - b
-                case "*":
-                    return a * b
-                case "/" if b:
-                    return a / b
-                case _:  # by zero, or of integers: no number that is written down
-                    return None
-        case _:  # no number
-            return None
-
-
 def _conjuncts(term: Term, universal: frozenset[Variable]) -> Iterator[tuple[Compare, frozenset[Variable]]]:
     match term:
         case And(items=items):
@@ -100,10 +69,10 @@ def _conjuncts(term: Term, universal: frozenset[Variable]) -> Iterator[tuple[Com
             yield from _conjuncts(body, universal | set(variables))
         case Quantified(quantifier=Quantifier.EXISTS, variables=variables, body=body):
             yield from _conjuncts(body, universal - set(variables))
-        case Compare(operator=operator) if operator in _FLIPPED:
+        case Compare(operator=operator) if operator in FLIPPED:
             yield term, universal
-        case Not(body=Compare(operator=operator, left=left, right=right)) if operator in _FLIPPED:
-            yield Compare(_FLIPPED[operator], left, right), universal
+        case Not(body=Compare(operator=operator, left=left, right=right)) if operator in FLIPPED:
+            yield Compare(OPPOSITE[operator], left, right), universal
         case _:  # bounds nothing
             return
 
@@ -116,7 +85,7 @@ def _trigger(item: Term) -> bool:
         case Not(body=Compare(operator="==") as equation) if Role.BOUND in _roles(equation):
             return True
         case _:  # judged by its variables
-            orders = [p for p in subterms(item) if isinstance(p, Compare) and p.operator in _FLIPPED]
+            orders = [p for p in subterms(item) if isinstance(p, Compare) and p.operator in FLIPPED]
             return not _roles(item) & {Role.OUTPUT} and all(_roles(p) <= {Role.INPUT} for p in orders)
 
 

@@ -11,10 +11,11 @@ from typing import Any
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic
 from avow.formulas.negation_normal_form import push_negations
+from avow.language.bounds import constant
 from avow.language.terms import Compare, In, Quantified, Quantifier, Role, Term, Variable, subterms
 from avow.system.paths import inside
 
-from .bound import Bound, constant, upper_bound
+from .bound import Bound, upper_bound
 from .expression import Expression, Malformed, parse
 from .quantity import conversion, decimal, figure, show
 

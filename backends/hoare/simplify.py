@@ -11,6 +11,7 @@ from fractions import Fraction
 
 from avow.formulas.formula import conjunction, disjunction, free_variables
 from avow.formulas.traversal import subterms, transform
+from avow.language.operators import OPPOSITE
 from avow.language.sorts import BOOL
 from avow.language.terms import (
     FALSE,
@@ -32,8 +33,6 @@ from avow.language.terms import (
     Widen,
 )
 
-_OPPOSITE = {"<": ">=", ">=": "<", "<=": ">", ">": "<=", "==": "!=", "!=": "=="}
-
 
 def simplify(term: Term) -> Term:
     """An equivalent formula, seldom longer."""
@@ -48,7 +47,7 @@ def opposite(term: Term) -> Term:
         case Not(body=body):
             return body
         case Compare(operator=operator, left=left, right=right):
-            return Compare(_OPPOSITE[operator], left, right)
+            return Compare(OPPOSITE[operator], left, right)
         case _:  # no opposite of its own
             return Not(term)
 

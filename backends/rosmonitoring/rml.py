@@ -8,6 +8,7 @@ from decimal import Decimal
 from fractions import Fraction
 
 from avow.formulas.flattening import flattened
+from avow.language.operators import OPPOSITE
 
 KEYWORDS = frozenset(
     "not matches with empty all var let if else abs sin cos tan min max true false null any none".split()  # noqa: SIM905
@@ -67,8 +68,6 @@ class Some:
 Condition = Comparison | Every | Some
 TRUE, FALSE = Every(), Some()
 
-_OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
-
 
 def compare(operator: str, left: Numeric, right: Numeric) -> Condition:
     """A comparison, decided at once where both sides are numbers."""
@@ -101,7 +100,7 @@ def _join(
 def opposite(condition: Condition) -> Condition:
     match condition:
         case Comparison(operator=operator, left=left, right=right):
-            return Comparison(_OPPOSITE[operator], left, right)
+            return Comparison(OPPOSITE[operator], left, right)
         case Every(items=items):
             return some([opposite(item) for item in items])
         case Some(items=items):
