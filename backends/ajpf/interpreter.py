@@ -126,9 +126,9 @@ class Agent(Mind):
         )
 
     def successors(self, state: State) -> tuple[State, ...]:
-        """Never empty: a run that has ended stays where it is."""
+        """Never empty: a run that has ended stays where it is, and nothing is drawn any more."""
         if state.over:
-            return (state,)
+            return (state._replace(drawn=False),)
         if state.planned:
             return self._deed(state)
         if state.asleep:

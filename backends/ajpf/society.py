@@ -101,9 +101,9 @@ class Society:
         )
 
     def successors(self, state: Common) -> tuple[Common, ...]:
-        """Never empty: a run that has ended stays where it is."""
+        """Never empty: a run that has ended stays where it is, and nothing is drawn any more."""
         if state.over:
-            return (state,)
+            return (state._replace(drawn=False),)
         if looks := self._looks(state):
             return looks
         if not any(state.awake):

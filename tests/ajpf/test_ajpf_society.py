@@ -144,6 +144,16 @@ def test_what_there_is_to_perceive_before_the_first_turn(holds, percepts, at_onc
     assert holds("P(p)", *agents, environment=draws) is at_once
 
 
+@pytest.mark.parametrize("agents", [1, 2])
+def test_a_run_that_ended_draws_no_more_and_so_is_fair(holds, agents):
+    """Its last draw may have been of nothing: "if percepts are drawn for ever" says nothing of it."""
+    draws = "draws: {at_start: true, at_quiescence: once}\npercepts: {x: [p, nothing]}\n"
+    fair = draws + "fair: [{percept: p, because: it comes}]\n"
+    system = [agent("one", "+p : { True } <- act;"), agent("two", "+q : { True } <- act;")][:agents]
+    assert not holds("<> B(one, p)", *system, environment=fair)
+    assert holds("<> B(one, p)", *system, environment=fair.replace("once", "repeatedly"))
+
+
 def test_programs_are_printed_and_read_again():
     for seed in range(20):
         once = program_text(parse_system(society(seed).program, "s.gwen"))
