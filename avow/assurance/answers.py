@@ -7,6 +7,7 @@ evidence, it is none.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -61,6 +62,16 @@ class Sort(StrEnum):
     MODELS = "models"
     SAMPLING = "sampling"
     MEANING = "meaning"
+
+
+ABOUT = {
+    Sort.WORLD: "about the world",
+    Sort.PLATFORM: "about the platform",
+    Sort.MODELS: "about models",
+    Sort.SAMPLING: "about samples",
+    Sort.MEANING: "about wording",
+}
+"""What a supposition of each sort is about, after its number: ``2 about the world``."""
 
 
 class Headline(StrEnum):
@@ -155,11 +166,29 @@ class SupposedLine:
     count: int
     says: str
     number: str
+    others: tuple[str, ...] = field(default=(), metadata=LATER)
+    """The numbers of the others of this sort."""
+
+    @property
+    def about(self) -> str:
+        """``2 about the world``."""
+        return f"{self.count} {ABOUT[self.sort]}"
 
     @property
     def more(self) -> str:
-        """``and 1 more``: the others of the sort; empty where there is no other."""
-        return f"and {self.count - 1} more" if self.count > 1 else ""
+        """``also S2 to S6``: where the others of the sort are; empty where there is no other."""
+        return f"also {', '.join(_ranges(self.others))}" if self.others else ""
+
+
+def _ranges(numbers: Sequence[str]) -> Iterator[str]:
+    """``S1``, ``S3 to S6``: three or more that follow one another as their ends."""
+    at = 0
+    while at < len(numbers):
+        end = at
+        while end + 1 < len(numbers) and int(numbers[end + 1][1:]) == int(numbers[end][1:]) + 1:
+            end += 1
+        yield from (f"{numbers[at]} to {numbers[end]}",) if end > at + 1 else numbers[at : end + 1]
+        at = end + 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,6 +273,10 @@ class Answers:
     """What a signature says."""
     warned: str = field(default="", metadata=LATER)
     """``WARNED: 13 findings known``, beside the verdict; empty where nothing is known to be bad."""
+    owners: str = field(default="", metadata=LATER)
+    """Who answers for the suppositions, and until when; empty where nobody does."""
+    weakened_by: str = field(default="", metadata=LATER)
+    """Which the ways are in which the case is weakened; empty where there is none."""
 
     @property
     def legend(self) -> str:

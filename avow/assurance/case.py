@@ -74,6 +74,7 @@ from avow.assurance.support import (
 )
 from avow.assurance.suppositions import Statements, suppositions
 from avow.assurance.weakenings import weakenings
+from avow.base.plain import count
 from avow.base.verdict import Link, Verdict
 from avow.evidence.audit import Discrepancy
 from avow.evidence.claims import Standing, judge
@@ -432,8 +433,8 @@ def _fresh(facts: Facts, views: Sequence[ObligationView]) -> tuple[bool, str]:
     if not facts.run.fresh:
         cached = sum(1 for view in views for v in view.counting if v.entry.evidence.run != facts.run.id)
         if not cached:
-            return False, "earlier records would have been believed: `avow verify --fresh` believes none"
-        return False, f"{cached} answer{'' if cached == 1 else 's'} from earlier runs, with unchanged inputs"
+            return False, "every answer is of this run, though earlier ones were allowed"
+        return False, f"{count(cached, 'answer')} from earlier runs, of the same inputs as now"
     unanswered = sum(
         1
         for view in views

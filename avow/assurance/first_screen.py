@@ -27,8 +27,8 @@ from avow.base.plain import count
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 
-ROWS, WORST, NODES, SQUARES, LINES = 6, 3, 8, 12, 5
-"""So many requirements have a row each; else so many of the worst; nodes; squares for a node; changes."""
+ROWS, WORST, NODES, SQUARES, LINES, OWNERS = 6, 3, 8, 12, 5, 3
+"""So many requirements have a row each; else so many of the worst; nodes; squares for a node; changes; owners."""
 _HOW_ORDER = (How.OPEN, How.ARGUED, How.BOUNDED, How.DERIVED)
 
 
@@ -130,6 +130,8 @@ def answers(
         signed="not signed",
         statement=_statement(f"{verdict} ({warned})" if warned else verdict, suppositions, kinds),
         warned=warned,
+        owners=_owners(suppositions),
+        weakened_by="; ".join(f"{w.count} {w.words}" for w in weakenings),
     )
 
 
@@ -160,7 +162,7 @@ def _verdict(
     return Headline.HOLDS, Headline.HOLDS.value, tone
 
 
-def badness(view: RequirementView) -> tuple[int, int, int]:
+def _badness(view: RequirementView) -> tuple[int, int, int]:
     """Sorts the worst requirement first: colour, how it holds, how much it supposes."""
     return view.tone.rank, _HOW_ORDER.index(view.how), -len(view.supposes)
 
@@ -168,7 +170,7 @@ def badness(view: RequirementView) -> tuple[int, int, int]:
 def _listed(requirements: Sequence[RequirementView]) -> tuple[str, ...]:
     if len(requirements) <= ROWS:
         return tuple(r.id for r in requirements)
-    return tuple(r.id for r in sorted(requirements, key=badness)[:WORST])
+    return tuple(r.id for r in sorted(requirements, key=_badness)[:WORST])
 
 
 def _basis(
@@ -226,7 +228,21 @@ def _lines(suppositions: Sequence[Supposition]) -> Iterable[SupposedLine]:
         of_sort = [s for s in suppositions if s.sort is sort]
         if of_sort:
             most = max(of_sort, key=lambda s: (s.expired, bool(s.says), len(s.needed_by)))
-            yield SupposedLine(sort, len(of_sort), most.words, most.number)
+            others = tuple(s.number for s in of_sort if s is not most)
+            yield SupposedLine(sort, len(of_sort), most.words, most.number, others)
+
+
+def _owners(suppositions: Sequence[Supposition]) -> str:
+    """``A. Person (3), B. Person (1); the first date is 2027-01-31``."""
+    owned = [s for s in suppositions if s.owned]
+    number = Counter(s.who for s in owned).most_common()
+    if not number:
+        return ""
+    ends = sorted({s.until for s in owned})
+    named = ", ".join(f"{who} ({many})" if len(number) > 1 else who for who, many in number[:OWNERS])
+    more = f" and {len(number) - OWNERS} more" if len(number) > OWNERS else ""
+    until = f", until {ends[0]}" if len(ends) == 1 else f"; the first date is {ends[0]}"
+    return f"{named}{more}{until}"
 
 
 def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:

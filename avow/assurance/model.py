@@ -410,6 +410,12 @@ class Case:
         """The obligation of that id. Raises KeyError."""
         return _by_id(self.obligations)[name]
 
+    @property
+    def listed(self) -> tuple[RequirementView, ...]:
+        """The requirements that have a row of their own on the first screen, in their order there."""
+        known = {r.id: r for r in self.requirements}
+        return tuple(known[name] for name in self.answers.listed)
+
     def said(self, name: str) -> Handled | None:
         """What the plan says of a claim's finding: the first entry with a reason that matches it, else any."""
         matching = [finding for finding in self.findings if name in finding.obligations]

@@ -110,7 +110,7 @@ def weakness(relied: Relied) -> tuple[int, float, int]:
 
 
 def seen(relied: Relied) -> str:
-    """What was seen, with its bound: ``47 runs, 0 failed (at most 6.2 % fail, 95 %)``."""
+    """What was seen, with its bound: ``47 runs, 0 failed (with 95 % confidence, at most 6.2 % fail)``."""
     bound = relied.record.bound
     match relied.status:
         case Status.PROVED:
@@ -142,8 +142,8 @@ def _at_most(record: Evidence, how: str) -> str:
     bound, confidence = upper_bound(record), record.bound.get("confidence")
     if bound is None:
         return ", with no bound on failures"
-    sure = f", {_percent(float(confidence))}" if isinstance(confidence, int | float) else ""
-    return f" ({how} {_percent(bound)} fail{sure})"
+    sure = f"with {_percent(float(confidence))} confidence, " if isinstance(confidence, int | float) else ""
+    return f" ({sure}{how} {_percent(bound)} fail)"
 
 
 def _percent(part: float) -> str:

@@ -13,18 +13,24 @@ from avow.evidence.status import Status, weigh
 
 _WORDS = {
     "argued": ("argued, not derived", "A person must agree that the guarantees amount to the sentence."),
-    "unconfirmed": ("sentences that nobody has confirmed", "A changed sentence would not be noticed: see `confirmed`."),
+    "unconfirmed": (
+        "sentence{s} that nobody has confirmed",
+        "A changed sentence would not be noticed (`confirmed`).",
+    ),
     "bounded": ("derived within bounds only", "Nothing is said outside the finite scenario."),
-    "unowned": ("suppositions without owner or date", "Nobody is named to keep them true, or they never expire."),
-    "sampled": ("guarantees sampled, not proved", "Other inputs and other runs may behave otherwise."),
-    "read": ("guarantees on a person's reading only", "No tool has looked at them."),
-    "single": ("guarantees with one method only", "An error of that tool would not be noticed."),
-    "tied": ("guarantees tied to what was examined by hand", "That a person's table or measure fits is not shown."),
-    "unrun": ("planned methods without an answer", "A tool is missing, gave up or failed; others answer in its place."),
-    "conditional": ("reviews accepted on conditions", "The reviewer names what must be so besides."),
-    "advice": ("pieces of advice open", "They fail nothing; read them."),
-    "excused": ("findings accepted by a person", "Somebody takes responsibility for what is not so."),
-    "believed": ("answers from earlier records", "They were not computed afresh for this report."),
+    "unowned": ("supposition{s} without owner or date", "Nobody is named to keep them true, or they never expire."),
+    "sampled": ("guarantee{s} sampled, not proved", "Other inputs and other runs may behave otherwise."),
+    "read": ("guarantee{s} on a person's reading only", "No tool has looked at them."),
+    "single": ("guarantee{s} with one method only", "An error of that tool would not be noticed."),
+    "tied": ("guarantee{s} tied by hand to what was examined", "That a person's table or measure fits is not shown."),
+    "unrun": (
+        "planned method{s} without an answer",
+        "A tool is missing, gave up or failed; others answer for it.",
+    ),
+    "conditional": ("review{s} accepted on conditions", "The reviewer names what must be so besides."),
+    "advice": ("piece{s} of advice open", "They fail nothing; read them."),
+    "excused": ("finding{s} accepted by a person", "Somebody takes responsibility for what is not so."),
+    "believed": ("answer{s} from earlier runs", "They were not computed afresh for this report."),
 }
 
 
@@ -58,7 +64,12 @@ def weakenings(
         "believed": [v.id for v in views if v.id in within and any(e.entry.evidence.run != run for e in v.counting)],
     }
     listed = {key: tuple(claims) for key, claims in found.items()}
-    return tuple(Weakening(key, len(claims), claims, *_WORDS[key]) for key, claims in listed.items() if claims)
+    return tuple(_weakening(key, claims) for key, claims in listed.items() if claims)
+
+
+def _weakening(key: str, claims: tuple[str, ...]) -> Weakening:
+    words, why = _WORDS[key]
+    return Weakening(key, len(claims), claims, words.format(s="" if len(claims) == 1 else "s"), why)
 
 
 def _status(view: ObligationView, relied: Mapping[str, Relied]) -> Status | None:

@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 
 from avow.assurance.answers import Headline, How, NodeBasis, Supposition, Tone
 from avow.assurance.changes import baseline_of
-from avow.assurance.first_screen import badness, basis_of
+from avow.assurance.first_screen import basis_of
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.modules import NodeModule, RequirementModule, node_modules, requirement_modules
 from avow.assurance.relied import word
@@ -43,11 +43,6 @@ WORDS = (
 def render_answers(case: Case, json_digest: str = "") -> str:
     """The page. Deterministic: same case, same bytes."""
     known = {view.id for view in case.obligations}
-    listed = set(case.answers.listed)
-    order = {r.id: badness(r) for r in case.requirements}
-    rows = sorted(
-        (r for r in case.requirements if r.id in listed), key=lambda r: order[r.id] if _many(case) else (0, 0, 0)
-    )
     return (
         environment()
         .get_template("answers.html.j2")
@@ -59,10 +54,9 @@ def render_answers(case: Case, json_digest: str = "") -> str:
             brief=wording.gate_line,
             by_how=[(how, [r.id for r in case.requirements if r.how is how]) for how, _ in case.answers.by_how],
             content=baseline_of(case).content,
-            freshness=freshness(case),
             full_reason=full_reason,
             known=known,
-            listed=rows,
+            listed=case.listed,
             many=_many(case),
             modules=[_requirement(case, m) for m in requirement_modules(case)],
             node_modules=[_node(case, m) for m in node_modules(case)],
@@ -76,13 +70,6 @@ def render_answers(case: Case, json_digest: str = "") -> str:
             words=WORDS,
         )
     )
-
-
-def freshness(case: Case) -> str:
-    """How fresh the answers are, in words (the grade's own name says nothing to a reader)."""
-    if case.fresh:
-        return case.freshness
-    return f"partly from earlier records ({case.freshness})"
 
 
 def full_reason(supposition: Supposition) -> str:
@@ -177,7 +164,8 @@ def render_index(cases: Sequence[Case], earlier: Sequence[str] = ()) -> str:
     else:
         rest = f"; {len(cases) - len(relied)} only examined" if len(relied) < len(cases) else ""
         tone = min((case.answers.tone for case in relied), key=lambda t: t.rank)
-        line = f"{wording.count(len(relied), 'system')} {'holds' if len(relied) == 1 else 'hold'}{rest}"
+        supposing = ", on suppositions" if any(case.suppositions for case in relied) else ""
+        line = f"{wording.count(len(relied), 'system')} {'holds' if len(relied) == 1 else 'hold'}{supposing}{rest}"
     if earlier:
         line += f"; {wording.count(len(earlier), 'report')} as of an earlier state"
         tone = Tone.AMBER if tone is Tone.GREEN else tone

@@ -132,8 +132,7 @@ def _source(source: SourceView) -> dict[str, Any]:
 def _first(case: Case) -> dict[str, Any]:
     """The first sheet: the page's first screen."""
     a = case.answers
-    listed = [r for r in case.requirements if r.id in a.listed]
-    many = len(listed) < len(case.requirements)
+    many = len(case.listed) < len(case.requirements)
     return {
         "kicker": f"{case.today} · {a.signed}",
         "verdict": f"{TONE_MARKS[a.tone]} {a.verdict}",
@@ -152,21 +151,27 @@ def _first(case: Case) -> dict[str, Any]:
                 f"{r.weakest_evidence.status}: {r.weakest_evidence.title}" if r.weakest_evidence else "none",
                 str(len(r.supposes)),
             ]
-            for r in listed
+            for r in case.listed
         ],
         "legend": a.legend,
         "based_on": [[b.title, [[letter, tone.value] for letter, tone in b.squares], b.words] for b in a.based_on],
         "more_nodes": a.more_nodes,
         "weakest": a.refuted or _weakest(case),
+        "weakened_by": f"What weakens the case: {a.weakened_by}." if a.weakened_by else "",
         "next": f"Next weakest: {a.next_weakest}." if a.next_weakest and not a.refuted else "",
-        "supposed": [[f"{line.count} of {line.sort}", f"{line.says} {line.more}".strip()] for line in a.supposed],
-        "owned": f"{a.owned} with owner and date" if a.owned else "Nothing.",
+        "supposed": [[line.about, f"{line.number} {line.says}{line.more and '; '}{line.more}"] for line in a.supposed],
+        "owned": _owned(case),
         "changed_against": a.changed_against,
         "changed": [f"{mark} {words}".strip() for mark, words in a.changed],
         "statement": a.statement,
         "signed": a.signed if a.signed.startswith("signed") else "",
         "content": f"What is signed has the digest {baseline_of(case).content[:16]}…",
     }
+
+
+def _owned(case: Case) -> str:
+    a = case.answers
+    return f"{a.owned} with owner and date{a.owners and ': '}{a.owners}." if a.owned else "Nothing."
 
 
 def _weakest(case: Case) -> str:

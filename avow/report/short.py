@@ -6,7 +6,7 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from avow.assurance.answers import Tone
+from avow.assurance.answers import ABOUT, Tone
 from avow.assurance.model import Case, RequirementView
 from avow.report.wording import clean
 
@@ -23,16 +23,15 @@ def terminal_lines(case: Case, command: str = "") -> list[str]:
     lines = [title + verdict]
     lines += _cut_lines(a.beside, 2)
     lines += ["1 Claimed"]
-    listed = [r for r in case.requirements if r.id in a.listed][:6]
-    lines += [_cut(f"  {_MARKS[r.tone]} {r.id} {r.how}, {_weakest(r)}: {_one(r)}") for r in listed]
-    if len(listed) < len(case.requirements):
+    lines += [_cut(f"  {_MARKS[r.tone]} {r.id} {r.how}, {_weakest(r)}: {_one(r)}") for r in case.listed]
+    if len(case.listed) < len(case.requirements):
         lines += [f"  the worst of {len(case.requirements)}"]
     shown = a.based_on[:4]
     more = f"; and {len(a.bases) - len(shown)} more nodes" if len(a.bases) > len(shown) else ""
     lines += ["2 Based on", *_cut_lines("; ".join(f"{b.title} {b.words}" for b in shown) + more, 2)]
     lines += ["3 Weakest evidence", *_cut_lines(_weakest_words(case), 3)]
     lines += [f"4 Supposed{f' ({a.owned} with owner and date)' if a.owned else ': nothing'}"]
-    lines += [_cut(f"  {line.count} of {line.sort}: {line.says}") for line in a.supposed]
+    lines += [_cut(f"  {line.about}: {line.says}") for line in a.supposed]
     head = f" {a.changed_against[:1].lower()}{a.changed_against[1:]}"
     lines += [_cut(f"5 Changed{head.removesuffix(':')}")]
     lines += [_cut(f"  {mark} {words}".rstrip()) for mark, words in a.changed]
@@ -80,9 +79,12 @@ def markdown_head(case: Case) -> Iterator[str]:
     yield "## 3 What is the weakest evidence?"
     yield _md(_weakest_words(case))
     yield "## 4 What is supposed, not shown?"
-    owned = f"{a.owned} with owner and date.\n\n" if a.owned else ""
+    owners = f": {_md(a.owners)}" if a.owners else ""
+    owned = f"{a.owned} with owner and date{owners}.\n\n" if a.owned else ""
     yield owned + (
-        "\n".join(f"- {s.number} ({s.sort}) {_md(s.words)}{_md(_owner(s.who, s.until))}" for s in case.suppositions)
+        "\n".join(
+            f"- {s.number} ({ABOUT[s.sort]}) {_md(s.words)}; {_md(_owner(s.who, s.until))}" for s in case.suppositions
+        )
         or "Nothing."
     )
     yield "## 5 What changed since the last signed report?"
@@ -94,7 +96,7 @@ def markdown_head(case: Case) -> Iterator[str]:
 
 
 def _owner(who: str, until: str) -> str:
-    return f" — {who}, until {until}" if who and until else f" — {who or 'no owner'}, {until or 'no date'}"
+    return f"{who or 'no owner'}, {f'until {until}' if until else 'no date'}"
 
 
 def _weakest(r: RequirementView) -> str:

@@ -12,11 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from assurance.sample import TODAY, case, evidence, guarantee, node_plan, obligation, rover_case, system
-from avow.assurance.answers import Headline, How, Sort, Tone
+from avow.assurance.answers import ABOUT, Headline, How, Sort, Supposition, Tone
 from avow.assurance.case import conclude_again
 from avow.assurance.changes import KINDS, baseline_of
-from avow.assurance.first_screen import WARNED
+from avow.assurance.first_screen import WARNED, _lines, _owners
 from avow.assurance.model import Case
+from avow.assurance.weakenings import _WORDS, _weakening
 from avow.base.plain import identifiers, words_of
 from avow.base.verdict import Hypothesis, HypothesisKind, Link, Verdict
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
@@ -263,6 +264,30 @@ def test_the_first_screen_of_a_full_case_is_in_plain_words() -> None:
     own = [a.verdict, a.counts, a.weakened, a.gates, a.owned, a.signed, *(b.words for b in a.based_on)]
     own += [b.title for b in a.based_on]
     assert [name for text in own for name in identifiers(text)] == []
+
+
+def test_which_suppositions_there_are_and_who_answers_for_them_is_said_in_a_line() -> None:
+    def supposed(at: int, who: str, until: str) -> Supposition:
+        key = f"environment.n.{at}"
+        return Supposition(f"S{at}", key, Sort.WORLD, f"It is {at}", "", "", who, until, False, ("R",), ())
+
+    said = [supposed(at, "A. Person" if at < 5 else "B", f"2027-01-0{at}") for at in range(1, 7)]
+    most = replace(said[2], needed_by=("R", "Q"))
+    (line,) = _lines([*said[:2], most, *said[3:]])
+    assert (line.number, line.about, line.more) == ("S3", "6 about the world", "also S1, S2, S4 to S6")
+    assert _owners(said) == "A. Person (4), B (2); the first date is 2027-01-01"
+    assert _owners(said[:1]) == "A. Person, until 2027-01-01"
+    assert _owners([replace(said[0], who="")]) == ""
+    assert set(ABOUT) == set(Sort)
+
+
+def test_weakenings_are_named_and_counted_on_the_first_screen() -> None:
+    found = rover_case()
+    assert found.answers.weakened_by.split("; ") == [f"{w.count} {w.words}" for w in found.weakenings]
+    for many in (1, 2):
+        said = [_weakening(key, ("x",) * many).words for key in _WORDS]
+        assert not any("{" in words for words in said)
+    assert _weakening("conditional", ("x",)).words == "review accepted on conditions"
 
 
 def test_plain_words() -> None:

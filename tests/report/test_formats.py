@@ -359,7 +359,7 @@ def test_the_index_does_not_call_known_bad_material_passed() -> None:
     assert examined.answers.tone is Tone.AMBER
     assert "✔" not in text.split("<main")[0]
     relied = case(system({"n": ["g"]}, requirements=[Requirement("R", "t", None, None, ("n.g",))]), [g], [evidence(g)])
-    assert "1 system holds; 1 only examined" in render_index([examined, relied])
+    assert "1 system holds, on suppositions; 1 only examined" in render_index([examined, relied])
 
 
 # -- trend ----------------------------------------------------------------------------------------------------------
