@@ -55,4 +55,43 @@ ROS_CODES = register(
         "A topic carries several variables, and which of them an input is cannot be seen from names.",
         "Give both ports one name, or connect them.",
     ),
+    declare(
+        "ROS120",
+        "no launch file",
+        "A launch file of the plan, or one that it includes, cannot be read as one. It is never run.",
+        "Correct the file; it is XML, YAML, or Python with `generate_launch_description()`.",
+    ),
+    declare(
+        "ROS121",
+        "launch file read in part",
+        "What stands at this place of a launch file is known only when it runs: an environment variable, a command, a "
+        "loop, a file outside the workspace.",
+        "Say under `ros: {nodes: …}` what it does, or give the value as `args` of the launch file in the plan.",
+        warning=True,
+    ),
+    declare(
+        "ROS122",
+        "plan against launch file",
+        "The plan calls a node, or a topic of it, otherwise than the launch files do.",
+        "Correct one of the two; what the launch files say need not be said again.",
+    ),
+    declare(
+        "ROS123",
+        "which started node",
+        "Launch files start several nodes that a node of the contract may be, with other names or remappings.",
+        "Name the one under `ros: {nodes: {NODE: {name: /…}}}`, or give the launch file its `args`.",
+    ),
+    declare(
+        "ROS124",
+        "started and not modelled",
+        "The launch files start a node that is not in the contract, or do not start one that is.",
+        "Name it under `ros: {nodes: …}` or under `model` (compound, dropped, external), or add it to the contract.",
+        warning=True,
+    ),
+    declare(
+        "ROS125",
+        "how a node runs",
+        "Under which name a node runs, and what remaps its topics, as the launch files say.",
+        "Nothing is to be done where it is what is meant.",
+    ),
 )

@@ -62,11 +62,13 @@ def of_plan(system: System, clean: set[tuple[str, str]] | None = None) -> tuple[
     what each backend says of its options; without the warnings that the plan switches off. `clean`: as for
     `diagnostics`."""
     from avow.system.graph import dataflow
+    from avow.system.launched import told as launched
     from avow.system.sentences import requirement_sentences
     from avow.system.statements import unconfirmed, without_words
 
     found = [
         *(d for d in dataflow(system).findings if d.code.startswith("ROS")),
+        *launched(system),
         *_model(system),
         *_policy(system),
         *requirement_sentences(system),

@@ -79,6 +79,7 @@ def compose_slice(system: System) -> ComposeSlice:
         plugins=(),
         lints_off=(),
         pictures=(),
+        launched=None,
         included=(),
     )
     return ComposeSlice(System(plan, replace(system.contract, files=())))

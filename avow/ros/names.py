@@ -22,6 +22,8 @@ class Placed:
     remaps: tuple[tuple[str, str], ...] = ()
     """(from, to), as written: either may be absolute, relative or private."""
     span: Span | None = field(default=None, compare=False, repr=False)
+    named: bool = field(default=False, compare=False, repr=False)
+    """Whether somebody has said its name; else it is supposed."""
 
     @property
     def namespace(self) -> str:

@@ -16,12 +16,14 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Contract
 from avow.system.formulas import check_formulas
 from avow.system.graph import dataflow
+from avow.system.launched import started
 from avow.system.links import with_links
 from avow.system.names import check_names
 from avow.system.plan import Plan, System
 from avow.system.plan_file import fill_methods, read_rest
 from avow.system.strict_yaml import Piece
 from avow.system.subsystems import check_subsystems, resolved
+from avow.system.topics import heard
 
 _WORD = re.compile(r"\w+'*")
 _QUOTED = re.compile(r"'([^']*)'")
@@ -84,6 +86,10 @@ def _of_names(rest: Rest) -> Iterator[Diagnostic]:
     if not rest.is_sound:
         yield from _syntax(plan)
         return
+    plan, unlike = started(plan, contract)
+    yield from unlike
+    plan, contract, unclear = heard(plan, contract)
+    yield from unclear
     wrong = check_subsystems(plan, contract)
     yield from wrong
     if wrong or plan.subsystems:

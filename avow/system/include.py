@@ -14,6 +14,7 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Contract
+from avow.ros.names import Placed, Resolver
 from avow.system.folding import holders, outermost
 from avow.system.graph import Graph, dataflow
 from avow.system.plan import Connection, Endpoint, EnvironmentInput, Plan, Statement, Subsystem, System
@@ -117,12 +118,25 @@ def _taken_in(
     files = [path for path in (part.plan.path, *part.plan.contract_files) if path.is_file()]
     larger = replace(
         plan,
+        ros=replace(plan.ros, names=_names(plan, subsystem, part)),
         connections=plan.connections + connections,
         environment=plan.environment + tuple(said),
         statements=(*plan.statements, *_statements(subsystem.name, part.plan)),
         included=tuple(dict.fromkeys((*plan.included, *files, *part.plan.included))),
     )
     return larger, merged, (*inner, whole)
+
+
+def _names(plan: Plan, subsystem: Subsystem, part: System) -> Resolver:
+    """How the nodes taken in run: as there, within the subsystem's namespace, unless it is said here."""
+    data = subsystem.options.data
+    namespace = str(data.get("namespace", "")).strip("/") if isinstance(data, dict) else ""
+    said = dict(plan.ros.names.nodes)
+    for node in part.contract.nodes:
+        there = part.plan.ros.names.placed(node.name)
+        whole = f"/{namespace}{there.name}" if namespace else there.name
+        said.setdefault(f"{subsystem.name}_{node.name}", Placed(whole, there.remaps, subsystem.span, there.named))
+    return Resolver(tuple(said.items()))
 
 
 def _statements(subsystem: str, plan: Plan) -> Iterator[Statement]:

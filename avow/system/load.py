@@ -11,6 +11,7 @@ from avow.system.faults import every_fault
 from avow.system.formulas import check_formulas
 from avow.system.graph import dataflow
 from avow.system.include import include, still_open
+from avow.system.launched import started
 from avow.system.links import with_links
 from avow.system.names import check_names
 from avow.system.plan import System
@@ -64,6 +65,8 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System]) -> 
     faults += more
     if any(fault.is_error for fault in more):
         raise Rejected(*faults)
+    plan, more = started(plan, contract)
+    faults += more
     plan, contract, more = heard(plan, contract)
     faults += more
     wrong = check_subsystems(plan, contract)

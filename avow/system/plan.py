@@ -14,6 +14,7 @@ from typing import Any
 from avow.base.diagnostics import Span
 from avow.base.files import digest
 from avow.language.contract import Contract
+from avow.ros.launch import Launched
 from avow.ros.names import Resolver
 
 
@@ -301,8 +302,11 @@ class Plan:
     subsystems: tuple[Subsystem, ...] = ()
     statements: tuple[Statement, ...] = ()
     ros: Ros = Ros()
+    launched: Launched | None = None
+    """What the launch files start; None where the plan names none."""
     included: tuple[Path, ...] = ()
-    """Files of other systems that were taken in as subsystems: what is said here depends on them too."""
+    """Launch files, and files of other systems that were taken in as subsystems: what is said here depends on them
+    too."""
 
     @property
     def root(self) -> Path:

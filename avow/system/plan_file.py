@@ -16,6 +16,8 @@ from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.base.files import digest
 from avow.base.verdict import unsaid
+from avow.ros.launch import Launched
+from avow.system.launched import read_launched
 from avow.system.paths import inside
 from avow.system.plan import (
     ComposeGoal,
@@ -128,6 +130,7 @@ class _PlanReader:
         }
         self.model_graph()
         scenario = self.scenario()
+        launched = self.launched()
         return Plan(
             system=name,
             title=self.text("title") or name,
@@ -150,10 +153,17 @@ class _PlanReader:
             subsystems=tuple(self.subsystems()),
             statements=self.statements(),
             ros=self.ros(),
+            launched=launched,
+            included=launched.files if launched is not None else (),
         )
 
     def ros(self) -> Ros:
         found, faults = read_ros(self.root)
+        self.faults += faults
+        return found
+
+    def launched(self) -> Launched | None:
+        found, faults = read_launched(self.path, self.items("ros", "launch"))
         self.faults += faults
         return found
 

@@ -42,7 +42,7 @@ def _placed(node: str, entry: Piece, faults: list[Diagnostic]) -> Placed:
             faults.append(_no_name(f"ros.nodes.{node}.remap.{old}", new))
         else:
             remaps.append((old, new.text))
-    return Placed(whole, tuple(remaps), entry.span)
+    return Placed(whole, tuple(remaps), entry.span, name is not None)
 
 
 def _no_name(where: str, piece: Piece) -> Diagnostic:

@@ -88,3 +88,15 @@ PROPERTY_LENGTH = 50_000
 REPAIR_ROUNDS = 20
 """Times that the pieces of a plan at fault are dropped to look at the rest: each may leave another without what it
 needs, and nothing but further messages hangs on it."""
+
+LAUNCH_BYTES = 1_000_000
+"""Of one launch file: the longest of large robots have a thousand lines."""
+
+LAUNCH_ELEMENTS = 20_000
+"""Elements of one launch file, and of all that includes bring in: files that include each other end here."""
+
+LAUNCH_DEPTH = 60
+"""Groups within groups, and files within files: what reads them recurses."""
+
+PACKAGES_SEARCHED = 20_000
+"""Folders of a workspace that are searched for packages: a robot's has some hundreds."""

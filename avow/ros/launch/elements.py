@@ -1,0 +1,81 @@
+"""What a launch file says, whatever it is written in: elements with attributes, as in ROS's XML."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from avow.base.diagnostics import Diagnostic, Severity, Span
+
+
+@dataclass(frozen=True, slots=True)
+class Unread:
+    """What cannot be known without running the file, and why."""
+
+    why: str
+
+
+Text = str | Unread
+"""A text with substitutions (``$(var x)``), or why there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """``<node name="a">``: its tag with ``_`` for ``-``, its attributes, what stands in it, and its place."""
+
+    tag: str
+    attributes: Mapping[str, Text]
+    children: tuple[Element, ...]
+    span: Span
+
+    def get(self, *names: str) -> Text | None:
+        """The first attribute that is there."""
+        return next((self.attributes[name] for name in names if name in self.attributes), None)
+
+
+@dataclass(slots=True)
+class Parsed:
+    """A file's elements, and what in it is no element that can be read."""
+
+    elements: tuple[Element, ...] = ()
+    unread: list[Diagnostic] = field(default_factory=list)
+
+
+class WrongLaunch(Exception):  # noqa: N818 - it is what was found wrong
+    """A text that is no launch file; `line` counts from 1."""
+
+    def __init__(self, message: str, line: int) -> None:
+        super().__init__(message)
+        self.line = line
+
+
+def place(file: str, line: int, column: int = 1) -> Span:
+    return Span(file, line, column, line, column + 1)
+
+
+def unread(span: Span, message: str) -> Diagnostic:
+    """What is not read, told with its place."""
+    return Diagnostic("ROS121", message, span, Severity.WARNING, HINT)
+
+
+HINT = "say what it does under `ros: {nodes: …}`, or give the value as `args` of the launch file in the plan"
+
+
+def literal(text: str) -> Text:
+    """A text in which nothing is a substitution."""
+    return Unread(f"{text[:60]!r} would be taken for a substitution") if "$(" in text else text
+
+
+def joined(parts: list[Text]) -> Text:
+    """Texts one after another; unread where one of them is."""
+    whole = ""
+    for part in parts:
+        if isinstance(part, Unread):
+            return part
+        whole += part
+    return whole
+
+
+VARIABLE = re.compile(r"[A-Za-z_][\w.-]*\Z", re.ASCII)
+"""A name that may stand in ``$(var …)``."""

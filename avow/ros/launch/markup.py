@@ -1,0 +1,109 @@
+"""Launch files in XML and YAML as elements. Neither is given a chance to load or to run anything."""
+
+from __future__ import annotations
+
+from xml.parsers import expat
+
+import yaml
+
+from avow.base.diagnostics import Span
+from avow.ros.launch.elements import Element, Parsed, Text, WrongLaunch, place, unread
+from avow.tuning.sizes import LAUNCH_DEPTH, LAUNCH_ELEMENTS
+
+
+def from_xml(text: str, file: str) -> Parsed:
+    """Raises WrongLaunch."""
+    parser = expat.ParserCreate()
+    stack: list[tuple[str, dict[str, Text], list[Element], Span]] = []
+    roots: list[Element] = []
+    count = 0
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        if len(stack) > LAUNCH_DEPTH or count > LAUNCH_ELEMENTS:
+            raise WrongLaunch("it has too many elements, or too many within one another", parser.CurrentLineNumber)
+        at = place(file, parser.CurrentLineNumber, parser.CurrentColumnNumber + 1)
+        stack.append((tag.replace("-", "_"), dict(attributes), [], at))
+
+    def end(tag: str) -> None:
+        name, attributes, children, at = stack.pop()
+        (stack[-1][2] if stack else roots).append(Element(name, attributes, tuple(children), at))
+
+    def doctype(*_: object) -> None:
+        raise WrongLaunch("a document type has no place in a launch file", parser.CurrentLineNumber)
+
+    parser.StartElementHandler = begin
+    parser.EndElementHandler = end
+    parser.StartDoctypeDeclHandler = doctype
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise WrongLaunch(f"this is not XML: {expat.ErrorString(error.code)}", error.lineno) from None
+    if not roots or roots[0].tag != "launch":
+        raise WrongLaunch("the outermost element of a launch file is <launch>", 1)
+    return Parsed(roots[0].children)
+
+
+def from_yaml(text: str, file: str) -> Parsed:
+    """Raises WrongLaunch."""
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise WrongLaunch(f"this is not YAML: {error.problem}", line) from None
+    except (yaml.YAMLError, RecursionError) as error:
+        raise WrongLaunch(f"this is not YAML: {type(error).__name__}", 1) from None
+    entries = root.value if isinstance(root, yaml.MappingNode) else []
+    top = next((value for key, value in entries if key.value == "launch"), None)
+    if top is None:
+        raise WrongLaunch("a launch file in YAML begins with `launch:`", 1)
+    work = _Yaml(file)
+    found = work.listed(top, 0)
+    return Parsed(tuple(found), work.parsed.unread)
+
+
+class _Yaml:
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.parsed = Parsed()
+        self.count = 0
+
+    def at(self, node: yaml.Node) -> Span:
+        return place(self.file, node.start_mark.line + 1, node.start_mark.column + 1)
+
+    def listed(self, node: yaml.Node, depth: int) -> list[Element]:
+        """A list of ``- tag: {…}``, each with one key."""
+        if not isinstance(node, yaml.SequenceNode):
+            raise WrongLaunch("a list of actions is wanted here", node.start_mark.line + 1)
+        found: list[Element] = []
+        for item in node.value:
+            if isinstance(item, yaml.MappingNode) and len(item.value) == 1:
+                key, value = item.value[0]
+                found.append(self.element(str(key.value), value, self.at(key), depth))
+            else:
+                self.parsed.unread.append(unread(self.at(item), "an action with one name is wanted here"))
+        return found
+
+    def element(self, tag: str, node: yaml.Node, at: Span, depth: int) -> Element:
+        self.count += 1
+        if depth > LAUNCH_DEPTH or self.count > LAUNCH_ELEMENTS:
+            raise WrongLaunch("it has too many elements, or too many within one another", at.line)
+        name = tag.replace("-", "_")
+        if isinstance(node, yaml.SequenceNode):  # group: [...]
+            return Element(name, {}, tuple(self.listed(node, depth + 1)), at)
+        if isinstance(node, yaml.ScalarNode):  # let: …
+            return Element(name, {"": node.value}, (), at)
+        attributes: dict[str, Text] = {}
+        children: list[Element] = []
+        for key, value in node.value:
+            if isinstance(value, yaml.ScalarNode):
+                attributes[str(key.value)] = value.value
+            elif key.value == "children":
+                children += self.listed(value, depth + 1)
+            elif isinstance(value, yaml.SequenceNode):
+                for item in value.value:
+                    children.append(self.element(str(key.value), item, self.at(item), depth + 1))
+            else:
+                children.append(self.element(str(key.value), value, self.at(key), depth + 1))
+        return Element(name, attributes, tuple(children), at)

@@ -1,0 +1,401 @@
+"""Launch files in Python as elements: read by their syntax, never imported, never run.
+
+What is written out in ``generate_launch_description`` is read: actions in lists, names that are bound once, texts put
+together of constants and substitutions. What stands in a loop, behind a condition or in another function is told.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from avow.base.diagnostics import Span
+from avow.ros.launch.elements import VARIABLE, Element, Parsed, Text, Unread, WrongLaunch, joined, literal, unread
+from avow.tuning.sizes import LAUNCH_ELEMENTS
+
+_NODES = {
+    "Node": "node",
+    "LifecycleNode": "node",
+    "ComposableNodeContainer": "node_container",
+    "ComposableNode": "composable_node",
+}
+_RENAMED = {
+    "package": "pkg",
+    "executable": "exec",
+    "node_executable": "exec",
+    "name": "name",
+    "node_name": "name",
+    "namespace": "namespace",
+    "node_namespace": "namespace",
+    "plugin": "plugin",
+}
+"""Keywords of nodes, and what XML calls them."""
+_SILENT = frozenset(
+    [
+        "LogInfo",
+        "SetParameter",
+        "SetParametersFromFile",
+        "SetUseSimTime",
+        "SetEnvironmentVariable",
+        "UnsetEnvironmentVariable",
+        "AppendEnvironmentVariable",
+        "SetROSLogDir",
+    ]
+)
+"""Actions that start nothing and rename nothing."""
+_ACTIONS = frozenset(
+    (*_NODES, *["IncludeLaunchDescription", "GroupAction", "PushRosNamespace", "SetRemap", "LoadComposableNodes"])
+)
+"""What must not go missing without a word."""
+
+
+def from_python(text: str, file: str) -> Parsed:
+    """Raises WrongLaunch."""
+    try:
+        module = ast.parse(text)
+        return _Python(file, module).parsed()
+    except SyntaxError as error:
+        raise WrongLaunch(f"this is not Python: {error.msg}", error.lineno or 1) from None
+    except (RecursionError, ValueError, MemoryError):
+        raise WrongLaunch("this is not Python that can be read", 1) from None
+
+
+@dataclass(slots=True)
+class _Python:
+    file: str
+    module: ast.Module
+    found: Parsed = field(default_factory=Parsed)
+    bound: dict[str, ast.expr] = field(default_factory=dict)
+    added: dict[str, list[ast.expr]] = field(default_factory=dict)
+    """What was appended to a list or a launch description of that name."""
+    seen: set[int] = field(default_factory=set)
+    steps: int = 0
+
+    def parsed(self) -> Parsed:
+        top = [
+            s for s in self.module.body if isinstance(s, ast.FunctionDef) and s.name == "generate_launch_description"
+        ]
+        if len(top) != 1:
+            raise WrongLaunch("a launch file in Python defines generate_launch_description() once", 1)
+        counts = _bindings(self.module)
+        result: ast.expr | None = None
+        for statement in (*self.module.body, *top[0].body):
+            if isinstance(statement, ast.Return):
+                result = result or statement.value
+            elif result is None:
+                self.statement(statement, counts)
+        if result is None:
+            self.tell(top[0], "generate_launch_description() returns nothing at its end")
+        self.found.elements = tuple(self.actions(result)) if result is not None else ()
+        for node in ast.walk(self.module):
+            if id(node) in self.seen:
+                continue
+            if isinstance(node, ast.Return) and node not in top[0].body and node in set(ast.walk(top[0])):
+                self.tell(node, "what is returned under a condition is not read")
+            elif isinstance(node, ast.Call) and _called(node) in _ACTIONS:
+                self.tell(node, f"this {_called(node)}(…) is not read: it is not written out in the list of actions")
+        return self.found
+
+    def statement(self, statement: ast.stmt, counts: Mapping[str, int]) -> None:
+        match statement:
+            case ast.Assign(targets=[ast.Name(id=name)], value=value) if counts[name] == 1:
+                self.bound[name] = value
+            case ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as value) if counts[name] == 1:
+                self.bound[name] = value
+            case ast.Expr(value=ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr=method), args=[item])):
+                if method in ("add_action", "append", "add_entity"):
+                    self.added.setdefault(name, []).append(item)
+                elif method == "extend":
+                    self.added.setdefault(name, []).append(ast.Starred(item, ast.Load()))
+            case _:  # what it holds is looked for at the end
+                pass
+
+    # -- actions -------------------------------------------------------------------------------------------------------
+
+    def actions(self, node: ast.expr) -> list[Element]:
+        self.step(node)
+        self.seen.add(id(node))
+        match node:
+            case ast.List(elts=items) | ast.Tuple(elts=items):
+                return [element for item in items for element in self.actions(item)]
+            case ast.Starred(value=value):
+                return self.actions(value)
+            case ast.BinOp(left=left, op=ast.Add(), right=right):
+                return self.actions(left) + self.actions(right)
+            case ast.Name(id=name) if name in self.bound:
+                added = self.added.get(name, [])
+                return [e for part in (self.bound[name], *added) for e in self.actions(part)]
+            case ast.Call():
+                return self.action(node)
+            case _:
+                self.tell(node, f"`{_shown(node)}` is not evaluated")
+                return []
+
+    def action(self, call: ast.Call) -> list[Element]:
+        name = _called(call)
+        if name in _NODES:
+            return [self.node(call, _NODES[name])]
+        if name in _SILENT:
+            return []
+        match name:
+            case "LaunchDescription":
+                return [e for part in self.given(call, ("initial_entities",)) for e in self.actions(part)]
+            case "GroupAction":
+                return [self.element(call, "group", ("actions",), scoped="scoped")]
+            case "TimerAction":
+                return [self.element(call, "timer", ("period", "actions"))]
+            case "LoadComposableNodes":
+                return [self.element(call, "load_composable_node", ("composable_node_descriptions",))]
+            case "PushRosNamespace" | "PushROSNamespace":
+                return [self.plain(call, "push_ros_namespace", ("namespace",))]
+            case "SetRemap":
+                return [self.plain(call, "set_remap", ("src", "dst"), src="from", dst="to")]
+            case "DeclareLaunchArgument":
+                return [self.plain(call, "arg", ("name", "default_value"), default_value="default")]
+            case "SetLaunchConfiguration":
+                return [self.plain(call, "let", ("name", "value"))]
+            case "IncludeLaunchDescription":
+                return [self.include(call)]
+            case _:
+                self.tell(call, f"{name}(…) is not read")
+                for inner in ast.walk(call):
+                    self.seen.add(id(inner))
+                return []
+
+    def given(self, call: ast.Call, names: Sequence[str]) -> list[ast.expr]:
+        """The arguments of these names, by place or by keyword."""
+        found = dict(zip(names, call.args, strict=False))
+        found |= {k.arg: k.value for k in call.keywords if k.arg is not None}
+        return [found[name] for name in names if name in found]
+
+    def element(self, call: ast.Call, tag: str, names: tuple[str, ...], **attributes: str) -> Element:
+        """An action that holds others, in the last of its arguments `names`."""
+        inner = dict(zip(names, call.args, strict=False)) | {k.arg or "": k.value for k in call.keywords}
+        children = self.actions(inner[names[-1]]) if names[-1] in inner else []
+        texts = {key: self.text(inner[keyword]) for keyword, key in attributes.items() if keyword in inner}
+        return Element(tag, {**texts, **self.condition(call)}, tuple(children), self.at(call))
+
+    def plain(self, call: ast.Call, tag: str, names: tuple[str, ...], **renamed: str) -> Element:
+        inner = dict(zip(names, call.args, strict=False)) | {k.arg or "": k.value for k in call.keywords}
+        texts = {renamed.get(name, name): self.text(inner[name]) for name in names if name in inner}
+        return Element(tag, {**texts, **self.condition(call)}, (), self.at(call))
+
+    def node(self, call: ast.Call, tag: str) -> Element:
+        texts: dict[str, Text] = {}
+        children: list[Element] = []
+        for keyword in call.keywords:
+            if keyword.arg in _RENAMED:
+                texts[_RENAMED[keyword.arg]] = self.text(keyword.value)
+            elif keyword.arg == "remappings":
+                children += self.remaps(keyword.value)
+            elif keyword.arg in ("arguments", "ros_arguments"):
+                parts = self.items(keyword.value)
+                texts["args"] = (
+                    joined([p for part in parts for p in (" ", self.text(part))])
+                    if parts is not None
+                    else self.unknown(keyword.value)
+                )
+            elif keyword.arg == "composable_node_descriptions":
+                children += self.actions(keyword.value)
+            elif keyword.arg is None:
+                texts["args"] = Unread("its keywords are not written out")
+        return Element(tag, {**texts, **self.condition(call)}, tuple(children), self.at(call))
+
+    def remaps(self, node: ast.expr) -> list[Element]:
+        found: list[Element] = []
+        pairs = self.items(node)
+        for pair in pairs if pairs is not None else [node]:
+            parts = self.items(pair) if pairs is not None else None
+            texts = [self.text(part) for part in parts] if parts is not None else []
+            if len(texts) != 2:
+                texts = [self.unknown(pair)] * 2
+            found.append(Element("remap", {"from": texts[0], "to": texts[1]}, (), self.at(pair)))
+        return found
+
+    def include(self, call: ast.Call) -> Element:
+        parts = self.given(call, ("launch_description_source",))
+        source = self.value(parts[0]) if parts else None
+        if isinstance(source, ast.Call) and _called(source).endswith("LaunchDescriptionSource"):
+            inner = self.given(source, ("launch_file_path", "location")) or [*source.args]
+            file = self.text(inner[0]) if inner else self.unknown(call)
+        else:
+            file = self.text(source) if source is not None else self.unknown(call)
+        children: list[Element] = []
+        for keyword in call.keywords:
+            if keyword.arg == "launch_arguments":
+                children += self.arguments(keyword.value)
+        return Element("include", {"file": file, **self.condition(call)}, tuple(children), self.at(call))
+
+    def arguments(self, node: ast.expr) -> list[Element]:
+        value = self.value(node)
+        if isinstance(value, ast.Call) and _called(value) == "items" and isinstance(value.func, ast.Attribute):
+            value = self.value(value.func.value)
+        pairs: list[tuple[ast.expr | None, ast.expr]] = []
+        if isinstance(value, ast.Dict):
+            pairs = list(zip(value.keys, value.values, strict=True))
+        else:
+            for item in self.items(value) or ():
+                parts = self.items(item)
+                if parts is not None and len(parts) == 2:
+                    pairs.append((parts[0], parts[1]))
+        if not pairs:
+            self.tell(node, f"the arguments `{_shown(node)}` are not evaluated")
+        named = [(key, v) for key, v in pairs if key is not None]
+        return [Element("arg", {"name": self.text(key), "value": self.text(v)}, (), self.at(v)) for key, v in named]
+
+    def condition(self, call: ast.Call) -> dict[str, Text]:
+        given = next((k.value for k in call.keywords if k.arg == "condition"), None)
+        if given is None or (isinstance(given, ast.Constant) and given.value is None):
+            return {}
+        value = self.value(given)
+        if isinstance(value, ast.Call) and len(value.args) == 1 and not value.keywords:
+            match _called(value):
+                case "IfCondition":
+                    return {"if": self.text(value.args[0])}
+                case "UnlessCondition":
+                    return {"unless": self.text(value.args[0])}
+                case _:
+                    pass
+        return {"if": Unread(f"the condition `{_shown(given)}` is not evaluated")}
+
+    # -- values --------------------------------------------------------------------------------------------------------
+
+    def value(self, node: ast.expr) -> ast.expr:
+        """What a name stands for."""
+        self.step(node)
+        self.seen.add(id(node))
+        if isinstance(node, ast.Name) and node.id in self.bound and node.id not in self.added:
+            return self.value(self.bound[node.id])
+        return node
+
+    def items(self, node: ast.expr) -> list[ast.expr] | None:
+        """The items of a list that is written out; None of anything else."""
+        self.step(node)
+        match node:
+            case ast.List(elts=items) | ast.Tuple(elts=items):
+                found: list[ast.expr] = []
+                for item in items:
+                    inner = self.items(item.value) if isinstance(item, ast.Starred) else [item]
+                    if inner is None:
+                        return None
+                    found += inner
+                return found
+            case ast.BinOp(left=left, op=ast.Add(), right=right):
+                one, other = self.items(left), self.items(right)
+                return None if one is None or other is None else one + other
+            case ast.Name(id=name) if name in self.bound:
+                known = self.items(self.bound[name])
+                if known is None or any(isinstance(a, ast.Starred) for a in self.added.get(name, ())):
+                    return None
+                return known + self.added.get(name, [])
+            case _:
+                return None
+
+    def text(self, node: ast.expr) -> Text:
+        node = self.value(node)
+        match node:
+            case ast.Constant(value=bool() | int() | float() as value):
+                return str(value)
+            case ast.Constant(value=str() as value):
+                return literal(value)
+            case ast.JoinedStr(values=values):
+                return joined([self.text(v) for v in values])
+            case ast.FormattedValue(value=value, conversion=-1, format_spec=None):
+                return self.text(value)
+            case ast.BinOp(left=left, op=ast.Add(), right=right):
+                return joined([self.text(left), self.text(right)])
+            case ast.List() | ast.Tuple():
+                parts = self.items(node)
+                return joined([self.text(part) for part in parts]) if parts is not None else self.unknown(node)
+            case ast.Call():
+                return self.called(node)
+            case _:
+                return self.unknown(node)
+
+    def called(self, call: ast.Call) -> Text:
+        """A substitution, or a function of which it is known what it gives."""
+        one = self.text(call.args[0]) if len(call.args) == 1 and not call.keywords else None
+        match _called(call):
+            case "LaunchConfiguration" if (name := self.word(call, "variable_name")) is not None:
+                return f"$(var {name})"
+            case "FindPackageShare" | "get_package_share_directory" | "get_package_share_path":
+                name = self.word(call, "package", "package_name")
+                return self.unknown(call) if name is None else f"$(find-pkg-share {name})"
+            case "EnvironmentVariable" if (name := self.word(call, "name")) is not None:
+                return f"$(env {name})"
+            case "ThisLaunchFileDir":
+                return "$(dirname)"
+            case "TextSubstitution":
+                texts = self.given(call, ("text",))
+                return self.text(texts[0]) if texts else self.unknown(call)
+            case "str" if one is not None:
+                return one
+            case "dirname" if ast.unparse(call.args[0]) in _THIS_FILE:
+                return "$(dirname)"
+            case "PathJoinSubstitution" if call.args:
+                return self.path(self.items(call.args[0]), call)
+            case "join" if isinstance(call.func, ast.Attribute) and ast.unparse(call.func.value).endswith("path"):
+                return self.path(call.args, call)
+            case _:
+                return self.unknown(call)
+
+    def word(self, call: ast.Call, *keywords: str) -> str | None:
+        """The one constant that is given."""
+        given = [*call.args, *(k.value for k in call.keywords if k.arg in keywords)]
+        text = self.text(given[0]) if given else None
+        return text if isinstance(text, str) and VARIABLE.match(text) else None
+
+    def path(self, parts: Sequence[ast.expr] | None, call: ast.Call) -> Text:
+        if parts is None or any(isinstance(part, ast.Starred) for part in parts):
+            return self.unknown(call)
+        texts = [self.text(part) for part in parts]
+        return joined([t for k, text in enumerate(texts) for t in ((text,) if k == 0 else ("/", text))])
+
+    def unknown(self, node: ast.expr) -> Unread:
+        return Unread(f"`{_shown(node)}` is not evaluated")
+
+    def step(self, node: ast.expr) -> None:
+        self.steps += 1
+        if self.steps > LAUNCH_ELEMENTS:
+            raise WrongLaunch("it says more than can be read", getattr(node, "lineno", 1))
+
+    def at(self, node: ast.expr | ast.stmt) -> Span:
+        line, column = getattr(node, "lineno", 1), getattr(node, "col_offset", 0) + 1
+        return Span(self.file, line, column, line, column + 1)
+
+    def tell(self, node: ast.expr | ast.stmt, message: str) -> None:
+        self.seen.add(id(node))
+        self.found.unread.append(unread(self.at(node), message))
+
+
+_THIS_FILE = ("__file__", "os.path.abspath(__file__)", "os.path.realpath(__file__)")
+
+
+def _called(call: ast.Call) -> str:
+    match call.func:
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return name
+        case _:
+            return "a call"
+
+
+def _shown(node: ast.expr) -> str:
+    text = " ".join(ast.unparse(node).split())
+    return text if len(text) <= 60 else f"{text[:59]}…"
+
+
+def _bindings(module: ast.Module) -> Counter[str]:
+    """How often each name is bound, anywhere in the file: of one that is bound again it cannot be told which is
+    meant."""
+    found: Counter[str] = Counter()
+    for node in ast.walk(module):
+        match node:
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) | ast.arg(arg=name):
+                found[name] += 1
+            case ast.Import(names=names) | ast.ImportFrom(names=names):
+                found.update(alias.asname or alias.name for alias in names)
+            case _:
+                pass
+    return found

@@ -1,0 +1,444 @@
+"""What launch files start: nodes by their whole names, with their remappings.
+
+Scopes, arguments and remappings are as roslaunch (ROS 1) and launch_ros (ROS 2) have them: in ROS 1 an included file
+sees only the arguments that it is given, and a node's own remapping goes before its group's; in ROS 2 arguments and
+pushed namespaces hold until their group ends, and a group's remapping goes first.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from avow.base.diagnostics import Diagnostic, Span
+from avow.ros.launch.elements import Element, Parsed, Text, Unread, WrongLaunch, place, unread
+from avow.ros.launch.markup import from_xml, from_yaml
+from avow.ros.launch.python import from_python
+from avow.ros.names import is_name
+from avow.tuning.sizes import LAUNCH_BYTES, LAUNCH_DEPTH, LAUNCH_ELEMENTS, PACKAGES_SEARCHED
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """A node that a launch file starts. `unread`: what of its names cannot be told without running the file."""
+
+    name: str
+    """``/robot1/sensor``; empty where it is not known."""
+    kind: str
+    """``package/executable``, as far as it is said."""
+    remaps: tuple[tuple[str, str], ...] = ()
+    unread: tuple[str, ...] = ()
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Launched:
+    """What some launch files start. `unread`: the places that cannot be read statically; `files`: all that were
+    read."""
+
+    nodes: tuple[Started, ...] = ()
+    unread: tuple[Diagnostic, ...] = ()
+    files: tuple[Path, ...] = ()
+
+
+def read_launch(files: Iterable[tuple[Path, Mapping[str, str]]], root: Path) -> Launched:
+    """The nodes that launch files start, each file with the values of its arguments; what they include is read where
+    it lies below `root`. What cannot be read stands in `unread`; an error there is a file that is none."""
+    work = _Reading(root.resolve())
+    for path, given in files:
+        work.file(path.resolve(), dict(given), None)
+    return Launched(tuple(work.nodes), tuple(dict.fromkeys(work.unread)), tuple(work.files))
+
+
+class _Unknown(Exception):  # noqa: N818 - it says what was found
+    """A text that cannot be known."""
+
+
+@dataclass(slots=True)
+class _Scope:
+    path: Path
+    ros1: bool
+    depth: int
+    namespace: str = ""
+    args: dict[str, Text] = field(default_factory=dict)
+    given: dict[str, Text] = field(default_factory=dict)
+    """ROS 1: what the file was given from outside."""
+    remaps: list[tuple[str, str]] = field(default_factory=list)
+    doubt: tuple[str, ...] = ()
+    """Why what stands here may not be started, or be called otherwise."""
+    lost: bool = False
+    """Its namespace is not known."""
+
+    def inner(self) -> _Scope:
+        return replace(self, args=dict(self.args), remaps=list(self.remaps))
+
+
+_SILENT = frozenset(
+    [
+        "param",
+        "rosparam",
+        "env",
+        "set_env",
+        "unset_env",
+        "set_parameter",
+        "set_use_sim_time",
+        "machine",
+        "test",
+        "master",
+        "log",
+        "description",
+        "append_env",
+    ]
+)
+"""Elements that start nothing and rename nothing."""
+_NODES = ("node", "lifecycle_node", "node_container", "composable_node", "composable_node_container")
+_SUBSTITUTION = re.compile(r"\$\(([^$()]*)\)")
+
+
+@dataclass(slots=True)
+class _Reading:
+    root: Path
+    nodes: list[Started] = field(default_factory=list)
+    unread: list[Diagnostic] = field(default_factory=list)
+    files: dict[Path, None] = field(default_factory=dict)
+    count: int = 0
+    packages: dict[str, Path] | None = None
+
+    def file(self, path: Path, given: dict[str, Text], outer: _Scope | None) -> None:
+        self.files[path] = None
+        try:
+            parsed = _parsed(path)
+        except WrongLaunch as wrong:
+            self.unread.append(Diagnostic("ROS120", f"{path.name}: {wrong}", place(str(path), wrong.line)))
+            return
+        self.unread += parsed.unread
+        ros1 = path.suffix not in (".py", ".yaml", ".yml") and not _is_ros2(parsed.elements)
+        if outer is None:
+            scope = _Scope(path, ros1, 0, args={} if ros1 else dict(given), given=given)
+        elif ros1:
+            scope = replace(outer.inner(), path=path, ros1=True, depth=outer.depth + 1, args={}, given=given)
+        else:  # what is included shares its includer's scope
+            scope = replace(outer, path=path, ros1=False, depth=outer.depth + 1)
+            scope.args.update(given)
+        self.each(parsed.elements, scope)
+        if outer is not None and not ros1:
+            outer.namespace, outer.lost, outer.remaps = scope.namespace, scope.lost, scope.remaps
+
+    def each(self, elements: Iterable[Element], scope: _Scope) -> None:
+        for element in elements:
+            self.count += 1
+            if self.count > LAUNCH_ELEMENTS:
+                self.tell(element, "more elements than can be read")
+                return
+            self.one(element, scope)
+
+    def one(self, element: Element, scope: _Scope) -> None:
+        started = self.condition(element, scope)
+        if started is False:
+            return
+        doubt = scope.doubt if started is True else (*scope.doubt, started)
+        match element.tag:
+            case tag if tag in _NODES:
+                self.node(element, replace(scope, doubt=doubt))
+            case "group":
+                inner = replace(scope.inner() if element.get("scoped") != "False" else scope, doubt=doubt)
+                self.push(element, inner, element.get("ns"))
+                self.each(element.children, inner)
+            case "timer":
+                self.each(element.children, replace(scope, doubt=doubt))
+            case "load_composable_node":
+                inner = replace(scope, doubt=doubt)
+                self.each((e for e in element.children if e.tag == "composable_node"), inner)
+            case "push_ros_namespace":
+                self.push(element, scope, element.get("namespace", "ns"), started)
+            case "remap" | "set_remap":
+                self.remap(element, scope, started)
+            case "include":
+                self.include(element, scope, doubt)
+            case "arg" | "let":
+                self.arg(element, scope, started)
+            case tag if tag in _SILENT:
+                pass
+            case tag:
+                self.tell(element, f"<{tag}> is not read")
+
+    def condition(self, element: Element, scope: _Scope) -> bool | str:
+        """Whether it counts; a text where that depends on what is not known."""
+        for name, wanted in (("if", True), ("unless", False)):
+            text = element.get(name)
+            if text is None:
+                continue
+            try:
+                value = self.expanded(text, scope).strip().lower()
+            except _Unknown as why:
+                self.tell(element, f"whether it counts is not known: {why}")
+                return f"it is started under a condition ({why})"
+            if value not in ("true", "1", "false", "0"):
+                self.tell(element, f"whether it counts is not known: {value[:40]!r} is neither true nor false")
+                return "it is started under a condition"
+            if (value in ("true", "1")) != wanted:
+                return False
+        return True
+
+    def push(self, element: Element, scope: _Scope, text: Text | None, started: bool | str = True) -> None:
+        if text is None:
+            return
+        try:
+            if isinstance(started, str):
+                raise _Unknown(started)
+            scope.namespace = _within(scope.namespace, self.name(text, scope))
+        except _Unknown as why:
+            self.tell(element, f"the namespace is not known: {why}")
+            scope.lost = True
+
+    def remap(self, element: Element, scope: _Scope, started: bool | str) -> None:
+        if element.children:
+            self.each(element.children, scope)  # ROS 1 nests what it remaps for
+        try:
+            if isinstance(started, str):
+                raise _Unknown(started)
+            old, new = (self.name(_wanted(element, key), scope, "a remapping") for key in ("from", "to"))
+        except _Unknown as why:
+            self.tell(element, f"the remapping is not known: {why}")
+            scope.doubt = (*scope.doubt, f"a remapping is not known ({why})")
+            return
+        if scope.ros1:  # the later one counts
+            scope.remaps = [pair for pair in scope.remaps if pair[0] != old]
+        scope.remaps = [*scope.remaps, (old, new)]
+
+    def arg(self, element: Element, scope: _Scope, started: bool | str) -> None:
+        name = element.get("name")
+        if not isinstance(name, str):
+            self.tell(element, "the argument's name is not known")
+            return
+        value, default = element.get("value", "var"), element.get("default")
+        if isinstance(started, str):
+            scope.args[name] = Unread(started)
+        elif element.tag == "let" or (value is not None and scope.ros1):
+            scope.args[name] = self.fixed(value, scope)
+        elif scope.ros1 and name in scope.given:
+            scope.args[name] = scope.given[name]
+        elif name not in scope.args or scope.ros1:
+            scope.args[name] = (
+                Unread(f"the argument {name} is not given, and has no default")
+                if default is None
+                else self.fixed(default, scope)
+            )
+
+    def include(self, element: Element, scope: _Scope, doubt: tuple[str, ...]) -> None:
+        inner = replace(scope.inner() if scope.ros1 else scope, doubt=doubt)
+        given: dict[str, Text] = dict(scope.args) if element.get("pass_all_args") in ("true", "1") else {}
+        for part in element.children:
+            name, value = part.get("name"), part.get("value")
+            if part.tag in ("arg", "let") and isinstance(name, str) and self.condition(part, scope) is True:
+                given[name] = self.fixed(value, scope)
+        self.push(element, inner, element.get("ns"))
+        try:
+            text = self.expanded(_wanted(element, "file"), scope)
+        except _Unknown as why:
+            self.tell(element, f"the file that is included is not known: {why}")
+            return
+        if not Path(text).is_absolute():
+            self.tell(element, f"{text[:80]!r} is relative to wherever the robot is started: it is not read")
+            return
+        path = Path(os.path.realpath(text))
+        if self.root not in path.parents:
+            self.tell(element, f"{path} lies outside {self.root}: it is not read")
+        elif not path.is_file():
+            self.tell(element, f"there is no file {path}")
+        elif scope.depth >= LAUNCH_DEPTH:
+            self.tell(element, "files are included within one another too deeply")
+        else:
+            self.file(path, given, inner)
+            if not scope.ros1:
+                scope.namespace, scope.lost, scope.remaps = inner.namespace, inner.lost, inner.remaps
+
+    def node(self, element: Element, outer: _Scope) -> None:
+        scope = outer.inner()
+        doubt = list(outer.doubt)
+        self.push(element, scope, element.get("ns", "namespace"))
+        own = replace(scope, remaps=[], doubt=())
+        for child in element.children:
+            if child.tag == "remap":
+                self.one(child, own)
+        doubt += own.doubt
+        name, rest = self.command_line(element, scope, doubt)
+        remaps = [*scope.remaps, *rest, *own.remaps]
+        if scope.ros1:
+            remaps = list(dict(remaps).items())
+        whole = ""
+        text = name if name is not None else element.get("name")
+        if text is None:
+            self.tell(element, "the node has no name here: it has the one that its program gives it")
+        elif not scope.lost:
+            try:
+                said = self.name(text, scope).lstrip("/")
+                whole = _within(scope.namespace, said)
+            except _Unknown as why:
+                self.tell(element, f"the node's name is not known: {why}")
+        parts = [self.shown(element.get(key), scope) for key in ("pkg", "exec", "type", "plugin")]
+        kind = "/".join(part for part in parts if part)
+        self.nodes.append(Started(whole, kind, tuple(remaps), tuple(dict.fromkeys(doubt)), element.span))
+        if element.tag.endswith("container"):
+            self.each((e for e in element.children if e.tag == "composable_node"), outer)
+
+    def command_line(
+        self, element: Element, scope: _Scope, doubt: list[str]
+    ) -> tuple[str | None, list[tuple[str, str]]]:
+        """The name and the remappings among a node's arguments: ``scan:=front __name:=x``."""
+        name: str | None = None
+        found: list[tuple[str, str]] = []
+        for key in ("args", "ros_args"):
+            text = element.get(key)
+            if text is None:
+                continue
+            try:
+                words = shlex.split(self.expanded(text, scope))
+            except (_Unknown, ValueError) as why:
+                self.tell(element, f"the arguments are not known, which may remap: {why}")
+                doubt.append(f"its arguments are not known ({why})")
+                continue
+            for before, word in zip(["", *words], words, strict=False):
+                old, sign, new = word.partition(":=")
+                if not sign or before in ("-p", "--param") or old.startswith("_") != old.startswith("__"):
+                    continue
+                if old in ("__name", "__node"):
+                    name = new
+                elif old == "__ns":
+                    scope.namespace = _within(scope.namespace, new)
+                elif is_name(old) and is_name(new):
+                    found.append((old, new))
+                elif not old.startswith("__"):
+                    self.tell(element, f"the remapping {word[:60]!r} is not read")
+                    doubt.append(f"a remapping is not read ({word[:60]})")
+        return name, found
+
+    # -- texts ---------------------------------------------------------------------------------------------------------
+
+    def name(self, text: Text, scope: _Scope, what: str = "a name") -> str:
+        found = self.expanded(text, scope).strip()
+        if not is_name(found) and found not in ("", "/"):
+            raise _Unknown(f"{found[:60]!r} is no name for {what}")
+        return found
+
+    def shown(self, text: Text | None, scope: _Scope) -> str:
+        try:
+            return self.expanded(text, scope) if text is not None else ""
+        except _Unknown:
+            return ""
+
+    def fixed(self, text: Text | None, scope: _Scope) -> Text:
+        """An argument's value."""
+        try:
+            return self.expanded(text if text is not None else Unread("it has no value"), scope)
+        except _Unknown as why:
+            return Unread(str(why))
+
+    def expanded(self, text: Text, scope: _Scope) -> str:
+        """With every substitution in place. Raises _Unknown."""
+        if isinstance(text, Unread):
+            raise _Unknown(text.why)
+        whole = text
+        for _ in range(LAUNCH_DEPTH):
+            found = _SUBSTITUTION.search(whole)
+            if found is None:
+                if "$(" in whole:
+                    raise _Unknown(f"{whole[:60]!r} is not read")
+                return whole
+            value = self.substituted(found[1], scope)
+            whole = f"{whole[: found.start()]}{value}{whole[found.end() :]}"
+            if len(whole) > LAUNCH_BYTES:
+                raise _Unknown("its text is too long")
+        raise _Unknown("it has too many substitutions")
+
+    def substituted(self, inside: str, scope: _Scope) -> str:
+        word, *rest = inside.split() or [""]
+        argument = rest[0].strip("'\"") if rest else ""
+        match word:
+            case "arg" | "var":
+                value = scope.args.get(argument)
+                if value is None:
+                    raise _Unknown(f"no argument {argument!r} is declared here")
+                if isinstance(value, Unread):
+                    raise _Unknown(value.why)
+                if "$(" in value:
+                    raise _Unknown(f"the argument {argument} holds a substitution")
+                return value
+            case "find" | "find-pkg-share" | "find-pkg-prefix":
+                folder = self.package(argument)
+                if folder is None:
+                    raise _Unknown(f"the package {argument} is not below {self.root}")
+                return str(folder)
+            case "dirname":
+                return str(scope.path.parent)
+            case "env" | "optenv":
+                raise _Unknown(f"it depends on the environment variable {argument}")
+            case "eval" | "command" | "anon" | "exec-in-pkg" | "exec-in-package" | "find-exec":
+                raise _Unknown(f"$({inside[:60]}) is known only when it runs")
+            case _:
+                raise _Unknown(f"$({inside[:60]}) is not read")
+
+    def package(self, name: str) -> Path | None:
+        if self.packages is None:
+            self.packages = dict(_packages(self.root))
+        return self.packages.get(name)
+
+    def tell(self, element: Element, message: str) -> None:
+        self.unread.append(unread(element.span, message))
+
+
+def _wanted(element: Element, key: str) -> Text:
+    text = element.get(key)
+    return text if text is not None else Unread(f"{key} is missing")
+
+
+def _within(namespace: str, name: str) -> str:
+    """A name in a namespace; an absolute one as it is. Neither ends in a slash."""
+    if name.startswith("/"):
+        return name.rstrip("/")
+    return f"{namespace}/{name}".rstrip("/")
+
+
+def _parsed(path: Path) -> Parsed:
+    try:
+        if path.stat().st_size > LAUNCH_BYTES:
+            raise WrongLaunch(f"it has more than {LAUNCH_BYTES} bytes", 1)
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise WrongLaunch(f"it cannot be read: {error}", 1) from None
+    match path.suffix:
+        case ".py":
+            return from_python(text, str(path))
+        case ".yaml" | ".yml":
+            return from_yaml(text, str(path))
+        case _:
+            return from_xml(text, str(path))
+
+
+def _is_ros2(elements: Iterable[Element]) -> bool:
+    """Whether it is ROS 2's XML: roslaunch has neither `exec` nor these elements."""
+    return any(
+        "exec" in e.attributes
+        or "namespace" in e.attributes
+        or e.tag in ("let", "push_ros_namespace", "set_remap", "node_container", "load_composable_node")
+        or any(isinstance(text, str) and ("$(var " in text or "$(find-pkg" in text) for text in e.attributes.values())
+        or _is_ros2(e.children)
+        for e in elements
+    )
+
+
+def _packages(root: Path) -> Iterator[tuple[str, Path]]:
+    """The packages below a folder, by name."""
+    for count, (folder, inside, files) in enumerate(os.walk(root)):
+        if count > PACKAGES_SEARCHED:
+            return
+        inside[:] = sorted(n for n in inside if not n.startswith(".") and n not in ("build", "install", "node_modules"))
+        if "package.xml" in files:
+            text = Path(folder, "package.xml").read_bytes()[:LAUNCH_BYTES].decode("utf-8", "replace")
+            found = re.search(r"<name>\s*([\w.-]+)\s*</name>", text)
+            if found:
+                yield found[1], Path(folder)

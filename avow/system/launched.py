@@ -1,0 +1,159 @@
+"""Launch files of a plan: they say how the contract's nodes are called when they run, and what remaps their topics.
+
+A started node is the contract's node of the name that the plan gives it, else of its own last name. What the plan says
+beside has to agree: a topic that the two resolve otherwise is an error that names both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.base.workspace import find_workspace
+from avow.language.contract import Contract, Node
+from avow.ros.launch import Launched, Started, read_launch
+from avow.ros.names import Placed, Resolver
+from avow.system.paths import inside
+from avow.system.plan import Plan, System
+from avow.system.schema import suggest
+from avow.system.strict_yaml import Piece
+
+
+def read_launched(plan: Path, pieces: Iterable[Piece]) -> tuple[Launched | None, tuple[Diagnostic, ...]]:
+    """What the plan's launch files start; None where it names none. They lie in the workspace, or in the system's
+    folder where that is in none."""
+    folder = plan.resolve().parent
+    place = find_workspace(folder)
+    root = place.root if place is not None else folder
+    faults: list[Diagnostic] = []
+    files: list[tuple[Path, dict[str, str]]] = []
+    for piece in pieces:
+        named = piece.at("file") or piece
+        path = inside(root, f"{folder.relative_to(root).as_posix()}/{named.text}")
+        if path is None or Path(named.text).is_absolute():
+            message = f"the path {named.text[:200]!r} leads out of the workspace"
+            faults.append(Diagnostic("PLAN108", message, named.span))
+        elif not path.is_file():
+            faults.append(Diagnostic("PLAN107", f"there is no file {named.text!r} in {folder}", named.span))
+        else:
+            given = piece.at("args")
+            entries = (given.entries or {}) if given is not None else {}
+            files.append((path, {name: _value(value) for name, value in entries.items()}))
+    if not files:
+        return None, tuple(faults)
+    found = read_launch(files, root)
+    return found, (*faults, *(d for d in found.unread if d.is_error))
+
+
+def _value(piece: Piece) -> str:
+    return str(piece.value).lower() if isinstance(piece.value, bool) else piece.text
+
+
+def started(plan: Plan, contract: Contract) -> tuple[Plan, tuple[Diagnostic, ...]]:
+    """The plan with the names and remappings of its launch files, and where it says otherwise."""
+    if plan.launched is None:
+        return plan, ()
+    faults: list[Diagnostic] = []
+    placed = dict(plan.ros.names.nodes)
+    for node in contract.nodes:
+        mine = plan.ros.names.placed(node.name)
+        launched = _launched(plan, node, mine, faults)
+        if launched is not None:
+            faults += _disagreements(node, mine, launched)
+            remaps = (*launched.remaps, *(mine.remaps if launched.unread else ()))
+            placed[node.name] = Placed(launched.name, remaps, launched.span, True)
+    names = Resolver(tuple(placed.items()))
+    return replace(plan, ros=replace(plan.ros, names=names)), tuple(faults)
+
+
+def told(system: System) -> Iterator[Diagnostic]:
+    """What `avow check` says of launch files: what cannot be read, how each node runs, and what is started beside."""
+    launched = system.plan.launched
+    if launched is None:
+        return
+    yield from launched.unread
+    model = system.plan.model.data if isinstance(system.plan.model.data, dict) else {}
+    named = [m for key in ("compound",) for members in model.get(key, {}).values() for m in _texts(members)]
+    named += [*model.get("dropped", {})]
+    spoken = {name.lstrip("/") for name in named}
+    known: dict[str, str] = {}
+    for node in system.contract.nodes:
+        placed = system.plan.ros.names.placed(node.name)
+        one = next((s for s in launched.nodes if s.name == placed.name), None)
+        if one is not None:
+            known[one.name] = node.name
+            yield _runs(node, placed, one)
+        elif not node.relay and node.name not in (*model.get("compound", {}), *model.get("external", {})):
+            message = f"no launch file starts {node.name}"
+            names = [s.name for s in launched.nodes if s.name]
+            hint = suggest(f"/{node.name}", names) or "name it under `ros: {nodes: …}`, or as `external` under `model`"
+            yield Diagnostic("ROS124", message, node.span, Severity.WARNING, hint)
+    for one in launched.nodes:
+        last = one.name.rpartition("/")[2]
+        if one.name and one.name not in known and not {last, one.name.lstrip("/")} & spoken:
+            what = f" ({one.kind})" if one.kind else ""
+            message = f"{one.name}{what} is started, and is neither a node of the contract nor named under `model`"
+            yield Diagnostic("ROS124", message, one.span, Severity.WARNING, "model: {dropped: {NAME: why}}")
+
+
+def _runs(node: Node, placed: Placed, one: Started) -> Diagnostic:
+    remaps = ", ".join(f"{old} → {new}" for old, new in placed.remaps)
+    message = f"{node.name} runs as {placed.name}" + (f", with {remaps}" if remaps else "")
+    doubts = "; ".join(one.unread)
+    if doubts:
+        return Diagnostic("ROS121", f"{message}; but {doubts}", one.span, Severity.WARNING)
+    return Diagnostic("ROS125", message, one.span, Severity.NOTE)
+
+
+def _texts(members: object) -> list[str]:
+    return [str(m) for m in members] if isinstance(members, list) else [str(members)]
+
+
+def _launched(plan: Plan, node: Node, mine: Placed, faults: list[Diagnostic]) -> Started | None:
+    """The started node that a node of the contract is; None where there is none, or it is not clear which."""
+    assert plan.launched is not None
+    every = [s for s in plan.launched.nodes if s.name]
+    if mine.named:
+        found = [s for s in every if s.name == mine.name]
+        if not found:
+            names = list(dict.fromkeys(s.name for s in every))
+            message = f"ros.nodes.{node.name}.name: no launch file starts {mine.name}"
+            sure = not plan.launched.unread
+            severity = Severity.ERROR if sure else Severity.WARNING
+            faults.append(Diagnostic("ROS122", message, mine.span, severity, suggest(mine.name, names)))
+    else:
+        found = [s for s in every if s.name.rpartition("/")[2] == node.name]
+    if len({(s.name, s.remaps) for s in found}) > 1:
+        shown = "; ".join(f"{s.name} at {_at(s.span)}" for s in found)
+        message = f"which of the started nodes {node.name} is, is not said: {shown}"
+        notes = tuple((f"{s.name} is started here", s.span) for s in found)
+        faults.append(Diagnostic("ROS123", message, mine.span or node.span, hint=_NAME_IT, notes=notes))
+        return None
+    if not found:
+        return None
+    return replace(found[0], unread=tuple(dict.fromkeys(why for s in found for why in s.unread)))
+
+
+_NAME_IT = "ros: {nodes: {NODE: {name: /…}}}"
+
+
+def _disagreements(node: Node, mine: Placed, launched: Started) -> Iterator[Diagnostic]:
+    """Topics that the plan's remappings name otherwise than the launch file's."""
+    if launched.unread:
+        return  # what was not read may be what the plan says
+    there = Placed(launched.name, launched.remaps)
+    here = Placed(launched.name, mine.remaps)
+    for old, _ in mine.remaps:
+        if here.resolved(old) != there.resolved(old):
+            message = (
+                f"ros.nodes.{node.name}.remap: {old} is {here.resolved(old)} by the plan, and {there.resolved(old)} "
+                f"by {_at(launched.span)}"
+            )
+            notes = ((f"{launched.name} is started here", launched.span),)
+            yield Diagnostic("ROS122", message, mine.span, notes=notes)
+
+
+def _at(span: Span | None) -> str:
+    return f"{Path(span.file).name}:{span.line}" if span is not None else "a launch file"

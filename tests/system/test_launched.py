@@ -1,0 +1,155 @@
+"""What launch files say of a plan's nodes links their topics; where the plan says otherwise, it is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.cli import main
+from avow.system.graph import dataflow
+from avow.system.launched import told
+from avow.system.load import load_system
+
+CONTRACT = """
+node a { inputs( ) outputs( x : REAL ) topics( float64 t matches(out.x) ) guarantee g ( out.x >= 0 ) }
+node b { inputs( y : REAL ) outputs( z : REAL ) topics( float64 u matches(in.y) )
+  assume a ( in.y >= 0 ) guarantee g ( out.z >= in.y ) }
+"""
+APART = """\
+<launch>
+  <group ns="left"><node name="a" pkg="p" type="a"/></group>
+  <node name="b" pkg="p" type="b"><remap from="u" to="/left/t"/></node>
+</launch>
+"""
+
+
+def make(folder: Path, plan: str, launch: str = APART, contract: str = CONTRACT) -> Path:
+    system = folder / "contracts/s"
+    system.mkdir(parents=True, exist_ok=True)
+    (folder / "dodo.py").write_text("", encoding="utf-8")
+    (folder / "launch").mkdir(exist_ok=True)
+    (folder / "launch/robot.launch").write_text(launch, encoding="utf-8")
+    (system / "system.rcl").write_text(contract, encoding="utf-8")
+    (system / "plan.yaml").write_text(plan, encoding="utf-8")
+    return system
+
+
+LAUNCH = "ros:\n  launch: [../../launch/robot.launch]\n"
+
+
+def edges(folder: Path) -> list[str]:
+    return [f"{e} {e.topic}" for e in dataflow(load_system(folder)).edges]
+
+
+def test_names_and_remappings_of_launch_files_link(tmp_path: Path) -> None:
+    assert edges(make(tmp_path, "{}")) == []
+    assert edges(make(tmp_path, LAUNCH)) == ["a.x → b.y /left/t"]
+
+
+def test_arguments_of_a_launch_file(tmp_path: Path) -> None:
+    launch = APART.replace("<launch>", '<launch><arg name="ns" default="right"/>').replace('"left"', '"$(arg ns)"')
+    assert edges(make(tmp_path, LAUNCH, launch)) == []
+    plan = "ros: {launch: [{file: ../../launch/robot.launch, args: {ns: left}}]}"
+    assert edges(make(tmp_path, plan, launch)) == ["a.x → b.y /left/t"]
+
+
+@pytest.mark.parametrize(
+    ("plan", "launch", "codes"),
+    [
+        ("  nodes: {b: {remap: {u: /left/t}}}", APART, []),
+        ("  nodes: {b: {remap: {u: /right/t}}}", APART, ["ROS122"]),
+        ("  nodes: {a: {name: /right/a}}", APART, ["ROS122"]),
+        ("", APART.replace("</launch>", '<node ns="right" name="a" pkg="p" type="a"/></launch>'), ["ROS123"]),
+        (
+            "  nodes: {a: {name: /left/a}}",
+            APART.replace("</launch>", '<node ns="right" name="a" pkg="p" type="a"/></launch>'),
+            [],
+        ),
+        ("", "<launch><node</launch>", ["ROS120"]),
+    ],
+)
+def test_what_does_not_agree_is_told(tmp_path: Path, plan: str, launch: str, codes: list[str]) -> None:
+    folder = make(tmp_path, LAUNCH + plan, launch)
+    found: tuple[Diagnostic, ...] = ()
+    try:
+        load_system(folder)
+    except Rejected as rejected:
+        found = rejected.diagnostics
+    assert [d.code for d in found] == codes
+    assert all(d.span is not None for d in found)
+
+
+@pytest.mark.parametrize(
+    ("launch", "expected"),
+    [
+        (APART, ["a runs as /left/a", "b runs as /b, with u → /left/t"]),
+        (
+            APART.replace("</launch>", '<node name="rviz" pkg="rviz" type="rviz"/></launch>'),
+            [
+                "a runs as /left/a",
+                "b runs as /b, with u → /left/t",
+                "/rviz (rviz/rviz) is started, and is neither a node of the contract nor named under `model`",
+            ],
+        ),
+        ('<launch><node name="a" pkg="p" type="a"/></launch>', ["a runs as /a", "no launch file starts b"]),
+    ],
+)
+def test_check_says_how_each_node_runs(tmp_path: Path, launch: str, expected: list[str]) -> None:
+    assert [d.message for d in told(load_system(make(tmp_path, LAUNCH, launch)))] == expected
+
+
+def test_paths_stay_in_the_workspace(tmp_path: Path) -> None:
+    with pytest.raises(Rejected) as caught:
+        load_system(make(tmp_path, "ros: {launch: [../../../x.launch, ../../launch/gone.launch, /etc/passwd]}"))
+    assert [d.code for d in caught.value.diagnostics] == ["PLAN108", "PLAN107", "PLAN108"]
+
+
+def test_faults_of_launch_files_are_told_with_all_others(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan = LAUNCH + "  nodes: {b: {remap: {u: /right/t}}, c: {}}\n  distro: noetic\nlints_of: []\n"
+    folder = make(tmp_path, plan, contract=CONTRACT.replace("float64 u", "float32 u"))
+    with pytest.raises(SystemExit, match="2"):
+        main(["check", str(folder)])
+    output = capsys.readouterr().out
+    assert all(code in output for code in ("ROS122", "PLAN103", "PLAN106"))
+
+
+def test_a_launch_file_is_what_the_answer_depends_on(tmp_path: Path) -> None:
+    system = load_system(make(tmp_path, LAUNCH))
+    assert [path.name for path in system.plan.included] == ["robot.launch"]
+
+
+PART = """
+node n { inputs( ) outputs( x : REAL ) topics( float64 t matches(out.x), float64 ~p matches(out.x) )
+  guarantee g ( out.x >= 0 ) }
+"""
+
+
+@pytest.mark.parametrize(
+    ("plan", "topics"),
+    [
+        ("", ["/t", "/n/p"]),
+        ("namespace: left", ["/left/t", "/left/n/p"]),
+    ],
+)
+def test_a_system_that_is_taken_in_keeps_its_names(tmp_path: Path, plan: str, topics: list[str]) -> None:
+    part = tmp_path / "contracts/part"
+    part.mkdir(parents=True)
+    (part / "plan.yaml").write_text("{}", encoding="utf-8")
+    (part / "p.rcl").write_text(PART, encoding="utf-8")
+    folder = make(tmp_path, f"subsystems: {{l: {{system: ../part, {plan}}}}}")
+    system = load_system(folder)
+    node = system.contract.node("l_n")
+    assert [system.plan.ros.names.topic("l_n", t.name) for t in node.topics] == topics
+
+
+def test_what_is_taken_in_may_be_called_otherwise_here(tmp_path: Path) -> None:
+    part = tmp_path / "contracts/part"
+    part.mkdir(parents=True)
+    (part / "plan.yaml").write_text("ros: {nodes: {n: {name: /deep/n, remap: {t: s}}}}", encoding="utf-8")
+    (part / "p.rcl").write_text(PART, encoding="utf-8")
+    whole = "subsystems: {l: {system: ../part}}\n"
+    assert load_system(make(tmp_path, whole)).plan.ros.names.topic("l_n", "t") == "/deep/s"
+    here = whole + "ros: {nodes: {l_n: {name: /here/n}}}"
+    assert load_system(make(tmp_path, here)).plan.ros.names.topic("l_n", "t") == "/here/t"
