@@ -112,6 +112,20 @@ def system_folder(name: str) -> Path:
     )
 
 
+def report_folder(given: Path) -> Path:
+    """The folder of a report: as it is given, or by the file in it, or by its system's name, folder or plan."""
+    if (given / "report.json").is_file():
+        return given
+    if given.name == "report.json" and given.is_file():
+        return given.parent
+    place = find_workspace(Path.cwd().resolve())
+    folder = named_folder(given)
+    name = folder.resolve().name if folder is not None else given.name
+    if place is not None and (folder is not None or len(given.parts) == 1):
+        return place.report(name)
+    return given
+
+
 def require_systems(place: Workspace, names: Iterable[str]) -> tuple[str, ...]:
     """The systems' names, each given as its name or its folder. Raises Rejected for one that is not there."""
     known = [p.name for p in place.systems()]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
 import click
 
@@ -16,21 +17,21 @@ from avow.cli.paths import PathArgument
 @click.option(
     "--check",
     "folder",
-    type=click.Path(exists=True, file_okay=False),
-    help="Does the report in this folder say what the ledger says?",
+    type=PathArgument(),
+    metavar="REPORT",
+    help="Does the report of this system, or in this folder, say what the ledger says?",
 )
 @click.option("--key", type=PathArgument(exists=True, dir_okay=False), help="Sign the attestations (AVOW_KEY).")
 @json_option()
-def command(systems: tuple[str, ...], folder: str | None, key: object, as_json: bool) -> int:
+def command(systems: tuple[str, ...], folder: Path | None, key: object, as_json: bool) -> int:
     """Render the report of each SYSTEM (its name or folder; else all) from its ledger; nothing is verified.
 
-    With --check DIR nothing is written: every record that the report in DIR quotes is looked up in the ledger, every
-    conclusion drawn again, every format rendered again and compared.
+    With --check REPORT nothing is written: every record that the report quotes is looked up in the ledger, every
+    conclusion drawn again, every format rendered again and compared; files that are others now than when the evidence
+    was made are named.
     """
-    from pathlib import Path
-
     if folder is not None:
-        return _check(Path(folder), as_json)
+        return _check(folder, as_json)
     from avow.base.workspace import require_systems, workspace
     from avow.pipeline.run_info import sign_with
     from avow.pipeline.tasks import execute
@@ -43,29 +44,34 @@ def command(systems: tuple[str, ...], folder: str | None, key: object, as_json: 
     )
 
 
-def _check(folder: object, as_json: bool) -> int:
-    from pathlib import Path
-
+def _check(folder: Path, as_json: bool) -> int:
     from avow.assurance.codec import read_case
-    from avow.base.workspace import find_workspace
+    from avow.base.workspace import find_workspace, report_folder
     from avow.evidence.ledger import Ledger
-    from avow.report.check import check
+    from avow.report.check import check, stale
 
-    assert isinstance(folder, Path)
+    folder = report_folder(folder)
     place = find_workspace(folder.resolve()) or find_workspace(Path.cwd().resolve())
     case = read_case(folder)
     path = place.ledger(case.system) if place else None
     ledger = Ledger(path) if path is not None and path.is_file() else None
     found = check(folder, ledger, place.root if place else None)
+    old = stale(case, place.root) if place else ()
     if as_json:
-        click.echo(json.dumps({"system": case.system, "agrees": not found, "differences": list(found)}, indent=1))
+        click.echo(
+            json.dumps(
+                {"system": case.system, "agrees": not found, "differences": list(found), "changed_since": list(old)},
+                indent=1,
+            )
+        )
     elif found:
         click.echo(f"{folder}: the report does not say what the ledger says")
         for line in found:
             click.echo(f"  ✘ {line}")
     else:
         records = sum(len(view.evidence) for view in case.obligations)
-        click.echo(
-            f"{folder}: agrees with the ledger: {records} records, {len(case.obligations)} obligations, {case.grade}"
-        )
+        told = f"{records} records, {len(case.obligations)} obligations, {case.grade}"
+        click.echo(f"{folder}: agrees with the ledger: {told}{', of an earlier state' if old else ''}")
+    for name in old if not as_json else ():
+        click.echo(f"  · {name} has changed since: `avow verify` asks again what was asked of it")
     return 1 if found else 0

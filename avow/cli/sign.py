@@ -30,17 +30,14 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
     from avow.assurance.signed import sign_case
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.files import write
-    from avow.base.workspace import find_workspace, workspace
+    from avow.base.workspace import find_workspace, report_folder, workspace
     from avow.evidence.envelope import seal_lines
     from avow.evidence.ledger import Ledger
-    from avow.report.check import check
+    from avow.report.check import check, stale
     from avow.report.exchange import render_attestation
 
-    folder = Path(name)
-    place = find_workspace(folder.resolve()) if (folder / "report.json").is_file() else None
-    place = place or workspace()
-    if not (folder / "report.json").is_file():
-        folder = place.report(name)
+    folder = report_folder(Path(name))
+    place = find_workspace(folder.resolve()) or workspace()
     case = read_case(folder)
     today = datetime.now().astimezone().date()
     try:
@@ -53,6 +50,7 @@ def command(name: str, who: str, until: str, key: object, as_json: bool) -> int:
         raise Rejected(Diagnostic("SIGN005", "--as: a name is wanted"))
     ledger = place.ledger(case.system)
     wrong = check(folder, Ledger(ledger) if ledger.is_file() else None, place.root)
+    wrong += tuple(f"{path} has changed since the evidence was made" for path in stale(case, place.root))
     if wrong:
         more = f" (and {len(wrong) - 1} more; see `avow report --check {folder}`)" if len(wrong) > 1 else ""
         raise Rejected(Diagnostic("SIGN006", f"not signed: {wrong[0]}{more}", hint="run `avow verify` first"))

@@ -15,11 +15,13 @@ from avow.backend_kit.protocol import COMMON_OPTIONS
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_file
 from avow.base.notes import read_note, write_note
+from avow.base.plain import count
 from avow.base.workspace import Workspace
 from avow.pipeline import export as exporting
 from avow.pipeline.work import ENGINES, Work, is_portable, method_backend, method_job, planned_method
 from avow.pipeline.workload import Survey
 from avow.system.plan import Located, Method, System
+from avow.tuning.shown import WARNINGS
 
 
 def is_current(workspace: Workspace, surveyed: Survey) -> bool:
@@ -28,8 +30,8 @@ def is_current(workspace: Workspace, surveyed: Survey) -> bool:
 
 
 def check(workspace: Workspace, surveyed: Survey) -> None:
-    """Raises Rejected with all errors; warnings go to the terminal and into the report. A method of which there was
-    nothing to say is not asked about again while its slice is the same."""
+    """Raises Rejected with all errors; warnings go into the report, the first few also to the terminal. A method of
+    which there was nothing to say is not asked about again while its slice is the same."""
     keys = {(w.node, w.method): exporting.key(w) for w in surveyed.catalogue.works if _depends_on_slice(w)}
     known = set((read_note(_stamp(workspace, surveyed)) or {}).get("clean", ()))
     clean = {name for name, key in keys.items() if key in known}
@@ -37,8 +39,8 @@ def check(workspace: Workspace, surveyed: Survey) -> None:
     errors = tuple(d for d in found if d.is_error)
     if errors:
         raise Rejected(*found)
-    show(found)
     warnings = [f"{d.span}: {d.message} [{d.code}]" for d in found if d.severity is Severity.WARNING]
+    _tell(workspace, surveyed.system.name, found)
     kept = sorted(keys[name] for name in clean if name in keys)
     write_note(_stamp(workspace, surveyed), {"key": _key(surveyed), "warnings": warnings, "clean": kept})
 
@@ -151,6 +153,18 @@ def _schema(schema: Mapping[str, Any], options: Located, whole: str) -> Iterable
         own = {k: v for k, v in data.items() if k not in COMMON_OPTIONS}
         options = Located(own, options.span, options.spans)
     yield from violations(options, schema, whole)
+
+
+def _tell(workspace: Workspace, system: str, found: Iterable[Diagnostic]) -> None:
+    """The first few warnings, a line each: `avow check` shows all of it, with the source."""
+    from avow.base.rendering import printable
+
+    warned = [d for d in found if d.severity is Severity.WARNING]
+    for d in warned[:WARNINGS]:
+        place = f"{workspace.relative(Path(d.span.file))}:{d.span.line}: " if d.span else ""
+        print(printable(f"warning[{d.code}]: {place}{d.message}"), file=sys.stderr)
+    if len(warned) > WARNINGS:
+        print(f"and {count(len(warned) - WARNINGS, 'more warning')}: `avow check {system}`", file=sys.stderr)
 
 
 def show(found: Iterable[Diagnostic]) -> None:

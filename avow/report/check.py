@@ -4,8 +4,9 @@ Five steps, none of which trusts the one before: every record that the report qu
 the ledger has no other for its claims; every conclusion follows again from those records (statuses, gates, exit code);
 the kernel establishes from the certificates in the report what it says that the kernel established;
 the contracts' texts that it shows have the digests that it names; every other format is, byte for byte, what that case
-renders to. What the report was made *of* (contract, plan) is compared by digest where the files are here. One thing it
-cannot know: whether the obligations are still those of today's contract; that is what `avow verify` is for.
+renders to. What the report was made *of* (contract, plan) is compared by digest where the files are here; which files
+of its evidence are others now is told (`stale`), and is no difference from the ledger. One thing it cannot know:
+whether the obligations are still those of today's contract; that is what `avow verify` is for.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from avow.calculus.certificate_json import from_json as certificate
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
 from avow.calculus.obligations import reestablished
-from avow.evidence.currency import as_of_now, changed_since, not_established
+from avow.evidence.currency import as_of_now, changed, changed_since, not_established
 from avow.evidence.envelope import unseal_lines
 from avow.evidence.ledger import Ledger
 from avow.report import ATTESTATION, LeftOut, formats
@@ -53,6 +54,22 @@ def check(folder: Path, ledger: Ledger | None, root: Path | None = None) -> tupl
     elif case.kernel.established:
         found.append("the contracts are not here: what the kernel established cannot be established again")
     return tuple(found)
+
+
+def stale(case: Case, root: Path) -> tuple[str, ...]:
+    """The files, under `root` or beyond it, that evidence which counts in the case was made of and that are others now:
+    the report says what the ledger says, but of an earlier state."""
+    counting = [item.entry.evidence for view in case.obligations for item in view.counting]
+    marks = {pair for record in counting for pair in record.inputs.items()}
+    seen = {path for record in counting for path in changed(record, root)}
+    return tuple(sorted(seen | {path for path, mark in marks if _digest(root / path) != mark}))
+
+
+def _digest(path: Path) -> str:
+    try:
+        return digest_file(path)
+    except (OSError, ValueError):
+        return ""
 
 
 def _conclusions(case: Case) -> Iterable[str]:

@@ -33,6 +33,9 @@ SENTENCE_CHARACTERS = 60
 DIAGNOSTICS = 200
 """More than this of one file are of no use to anyone: reading ends there."""
 
+WARNINGS = 3
+"""Warnings of a system that a run prints, a line each: `avow check` shows all."""
+
 GATE_REASON = 240
 """Characters of a failing gate's reason on the terminal: three lines."""
 

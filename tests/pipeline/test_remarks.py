@@ -9,9 +9,12 @@ import pytest
 from avow.backend_kit.protocol import Report
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.base.verdict import Outcome, Verdict
+from avow.base.workspace import Workspace
+from avow.pipeline.check import _tell
 from avow.pipeline.remarks import remarked
 from avow.pipeline.work import method_job
 from avow.system.load import load_system
+from avow.tuning.shown import WARNINGS
 
 CONTRACT = "node n { inputs( r : REAL ) outputs( b : BOOL ) topics() guarantee( b <=> r > 0 ) }\n"
 PLAN = "system: s\ncontract: system.rcl\nnodes:\n  n: {methods: [{hoare: {program: p.imp}}]}\n"
@@ -37,3 +40,16 @@ def test_warnings_stand_beside_the_answer(tmp_path: Path, off: str) -> None:
     assert outcome.details == {"outline": "…", "remarks": told[1:] if off else told}
     assert outcome.verdict is Verdict.PROVED
     assert remarked(ANSWER, [note], job) == ANSWER
+
+
+def test_a_run_prints_the_first_warnings_a_line_each_and_no_notes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    place = Span(str(tmp_path / "contracts/s/system.rcl"), 3, 1, 3, 2)
+    said = [Diagnostic("RCL408", f"remark {at}\x1b[2J", place, Severity.WARNING) for at in range(WARNINGS + 2)]
+    _tell(Workspace(tmp_path), "s", [Diagnostic("MON107", "a note", place, Severity.NOTE), *said])
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == WARNINGS + 1
+    assert lines[0].startswith("warning[RCL408]: contracts/s/system.rcl:3: remark 0")
+    assert "\x1b" not in lines[0]
+    assert lines[-1] == "and 2 more warnings: `avow check s`"

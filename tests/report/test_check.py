@@ -12,11 +12,12 @@ from assurance.sample import case, evidence, rover_parts
 from helpers import some
 
 from avow.assurance.codec import from_json
+from avow.base.files import digest
 from avow.base.verdict import Verdict
 from avow.evidence.currency import changed_since, not_established
 from avow.evidence.ledger import Entry, Ledger
 from avow.report import render_all
-from avow.report.check import _ledger, check
+from avow.report.check import _ledger, check, stale
 
 
 @pytest.fixture(scope="module")
@@ -162,3 +163,16 @@ def test_what_counts_no_more_is_quoted_so_and_a_refutation_is_not(
         told = [line for line in _ledger(replace(honest, obligations=views), ledger, made) if "otherwise" in line]
         quoted = any(i.entry == entry for v in honest.obligations for i in v.evidence)
         assert bool(told) == (quoted and not entry.evidence.verdict.supports)
+
+
+def test_files_that_are_others_now_are_named_and_are_no_difference(tmp_path: Path) -> None:
+    subject, obligations, records, keys, extras = rover_parts()
+    for name in ("same.py", "other.py", "gone.py"):
+        (tmp_path / name).write_text(name)
+    marks = {name: digest((tmp_path / name).read_bytes()) for name in ("same.py", "other.py", "gone.py")}
+    records = [replace(record, inputs=marks) for record in records]
+    made_of = case(subject, obligations, records, keys=keys, **extras)
+    assert stale(made_of, tmp_path) == ()
+    (tmp_path / "other.py").write_text("another")
+    (tmp_path / "gone.py").unlink()
+    assert stale(made_of, tmp_path) == ("gone.py", "other.py")

@@ -111,8 +111,9 @@ def test_explain_shows_runs_and_history_and_says_what_is_near(root: Path) -> Non
 
 
 def test_report_check(root: Path) -> None:
-    code, text = run(report, "--check", "reports/rover")
-    assert (code, text.count("agrees with the ledger")) == (0, 1), text
+    for given in ("reports/rover", "rover", "contracts/rover", "reports/rover/report.json"):
+        code, text = run(report, "--check", given)
+        assert (code, text.count("agrees with the ledger")) == (0, 1), text
     (root / "contracts/rover/system.rcl").write_text("another contract")
     code, text = run(report, "--check", "reports/rover")
     assert code == 1
