@@ -145,6 +145,9 @@ class Backend(ABC):
     """Whether an answer may depend on the scenario's `steps`; likewise."""
     uses_wiring: bool = True
     """Whether an answer may depend on topics, connections or other nodes; likewise."""
+    remembers: bool = False
+    """Whether it judges clauses that speak of other steps (`avow.temporal`), or does not read formulas at all. The
+    others are never shown such a clause: what the plan asks of them is refused by name."""
     portable: bool = False
     """Whether an answer depends on the job and the bytes of `files` alone: not on the exported files, on other files of
     the system's folder, or on what they start. Such a work can be sent to another machine; others run where the
@@ -199,6 +202,7 @@ _REQUIRED: Mapping[str, type | tuple[type, ...]] = {
     "uses_scenario": bool,
     "uses_steps": bool,
     "uses_wiring": bool,
+    "remembers": bool,
     "portable": bool,
     "codes": Mapping,
     "translations": Mapping,

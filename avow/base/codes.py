@@ -296,6 +296,33 @@ _SORTS = (
         "`mod` and `div` divide by a positive whole number that is written down, so that they always have a value.",
         "guarantee(mod(in.count, in.count) == 0)",
     ),
+    Code(
+        "RCL320",
+        "length of time without a unit",
+        "A limit says whether it counts steps or seconds: `[5 steps]`, `[200 ms]`; a REAL that is not written down is "
+        "in seconds. Units of time are ns, us, ms, s, min and h.",
+        "guarantee(held[5](in.level > 3) -> out.status == high)",
+    ),
+    Code(
+        "RCL321",
+        "response in another place",
+        "`next`, `within`, `for`, `until` and `eventually` speak of later steps. They stand as the whole right side of "
+        "a clause's outermost `->` (also under an outer `forall`), or are the clause.",
+        "guarantee(next(out.status == high) and in.level > 3)",
+    ),
+    Code(
+        "RCL322",
+        "one step only",
+        "Here a formula is about one step: an operator that speaks of others has no meaning.",
+        "context { C = (once(1 > 0)); }",
+    ),
+    Code(
+        "RCL323",
+        "wrong limit",
+        "`held`, `within` and `for` have a limit; `once`, `historically` and `since` may have one, that of `since` "
+        "with `<=`, `<`, `>=` or `>`; the others have none.",
+        "guarantee(held(in.level > 3) -> out.status == high)",
+    ),
 )
 
 

@@ -50,6 +50,12 @@ WORKSPACE_CODES = register(
         "`avow verify` loads them; see `docs/trust-model.md`.",
     ),
     declare(
+        "BACKEND006",
+        "single steps only",
+        "The method judges single steps, and the clause, or an assumption of its node, speaks of others.",
+        "Give the guarantee a method that judges runs, or say it with a port that carries what is remembered.",
+    ),
+    declare(
         "POLICY001",
         "no such profile",
         "The plan names a policy profile that does not exist.",

@@ -67,6 +67,7 @@ def _by_backend(
 ) -> int:
     from dataclasses import replace
 
+    from avow.backend_kit import one_step
     from avow.backend_kit.registry import translators
     from avow.base.diagnostics import Rejected, Severity
     from avow.base.rendering import render
@@ -82,7 +83,7 @@ def _by_backend(
     refused: list[Diagnostic] = []
     for node in _only(system.contract, nodes).nodes:
         try:
-            made = known[notation].translate(notation, system, node)
+            made = one_step.translate(known[notation], notation, system, node)
         except Rejected as rejected:
             refused += rejected.diagnostics
             continue

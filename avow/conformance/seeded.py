@@ -10,6 +10,7 @@ from typing import Any
 
 import yaml
 
+from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.files import write
 from avow.base.verdict import Verdict
@@ -89,10 +90,10 @@ class Seeded:
 
 def settle(backend: Backend, job: Job, folder: Path, limits: Limits) -> Report:
     """Export and discharge, as the pipeline does both."""
-    for name, text in backend.export(job).items():
+    for name, text in one_step.export(backend, job).items():
         write(folder / name, text)
     folder.mkdir(parents=True, exist_ok=True)
-    return backend.discharge(job, folder, limits)
+    return one_step.discharge(backend, job, folder, limits)
 
 
 def verdicts(job: Job, report: Report) -> dict[str, Verdict]:

@@ -19,8 +19,11 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.tools import find_tool
 from avow.base.verdict import Outcome, Verdict
 from avow.conformance.seeded import Seeded, settle, verdicts
-from avow.language.contract import Node
+from avow.language.contract import Clause, ClauseKind, Node
+from avow.language.sorts import BOOL
+from avow.language.terms import TRUE, And, History, Not, Past
 from avow.pipeline.evidence_keys import surroundings
+from avow.pipeline.work import method_job
 from avow.system.plan import System
 from avow.tuning.running import CONFORMANCE_PATIENCE
 
@@ -175,6 +178,32 @@ class Conformance:
             assert made.files or made.missing
             assert made == self.backend.translate(notation, job.system, job.node)
             self.codes_are_known(made.missing)
+
+    def test_other_steps(self, case: Seeded, job: Job, tmp_path: Path) -> None:
+        """A clause that speaks of other steps is judged, or refused by name: here each demands what no step has."""
+        never = Not(History(Past.ONCE, (TRUE,), BOOL))
+        for where in ("guarantees", "assumptions"):
+            node = job.node
+            if where == "guarantees":
+                asked = {o.name for o in job.obligations}
+                changed = tuple(
+                    replace(c, formula=And((c.formula, never))) if c.name in asked else c for c in node.guarantees
+                )
+                node = replace(node, guarantees=changed)
+            elif not self.backend.remembers:
+                odd = Clause(ClauseKind.ASSUMPTION, "begun", len(node.assumptions) + 1, Not(never))
+                node = replace(node, assumptions=(*node.assumptions, odd))
+            else:
+                continue
+            nodes = tuple(node if other.name == node.name else other for other in job.contract.nodes)
+            system = replace(job.system, contract=replace(job.contract, nodes=nodes))
+            other = method_job(system, node, job.method)
+            report = settle(self.backend, other, tmp_path / where, _ENOUGH)
+            for outcome in report.outcomes:
+                assert not outcome.verdict.supports, f"{outcome.obligation} is {outcome.verdict}"
+                if not self.backend.remembers:
+                    assert outcome.verdict is Verdict.UNKNOWN
+                    assert "once" in outcome.summary
 
     # -- hostile input -------------------------------------------------------------------------------------------------
 

@@ -34,6 +34,7 @@ from avow.language.terms import (
     Conditional,
     Construct,
     EnumValue,
+    History,
     Iff,
     Implies,
     In,
@@ -223,6 +224,8 @@ class Compiler:
                 for variable in term.variables:
                     self.bind(variable)
                 return self.quantifiers.code(self, term)
+            case History(operator=name):
+                raise NotEvaluable(f"`{name}` speaks of other steps")
             case _:
                 assert_never(term)
 

@@ -42,6 +42,7 @@ from avow.language.terms import (
     Conditional,
     Construct,
     EnumValue,
+    History,
     Iff,
     Implies,
     In,
@@ -403,6 +404,9 @@ def _head(term: Term) -> tuple[str, ...]:
             return (type(term).__name__, sort_digest(sort))
         case Operation(operator=operator, sort=sort):
             return ("operation", operator, sort_digest(_integers(sort)))
+        case History(operator=operator, sort=sort, limit=limit):
+            bound = () if limit is None else (limit.relation, "steps" if limit.steps else "seconds")
+            return ("history", operator, sort_digest(_integers(sort)), *bound)
         case (
             Apply()
             | Index()

@@ -38,6 +38,7 @@ from avow.language.terms import (
     EnumValue,
     Index,
     Length,
+    Past,
     SequenceRange,
     SequenceTerm,
     SetTerm,
@@ -47,6 +48,7 @@ from avow.language.terms import (
 
 _BUILTINS = frozenset(Builtin)
 """Words that are operators directly before a parenthesis, unless the contract gives them another meaning."""
+_PAST = frozenset(Past) - {Past.SINCE, Past.UNTIL}
 
 
 class Applications(Names):
@@ -63,6 +65,8 @@ class Applications(Names):
                     return self.length(tree, arguments)
                 if name in _BUILTINS:
                     return self.builtin_operation(tree, Builtin(name), arguments)
+                if name in _PAST:
+                    return self.history(tree, Past(name), arguments)
                 if name not in self.scope.nodes:
                     self.undeclared(name, head, "function or constructor")
                     if name.casefold() not in ("forall", "exists", "exist"):  # whose variables are unknown

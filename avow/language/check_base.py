@@ -19,7 +19,7 @@ from avow.language.sorts import (
 )
 from avow.language.source import Reports
 from avow.language.syntax import Syntax, TermSyntax
-from avow.language.terms import Construct, EnumValue, Term
+from avow.language.terms import Construct, EnumValue, Past, Term
 
 
 class Base(ABC):
@@ -57,6 +57,10 @@ class Base(ABC):
     @abstractmethod
     def term(self, tree: TermSyntax, expected: Sort | None = None) -> Term | None:
         """A term of any sort; `expected` helps only where the text leaves the sort open (``<>``)."""
+
+    @abstractmethod
+    def history(self, tree: TermSyntax, operator: Past, arguments: Sequence[TermSyntax]) -> Term | None:
+        """A form that speaks of other steps than this one."""
 
     def error(
         self,

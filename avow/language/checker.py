@@ -2,7 +2,8 @@
 
 A part in error becomes None and is not mentioned again, so that one run reports every independent error of a formula.
 Recursion is as deep as the formula, which the parser bounds (`avow.language.parser.MAX_DEPTH`). The checker is a class
-in four parts: `check_names`, `check_applications`, `check_relations`, and here connectives and quantifiers.
+in five parts: `check_names`, `check_applications`, `check_relations`, `check_history`, and here connectives and
+quantifiers.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from typing import assert_never
 
 from avow.base.diagnostics import Span
 from avow.language.chains import equivalence, implication
+from avow.language.check_history import Histories
 from avow.language.check_names import BUILTINS
-from avow.language.check_relations import Relations
 from avow.language.environment import did_you_mean
 from avow.language.foreign import FOREIGN_TYPES
 from avow.language.lexer import Token
@@ -34,6 +35,8 @@ from avow.language.syntax import (
     Comparison,
     Connective,
     IfThenElse,
+    Lasting,
+    Limited,
     Minus,
     Name,
     Negation,
@@ -42,6 +45,7 @@ from avow.language.syntax import (
     Parentheses,
     PortName,
     Quantification,
+    Quantity,
     RangeDisplay,
     SequenceDisplay,
     SetDisplay,
@@ -67,7 +71,7 @@ from avow.language.terms import (
 )
 
 
-class Checker(Relations):
+class Checker(Histories):
     """Types formulas of one scope: `formula` what must be true or false, `term` anything, `wanted` a given sort."""
 
     def term(self, tree: TermSyntax, expected: Sort | None = None) -> Term | None:
@@ -99,6 +103,12 @@ class Checker(Relations):
                 return self.quantified(tree)
             case IfThenElse():
                 return self.if_then_else(tree, expected)
+            case Limited():
+                return self.limited(tree)
+            case Lasting():
+                return self.lasting(tree)
+            case Quantity():
+                return self.quantity(tree)
             case NodePort():
                 return self.node_port(tree)
             case TupleDisplay():

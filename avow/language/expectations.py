@@ -98,6 +98,8 @@ def _in_relation(
         return "an operator stands between what it joins: `r > 3 and r < 5`"
     if found.type == "EQUALS" or (before is not None and before.type == "EQUALS"):
         return "equality is written `==`"
+    if found.type in ("SINCE", "UNTIL") and "AND" in expected:
+        return f"`{found.text}` does not chain: put the parentheses that you mean"
     if found.type == "EMPTY_SEQUENCE" and "NE" in expected:
         return "unequal is written `!=`"
     if found.type == "NOT" and after is not None and after.type in ("IN", "EQ", "EQUALS"):

@@ -18,6 +18,9 @@ from avow.language.syntax import (
     Element,
     FunctionType,
     IfThenElse,
+    Lasting,
+    Limited,
+    LimitSyntax,
     Minus,
     Name,
     NamedType,
@@ -30,6 +33,7 @@ from avow.language.syntax import (
     PortName,
     ProductType,
     Quantification,
+    Quantity,
     RangeDisplay,
     RosType,
     SequenceDisplay,
@@ -90,6 +94,15 @@ def flat(tree: Syntax) -> str:
             return f"{quantifier_head(tree)} {flat(tree.body)})"
         case IfThenElse(condition=condition, then=then, otherwise=otherwise):
             return f"if {flat(condition)} then {flat(then)} else {flat(otherwise)}"
+        case Quantity(digits=digits, unit=unit):
+            return f"{digits} {unit.text}"
+        case LimitSyntax(relation=relation, amount=amount, unit=named):
+            inside = (relation, flat(amount), named.text if named is not None else "")
+            return f"[{' '.join(part for part in inside if part)}]"
+        case Limited(name=token, limit=limit, arguments=arguments):
+            return f"{token.text}{flat(limit)}({_listed(arguments)})"
+        case Lasting(word=word, left=one, limit=bound, right=other):
+            return f"{flat(one)} {word}{'' if bound is None else flat(bound)} {flat(other)}"
         case Binder(names=names, domain=domain):
             return f"{_texts(names)} in {flat(domain)}"
         case FunctionType(parameters=left, result=right):

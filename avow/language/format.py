@@ -22,6 +22,8 @@ from avow.language.syntax import (
     ConstantDeclaration,
     Declaration,
     IfThenElse,
+    Lasting,
+    Limited,
     Negation,
     Parentheses,
     PortList,
@@ -295,6 +297,13 @@ def _lay(tree: TermSyntax, indent: int, width: int) -> list[str]:
                 more = _lay(part, deeper, width - (0 if last else len(sign)))
                 lines += [" " * deeper + more[0], *more[1:]]
             return lines
+        case Lasting(word=word, left=one, limit=bound, right=other):
+            sign = f"{word}{'' if bound is None else flat(bound)} "
+            more = _lay(other, indent + len(sign), width)
+            return [*_lay(one, indent, width), " " * indent + sign + more[0], *more[1:]]
+        case Limited(arguments=(inner,)):
+            head = f"{tree.name.text}{flat(tree.limit)}("
+            return _enclosed(head, _lay(inner, indent + len(head), width - 1), ")")
         case Negation(body=inner):
             return _enclosed("not ", _lay(inner, indent + 4, width), "")
         case Quantification(body=inner):

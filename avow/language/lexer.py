@@ -27,11 +27,19 @@ KEYWORDS = {
     **{word: word.upper() for word in ("assume", "guarantee", "forall", "exists", "in", "out", "not", "and", "or")},
     "exists_unique": "UNIQUE",
     "upto": "UPTO",
-    **{word: word.upper() for word in ("if", "then", "else")},
+    **{word: word.upper() for word in ("if", "then", "else", "since", "until")},
     "TRUE": "TRUE",
     "FALSE": "FALSE",
     **dict.fromkeys(("REAL", "INTEGER", "NATURAL", "BOOL", "STRING"), "BUILTIN"),
 }
+LIMITED = frozenset(("once", "historically", "held", "within", "for"))
+"""Words that are operators directly before a limit, ``once[5 steps](…)``; `since` has one too."""
+UNITS = {"ns": 9, "us": 6, "ms": 3, "s": 0}
+"""Units of time by the decimal places of a second; minutes and hours are whole seconds."""
+LONG_UNITS = {"min": 60, "h": 3600}
+STEPS = ("steps", "step")
+_UNITS = frozenset((*UNITS, *LONG_UNITS, *STEPS))
+"""Words that are units directly behind a number."""
 SYMBOLS = {
     "-->": "ARROW",
     "<=>": "IFF",
@@ -104,7 +112,11 @@ def tokens(reports: Reports, comments: list[Token] | None = None) -> list[Token]
         piece = match.group()
         if kind == "name":
             word = KEYWORDS.get(piece, "NAME")
+            if piece in _UNITS and found and found[-1].type == "NUMBER":
+                word = "UNIT"
             append(other.section(piece, word, start, at) if word in _STRUCTURE else Token(word, piece, start, at))
+        elif piece == "<" and found and found[-1].type == "LSQUARE":
+            append(Token("YOUNGER", piece, start, at))
         elif kind in ("symbol", "arrow"):
             append(Token(SYMBOLS[piece], piece, start, at))
         elif kind == "ne":
@@ -214,9 +226,17 @@ class _Other:
     def bracket(self, piece: str, start: int, end: int) -> None:
         """A square bracket: of an item (`s[0]`), an array type (`REAL[]`), an interval, or a collection."""
         reports, text = self.reports, self.reports.source.text
+        last = self.found[-1] if self.found else Token("", "", -1, -1)
+        limits = last.type == "SINCE" or (last.type == "NAME" and last.text in LIMITED)
+        if piece == "[" and limits and not text[last.end : start].strip():
+            self.square.append(("RSQUARE", "]"))
+            self.found.append(Token("LSQUARE", "[", start, end))
+            return
         if piece == "]" and self.square:
             kind, sign = self.square.pop()
-            if kind:
+            if kind == "RSQUARE":
+                self.found.append(Token(kind, sign, start, end))
+            elif kind:
                 self.stand_in((kind, sign), start, end)
             return
         hint, opening, closing = "write sets as `{a, b}` and sequences as `<a, b>`", "", ("", "")
@@ -327,6 +347,8 @@ def _about_tail(number: str, tail: str) -> str:
         return f"write `{_short(number)}`: numbers have no endings"
     if number == "0" and re.fullmatch(r"[xXbBoO][0-9A-Fa-f_]+", tail):
         return "write the number in decimal"
+    if tail in UNITS or tail in LONG_UNITS:
+        return f"write `{_short(number)} {tail}`"
     if re.fullmatch(r"[0-9_']+", tail):
         return f"write `{_short(number + re.sub('[^0-9]', '', tail))}`"
     return "names begin with a letter, and numbers have no units"

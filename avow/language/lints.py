@@ -28,10 +28,12 @@ from avow.language.terms import (
     Compare,
     Conditional,
     EnumValue,
+    History,
     Implies,
     In,
     Literal,
     Or,
+    Past,
     Quantified,
     Quantifier,
     Role,
@@ -192,7 +194,7 @@ def _about_node(node: Node) -> Iterator[Diagnostic]:
         if clause.formula != TRUE and _always(clause.formula):
             message = f"the assumption `{clause.name}` says nothing: the types of the inputs make it true"
             yield _warning("RCL408", message, clause.formula.span, "leave it out, or say what was meant")
-        spoken = sorted(name for role, name in _variables(clause.formula) if role is Role.OUTPUT)
+        spoken = sorted(name for role, name in _variables(_now(clause.formula)) if role is Role.OUTPUT)
         if spoken:
             message = f"the assumption `{clause.name}` speaks of the node's own output `{spoken[0]}`"
             yield _warning("RCL416", message, clause.formula.span, "assume of inputs, guarantee of outputs")
@@ -227,6 +229,14 @@ def _looked_up(node: Node) -> Iterator[Diagnostic]:
 
 def _variables(term: Term) -> set[tuple[Role, str]]:
     return {(t.role, t.name) for t in subterms(term) if isinstance(t, Variable)}
+
+
+def _now(term: Term) -> Term:
+    """The term without the values before: what it says of this step."""
+    if isinstance(term, History) and term.operator is Past.PREVIOUS:
+        return _now(term.arguments[1])
+    parts = tuple(map(_now, term.children))
+    return term.rebuild(parts) if parts else term
 
 
 def _unused(term: Term) -> Iterator[Variable]:

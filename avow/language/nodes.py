@@ -61,7 +61,8 @@ def check_node(
     reports: Reports,
 ) -> Node:
     """The node, with those of its clauses that are sound; what is not is reported."""
-    scope = Scope(declarations.environment, inputs, outputs, broken=set(node.broken), node=node.name.text)
+    broken = set(node.broken)
+    scope = Scope(declarations.environment, inputs, outputs, broken=broken, node=node.name.text, remembers=True)
     topics = tuple(_topics(node, scope, reports))
     clauses: dict[ClauseKind, list[Clause]] = {ClauseKind.ASSUMPTION: [], ClauseKind.GUARANTEE: []}
     counts = dict.fromkeys(ClauseKind, 0)
@@ -99,7 +100,7 @@ def _clause(
     seen.setdefault(name, span)
     if syntax.formula is None:
         return None
-    formula = Checker(scope, reports).formula(syntax.formula)
+    formula = Checker(scope, reports).clause(syntax.formula)
     if formula is None or not _is_small(formula, place, scope, reports):
         return None
     text = reports.source.text[slice(*syntax.inside)].strip()

@@ -35,12 +35,13 @@ class Level(IntEnum):
     IMPLIES = 1
     OR = 2
     AND = 3
-    NOT = 4
-    COMPARE = 5
-    SUM = 6
-    PRODUCT = 7
-    UNARY = 8
-    ATOM = 9
+    LASTING = 4
+    NOT = 5
+    COMPARE = 6
+    SUM = 7
+    PRODUCT = 8
+    UNARY = 9
+    ATOM = 10
 
 
 @dataclass(frozen=True, slots=True)

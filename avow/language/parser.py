@@ -28,6 +28,9 @@ from avow.language.syntax import (
     Element,
     FunctionType,
     IfThenElse,
+    Lasting,
+    Limited,
+    LimitSyntax,
     Minus,
     Name,
     NamedType,
@@ -40,6 +43,7 @@ from avow.language.syntax import (
     PortName,
     ProductType,
     Quantification,
+    Quantity,
     RangeDisplay,
     RosType,
     SequenceDisplay,
@@ -398,6 +402,33 @@ class _Build:
 
     def if_then_else(self, c: list[Any]) -> IfThenElse:
         return IfThenElse(c[0].start, c[5].end, _deepest(c[1::2]), c[1], c[3], c[5])
+
+    def quantity(self, c: list[Any]) -> Quantity:
+        return Quantity(c[0].start, c[1].end, 1, c[0].text, c[1])
+
+    def since(self, c: list[Any]) -> Lasting:
+        return Lasting(c[0].start, c[2].end, _deepest(c[::2]), c[1].text, c[0], None, c[2])
+
+    until = since
+
+    def limited_since(self, c: list[Any]) -> Lasting:
+        return Lasting(c[0].start, c[3].end, _deepest((c[0], *c[2:])), c[1].text, c[0], c[2], c[3])
+
+    def limited(self, c: list[Any]) -> Limited:
+        arguments = tuple(c[3:-1:2])
+        return Limited(c[0].start, c[-1].end, _deepest((c[1], *arguments)), c[0], c[1], arguments)
+
+    def plain_limit(self, c: list[Any]) -> LimitSyntax:
+        return LimitSyntax(c[0].start, c[2].end, c[1].depth + 1, "", c[1], None)
+
+    def related_limit(self, c: list[Any]) -> LimitSyntax:
+        return LimitSyntax(c[0].start, c[3].end, c[2].depth + 1, c[1].text, c[2], None)
+
+    def named_limit(self, c: list[Any]) -> LimitSyntax:
+        return LimitSyntax(c[0].start, c[3].end, c[1].depth + 1, "", c[1], c[2])
+
+    def related_named_limit(self, c: list[Any]) -> LimitSyntax:
+        return LimitSyntax(c[0].start, c[4].end, c[2].depth + 1, c[1].text, c[2], c[3])
 
     def binders(self, c: list[Any]) -> _Binders:
         return tuple(c[::2])

@@ -36,16 +36,19 @@ from avow.language.terms import (
     Conditional,
     Construct,
     EnumValue,
+    History,
     Iff,
     Implies,
     In,
     Index,
     Length,
+    Limit,
     Literal,
     Negative,
     Not,
     Operation,
     Or,
+    Past,
     Quantified,
     Role,
     SequenceRange,
@@ -57,7 +60,7 @@ from avow.language.terms import (
     Widen,
 )
 
-_LOOSEST, IFF, IMPLIES, OR, AND, NOT, COMPARE, SUM, PRODUCT, UNARY, ATOM = Level
+_LOOSEST, IFF, IMPLIES, OR, AND, LASTING, NOT, COMPARE, SUM, PRODUCT, UNARY, ATOM = Level
 _UP, _DOWN = frozenset(("<", "<=", "==")), frozenset((">", ">=", "=="))
 
 
@@ -180,7 +183,7 @@ class _Printer:
             case And(items=(only,)) | Or(items=(only,)):
                 return self.form(only, real)
             case And(items=items):
-                return words["and"].join(self.show(i, NOT) for i in items), AND
+                return words["and"].join(self.show(i, LASTING) for i in items), AND
             case Or(items=items):
                 return words["or"].join(self.show(i, AND) for i in items), OR
             case Implies(left=left, right=right):
@@ -194,10 +197,41 @@ class _Printer:
             case Conditional(condition=condition, then=then, otherwise=otherwise):
                 whole = words["if"] + self.show(condition, IFF) + words["then"] + self.show(then, IFF)
                 return whole + words["else"] + self.show(otherwise, _LOOSEST), _LOOSEST
+            case History():
+                return self.history(term)
             case Widen(term=inner):
                 return self.form(inner, real)
             case _:
                 assert_never(term)
+
+    def history(self, term: History) -> tuple[str, int]:
+        """``once[5 steps](F)``, ``F since G``; in words where the style has some."""
+        limit = "" if term.limit is None else self.limit(term.limit)
+        phrase = self.style.phrases.get(term.operator)
+        if phrase is not None:
+            shown = [self.show(each, COMPARE) for each in term.arguments]
+            limited = self.style.phrases.get(f"{term.operator} limited", phrase) if limit else phrase
+            return limited.format(*shown, limit=limit.strip("[]")), NOT
+        name = self.style.past(term.operator)
+        if term.operator in (Past.SINCE, Past.UNTIL):
+            left, right = (self.show(each, NOT) for each in term.arguments)
+            return f"{left} {name}{limit} {right}", LASTING
+        if term.operator is Past.COUNTED:
+            left, right = (self.show(each, NOT) for each in term.arguments)
+            return f"{name}({left} {self.style.past(Past.SINCE)} {right})", ATOM
+        real = term.operator is Past.PREVIOUS and any(map(_shows_real, term.arguments))
+        return f"{name}{limit}({self.listed(term.arguments, _LOOSEST, real=real)})", ATOM
+
+    def limit(self, limit: Limit) -> str:
+        relation = self.style.words[limit.relation].strip() + " " if limit.relation else ""
+        amount = limit.amount
+        if limit.steps:
+            shown = f"{self.show(amount, SUM)} steps"
+        elif isinstance(amount, Literal):
+            shown = f"{show_number(Fraction(amount.value))[0]} s"
+        else:
+            shown = self.show(amount, SUM)
+        return self.style.limit(f"{relation}{shown}")
 
     def variable(self, term: Variable) -> str:
         """``in.r``; of another node, ``sensor.r`` (in RCL ``sensor.in.r``, which has one meaning always)."""

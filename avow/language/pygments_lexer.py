@@ -39,7 +39,8 @@ class RclLexer(RegexLexer):  # type: ignore[misc]  # pygments has no types
             (rf"(in|out)(\s*\.\s*)({_NAME})", bygroups(Name.Variable.Instance, Punctuation, Name.Variable)),
             (
                 words(
-                    ("forall", "exists_unique", "exists", "matches", "upto", "if", "then", "else"), suffix=r"\b(?!')"
+                    ("forall", "exists_unique", "exists", "matches", "upto", "if", "then", "else", "since", "until"),
+                    suffix=r"\b(?!')",
                 ),
                 Keyword,
             ),

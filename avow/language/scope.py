@@ -29,6 +29,8 @@ class Scope:
     bound: dict[str, Variable] = field(default_factory=dict)
     broken: set[str] = field(default_factory=set)
     node: str | None = None
+    remembers: bool = False
+    """Whether it may speak of other steps than this one."""
 
     @property
     def named(self) -> str:

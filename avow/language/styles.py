@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Literal as OneOf
 
 from avow.language.lexer import quote
 from avow.language.operators import OPERATORS
-from avow.language.terms import Quantifier
+from avow.language.terms import Past, Quantifier
 
 StyleName = OneOf["unicode", "rcl", "latex", "text"]
 
@@ -30,6 +30,11 @@ class Style:
     """Whether a quantifier closes itself, so that it never needs parentheses."""
     comma: str = ", "
     """Between arguments and items; where lines are broken, a place to do so if there is no better one."""
+    past: Callable[[Past], str] = str
+    """What an operator that speaks of other steps is called."""
+    limit: Callable[[str], str] = lambda text: f"[{text}]"
+    phrases: Mapping[str, str] = field(default_factory=dict)
+    """How such operators are said in words; those with a limit under `once limited`."""
     careful: bool = False
     """Whether `and` and `or` stand in parentheses beside `->` and `<=>`, though they need none."""
 
@@ -99,6 +104,39 @@ _WORDS = {
     "TRUE": "TRUE",
     "FALSE": "FALSE",
 }
+_PHRASES = {
+    "previous": "{0} one step before (at the first step {1})",
+    "rose": "{0} has just become true",
+    "fell": "{0} has just become false",
+    "changed": "{0} has just changed",
+    "once": "{0} at some step up to now",
+    "once limited": "{0} at some time in the last {limit}",
+    "historically": "{0} at every step up to now",
+    "historically limited": "{0} throughout the last {limit}",
+    "held": "{0} for {limit} already",
+    "since": "{0} ever since {1}",
+    "since limited": "{0} ever since {1}, which is {limit} ago",
+    "counted": "the number of steps with {0} after the last with {1}",
+    "next": "{0} at the next step",
+    "within": "{0} within {limit}",
+    "for": "{0} for {limit}",
+    "until": "{0} until {1}",
+    "eventually": "{0} eventually",
+}
+
+
+def _latex_past(word: Past) -> str:
+    return rf"\ \mathbf{{{word}}}" if word in (Past.SINCE, Past.UNTIL) else rf"\mathrm{{{word}}}"
+
+
+def _latex_limit(text: str) -> str:
+    shown = text
+    for unit in (" steps", " s"):
+        if text.endswith(unit):
+            shown = rf"{text.removesuffix(unit)}\,\mathrm{{{unit.strip()}}}"
+    return rf"_{{[{shown}]}}"
+
+
 _SORTS = {name: name for name in ("BOOL", "REAL", "INTEGER", "NATURAL", "STRING")}
 STYLES: dict[StyleName, Style] = {
     "rcl": Style(
@@ -164,6 +202,7 @@ STYLES: dict[StyleName, Style] = {
         string=quote,
         braces=lambda inner: f"{{{inner}}}",
         tight_quantifier=False,
+        phrases=_PHRASES,
     ),
     "latex": Style(
         words={
@@ -198,5 +237,7 @@ STYLES: dict[StyleName, Style] = {
         string=lambda value: rf"\text{{``{latex_escape(value)}''}}",
         braces=lambda inner: rf"\{{{inner}\}}",
         tight_quantifier=False,
+        past=_latex_past,
+        limit=_latex_limit,
     ),
 }

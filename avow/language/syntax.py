@@ -180,6 +180,42 @@ class IfThenElse(_Placed):
     otherwise: TermSyntax
 
 
+@dataclass(frozen=True, slots=True)
+class Quantity(_Placed):
+    """``200 ms``, and in a limit ``5 steps``."""
+
+    digits: str
+    unit: Token
+
+
+@dataclass(frozen=True, slots=True)
+class LimitSyntax(_Placed):
+    """``[<= 200 ms]``, ``[n steps]``; `relation` is empty where there is none."""
+
+    relation: str
+    amount: TermSyntax
+    unit: Token | None
+
+
+@dataclass(frozen=True, slots=True)
+class Limited(_Placed):
+    """``once[5 steps](F)``."""
+
+    name: Token
+    limit: LimitSyntax
+    arguments: tuple[TermSyntax, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Lasting(_Placed):
+    """``F since G``, ``F since[<= 5 steps] G``, ``R until U``."""
+
+    word: str
+    left: TermSyntax
+    limit: LimitSyntax | None
+    right: TermSyntax
+
+
 TermSyntax = (
     Connective
     | Negation
@@ -201,6 +237,9 @@ TermSyntax = (
     | RangeDisplay
     | Quantification
     | IfThenElse
+    | Quantity
+    | Limited
+    | Lasting
 )
 
 
@@ -317,7 +356,16 @@ class TopicList(_Placed):
 Declaration = TypeDeclaration | ConstantDeclaration
 Listing = PortList | TopicList
 Syntax = (
-    TermSyntax | Binder | TypeSyntax | Element | Declaration | Listing | PortDeclaration | TopicDeclaration | RosType
+    TermSyntax
+    | Binder
+    | LimitSyntax
+    | TypeSyntax
+    | Element
+    | Declaration
+    | Listing
+    | PortDeclaration
+    | TopicDeclaration
+    | RosType
 )
 
 
@@ -325,7 +373,7 @@ def children(tree: Syntax) -> tuple[Syntax, ...]:
     """The direct parts that are trees themselves, in reading order."""
     match tree:
         case (
-            Name() | BuiltinName() | Number() | Text() | Truth() | PortName() | NodePort()
+            Name() | BuiltinName() | Number() | Quantity() | Text() | Truth() | PortName() | NodePort()
             | NamedType() | BuiltinType() | UnspecifiedType() | RosType()
         ):  # fmt: skip
             return ()
@@ -345,6 +393,12 @@ def children(tree: Syntax) -> tuple[Syntax, ...]:
             return (*tree.binders, tree.body)
         case IfThenElse():
             return (tree.condition, tree.then, tree.otherwise)
+        case LimitSyntax():
+            return (tree.amount,)
+        case Limited():
+            return (tree.limit, *tree.arguments)
+        case Lasting():
+            return (tree.left, tree.right) if tree.limit is None else (tree.left, tree.limit, tree.right)
         case FunctionType():
             return (tree.parameters, tree.result)
         case ProductType():

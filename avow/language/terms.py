@@ -45,6 +45,29 @@ class Builtin(StrEnum):
     DIV = "div"
 
 
+class Past(StrEnum):
+    """An operator that speaks of more than one step of a run. `avow.temporal` has what each means."""
+
+    PREVIOUS = "previous"
+    ROSE = "rose"
+    FELL = "fell"
+    CHANGED = "changed"
+    ONCE = "once"
+    HISTORICALLY = "historically"
+    HELD = "held"
+    SINCE = "since"
+    COUNTED = "counted"
+    NEXT = "next"
+    WITHIN = "within"
+    FOR = "for"
+    UNTIL = "until"
+    EVENTUALLY = "eventually"
+
+
+RESPONSES = frozenset((Past.NEXT, Past.WITHIN, Past.FOR, Past.UNTIL, Past.EVENTUALLY))
+"""They speak of later steps, and stand only as the right side of a clause's outermost `->`, or as the clause."""
+
+
 class _Leaf:
     """A term without subterms."""
 
@@ -436,6 +459,40 @@ class Conditional:
         return Conditional(parts[0], parts[1], parts[2], self.sort, self.span)
 
 
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """``[5 steps]``, ``[< 200 ms]``: how old something may be, the limit itself included unless `relation` is strict.
+    `amount` is a number of steps (a whole number) or of seconds (REAL); `relation` is `<=` `<` `>=` `>`, empty where
+    the operator says which."""
+
+    relation: str
+    amount: Term
+    steps: bool
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """``once[5 steps](F)``, ``F since G``: what a run was like up to now, or (a response) has to be like from now on.
+
+    The arguments are in the order in which they are written; of `counted(F since G)` they are F and G."""
+
+    operator: Past
+    arguments: tuple[Term, ...]
+    sort: Sort
+    limit: Limit | None = None
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def children(self) -> tuple[Term, ...]:
+        return self.arguments if self.limit is None else (*self.arguments, self.limit.amount)
+
+    def rebuild(self, parts: tuple[Term, ...]) -> Term:
+        if self.limit is None:
+            return History(self.operator, parts, self.sort, None, self.span)
+        limit = Limit(self.limit.relation, parts[-1], self.limit.steps)
+        return History(self.operator, parts[:-1], self.sort, limit, self.span)
+
+
 Term = (
     Literal
     | EnumValue
@@ -461,6 +518,7 @@ Term = (
     | Quantified
     | Operation
     | Conditional
+    | History
 )
 
 TRUE = Literal(True, BOOL)
@@ -474,3 +532,8 @@ def subterms(term: Term) -> Iterator[Term]:
         current = stack.pop()
         yield current
         stack.extend(reversed(current.children))
+
+
+def histories(term: Term) -> tuple[History, ...]:
+    """What in a term speaks of other steps than this one, in reading order; none in a term of one step."""
+    return tuple(part for part in subterms(term) if isinstance(part, History))

@@ -11,6 +11,7 @@ from typing import Any
 
 from doit.exceptions import TaskError
 
+from avow.backend_kit import one_step
 from avow.backend_kit.protocol import COMMON_OPTIONS
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest_file
@@ -142,7 +143,7 @@ def _method(system: System, node: str, method: Method, *, asks: bool = True) -> 
     wrong = tuple(_schema(tool.options_schema, method.options, f"nodes.{node}: {method.id}"))
     yield from wrong
     if asks and node in [n.name for n in system.contract.nodes] and not any(d.is_error for d in wrong):
-        yield from tool.check(method_job(system, system.contract.node(node), method))
+        yield from one_step.check(tool, method_job(system, system.contract.node(node), method))
 
 
 def _schema(schema: Mapping[str, Any], options: Located, whole: str) -> Iterable[Diagnostic]:

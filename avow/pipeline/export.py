@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from avow.backend_kit import one_step
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.files import digest, is_intact, write
 from avow.base.notes import read_note, write_note
@@ -48,7 +49,7 @@ def generated(work: Work) -> Mapping[str, str]:
     assert isinstance(cut, MethodSlice)
     tool = method_backend(work.system, planned_method(work))
     method = cut.system.plan.node(cut.node).methods[0]
-    return tool.export(method_job(cut.system, cut.system.contract.node(cut.node), method))
+    return one_step.export(tool, method_job(cut.system, cut.system.contract.node(cut.node), method))
 
 
 def export(workspace: Workspace, work: Work, key: str) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from avow.backend_kit import one_step
 from avow.backend_kit.protocol import Report
 from avow.backend_kit.registry import trust_plugins
 from avow.base import process
@@ -172,15 +173,15 @@ def _discharge(request: Request, system: System, work: Work) -> Report:
     if request.altered:
         system = alter(system, node, request.altered)
         node = system.contract.node(node.name)
-        for name, text in tool.export(method_job(system, node, method)).items():
+        for name, text in one_step.export(tool, method_job(system, node, method)).items():
             write(folder / name, text)
     job, wanted = method_job(system, node, method), {o.id for o in claims}
     job = replace(job, obligations=tuple(o for o in job.obligations if o.id in wanted), kept=request.kept)
-    report = tool.discharge(job, folder, request.limits)
+    report = one_step.discharge(tool, job, folder, request.limits)
     if request.root and not request.altered:  # tools read the plan's files by themselves, at any time until now
         again = _method_work(system, work.node, work.method)
         _claims(request, again.obligations, again.keys)
-    return report if request.altered else remarked(report, tool.check(job), job)
+    return report if request.altered else remarked(report, one_step.check(tool, job), job)
 
 
 if __name__ == "__main__":

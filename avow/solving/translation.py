@@ -33,6 +33,7 @@ from avow.language.terms import (
     Conditional,
     Construct,
     EnumValue,
+    History,
     Iff,
     Implies,
     In,
@@ -194,6 +195,8 @@ class Translator(Sorts):
                 return self._range(low, high, sequence, term.span)
             case SetTerm():
                 raise Unsupported("a set outside the right-hand side of `in`", term.span)
+            case History(operator=operator):
+                raise Unsupported(f"`{operator}`, which speaks of other steps", term.span)
             case _:
                 assert_never(term)
 

@@ -43,6 +43,7 @@ from avow.language.terms import (
     Conditional,
     Construct,
     EnumValue,
+    History,
     Iff,
     Implies,
     In,
@@ -249,6 +250,8 @@ class _Printer:
                 return f"Types.Upto({inner})", True
             case SetTerm():
                 raise NotExpressible("a set outside 'in'", term.span)
+            case History(operator=operator):
+                raise NotExpressible(f"'{operator}', which speaks of other steps", term.span)
             case Compare(operator=operator, left=left, right=right):
                 whole = yield self.infix(OPERATORS[operator].dafny, (left, right), scope)
                 return whole

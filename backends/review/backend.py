@@ -51,6 +51,7 @@ class ReviewBackend(Backend):
     uses_scenario = False
     uses_wiring = False
     portable = True
+    remembers = True  # a person judges; no formula is read
     link = Link.GUIDED
     options_schema = SCHEMA
     codes = CODES

@@ -1,0 +1,100 @@
+"""How a backend is asked. What speaks of other steps reaches only a backend that says that it understands that
+(`Backend.remembers`): of the others, the guarantee is refused by name, and they see a contract without it.
+
+An assumption that speaks of other steps holds for the whole node: none of its guarantees can be asked about then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from avow.backend_kit.protocol import Backend, Job, Limits, Report, Translated
+from avow.base.diagnostics import Diagnostic, Severity
+from avow.base.verdict import Outcome, Verdict
+from avow.language.contract import Clause, Node
+from avow.language.terms import History, histories
+from avow.system.plan import System
+
+
+def discharge(tool: Backend, job: Job, folder: Path, limits: Limits) -> Report:
+    """`Backend.discharge`; what is refused is `unknown`, with the reason."""
+    asked, refused = _sayable(tool, job)
+    outcomes = tuple(Outcome(o.id, Verdict.UNKNOWN, refused[o.id]) for o in job.obligations if o.id in refused)
+    if job.obligations and not asked.obligations:
+        return Report(outcomes, tool.name, tool.version)
+    report = tool.discharge(asked, folder, limits)
+    return replace(report, outcomes=(*report.outcomes, *outcomes)) if outcomes else report
+
+
+def export(tool: Backend, job: Job) -> Mapping[str, str]:
+    """`Backend.export`, of what the backend can say."""
+    asked, refused = _sayable(tool, job)
+    return {} if refused and not asked.obligations else tool.export(asked)
+
+
+def check(tool: Backend, job: Job) -> Iterator[Diagnostic]:
+    """`Backend.check`, and a warning for each guarantee that is refused."""
+    asked, refused = _sayable(tool, job)
+    for obligation in job.obligations:
+        if obligation.id in refused:
+            span = job.clause(obligation).span
+            yield Diagnostic("BACKEND006", refused[obligation.id], span, Severity.WARNING)
+    if not refused or asked.obligations:
+        yield from tool.check(asked)
+
+
+def translate(tool: Backend, notation: str, system: System, node: Node) -> Translated:
+    """`Backend.translate`, of what the backend can say. Raises Rejected where the input is at fault."""
+    told = {clause.name: _refusal(tool, node, clause) for clause in node.guarantees}
+    missing = tuple(
+        Diagnostic("BACKEND006", why, node.clause(name).span, Severity.WARNING)
+        for name, why in told.items()
+        if why is not None
+    )
+    if missing and len(missing) == len(node.guarantees):
+        return Translated({}, missing)
+    system = _one_step(system) if missing else system
+    made = tool.translate(notation, system, system.contract.node(node.name) if missing else node)
+    return replace(made, missing=(*made.missing, *missing))
+
+
+def _sayable(tool: Backend, job: Job) -> tuple[Job, Mapping[str, str]]:
+    """The job without what the backend cannot say, and why not, by obligation."""
+    told = {o.id: _refusal(tool, job.node, job.clause(o)) for o in job.obligations}
+    refused = {name: why for name, why in told.items() if why is not None}
+    if tool.remembers or not any(histories(c.formula) for node in job.contract.nodes for c in node.clauses):
+        return job, refused
+    system = _one_step(job.system)
+    left = tuple(o for o in job.obligations if o.id not in refused)
+    return replace(job, system=system, node=_without(job.node), obligations=left), refused
+
+
+def _refusal(tool: Backend, node: Node, clause: Clause) -> str | None:
+    """Why a guarantee cannot be asked of a backend, if it cannot."""
+    if tool.remembers:
+        return None
+    said = next(((c, found[0]) for c in (clause, *node.assumptions) if (found := histories(c.formula))), None)
+    if said is None:
+        return None
+    where, record = said
+    about = f"{node.name}.{clause.name}" if where is clause else f"{node.name}'s assumption {where.name}"
+    return f"{tool.name} judges single steps and has no `{_shown(record)}`, of which {about} speaks"
+
+
+def _shown(record: History) -> str:
+    return f"{record.operator}[…]" if record.limit is not None else str(record.operator)
+
+
+def _one_step(system: System) -> System:
+    return replace(system, contract=replace(system.contract, nodes=tuple(map(_without, system.contract.nodes))))
+
+
+def _without(node: Node) -> Node:
+    """The node's clauses that are about one step."""
+
+    def kept(clauses: tuple[Clause, ...]) -> tuple[Clause, ...]:
+        return tuple(clause for clause in clauses if not histories(clause.formula))
+
+    return replace(node, assumptions=kept(node.assumptions), guarantees=kept(node.guarantees))

@@ -1,0 +1,197 @@
+"""The formula checker, part four: what speaks of other steps than this one, and lengths of time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from avow.language.check_base import count
+from avow.language.check_relations import Relations
+from avow.language.conversions import WHOLE, common, joined, widen
+from avow.language.lexer import LIMITED, LONG_UNITS, STEPS, UNITS
+from avow.language.printer import show_sort
+from avow.language.sorts import BOOL, NATURAL, REAL, FunctionSort, SetSort
+from avow.language.syntax import (
+    Connective,
+    Lasting,
+    Limited,
+    LimitSyntax,
+    Number,
+    Quantification,
+    Quantity,
+    Sign,
+    TermSyntax,
+    unparenthesised,
+)
+from avow.language.terms import RESPONSES, Arithmetic, History, Limit, Literal, Past, Quantifier, Term
+
+_ALWAYS_LIMITED = (Past.HELD, Past.WITHIN, Past.FOR)
+_PLACE = "a response stands as the whole right side of a clause's outermost `->`, or is the clause"
+
+
+class Histories(Relations):
+    """Records of the past, and responses."""
+
+    response: TermSyntax | None = None
+    """Where a response may stand."""
+
+    def clause(self, tree: TermSyntax) -> Term | None:
+        """A clause's formula, which may speak of other steps and be a response."""
+        self.response = _right_side(tree)
+        return self.formula(tree)
+
+    def quantity(self, tree: Quantity) -> Term | None:
+        scale = _scale(tree.unit.text)
+        if scale is None:
+            hint = f"units of time are {', '.join((*UNITS, *LONG_UNITS))}; steps are counted in a limit only"
+            self.error("RCL320", f"`{tree.unit.text}` is no unit of time", tree.unit, hint=hint)
+            return None
+        return Literal(Fraction(tree.digits) * scale, REAL, self.span(tree))
+
+    def limited(self, tree: Limited) -> Term | None:
+        return self.history(tree, Past(tree.name.text), tree.arguments, tree.limit)
+
+    def lasting(self, tree: Lasting) -> Term | None:
+        return self.history(tree, Past(tree.word), (tree.left, tree.right), tree.limit)
+
+    def history(
+        self, tree: TermSyntax, operator: Past, arguments: Sequence[TermSyntax], limit: LimitSyntax | None = None
+    ) -> Term | None:
+        if not self.scope.remembers:
+            self.error("RCL322", f"`{operator}` speaks of other steps than this one, and there is one here only", tree)
+            return None
+        if operator in RESPONSES and self.response is not tree:
+            self.error("RCL321", f"`{operator}` is a response, and does not stand here: {_PLACE}", tree)
+            return None
+        sound = self._limits(tree, operator, limit)
+        inside, self.response = self.response, None
+        try:
+            made = self._arguments(tree, operator, arguments)
+        finally:
+            self.response = inside
+        bound = self.limit(limit) if limit is not None and sound else None
+        if made is None or not sound or (limit is not None and bound is None):
+            return None
+        if operator is Past.PREVIOUS:
+            return History(operator, made, joined(list(made)), None, self.span(tree))
+        sort = NATURAL if operator is Past.COUNTED else BOOL
+        return History(operator, made, sort, bound, self.span(tree))
+
+    def _limits(self, tree: TermSyntax, operator: Past, limit: LimitSyntax | None) -> bool:
+        """Whether it has a limit where it needs one, and one of its kind; reports it if not."""
+        if limit is None:
+            if operator not in _ALWAYS_LIMITED:
+                return True
+            hint = f"write `{operator}[5 steps](…)` or `{operator}[200 ms](…)`"
+            self.error("RCL323", f"`{operator}` has a limit", tree, hint=hint)
+            return False
+        if operator is Past.SINCE:
+            if limit.relation:
+                return True
+            hint = "write `since[<= 5 steps]` or `since[>= 5 steps]`"
+            self.error("RCL323", "the limit of `since` says whether it is the most or the least", limit, hint=hint)
+            return False
+        if operator not in LIMITED:
+            self.error("RCL323", f"`{operator}` has no limit", limit)
+            return False
+        if limit.relation:
+            hint = f"write `{operator}[{self.text(limit.amount)}{f' {limit.unit.text}' if limit.unit else ''}](…)`"
+            self.error("RCL323", f"the limit of `{operator}` is only a length", limit, hint=hint)
+            return False
+        return True
+
+    def _arguments(self, tree: TermSyntax, operator: Past, arguments: Sequence[TermSyntax]) -> tuple[Term, ...] | None:
+        wanted = 2 if operator in (Past.PREVIOUS, Past.SINCE, Past.UNTIL) else 1
+        if len(arguments) != wanted:
+            self.terms(arguments)
+            hint = None
+            if operator is Past.PREVIOUS:
+                hint = "say what its value is at the first step: `previous(in.r, 0)`"
+            message = f"`{operator}` takes {count(wanted, 'argument')} and is given {len(arguments) or 'none'}"
+            self.error("RCL305", message, tree, hint=hint)
+            return None
+        if operator is Past.COUNTED:
+            inner = unparenthesised(arguments[0])
+            if not isinstance(inner, Lasting) or inner.word != Past.SINCE or inner.limit is not None:
+                self.error("RCL323", "`counted` is of steps since another", tree, hint="write `counted(F since G)`")
+                return None
+            arguments = (inner.left, inner.right)
+        if operator in (Past.PREVIOUS, Past.CHANGED):
+            made = self.terms(arguments)
+        else:
+            made = [self.formula(each) for each in arguments]
+        terms = [term for term in made if term is not None]
+        if len(terms) != len(made):
+            return None
+        for each, term in zip(arguments, terms, strict=True):
+            if isinstance(term.sort, FunctionSort | SetSort):
+                message = f"what is remembered is a value, and this is of type {show_sort(term.sort)}"
+                self.error("RCL302", message, each, hint="apply the function, or say what is in the set")
+                return None
+        if operator is not Past.PREVIOUS:
+            return tuple(terms)
+        same = common(terms)
+        if same is None:
+            message = f"the value at the first step is of type {show_sort(terms[1].sort)}, "
+            self.error("RCL302", message + f"the others are of {show_sort(terms[0].sort)}", arguments[1])
+            return None
+        return tuple(same)
+
+    def limit(self, tree: LimitSyntax) -> Limit | None:
+        """A limit, in steps or in seconds."""
+        amount, unit = tree.amount, tree.unit.text if tree.unit is not None else ""
+        inner = unparenthesised(amount)
+        if isinstance(inner, Quantity) and inner.unit.text in STEPS and not unit:
+            unit = inner.unit.text
+            amount = Number(inner.start, inner.unit.start, 1, inner.digits)
+        if unit in STEPS:
+            term = self.term(amount)
+            if term is None:
+                return None
+            if not isinstance(term.sort, WHOLE):
+                message = f"a number of steps is a whole number, and this is of type {show_sort(term.sort)}"
+                self.error("RCL303", message, amount)
+                return None
+            return Limit(tree.relation, term, True)
+        if inner.start in self.reports.odd:
+            return None  # reported by the lexer
+        if not unit and isinstance(inner, Number):
+            hint = f"write `[{inner.digits} steps]` or `[{inner.digits} s]`"
+            self.error("RCL320", "a limit has a unit", tree, hint=hint)
+            return None
+        scale = _scale(unit) if unit else Fraction(1)
+        if scale is None:
+            hint = f"units are steps, {', '.join((*UNITS, *LONG_UNITS))}"
+            assert tree.unit is not None
+            self.error("RCL320", f"`{unit}` is no unit of time", tree.unit, hint=hint)
+            return None
+        term = self.term(amount)
+        if term is None:
+            return None
+        if not isinstance(term.sort, (*WHOLE, type(REAL))) or (not unit and term.sort != REAL):
+            message = f"a limit without a unit is a REAL, in seconds, and this is of type {show_sort(term.sort)}"
+            self.error("RCL320", message, tree, hint="write `[… steps]` or `[… s]`")
+            return None
+        seconds = widen(term)
+        if isinstance(seconds, Literal) and not isinstance(seconds.value, bool | str):
+            seconds = Literal(Fraction(seconds.value) * scale, REAL, seconds.span)
+        elif scale != 1:
+            seconds = Arithmetic("*", seconds, Literal(scale, REAL), REAL, seconds.span)
+        return Limit(tree.relation, seconds, False)
+
+
+def _right_side(tree: TermSyntax) -> TermSyntax:
+    """The right side of a formula's outermost `->`, under universal quantifiers; the formula, where it has none."""
+    tree = unparenthesised(tree)
+    while isinstance(tree, Quantification) and tree.quantifier is Quantifier.FORALL:
+        tree = unparenthesised(tree.body)
+    if isinstance(tree, Connective) and tree.sign is Sign.IMPLIES:
+        return unparenthesised(tree.items[-1])
+    return tree
+
+
+def _scale(unit: str) -> Fraction | None:
+    """How many seconds a unit is."""
+    if unit in LONG_UNITS:
+        return Fraction(LONG_UNITS[unit])
+    return Fraction(1, 10 ** UNITS[unit]) if unit in UNITS else None

@@ -1,0 +1,216 @@
+"""The compiler to cells against the definitions over all steps of a run, on random formulas; its mutants die."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+import pytest
+
+from avow.evaluation.evaluate import evaluate
+from avow.evaluation.running import Keeper
+from avow.formulas.formula import digest
+from avow.formulas.values import Value
+from avow.language.load import check_text
+from avow.language.printer import show_term
+from avow.language.sorts import BOOL, NATURAL
+from avow.language.terms import (
+    FALSE,
+    TRUE,
+    And,
+    Compare,
+    History,
+    Iff,
+    Implies,
+    Limit,
+    Literal,
+    Not,
+    Or,
+    Past,
+    Role,
+    Term,
+    Variable,
+    histories,
+)
+from avow.temporal import cells as compiler
+from avow.temporal.cells import Records, Unsaid
+from temporal.positions import Step, broken, value
+
+A, B = Variable(Role.INPUT, "a", BOOL), Variable(Role.OUTPUT, "b", BOOL)
+N = Variable(Role.INPUT, "n", NATURAL)
+_RELATIONS = ("<=", "<", ">=", ">")
+
+
+def formula(rng: random.Random, depth: int, *, past: bool = True) -> Term:
+    """A random formula over `A`, `B` and `N`."""
+    if depth == 0:
+        return rng.choice((A, B, A, B, Compare("<=", N, Literal(rng.randrange(3), NATURAL)), TRUE, FALSE))
+    inner = lambda: formula(rng, depth - 1, past=past)  # noqa: E731
+    kind = rng.randrange(8) if past else rng.randrange(3)
+    match kind:
+        case 0:
+            return Not(inner())
+        case 1:
+            return rng.choice((And, Or))((inner(), inner()))
+        case 2:
+            return rng.choice((Implies, Iff))(inner(), inner())
+        case _:  # a record
+            return record(rng, inner)
+
+
+def record(rng: random.Random, inner: Callable[[], Term]) -> Term:
+    """A random formula that speaks of the past."""
+
+    def limit(relation: str = "") -> Limit:
+        amount = N if rng.random() < 0.15 else Literal(rng.randrange(4), NATURAL)
+        return Limit(relation, amount, True)
+
+    match rng.randrange(11):
+        case 0:
+            return History(Past.PREVIOUS, (inner(), inner()), BOOL)
+        case 1:
+            return History(rng.choice((Past.ROSE, Past.FELL, Past.CHANGED)), (inner(),), BOOL)
+        case 2:
+            return History(Past.CHANGED, (N,), BOOL)
+        case 3:
+            return Compare("==", N, History(Past.PREVIOUS, (N, rng.choice((N, Literal(2, NATURAL)))), NATURAL))
+        case 4 | 5:
+            bound = limit() if rng.random() < 0.6 else None
+            return History(rng.choice((Past.ONCE, Past.HISTORICALLY)), (inner(),), BOOL, bound)
+        case 6 | 7:
+            return History(Past.HELD, (inner(),), BOOL, limit())
+        case 8:
+            counted = History(Past.COUNTED, (inner(), inner()), NATURAL)
+            return Compare(rng.choice(_RELATIONS), counted, Literal(rng.randrange(4), NATURAL))
+        case _:  # since, the most intricate
+            bound = limit(rng.choice(_RELATIONS)) if rng.random() < 0.75 else None
+            return History(Past.SINCE, (inner(), inner()), BOOL, bound)
+
+
+def response(rng: random.Random) -> tuple[Term, History]:
+    """A random trigger, which may speak of the past, and a response to it."""
+    trigger, wanted = formula(rng, 1), formula(rng, 1)
+    operator = rng.choice((Past.NEXT, Past.WITHIN, Past.FOR, Past.UNTIL))
+    bound = Limit("", Literal(rng.randrange(4), NATURAL), True) if operator in (Past.WITHIN, Past.FOR) else None
+    arguments = (wanted, formula(rng, 1)) if operator is Past.UNTIL else (wanted,)
+    return trigger, History(operator, arguments, BOOL, bound)
+
+
+def run_of(rng: random.Random, length: int = 9) -> list[Step]:
+    return [{"in.a": rng.random() < 0.6, "out.b": rng.random() < 0.5, "in.n": rng.randrange(4)} for _ in range(length)]
+
+
+def judged(term: Term, run: list[Step]) -> list[Value]:
+    """The formula at each step, by its cells."""
+    records = Records()
+    now = records.clause(term)
+    keeper, found = Keeper(records.cells), []
+    for step in run:
+        found.append(evaluate(now, keeper.at(step)))
+        keeper.advance(step)
+    return found
+
+
+def disagreement(rng: random.Random) -> str | None:
+    """A formula of which cells and definition say something else somewhere in a run."""
+    term, run = formula(rng, rng.randrange(1, 4)), run_of(rng)
+    if judged(term, run) != [value(term, run, k) for k in range(len(run))]:
+        return show_term(term, "rcl")
+    trigger, wanted = response(rng)
+    by_cells = judged(Implies(trigger, wanted), run)
+    first = next((k for k, holds in enumerate(by_cells) if not holds), None)
+    return None if first == broken(trigger, wanted, run) else show_term(Implies(trigger, wanted), "rcl")
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_cells_are_what_the_definitions_say(seed: int) -> None:
+    rng = random.Random(seed)
+    assert [found for _ in range(150) if (found := disagreement(rng)) is not None] == []
+
+
+def _late(trigger: Term, response: History) -> Term:
+    made = _demanded(trigger, response)
+    if response.operator is not Past.WITHIN:
+        return made
+    since = made.body.body if isinstance(made, Not) and isinstance(made.body, Not) else made.children[0]
+    assert isinstance(since, History)
+    assert since.limit is not None
+    return Not(History(Past.SINCE, since.arguments, BOOL, Limit(">", since.limit.amount, True)))
+
+
+_demanded = compiler._demanded
+_latest, _earliest, _kept, _record = Records._latest, Records._earliest, Records._kept, Records._record
+_plus = compiler._plus_one
+
+MUTANTS: dict[str, tuple[object, str, object]] = {
+    "a response one step late passes": (compiler, "_demanded", _late),
+    "ages stand still": (compiler, "_plus_one", lambda term: term),
+    "ages run twice as fast": (compiler, "_plus_one", lambda term: _plus(_plus(term))),
+    "the latest beginning in place of the earliest": (Records, "_earliest", _latest),
+    "the earliest beginning in place of the latest": (Records, "_latest", _earliest),
+    "what held is forgotten": (
+        Records, "_kept",
+        lambda self, term, sort, initial, now: _kept(self, term, sort, initial, lambda _: now(initial)),
+    ),
+    "every step is the first": (Records, "_is_first", lambda self: TRUE),
+    "no step is the first": (Records, "_is_first", lambda self: FALSE),
+    "a limit is one step shorter": (
+        Records, "_latest",
+        lambda self, t, h, b, r, a: _latest(self, t, h, b, "<" if r == "<=" else r, a),
+    ),
+    "a limit leaves its end out": (
+        Records, "_earliest",
+        lambda self, t, h, b, r, a: _earliest(self, t, h, b, ">" if r == ">=" else r, a),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_mutants_die(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    where, attribute, mutant = MUTANTS[name]
+    monkeypatch.setattr(where, attribute, mutant)
+    rng = random.Random(7)
+    assert any(disagreement(rng) is not None for _ in range(400))
+
+
+def test_a_number_of_steps_that_is_written_down_bounds_the_memory() -> None:
+    term = History(Past.SINCE, (A, B), BOOL, Limit(">=", Literal(3, NATURAL), True))
+    records = Records()
+    records.clause(Or((term, History(Past.ONCE, (A,), BOOL, Limit("", Literal(2, NATURAL), True)))))
+    keeper, seen = Keeper(records.cells), set()
+    rng = random.Random(0)
+    for step in run_of(rng, 2000):
+        keeper.advance(step)
+        seen.add(tuple(keeper.memory.values()))
+    assert len(seen) <= 6 * 4
+
+
+def test_equal_records_share_a_cell() -> None:
+    records = Records()
+    once = History(Past.ONCE, (A,), BOOL)
+    records.clause(And((once, Not(once), History(Past.ROSE, (A,), BOOL))))
+    assert len(records.cells) == 2
+
+
+def test_what_no_first_steps_can_break_is_left_out_and_leaves_no_cell() -> None:
+    records = Records()
+    with pytest.raises(Unsaid, match="eventually"):
+        records.clause(Implies(History(Past.ONCE, (A,), BOOL), History(Past.EVENTUALLY, (B,), BOOL)))
+    assert records.cells == []
+
+
+_HEAD = "node n { inputs( a : BOOL, n : NATURAL ) outputs( b : BOOL ) topics() "
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_printed_reads_back(seed: int) -> None:
+    rng = random.Random(100 + seed)
+    for _ in range(60):
+        trigger, wanted = response(rng)
+        for term in (formula(rng, 3), Implies(trigger, wanted)):
+            contract, found = check_text(f"{_HEAD} guarantee( {show_term(term, 'rcl')} ) }}", "n.rcl")
+            assert contract is not None, found
+            (clause,) = contract.nodes[0].guarantees
+            assert show_term(clause.formula, "rcl") == show_term(term, "rcl")
+            assert digest(clause.formula) == digest(term)
+            assert bool(histories(clause.formula)) == bool(histories(term))
