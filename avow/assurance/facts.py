@@ -172,6 +172,7 @@ def facts_of_case(case: Case) -> Facts:
                 f.expires or None,
                 f.method or None,
                 matched=f.matched,
+                found=f.found,
             ),
         )
         for f in case.findings

@@ -4,16 +4,21 @@
 listed one that is not there, or whose last day (where it names one) has gone by. *Accepted* is a risk that a named
 person takes, for a reason, until a date; without one it lasts a year. A finding that has expired excuses nothing.
 Wildcards stand for what they matched when they were written, as the plan records it; what they match besides is an
-open item.
+open item. A finding with a mark (``found``) stands for what was found when it was written: a later, perhaps worse
+refutation of the same claim is another finding.
 """
 
 from __future__ import annotations
 
 import fnmatch
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import date, timedelta
 
 from avow.assurance.model import Handled
+from avow.base import codec
+from avow.base.files import digest
+from avow.base.verdict import Verdict
 from avow.evidence.ledger import Entry
 from avow.evidence.obligation import Obligation
 from avow.evidence.status import Status, roll_up
@@ -60,6 +65,13 @@ def _match(
         if _matches(finding.obligation, obligation.local_id)
         and _status(finding, obligation.id, statuses, counting) == finding.verdict
     ]
+    now = ""
+    if alike and finding.verdict in FINDINGS and not is_wild(finding.obligation):
+        asked = (e for e in counting[alike[0].id] if finding.method in (None, e.evidence.method))
+        now = mark(asked)
+    now = now if now != finding.found else ""
+    if now and finding.found:
+        alike = []
     taken = tuple(o.id for o in alike if takes(finding.obligation, finding.matched, o.local_id))
     return Handled(
         how=how,
@@ -74,7 +86,20 @@ def _match(
         obligations=taken,
         matched=finding.matched,
         unlisted=tuple(o.local_id for o in alike if o.id not in taken),
+        found=finding.found,
+        now=now,
     )
+
+
+def mark(counting: Iterable[Entry]) -> str:
+    """Of what was found of a claim: who found it, and by which counterexample. The claim itself is in it, too."""
+    records = (e.evidence for e in counting)
+    found = [
+        [e.obligation_digest, e.method, e.verdict.value, codec.to_json(e.counterexample)]
+        for e in records
+        if e.verdict is Verdict.REFUTED or e.vacuous
+    ]
+    return digest(json.dumps(sorted(found, key=json.dumps)))[:12]
 
 
 def _is_out(finding: Finding, today: date) -> bool:

@@ -15,6 +15,7 @@ from avow.assurance.answers import Answers, Baseline, Changes, How, Supposition,
 from avow.assurance.certification import KernelRun, ProofView, Trusted
 from avow.assurance.naming import is_advice
 from avow.assurance.policy import Policy
+from avow.base import codec
 from avow.base.diagnostics import Span
 from avow.base.remembered import by_identity
 from avow.base.verdict import Link, Verdict
@@ -143,6 +144,10 @@ class Handled:
     """As the plan records it, where the pattern has wildcards."""
     unlisted: tuple[str, ...] = ()
     """What the wildcards match besides: it is not handled."""
+    found: str = field(default="", metadata=codec.LATER)
+    """The mark of the finding that is meant, as the plan records it; empty: whatever is found."""
+    now: str = field(default="", metadata=codec.LATER)
+    """The mark of what is found now, where the plan has another or none: another is not handled."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,10 +59,19 @@ def open_items(
                 f"if these are meant too, write  matched: [{listed}]"
             )
             items.append(OpenItem("unlisted", f.pattern, text))
+        if f.now and f.found:
+            text = (
+                f"{f.how} as {f.verdict} by {f.who or 'nobody'}, but what is found now is not what was found then; "
+                f"if this is meant too, write  found: {f.now}"
+            )
+            items.append(OpenItem("another finding", f.pattern, text))
+        elif f.now and f.how == "accepted":
+            text = f"accepted, whatever refutes it: for this finding, and no worse one, write  found: {f.now}"
+            items.append(OpenItem("unmarked", f.pattern, text, advice=True))
         if f.expired:
             until = f.expires or f"a year after {f.date or 'no date'}"
             items.append(OpenItem("expired", f.pattern, f"{f.how} by {f.who or 'nobody'} until {until}: {f.reason}"))
-        elif f.how == "accepted" and not f.obligations:
+        elif f.how == "accepted" and not f.obligations and not f.now:
             items.append(
                 OpenItem("unused", f.pattern, f"accepted as {f.verdict}, but nothing is so: remove it", advice=True)
             )

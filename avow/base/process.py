@@ -205,12 +205,6 @@ def _children(pid: int) -> list[int]:
     return _parents().get(pid, [])
 
 
-def python_path() -> str:
-    """PYTHONPATH for a Python that proves or tests: no entry means the folder in which one happens to stand."""
-    entries = os.environ.get("PYTHONPATH", "").split(os.pathsep)
-    return os.pathsep.join(entry for entry in entries if os.path.isabs(entry))  # noqa: PTH117
-
-
 def _before_exec(megabytes: int | None) -> Callable[[], None]:
     size = megabytes * 1024 * 1024 if megabytes else None
     here = os.getpid()

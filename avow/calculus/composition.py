@@ -42,6 +42,8 @@ class Composition:
     _answers: dict[str, Answers] = field(default_factory=dict)
     _machine: Machine | None = None
     _certificates: Certificates | None = None
+    _whole: tuple[Goal, frozenset[ClauseName]] | None = None
+    """The derivation over every node, and the assumptions that it shows."""
 
     def goal(self, name: str) -> Goal:
         return next(goal for goal in self.goals if goal.name == name)
@@ -98,8 +100,8 @@ class Composition:
             if about not in goal.root.assumed:
                 return goal, about
             about = ClauseName(name, str(about))
-        shown = {condition.about for condition in self.whole.conditions}
-        return (self.whole, about) if about in shown else None
+        whole, shown = self._over_all()
+        return (whole, about) if about in shown else None
 
     def known(self, goal: Goal) -> Mapping[SideCondition, Settled]:
         """The side conditions of a goal that have been settled; none if it was not asked for."""
@@ -115,9 +117,15 @@ class Composition:
     @property
     def whole(self) -> Goal:
         """The derivation over every node: the plan's own, or the one named ``whole``."""
-        everything = set(self.outermost)
-        complete = (goal for goal in self.goals if set(goal.nodes) == everything and not _left_open(self, goal))
-        return next(complete, self.goals[-1])
+        return self._over_all()[0]
+
+    def _over_all(self) -> tuple[Goal, frozenset[ClauseName]]:
+        if self._whole is None:
+            everything = set(self.outermost)
+            complete = (goal for goal in self.goals if set(goal.nodes) == everything and not _left_open(self, goal))
+            whole = next(complete, self.goals[-1])
+            self._whole = whole, frozenset(condition.about for condition in whole.conditions)
+        return self._whole
 
 
 def compose(system: System) -> Composition:

@@ -11,9 +11,13 @@ import os
 import sys
 from typing import Any
 
-import click
+from avow.base.module_path import leave_here
 
-from avow import __version__
+leave_here()  # before anything is imported that a folder of somebody else's could have a module for
+
+import click  # noqa: E402
+
+from avow import __version__  # noqa: E402
 
 COMMANDS = {
     "agent": "run an agent program, told step by step",

@@ -152,10 +152,16 @@ def read_sources_only(root: str) -> None:
 
 _READS = frozenset({"os.chdir"})
 _LISTS = frozenset({"os.listdir", "os.scandir"})
-_CHANGES = frozenset(
-    {"os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.truncate", "os.chmod", "os.chown"}
-    | {"os.utime", "os.setxattr", "os.removexattr", "os.mkfifo", "os.mknod"}
-)
+_CHANGES = {
+    **dict.fromkeys(("os.remove", "os.rmdir"), ((0, 1),)),
+    **dict.fromkeys(("os.mkdir", "os.chmod"), ((0, 2),)),
+    **dict.fromkeys(("os.chown", "os.utime"), ((0, 3),)),
+    **dict.fromkeys(("os.rename", "os.link"), ((0, 2), (1, 3))),  # what is linked to can be written by its new name
+    **dict.fromkeys(("os.truncate", "os.setxattr", "os.removexattr"), ((0, -1),)),
+    "os.symlink": ((1, 2),),
+}
+"""Event → where among its arguments the paths are that it changes, each with its folder's descriptor, if any."""
+
 _PROCESSES = frozenset({"os.fork", "os.forkpty", "os.kill", "os.killpg", "os.exec", "signal.pthread_kill", "pty.spawn"})
 _PROGRAMS = frozenset({"subprocess.Popen", "os.posix_spawn", "os.spawn", "os.system"})
 _NETWORK = ("socket.", "urllib.", "http.", "ftplib.", "smtplib.", "telnetlib.", "imaplib.", "poplib.", "nntplib.")
@@ -179,19 +185,35 @@ def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Ca
     seen: list[list[str]] = []
     known: set[tuple[str, str]] = set()
     fspath, isabs, join, getcwd, norm = os.fspath, os.path.isabs, os.path.join, os.getcwd, os.path.normpath
+    readlink, dirname = os.readlink, os.path.dirname
+
+    def written(place: Any) -> str:
+        place = fspath(place)
+        if isinstance(place, bytes):
+            place = bytes.decode(place, sys.getfilesystemencoding(), "surrogateescape")
+        return str.__str__(place)  # of no class of the subject's own
 
     def path_of(place: Any) -> str | None:
         if place is None or isinstance(place, int):  # an open descriptor: told when it was opened
             return None
-        place = fspath(place)
-        if isinstance(place, bytes):
-            place = bytes.decode(place, sys.getfilesystemencoding(), "surrogateescape")
-        text = str.__str__(place)  # of no class of the subject's own
+        text = written(place)
         path = norm(text if isabs(text) else join(getcwd(), text))
         return None if path == scratch or path.startswith(scratch + os.sep) else path
 
+    def opened(descriptor: int) -> str:
+        try:
+            return readlink(f"/proc/self/fd/{descriptor}")
+        except OSError:
+            return f"/a file of descriptor {descriptor}"
+
+    def at(place: Any, folder: Any) -> str:
+        """The path of what a call names, also by descriptors."""
+        if isinstance(place, int):
+            return opened(place)
+        return join(opened(folder), written(place)) if isinstance(folder, int) and folder >= 0 else written(place)
+
     def told(event: str, place: Any) -> None:
-        path = place if event in ("outside", "program") else path_of(place)
+        path = place if event in ("outside", "program", "variable") else path_of(place)
         if path is not None and (event, path) not in known:
             known.add((event, path))
             seen.append([event, path])
@@ -220,7 +242,7 @@ def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Ca
         if event == "open":
             opens(*arguments)
         elif event in _LISTS:
-            told("list", arguments[0] if arguments[0] is not None else ".")
+            told("list", at(arguments[0] if arguments[0] is not None else ".", None))
         elif event == "import":
             told("read", arguments[1])
         elif event == "ctypes.dlopen" and arguments[0] is not None:  # of None: `import ctypes` itself
@@ -236,7 +258,10 @@ def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Ca
         elif event in _READS:
             told("read", arguments[0])
         elif event in _CHANGES:
-            changes(arguments[0], event)
+            for place, folder in _CHANGES[event]:
+                changes(at(arguments[place], arguments[folder] if folder > 0 else None), event)
+            if event == "os.symlink":  # by which what it leads to could be written or read unseen
+                changes(join(dirname(at(arguments[1], arguments[2])), written(arguments[0])), event)
         elif event in _PROCESSES:
             fault(f"calls {event}")
         elif event in _PROGRAMS:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base import process
+from avow.base.module_path import absolute_only
 from avow.base.process import Completed
 
 
@@ -37,7 +38,7 @@ def ask(
             cwd=cwd,
             seconds=seconds,
             megabytes=megabytes,
-            env={"PYTHONPATH": process.python_path(), **env},
+            env={"PYTHONPATH": absolute_only(), **env},
             pass_fds=(theirs,),
         )
     finally:

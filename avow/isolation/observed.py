@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.files import digest, digest_file
+from avow.base.module_path import absolute_only
 
 
 class Seen(StrEnum):
@@ -33,6 +34,10 @@ class Seen(StrEnum):
     """Looked at, not opened: besides its kind, its size and its mode."""
     KIND = "kind"
     """Whether it is there, whether it is a file, a folder or a link, and where a link points to."""
+    PLACE = "place"
+    """Which folder it runs in; the digest is of its absolute path."""
+    VARIABLE = "variable"
+    """One of the environment that is not always the same (`variables`); the digest is of its value."""
     OUTSIDE = "outside"
     """Something whose content cannot be recorded: the network, another program, a device. The digest is empty."""
 
@@ -48,6 +53,10 @@ class Observed:
 
 def look(kind: Seen, path: str) -> str:
     """The digest as of now. A thing that has changed its kind has another digest."""
+    if kind is Seen.VARIABLE:
+        return digest(variables().get(os.path.basename(path), ""))  # noqa: PTH119
+    if kind is Seen.PLACE:
+        return digest(os.path.realpath(path))
     try:
         info = os.stat(path)  # noqa: PTH116 - bytes of names that are no text stay as they are
         match kind:
@@ -67,6 +76,11 @@ def look(kind: Seen, path: str) -> str:
                 return ""
     except (OSError, ValueError):
         return _link(path) if kind in (Seen.MISSING, Seen.OUTSIDE) else "gone"
+
+
+def variables() -> dict[str, str]:
+    """Those of a subject's environment that differ from machine to machine."""
+    return {"PATH": os.environ.get("PATH", os.defpath), "PYTHONPATH": absolute_only()}
 
 
 def _link(path: str) -> str:
@@ -90,6 +104,8 @@ def recorded(events: Iterable[tuple[str, str]]) -> tuple[Observed, ...]:
 def _kind(event: str, path: str) -> Seen | None:
     if event in ("outside", "program"):
         return Seen.OUTSIDE
+    if event in ("place", "variable"):
+        return Seen(event)
     if _of_python(path):
         return None
     if f"{path}/".startswith(("/proc/", "/sys/")):

@@ -287,13 +287,14 @@ _FIELDS = tuple(
 class _Entry:
     """In place of an `os.DirEntry`: what is asked of it is asked of its file."""
 
-    __slots__ = ("_real", "_told", "name", "path")
+    __slots__ = ("_at", "_real", "_told", "name", "path")
 
-    def __init__(self, real: Any, told: Told) -> None:
+    def __init__(self, real: Any, told: Told, folder: str | None = None) -> None:
         self._real, self._told, self.name, self.path = real, told, real.name, real.path
+        self._at = self.path if folder is None else os.path.join(folder, self.name)  # noqa: PTH118
 
     def _kind(self, name: str, **named: Any) -> bool:
-        self._told("kind", self.path)
+        self._told("kind", self._at)
         return bool(getattr(self._real, name)(**named))
 
     def is_dir(self, *, follow_symlinks: bool = True) -> bool:
@@ -313,8 +314,8 @@ class _Entry:
         return int(self._real.inode())
 
     def stat(self, *, follow_symlinks: bool = True) -> Any:
-        self._told("kind", self.path)
-        return _State(self._real.stat(follow_symlinks=follow_symlinks), self._told, self.path)
+        self._told("kind", self._at)
+        return _State(self._real.stat(follow_symlinks=follow_symlinks), self._told, self._at)
 
     def __fspath__(self) -> Any:
         return self.path
@@ -326,14 +327,14 @@ class _Entry:
 class _Entries:
     """In place of what `os.scandir` returns."""
 
-    def __init__(self, real: Any, told: Told) -> None:
-        self._real, self._told = real, told
+    def __init__(self, real: Any, told: Told, folder: str | None = None) -> None:
+        self._real, self._told, self._folder = real, told, folder
 
     def __iter__(self) -> _Entries:
         return self
 
     def __next__(self) -> _Entry:
-        return _Entry(next(self._real), self._told)
+        return _Entry(next(self._real), self._told, self._folder)
 
     def __enter__(self) -> _Entries:
         return self
@@ -348,7 +349,13 @@ class _Entries:
 def watch_state(told: Told) -> None:
     """Tells which files are looked at without being opened, of which no audit event tells, and programs started by
     hand."""
-    readlink, scandir = os.readlink, os.scandir
+    readlink, scandir, open_ = os.readlink, os.scandir, os.open
+
+    def opened(path: Any, flags: int, mode: int = 0o777, *, dir_fd: int | None = None) -> int:
+        folder = place(dir_fd) if dir_fd is not None else None
+        if folder is None:
+            return open_(path, flags, mode, dir_fd=dir_fd)
+        return open_(os.path.join(os.fsencode(folder), os.fsencode(path)), flags, mode)  # noqa: PTH118
 
     def mine(named: dict[str, Any]) -> bool:
         if named.get("dir_fd") is not None and _asked():
@@ -384,21 +391,72 @@ def watch_state(told: Told) -> None:
         return functools.wraps(inner)(call)
 
     def listed(path: Any = ".") -> Any:
-        if isinstance(path, int) and _asked():
-            told("outside", "a file by its folder's descriptor")
+        if isinstance(path, int):
+            return _Entries(scandir(path), told, place(path))
         return _Entries(scandir(path), told)
 
     new: dict[str, Any] = {name: state(getattr(os, name)) for name in ("stat", "lstat", "fstat")}
     new |= {"access": outer(os.access, "state"), "readlink": outer(readlink, "link")}
-    new |= {"scandir": listed, "DirEntry": _Entry}
+    new |= {"scandir": listed, "DirEntry": _Entry, "open": opened}
     for name, function in new.items():
         setattr(os, name, function)
         setattr(posix, name, function)
     _posixsubprocess.fork_exec = outer(_posixsubprocess.fork_exec, "program", "a program")
 
 
+# -- where it runs -----------------------------------------------------------------------------------------------------
+
+
+class _Variables(dict[bytes, bytes]):
+    """In place of the environment's dictionary: tells which of the variables is read that are not always the same."""
+
+    told: Told
+
+    def _read(self, *names: Any) -> None:
+        for name in names:
+            if name in (b"PATH", b"PYTHONPATH") and _asked(importing=False):
+                self.told("variable", name.decode())
+
+    def __getitem__(self, name: bytes) -> bytes:
+        self._read(name)
+        return dict.__getitem__(self, name)
+
+    def get(self, name: bytes, default: Any = None) -> Any:
+        self._read(name)
+        return dict.get(self, name, default)
+
+    def __iter__(self) -> Iterator[bytes]:
+        self._read(*dict.__iter__(self))
+        return dict.__iter__(self)
+
+    def items(self) -> Any:
+        return [(name, self[name]) for name in self]
+
+    def values(self) -> Any:
+        return [self[name] for name in self]
+
+
+def watch_place(told: Told) -> None:
+    """Tells when the subject asks in which folder it runs, or reads a search path."""
+    known = _Variables(os.environ._data)  # type: ignore[attr-defined]
+    known.told = told
+    os.environ._data = posix.environ = known  # type: ignore[attr-defined]
+    for name in ("getcwd", "getcwdb"):
+        inner = getattr(os, name)
+
+        def asked(inner: Callable[[], Any] = inner) -> Any:
+            here = inner()
+            if _asked(importing=False):
+                told("place", here)
+            return here
+
+        for module in (os, posix):
+            setattr(module, name, functools.wraps(inner)(asked))
+
+
 def watch_all(told: Told) -> Callable[[], None]:
     """All of it; returns what is to be called at the end."""
     watch_state(told)
     watch_system(told)
+    watch_place(told)
     return watch_chance(told)

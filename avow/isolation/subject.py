@@ -16,7 +16,7 @@ from typing import Any
 
 from avow.base import process
 from avow.isolation.level import Isolation, available, sealed
-from avow.isolation.observed import Observed, interpreter, recorded
+from avow.isolation.observed import Observed, interpreter, recorded, variables
 from avow.isolation.tracing import Trace, traces
 
 _SCRATCH = "/tmp/avow-scratch"
@@ -160,8 +160,7 @@ class Subject:
         mark = self._trace.mark if self._trace is not None else ""
         command += [self.isolation.value, str(there), str(back), mark]
         environment = {
-            "PATH": os.environ.get("PATH", os.defpath),
-            "PYTHONPATH": process.python_path(),
+            **variables(),
             "PYTHONHASHSEED": "0",
             "LANG": "C.UTF-8",
             "TZ": "UTC",

@@ -31,6 +31,11 @@ _CHANGES = frozenset(
     | {"symlinkat", "truncate", "chmod", "fchmodat", "chown", "lchown", "fchownat", "utimensat", "mknod", "mknodat"}
     | {"setxattr", "lsetxattr", "removexattr", "lremovexattr"}
 )
+_LINKS = frozenset({"symlink", "symlinkat"})
+_BOTH = _LINKS | {"rename", "renameat", "renameat2", "link", "linkat"}
+"""Calls that name two paths, and change both: what is linked to can be written by its new name."""
+_BY_HANDLE = frozenset({"fchmod", "fchown", "ftruncate", "fsetxattr", "fremovexattr", "utimensat"})
+"""Calls that change what a descriptor is of."""
 _WRITES = re.compile(rb"\bO_(?:WRONLY|RDWR|CREAT|TRUNC|APPEND)\b")
 
 _MACHINE = tuple(
@@ -66,7 +71,7 @@ def traces() -> bool:
 
 
 def _strace(place: str) -> list[str]:
-    calls = ",".join(["%file", *sorted(_SIGNALS | _PROBES | _NETWORK)])
+    calls = ",".join(["%file", *sorted(_SIGNALS | _PROBES | _NETWORK | _BY_HANDLE)])
     program = shutil.which("strace") or "strace"
     return [program, "-f", "--seccomp-bpf", "-y", "-q", "-e", "signal=none", "-e", f"trace={calls}", "-o", place]
 
@@ -120,6 +125,18 @@ _STRING = rb'"((?:[^"\\]|\\.)*)"(?:\.\.\.)?'
 _CALL = re.compile(rb"(\w+)\((?:(?:AT_FDCWD|-?\d+)(?:<((?:[^>\\]|\\.)*)>)?, )?(?:" + _STRING + rb")?(.*)", re.DOTALL)
 
 
+_PATH = re.compile(rb"(?:(?:AT_FDCWD|-?\d+)(?:<((?:[^>\\]|\\.)*)>)?, )?" + _STRING)
+
+
+def _both(call: str, line: bytes, folder: str) -> list[str]:
+    """The two paths of a call."""
+    found = [(_text(base) if base else folder, _text(text)) for base, text in _PATH.findall(line)[:2]]
+    paths = [os.path.normpath(os.path.join(*pair)) for pair in found]  # noqa: PTH118
+    if call in _LINKS and len(paths) == 2:
+        paths[0] = os.path.normpath(os.path.join(os.path.dirname(paths[1]), found[0][1]))  # noqa: PTH118, PTH120
+    return paths
+
+
 def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: str) -> Traced | None:
     events: dict[tuple[str, str], None] = {}
     faults: dict[str, None] = {}
@@ -154,6 +171,14 @@ def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: s
         elif call in _NETWORK:
             if (call == "socket" and b"AF_UNIX" not in line) or (call == "connect" and rest.rstrip().endswith(b"= 0")):
                 events["outside", "the network"] = None
+        elif call in _BOTH:
+            for path in _both(call, line, places.get(process, folder)):
+                if path != scratch and not path.startswith(scratch + os.sep):
+                    faults[f"writes {path}"] = None
+        elif text is None and call in _BY_HANDLE:
+            path = _text(base or b"")
+            if path != scratch and not path.startswith((scratch + os.sep, "/memfd:", "/dev/")):
+                faults[f"writes {path or 'a file'}"] = None
         elif text is not None:
             at = _text(base) if base is not None else places.get(process, folder)
             path = os.path.normpath(os.path.join(at, _text(text)))  # noqa: PTH118

@@ -25,6 +25,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from avow.base import process
+from avow.base.module_path import absolute_only
 from avow.base.process import Completed
 from avow.tuning.running import FORK_LOOK, FORK_START, FORK_STOP
 from avow.tuning.sizes import OUTPUT_KEPT
@@ -37,7 +38,7 @@ PLAIN = "AVOW_PLAIN_WORKERS"
 def _python() -> dict[str, str]:
     """Environment of a Python that works for us. It keeps its byte code: a run may start dozens, and each would compile
     the same modules again."""
-    return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": process.python_path()}
+    return {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": absolute_only()}
 
 
 _lock = threading.Lock()

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
+from avow.base.module_path import leave_here
 from avow.base.workspace import Workspace
 from avow.pipeline.reporter import reporter_of
 from avow.pipeline.run_info import FRESH
@@ -26,6 +27,7 @@ class Pipeline:
     """
 
     def __init__(self, root: Path, asked: Sequence[str], answer: IO[str] | None = None) -> None:
+        leave_here()
         if _runs(asked) and not {"-a", "--always-execute"}.isdisjoint(asked):
             os.environ[FRESH] = "1"  # believe no earlier run: else each stage would find that there is nothing to do
         if asked[:1] == ["forget"]:

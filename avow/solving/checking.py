@@ -97,27 +97,57 @@ def _ask(
     seed: int,
     engine: Engine,
 ) -> tuple[Status, object | None, tuple[str, ...], str]:
-    effort = allowed(effort)
-    if effort <= 0:
-        spend(QUESTION_STEPS)  # it was written down all the same: a loop of refused questions comes to an end
+    granted = _granted(effort)
+    if granted <= 0:
         return "unknown", None, (), NO_ANSWER
     if engine == "qsat":
-        return _ask_qsat(translator, assertions, tracked, effort)
-    solver = z3.Solver(ctx=translator.context)
-    solver.add(*assertions)
-    switches = {}
-    for number, (label, expr) in enumerate(tracked):
-        switch = z3.Bool(f"track!{number}", translator.context)
-        solver.add(z3.Implies(switch, expr))
-        switches[switch.get_id()] = (switch, label)
-    said = put(translator, solver, effort, seed, *(switch for switch, _ in switches.values()))
+        return _ask_qsat(translator, assertions, tracked, granted)
+    loaded = _Loaded.of(translator, assertions, tracked)
+    said = loaded.put(translator, loaded.switches, granted, seed)
     match said.status:
         case "sat":
-            return "sat", solver.model(), (), ""
+            return "sat", loaded.solver.model(), (), ""
         case "unsat":
-            return "unsat", None, tuple(switches[s.get_id()][1] for s in solver.unsat_core()), ""
+            return "unsat", None, loaded.core(), ""
         case _:  # unknown
             return "unknown", None, (), said.reason
+
+
+def _granted(effort: int) -> int:
+    """What a question may take of its effort; one that may take nothing is written down all the same, so that a loop of
+    refused questions comes to an end."""
+    granted = allowed(effort)
+    if granted <= 0:
+        spend(QUESTION_STEPS)
+    return granted
+
+
+@dataclass(frozen=True, slots=True)
+class _Loaded:
+    """A solver that holds assertions, and tracked ones each under a switch."""
+
+    solver: Any
+    switches: tuple[tuple[Expr, str], ...]
+    """Each with its label."""
+
+    @classmethod
+    def of(cls, translator: Translator, assertions: Sequence[Expr], tracked: Sequence[tuple[str, Expr]]) -> _Loaded:
+        solver = z3.Solver(ctx=translator.context)
+        solver.add(*assertions)
+        switches = []
+        for number, (label, expr) in enumerate(tracked):
+            switch = z3.Bool(f"track!{number}", translator.context)
+            solver.add(z3.Implies(switch, expr))
+            switches.append((switch, label))
+        return cls(solver, tuple(switches))
+
+    def put(self, translator: Translator, on: Iterable[tuple[Expr, str]], effort: int, seed: int) -> Said:
+        return put(translator, self.solver, effort, seed, *(switch for switch, _ in on))
+
+    def core(self) -> tuple[str, ...]:
+        """The labels that conflict, after `unsat`."""
+        labels = {switch.get_id(): label for switch, label in self.switches}
+        return tuple(labels[switch.get_id()] for switch in self.solver.unsat_core())
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,11 +278,25 @@ def _minimal(
     seed: int,
     engine: Engine,
 ) -> tuple[str, ...]:
-    """Drop what is not needed, one label at a time."""
-    kept = list(core)
+    """Drop what is not needed, one label at a time. One solver is asked about all of them, as it learns; another is
+    asked afresh only where it gives up."""
+    kept, effort = list(core), min(effort, 2_000)
+    loaded: _Loaded | None = None
     for label in core:
         rest = [(name, expr) for name, expr in tracked if name in kept and name != label]
-        status, _, smaller, _ = _ask(translator, assertions, rest, min(effort, 2_000), seed, engine)
+        status: Status = "unknown"
+        smaller: tuple[str, ...] = ()
+        if engine == "smt":
+            granted = _granted(effort)
+            if granted > 0:
+                if loaded is None:
+                    loaded = _Loaded.of(translator, assertions, [pair for pair in tracked if pair[0] in core])
+                names = {name for name, _ in rest}
+                on = [pair for pair in loaded.switches if pair[1] in names]
+                status = loaded.put(translator, on, granted, seed).status
+                smaller = loaded.core() if status == "unsat" else ()
+        if status == "unknown":
+            status, _, smaller, _ = _ask(translator, assertions, rest, effort, seed, engine)
         if status == "unsat":
             kept = [name for name in kept if name in smaller]
     return tuple(kept)

@@ -245,6 +245,8 @@ class Finding:
     span: Span | None = field(default=None, compare=False, repr=False)
     matched: tuple[str, ...] = ()
     """Where `obligation` has wildcards: what it stood for when it was written, and stands for now."""
+    found: str = ""
+    """The mark of what was found when it was written: it stands for that, and for no other finding of the claim."""
 
 
 def is_wild(pattern: str) -> bool:

@@ -454,6 +454,10 @@ class _PlanReader:
                     f"{key}: {texts['obligation']!r} has no * or ? in it: it matches what it names, and nothing else"
                 )
                 self.fault("PLAN110", message, matched.span, hint="leave  matched  out")
+            found = piece.at("found")
+            if found is not None and is_wild(texts["obligation"]):
+                message = f"{key}: {texts['obligation']!r} may stand for several, and  found  marks one finding"
+                self.fault("PLAN110", message, found.span, hint="name each obligation by itself")
             yield Finding(
                 texts["obligation"],
                 unsaid(texts["verdict"]),
@@ -464,6 +468,7 @@ class _PlanReader:
                 texts.get("method"),
                 piece.span,
                 tuple(_texts(matched)),
+                texts.get("found", ""),
             )
 
 

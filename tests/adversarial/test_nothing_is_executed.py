@@ -60,6 +60,24 @@ def run(root: Path, *words: str, stdin: bytes = b"") -> str:
     return said
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [["check"], ["verify"], ["audit"], ["doctor"], ["report"]], ids=" ".join)
+def test_a_module_path_that_means_here_is_left(
+    tmp_path: Path, words: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of what Avow imports; what Python looks for before, nobody can keep from being found."""
+    folder = tmp_path / "contracts" / "s"
+    folder.mkdir(parents=True)
+    (folder / "s.rcl").write_text(RCL)
+    (folder / "plan.yaml").write_text(PLAN.replace("plugins: [evil]\n", "").replace(", evil]", "]"))
+    (folder / "graph.dot").write_text("digraph { a -> b }\n")
+    (folder / "m.py").write_text("def step(x):\n    return 0\n")
+    for name in ("z3", "click", "yaml", "lark", "hypothesis", "rich", "cryptography", "doit", "jinja2"):
+        (tmp_path / f"{name}.py").write_text(EVIL.format(root=str(tmp_path)))
+    monkeypatch.setenv("PYTHONPATH", ".")
+    run(tmp_path, *words)
+
+
 READERS = [
     ["check"],
     ["check", "contracts/s"],

@@ -30,7 +30,7 @@ from avow.assurance.model import Case, Currency, Derivation, SideCondition
 from avow.base.codec import Unreadable
 from avow.base.diagnostics import Span
 from avow.base.files import digest
-from avow.base.verdict import Verdict
+from avow.base.verdict import Counterexample, Verdict
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind
 from avow.evidence.status import Status
@@ -316,6 +316,29 @@ def test_accepted_findings_expire() -> None:
     assert finding_case(None, [accepted(verdict="vacuous")], REFUTED).exit_code == 1
     unused = finding_case(None, [accepted()], evidence(G))
     assert any(i.kind == "unused" for i in unused.open_items)
+
+
+def test_a_marked_finding_is_that_one_and_no_later_one() -> None:
+    taken = Finding("n/guarantee/g", "refuted", "known", "A. Person", "2026-01-01", "2026-12-31")
+    small, large = (replace(REFUTED, counterexample=Counterexample((("in.x", x),))) for x in ("1", "1000"))
+    unmarked = finding_case(None, [taken], small)
+    assert unmarked.exit_code == 0
+    (told,) = (i for i in unmarked.open_items if i.kind == "unmarked")
+    assert told.advice
+    marked = replace(taken, found=told.text.rpartition(" ")[2])
+    assert finding_case(None, [marked], small).exit_code == 0
+    assert not any(i.kind == "unmarked" for i in finding_case(None, [marked], small).open_items)
+    both = (small, replace(large, method="hypothesis"))
+    for records in ((large,), both, (replace(small, obligation_digest=G.digest, vacuous=True), large)):
+        worse = finding_case(None, [marked], *records)
+        assert worse.exit_code == 1
+        assert any(i.kind == "another finding" and not i.advice for i in worse.open_items)
+        assert worse.obligations[0].handled == ""
+    assert finding_case([marked], [], large).exit_code == 1  # expected ones, too
+    by_one = replace(taken, method=small.method)
+    of_one = finding_case(None, [by_one], *both)
+    mark = next(i.text for i in of_one.open_items if i.kind == "unmarked").rpartition(" ")[2]
+    assert mark == marked.found
 
 
 def test_advice_fails_nothing_but_is_told() -> None:

@@ -124,6 +124,21 @@ ATTACKS |= {
     "a database beside itself": "import sqlite3\ntry:\n    sqlite3.connect('s2.py').execute('create table t(x)')\n"
     "except Exception:\n    pass" + STEP,
     "a link beside itself": "import os\ntry:\n    os.symlink('/etc/passwd', 's2.py')\nexcept OSError:\n    pass" + STEP,
+    "a file moved onto another": "import os, tempfile\ntry:\n    os.rename(tempfile.mkstemp()[1], 's2.py')\n"
+    "except OSError:\n    pass" + STEP,
+    "another name of a file": "import os, tempfile\ntry:\n    os.link(__file__, tempfile.gettempdir() + '/x')\n"
+    "except OSError:\n    pass" + STEP,
+    "a link of its own that leads out": "import os, tempfile\ntry:\n"
+    "    os.symlink(__file__, tempfile.gettempdir() + '/x')\n"
+    "except OSError:\n    pass" + STEP,
+    "a mode by descriptor": "import os\nos.chmod(os.open(__file__, os.O_RDONLY), 0o600)" + STEP,
+    "a file by its folder's descriptor": "import os, tempfile\nf = os.open('.', os.O_RDONLY)\n"
+    "os.chdir(tempfile.gettempdir())\ntry:\n    os.open('s2.py', os.O_WRONLY | os.O_CREAT, dir_fd=f)\n"
+    "except OSError:\n    pass" + STEP,
+    "a program that moves": "import os, subprocess, tempfile\n"
+    "subprocess.run(['mv', tempfile.mkstemp()[1], 's2.py'], stderr=-3)" + STEP,
+    "a program that links": "import os, subprocess, tempfile\n"
+    "subprocess.run(['ln', '-s', tempfile.gettempdir(), 's2.py'], stderr=-3)" + STEP,
     "a program that writes": "import subprocess\nsubprocess.run(['sh', '-c', 'echo x > s2.py'], stderr=-3)" + STEP,
     "a program that kills": "import os, subprocess\n"
     "subprocess.run(['sh', '-c', 'kill -0 %d' % os.getppid()], stderr=-3)" + STEP,

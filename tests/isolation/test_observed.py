@@ -14,7 +14,7 @@ from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import ledger_of
 from avow.isolation.level import SANDBOX, seals
-from avow.isolation.observed import Seen
+from avow.isolation.observed import Seen, look
 from avow.isolation.subject import Subject
 from avow.isolation.tracing import traces
 from avow.pipeline.discharge import discharge, open_obligations
@@ -333,6 +333,43 @@ SEEN_THROUGH = {
     "logging.getLogger().warning('x')\ntempfile.TemporaryFile().close()\n"
     "t = threading.Thread(target=queue.Queue().put, args=(1,))\nt.start()\nt.join(5)\ntop = 10\n",
 }
+
+
+SEEN_THROUGH["what it makes and removes of its own"] = (
+    "import os, pathlib, shutil, tempfile\n"
+    "with tempfile.TemporaryDirectory() as d:\n"
+    "    (pathlib.Path(d) / 'a').mkdir()\n    (pathlib.Path(d) / 'a' / 'b').write_text('x')\n"
+    "d = tempfile.mkdtemp()\n(pathlib.Path(d) / 'c').write_text('x')\nshutil.rmtree(d)\n"
+    "assert not os.path.exists(d)\ntop = 10\n"
+)
+
+WHERE = {
+    "its folder": ("import os\nos.getcwd()\ntop = 10\n", Seen.PLACE),
+    "its folder by the library": ("import os\nos.path.abspath('x')\ntop = 10\n", Seen.PLACE),
+    "a variable": ("import os\nos.environ['PATH']\ntop = 10\n", Seen.VARIABLE),
+    "all variables": ("import os\ndict(os.environ)\ntop = 10\n", Seen.VARIABLE),
+    "variables as they came": ("import posix\nposix.environ[b'PYTHONPATH']\ntop = 10\n", Seen.VARIABLE),
+    "nothing": ("import os\nos.environ['TZ']\ntop = 10\n", None),
+}
+
+
+@pytest.mark.parametrize("name", WHERE)
+def test_where_a_subject_runs_is_an_input_where_it_asks(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, kind = WHERE[name]
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "m.py").write_text(text + "def step(): return top\n")
+    subject = Subject(tmp_path / "a" / "m.py", "step", 10.0)
+    subject.ask({})
+    assert not subject.close()
+    seen = [o for o in subject.observed() if o.kind in (Seen.PLACE, Seen.VARIABLE)]
+    assert [kind] * bool(kind) == list(dict.fromkeys(o.kind for o in seen))
+    assert all(look(o.kind, o.path) == o.digest for o in seen)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    here = [str(tmp_path / "b") if o.kind is Seen.PLACE else o.path for o in seen]
+    assert all(look(o.kind, path) != o.digest for o, path in zip(seen, here, strict=True))
 
 
 @pytest.mark.parametrize("name", some(SEEN_THROUGH, 2))
