@@ -202,7 +202,8 @@ class _Run:
 
 def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
     from .options import origin, readable
-    from .traces import digest_trace, read_trace
+    from .session import judge
+    from .traces import digest_trace
 
     run = _Run(name, monitor)
     path = inside(job.root, name)
@@ -214,9 +215,9 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
         where = origin(job.system)
         if wrong := readable(monitor.setup, path, where):
             raise Rejected(*wrong)
-        for recorded in read_trace(path, where, monitor.listens):
-            run.note(monitor.step(recorded.event))
-            if recorded.index % 256 == 0 and time.monotonic() > deadline:
+        for _, found in judge([monitor], monitor.step, lambda topic, count: None, path, where):
+            run.note(found)
+            if time.monotonic() > deadline:
                 run.unknown = f"{name}: time was up after {monitor.events} events"
                 break
         run.note(monitor.finish())

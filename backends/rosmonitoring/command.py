@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from avow.system.plan import System
 
     from .session import Session
-    from .traces import Recorded
     from .watched import Violation
 
 
@@ -81,23 +80,12 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
 
 def _violations(running: Session, trace: str) -> Iterator[tuple[int, Violation]]:
     """With the line of the event at which each was found; the last line's where it took the whole run."""
-    line = 0
-    for recorded in _events(trace, running):
-        line = recorded.line
-        for violation in running.step(recorded.event):
-            yield line, violation
-    for violation in running.finish():
-        yield line, violation
-
-
-def _events(trace: str, running: Session) -> Iterator[Recorded]:
+    if trace != "-":
+        yield from running.run(Path(trace))
+        return
     from avow.base.diagnostics import Diagnostic, Rejected
 
-    from .options import origin
-    from .traces import read_lines, read_trace
-
-    if trace != "-":
-        return read_trace(Path(trace), origin(running.system), running.listens)
+    from .traces import read_lines
 
     def lines() -> Iterator[str]:
         try:
@@ -105,7 +93,13 @@ def _events(trace: str, running: Session) -> Iterator[Recorded]:
         except UnicodeDecodeError:
             raise Rejected(Diagnostic("MON204", "standard input is not UTF-8 text")) from None
 
-    return read_lines(lines(), "<stdin>")
+    line = 0
+    for recorded in read_lines(lines(), "<stdin>"):
+        line = recorded.line
+        for violation in running.step(recorded.event):
+            yield line, violation
+    for violation in running.finish():
+        yield line, violation
 
 
 def _anything_judged(running: Session) -> bool:

@@ -8,7 +8,8 @@ environment's door, not the node's.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -164,6 +165,11 @@ class Monitor:
                 watched.memory.pop(name, None)
                 if source in self.values:
                     watched.memory[name] = self.values[source]
+        self.settle_previous()
+        return found
+
+    def settle_previous(self) -> None:
+        """An answer is over: what it said is now what the step before said."""
         for name, source in self._previous:
             value = self.values.get(source)
             if value is None:
@@ -172,7 +178,52 @@ class Monitor:
             elif self.values.get(name) is not value:
                 self.values[name] = value
                 self._versions[name] += 1
-        return found
+
+    # -- for `compiled`, which passes over events that change only values ----------------------------------------------
+
+    @property
+    def by_values(self) -> bool:
+        """Whether a verdict depends on the latest values alone."""
+        return self._pairing is None
+
+    def carried(self, topic: str) -> tuple[str, ...]:
+        """The variables that a topic's messages carry."""
+        return tuple(name for name, _ in self._readers.get(same_topic(topic), ()))
+
+    def triggered_by(self, name: str) -> Sequence[Watched]:
+        """The clauses that are judged when a variable is published."""
+        return self._clauses.get(name, ())
+
+    def caught_up(self, event: Mapping[str, Any], count: int) -> None:
+        """Take over the latest of some events of one topic that could all be read."""
+        self.relevant += count
+        topic = same_topic(str(event["topic"]))
+        for name, read in self._readers[topic]:
+            old = self.values.get(name)
+            new = read(event, old)
+            if old is None or new != old:
+                self.values[name] = new
+                self._versions[name] += 1
+            if name in self._heard:
+                self._heard[name] = (time_of(event), False)
+        if self._latest is not None:
+            self._latest = max(self._latest, time_of(event))
+
+    @property
+    def not_before(self) -> float:
+        """An event that is later tells nothing of the order of the events."""
+        answers = self.setup.answers
+        if self._latest is None or self.backwards or answers is None or answers.by != "arrival":
+            return -math.inf
+        return math.nextafter(float(self._latest), math.inf)
+
+    @property
+    def deadline(self) -> float:
+        """No deadline passes before this time."""
+        if not self.setup.fresh:
+            return math.inf
+        left = [since + self.setup.fresh[name] for name, (since, told) in self._heard.items() if not told]
+        return math.nextafter(float(min(left)), 0.0) if left else math.inf
 
     def _watch_order(self, event: Mapping[str, Any]) -> None:
         """By arrival, the order of the events is that of cause: times that run backwards say otherwise."""

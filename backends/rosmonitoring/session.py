@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,13 @@ from avow.language.contract import ClauseKind
 from avow.system.plan import System
 from avow.system.schema import suggest
 
+from .bags import Event, Origin, is_bag
 from .blame import Blame
+from .compiled import Compiled
 from .coverage import Tally
 from .engine import Monitor
 from .options import NAME, known_types, origin, readable, same_topic, setup
+from .traces import read_trace
 from .watched import Fault, Violation
 
 
@@ -42,6 +45,21 @@ class Session:
         if isinstance(topic, str) and not self.listens(topic):
             self.unheard[topic] = self.unheard.get(topic, 0) + 1
         yield from self._told([v for monitor in self.monitors for v in monitor.step(event)])
+
+    def passed(self, topic: str, count: int) -> None:
+        """So many events of a topic needed no judging."""
+        self.events += count
+        if not self.listens(topic):
+            self.unheard[topic] = self.unheard.get(topic, 0) + count
+
+    def run(self, path: Path) -> Iterator[tuple[int, Violation]]:
+        """Judge a whole trace: what was found, each with the line (0 in a bag) of its event. Raises Rejected."""
+        line = 0
+        for line, found in judge(self.monitors, self.step, self.passed, path, origin(self.system)):
+            for violation in found:
+                yield line, violation
+        for violation in self.finish():
+            yield line, violation
 
     def _told(self, violations: list[Violation]) -> Iterator[Violation]:
         if not violations:
@@ -124,6 +142,21 @@ class Session:
             "listened": list(self.topics),
             "unknown_topics": dict(self.unheard),
         }
+
+
+def judge(
+    monitors: Sequence[Monitor],
+    step: Callable[[Event], Iterable[Violation]],
+    passed: Callable[[str, int], None],
+    path: Path,
+    where: Origin,
+) -> Iterator[tuple[int, list[Violation]]]:
+    """Feed a trace to some monitors: lines, and what was found there (often nothing). Raises Rejected."""
+    if not is_bag(path):
+        yield from Compiled(monitors, step, passed).run(path)
+        return
+    for recorded in read_trace(path, where, lambda topic: any(monitor.listens(topic) for monitor in monitors)):
+        yield recorded.line, list(step(recorded.event))
 
 
 def _asked(kind: ClauseKind, tally: Tally) -> int:

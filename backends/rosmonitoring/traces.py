@@ -63,24 +63,36 @@ def wrong_time(event: Event) -> str:
         return f"`time` is no number of seconds: {json.dumps(raw, default=str)[:60]}"
 
 
+def event_of(line: str, name: str, number: int) -> Event | None:
+    """The event of one line of a trace; None of a blank one. Raises Rejected."""
+    if not line or line.isspace():
+        return None
+    if len(line) > EVENT_CHARACTERS:
+        raise Rejected(_fault(name, number, 1, f"the line is longer than {EVENT_CHARACTERS} characters"))
+    try:
+        event = parse_event(line)
+    except json.JSONDecodeError as error:
+        raise Rejected(_fault(name, number, error.colno, f"this is not JSON: {error.msg}")) from None
+    except ValueError as error:
+        raise Rejected(_fault(name, number, 1, str(error))) from None
+    if wrong := wrong_time(event):
+        raise Rejected(_fault(name, number, max(1, line.find('"time"') + 1), wrong))
+    return event
+
+
+def not_text(name: str) -> Rejected:
+    """What is told of a file that is not UTF-8."""
+    return Rejected(_fault(name, 1, 1, "the file is not UTF-8 text"))
+
+
 def read_lines(lines: Iterable[str], name: str) -> Iterator[Recorded]:
     """Events from lines of text; blank lines are skipped. Raises Rejected at the first line that is no event."""
     index = 0
     for number, line in enumerate(lines, start=1):
-        if line.isspace():
-            continue
-        if len(line) > EVENT_CHARACTERS:
-            raise Rejected(_fault(name, number, 1, f"the line is longer than {EVENT_CHARACTERS} characters"))
-        index += 1
-        try:
-            event = parse_event(line)
-            if wrong := wrong_time(event):
-                raise Rejected(_fault(name, number, max(1, line.find('"time"') + 1), wrong))
+        event = event_of(line, name, number)
+        if event is not None:
+            index += 1
             yield Recorded(index, number, event)
-        except json.JSONDecodeError as error:
-            raise Rejected(_fault(name, number, error.colno, f"this is not JSON: {error.msg}")) from None
-        except ValueError as error:
-            raise Rejected(_fault(name, number, 1, str(error))) from None
 
 
 def read_trace(
@@ -96,7 +108,7 @@ def read_trace(
         with path.open(encoding="utf-8-sig", errors="strict", newline="\n") as file:
             yield from read_lines(file, str(path))
     except UnicodeDecodeError:
-        raise Rejected(_fault(str(path), 1, 1, "the file is not UTF-8 text")) from None
+        raise not_text(str(path)) from None
     except OSError as error:
         raise Rejected(Diagnostic("MON201", f"cannot read {path}: {error.strerror or error}")) from None
 

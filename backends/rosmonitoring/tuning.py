@@ -39,3 +39,15 @@ is undecided may have broken the guarantee."""
 
 OPEN_QUESTIONS = 1_000
 """Answers of which a part is missing that are asked of Z3, in one run: some seconds. Others are undecided."""
+
+SHAPE_VALUES = 400
+"""Marks and values of a line whose shape is kept: a pattern of more costs more than it saves."""
+
+SHAPES_KEPT = 64
+"""Shapes of lines in one trace; lines of others are parsed."""
+
+REMEMBERED = 65_536
+"""Verdicts and readings that are remembered at a time, of each topic: some megabytes."""
+
+CHUNK = 1 << 20
+"""Bytes of a trace that are read at a time."""

@@ -176,6 +176,10 @@ def _of_float(value: float, wide: bool) -> Fraction:
     return _held(Fraction(value if wide else _single(value)), wide=wide)
 
 
+_LARGEST_SINGLE = (2 - 2.0**-23) * 2.0**127
+"""What a float32 holds at most."""
+
+
 def _single(value: float) -> float:
     try:
         found: float = struct.unpack("<f", struct.pack("<f", value))[0]
@@ -202,8 +206,9 @@ def _held(value: Fraction, *, wide: bool) -> Fraction:
     digits = repr(near)
     if not wide:
         bits = struct.pack("<f", near)
-        shorter = (f"{near:.{places}g}" for places in range(1, 9))
-        digits = next((repr(float(t)) for t in shorter if struct.pack("<f", float(t)) == bits), digits)
+        shorter = (float(f"{near:.{places}g}") for places in range(1, 9))
+        fitting = (t for t in shorter if abs(t) <= _LARGEST_SINGLE and struct.pack("<f", t) == bits)
+        digits = next(map(repr, fitting), digits)
     return Binary.held(value, digits.removesuffix(".0"))
 
 

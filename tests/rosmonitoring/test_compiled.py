@@ -1,0 +1,218 @@
+"""Compiled monitors say of every event what the engine says: passing over some causes no false alarm and no silence."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from helpers import some
+
+from avow.backends.rosmonitoring.compiled import Compiled
+from avow.backends.rosmonitoring.engine import Monitor
+from avow.backends.rosmonitoring.options import Setup, setup
+from avow.backends.rosmonitoring.regions import regions
+from avow.backends.rosmonitoring.session import session
+from avow.backends.rosmonitoring.shapes import scanner, shape
+from avow.backends.rosmonitoring.traces import read_trace
+from avow.base.diagnostics import Rejected
+from avow.evaluation.evaluate import compile_term
+from avow.system.plan import System
+from rosmonitoring.test_agreement import MAPPING, RCL, formula, trace
+
+
+def both(found: Setup, path: Path) -> tuple[int, int]:
+    """Judge a trace twice; the numbers of violations, and of events that the compiled monitor passed over."""
+    plain, fast = Monitor(found), Monitor(found)
+    expected = [(r.line, v) for r in read_trace(path) for v in plain.step(r.event)]
+    expected += [(0, v) for v in plain.finish()]
+    passed: dict[str, int] = {}
+
+    def note(topic: str, count: int) -> None:
+        passed[topic] = passed.get(topic, 0) + count
+
+    got = [(line, v) for line, all_ in Compiled([fast], fast.step, note).run(path) for v in all_]
+    got += [(0, v) for v in fast.finish()]
+    assert got == expected
+    assert fast.tallies == plain.tallies
+    assert (fast.events, fast.relevant, fast.heard) == (plain.events, plain.relevant, plain.heard)
+    assert (fast.backwards, fast.values) == (plain.backwards, plain.values)
+    return len(got), sum(passed.values())
+
+
+def setup_of(system: System, node: str = "n") -> Setup:
+    found, faults = setup(system, system.contract.node(node), system.plan.node(node).methods[0].options)
+    assert not faults
+    return found
+
+
+def written(path: Path, events: list[dict[str, Any]], rng: random.Random) -> Path:
+    """As several programs would write them: some with other spaces, other orders, blank lines."""
+    styles: list[dict[str, Any]] = [{}, {"separators": (",", ":")}, {"sort_keys": True}]
+    lines = []
+    for event in events:
+        lines.append(json.dumps(event, **(rng.choice(styles) if rng.random() < 0.2 else {})))
+        lines += [""] * (rng.random() < 0.02)
+    path.write_text("\n".join(lines) + rng.choice(("", "\n")), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("seed", some(range(12), 3))
+def test_generated_contracts_are_judged_alike(seed: int, make_system: Callable[..., System], tmp_path: Path) -> None:
+    rng = random.Random(seed)
+    passed = broken = 0
+    for at in range(8):
+        when = rng.choice(("outputs", "outputs", "any", "every"))
+        answers = rng.choice(({"by": "arrival", "because": "one"}, None))
+        fresh = rng.choice(({}, {"in.r": "900 ms", "out.light": "2 s"}))
+        options = {k: v for k, v in (("answers", answers), ("fresh", fresh)) if v}
+        text = " and ".join(f"({formula(rng, rng.choice((0, 1, 1, 2)))})" for _ in range(2))
+        system = make_system(RCL.format(formula=text), MAPPING, when=when, **options)
+        events = trace(rng, 400)
+        clock = 0.0
+        for event in events:
+            clock += rng.choice((0, 0.05, 0.1, 0.1, 0.3)) if rng.random() < 0.995 else -0.5
+            event["time"] = round(max(0.0, clock), 2)
+        found, quiet = both(setup_of(system), written(tmp_path / f"{at}.jsonl", events, rng))
+        passed += quiet
+        broken += found
+    assert passed > 300
+    assert broken > 20
+
+
+NODE = """
+node n {{
+  inputs( r : REAL )
+  outputs( s : REAL )
+  topics( std_msgs/{kind} r matches(in.r), std_msgs/{kind} s matches(out.s) )
+  assume sane ( -5 <= in.r <= 400 )
+  guarantee low ( out.s <= 120 )
+  guarantee kept ( in.r > 250.5 -> out.s !in {{1, 2.5, -3}} )
+}}
+"""
+
+
+@pytest.mark.parametrize("kind", ["Float64", "Float32", "Other"])
+@pytest.mark.parametrize("seed", range(2))
+def test_readings_at_the_numbers_that_matter(
+    kind: str, seed: int, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    """The neighbours of each threshold, in doubles, in floats, and in digits that no double has."""
+    rng = random.Random(seed)
+    numbers = [
+        f"{base}{tail}"
+        for base in ("120", "250.5", "1", "2.5", "-3", "-5", "400", "0", "119.99999", "7")
+        for tail in ("", "0000000000001" if "." in base else ".0000000000000001", "00001" if "." in base else ".00001")
+    ]
+    numbers += ["119.9999999999999999999", "1e2", "1.2E+2", "120e0", "-0", "3.5e38", "1e99", "249" * 6]
+    lines = []
+    for at in range(1500):
+        number = rng.choice(numbers) if rng.random() < 0.3 else str(round(rng.uniform(0, 119), 3))
+        lines.append(f'{{"topic": "{rng.choice("rs")}", "time": {at / 100}, "data": {number}}}\n')
+    path = tmp_path / "t.jsonl"
+    path.write_text("".join(lines), encoding="utf-8")
+    mapping = {"in.r": "data", "out.s": "data"}
+    system = make_system(NODE.format(kind=kind), mapping, ros={"distro": "noetic"})
+    found, passed = both(setup_of(system), path)
+    assert found > 50
+    assert passed > 800
+
+
+def test_a_region_holds_only_readings_of_one_verdict(make_system: Callable[..., System]) -> None:
+    from bisect import bisect
+    from fractions import Fraction
+
+    found = setup_of(make_system(NODE.format(kind="Float64"), {"in.r": "data", "out.s": "data"}))
+    formulas = [clause.formula for clause in found.node.clauses]
+    bounds = regions(found.rules["out.s"], formulas)
+    assert bounds is not None
+    verdicts: dict[int, set[tuple[bool, ...]]] = {}
+    rng = random.Random(3)
+    for _ in range(3000):
+        near = rng.choice((120, 1, 2.5, -3, rng.uniform(-1e3, 1e3)))
+        reading = Fraction(near) + Fraction(rng.choice((0, 1, -1, 3)), 10 ** rng.randrange(1, 20))
+        values = {"in.r": Fraction(300), "out.s": reading}
+        place = bisect(bounds, float(reading))
+        if place % 2 == 0:
+            verdicts.setdefault(place, set()).add(tuple(bool(compile_term(f)(values)) for f in formulas))
+    assert len(verdicts) >= 5
+    assert all(len(each) == 1 for each in verdicts.values())
+
+
+def test_a_variable_that_is_calculated_with_has_no_regions(make_system: Callable[..., System]) -> None:
+    text = NODE.format(kind="Float64").replace("out.s <= 120", "out.s + in.r <= 120")
+    found = setup_of(make_system(text, {"in.r": "data", "out.s": "data"}))
+    formulas = [clause.formula for clause in found.node.clauses]
+    assert regions(found.rules["out.s"], formulas) is None
+    assert regions(found.rules["in.r"], formulas) is None
+
+
+def test_the_case_study_is_judged_alike(case_folder: Path, tmp_path: Path) -> None:
+    """Laps of the nominal run, which break guarantees from the second on, with fresh readings."""
+    from avow.system.load import load_system
+
+    system = load_system(case_folder)
+    rng = random.Random(1)
+    nominal = (case_folder / "traces/nominal.jsonl").read_text(encoding="utf-8").splitlines()
+    lines = []
+    for line in nominal * 12:
+        event = json.loads(line)
+        if event["topic"] == "r":
+            event["radiation"] = rng.randrange(30, 2600) / 10
+        lines.append(json.dumps(event))
+    path = tmp_path / "laps.jsonl"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    slow, fast = session(system), session(system)
+    expected = [(r.line, v) for r in read_trace(path) for v in slow.step(r.event)]
+    expected += [(len(lines), v) for v in slow.finish()]
+    assert list(fast.run(path)) == expected
+    assert fast.summary() == slow.summary()
+    assert len(expected) > 100
+
+
+@pytest.mark.parametrize(
+    ("second", "words"),
+    [
+        ('{"topic": "s", "time": 1, "data": 1, "data": 200}', "stands twice"),
+        ('{"topic": "s", "time": 1, "data": 1', "not JSON"),
+        ('{"topic": "s", "time": -1, "data": 1}', "negative"),
+        ('{"topic": "s", "time": 01, "data": 1}', "not JSON"),
+        ('{"topic": "s", "time": 1, "data": 1.}', "not JSON"),
+        ('{"topic": "s", "time": 1, "data": 1} x', "not JSON"),
+        ('{"topic": "s", "time": 1, "data": +1}', "not JSON"),
+        ('{"topic": "s", "time": "1", "data": 1}', "no number of seconds"),
+    ],
+)
+def test_what_is_no_event_is_told_after_many_that_are(
+    second: str, words: str, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    found = setup_of(make_system(NODE.format(kind="Other"), {"in.r": "data", "out.s": "data"}))
+    path = tmp_path / "t.jsonl"
+    path.write_text('{"topic": "s", "time": 1, "data": 1}\n' * 50 + second + "\n", encoding="utf-8")
+    monitor = Monitor(found)
+    with pytest.raises(Rejected, match=words) as error:
+        list(Compiled([monitor], monitor.step).run(path))
+    (fault,) = error.value.diagnostics
+    assert fault.span is not None
+    assert fault.span.line == 51
+
+
+def test_a_shape_is_of_lines_that_are_read_alike() -> None:
+    line = b'{"topic": "a", "time": 1.5, "data": {"x": [1, {"y": "on"}], "z": true, "u": null}}'
+    made = shape(line, "a", lambda path: True)
+    assert made is not None
+    assert made.paths == (("time",), ("data", "x", 0), ("data", "x", 1, "y"), ("data", "z"))
+    scan, _ = scanner([made])
+
+    def known(text: bytes) -> bool:
+        match = scan.fullmatch(text + b"\n")
+        return match is not None and match.lastindex != scan.groups
+
+    assert known(line)
+    assert known(line.replace(b"1.5", b"0").replace(b'"on"', b'"off and on"').replace(b"true", b"false"))
+    others = [(b"1.5", b"-1"), (b"[1", b'["1"'), (b'"on"', b'"o\\"n"'), (b"null", b"1"), (b'"a"', b'"b"'), (b"x", b"v")]
+    assert not any(known(line.replace(*other)) for other in others)
+    assert shape(b'{"topic": "a", "time": 1, "x": "\\u0041"}', "a", lambda path: True) is None
