@@ -215,7 +215,7 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
         where = origin(job.system)
         if wrong := readable(monitor.setup, path, where):
             raise Rejected(*wrong)
-        for _, found in judge([monitor], monitor.step, lambda topic, count: None, path, where):
+        for _, found in judge([monitor], path, where):
             run.note(found)
             if time.monotonic() > deadline:
                 run.unknown = f"{name}: time was up after {monitor.events} events"

@@ -2,8 +2,8 @@
 
 The engine (`engine`) judges. What it found is remembered by what its verdict depends on: of each variable of the
 clauses that are due, the text of its message, or the region of numbers in which its reading lies. An event with a
-remembered verdict, every clause due held and nothing else to be told, only moves the counters and the latest messages.
-For any other event the engine is brought up to date and judges it; so the verdicts are the engine's.
+remembered verdict only moves the counters and the latest messages; what was broken is told again. For any other event
+the engine is brought up to date and judges it; so the verdicts are the engine's.
 
 The code for each shape of line (`shapes`) is generated; it holds numbers, and no text of a contract or a trace.
 """
@@ -15,28 +15,30 @@ import math
 import re
 from bisect import bisect
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as File
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.formulas.values import Value
 
-from .bags import Event
 from .coverage import Tally
 from .engine import Monitor
+from .numbers import Decimal
 from .options import same_topic
 from .regions import regions
 from .rules import Choice, Fields, Hold, Lookup, Path, Previous
 from .shapes import Shape, scanner, shape
 from .traces import event_of, not_text
 from .tuning import CHUNK, EVENT_CHARACTERS, REMEMBERED, SHAPES_KEPT
-from .watched import Fault, Violation, Watched
+from .watched import Fault, Violation, Watched, time_text
 
 Token = int
 """Stands for a variable's value: equal tokens of a variable, equal truth of every clause."""
 
 Match = re.Match[bytes]
+Handler = Callable[[Match], Any]
+"""False: the engine has to judge the event; True: all is well; else what is to be told, by monitors."""
 
 
 @dataclass(slots=True)
@@ -49,8 +51,12 @@ class _Plan:
     due: tuple[Watched, ...]
     key: tuple[int, ...]
     """The slots of the variables that the due clauses speak of."""
-    quiet: set[tuple[Token, ...]] = field(default_factory=set)
+    excuse: tuple[int, ...]
+    """The slots of all that may matter where one of them is broken: the assumptions' too."""
+    quiet: set[tuple[Token | None, ...]] = field(default_factory=set)
     """Where all of them held."""
+    loud: dict[tuple[Token | None, ...], tuple[Violation, ...]] = field(default_factory=dict)
+    """Where some were broken: what is told then."""
 
 
 @dataclass(slots=True)
@@ -73,21 +79,23 @@ class _Topic:
 
     name: str
     count: int = 0
+    """Events that the engine has not counted."""
     last: Match | None = None
+    """The latest, if the engine has not read it."""
 
 
 class Compiled:
-    """Feed it a trace with `run`. `step` judges an event, by all the monitors; `passed` is told of topics whose events
-    needed no judging, and how many."""
+    """Feed it a trace with `run`. `told` is given what the monitors find at one event, and may explain it; `heard` is
+    told of topics, and how many events of them there were."""
 
     def __init__(
         self,
         monitors: Sequence[Monitor],
-        step: Callable[[Event], Iterable[Violation]],
-        passed: Callable[[str, int], None] = lambda topic, count: None,
+        told: Callable[[list[Violation]], Iterable[Violation]] = lambda found: found,
+        heard: Callable[[str, int], None] = lambda topic, count: None,
     ) -> None:
-        self._step = step
-        self._passed = passed
+        self._told = told
+        self._heard = heard
         self._watches = [_watch(monitor) for monitor in monitors]
         self._fresh = itertools.count(1 << 40)
         self._shapes: list[Shape] = []
@@ -114,9 +122,10 @@ class Compiled:
                         before, handlers = len(self._shapes), self._handlers
                         done = line
                         for line, match in enumerate(self._scan.finditer(chunk, at), done + 1):
-                            if handlers[match.lastindex](match):
+                            known = handlers[match.lastindex](match)
+                            if known is True:
                                 continue
-                            found = self._slow(match, str(path), line)
+                            found = self._again(known) if known else self._slow(match, str(path), line)
                             if found:
                                 yield line, found
                             if len(self._shapes) != before:
@@ -143,56 +152,70 @@ class Compiled:
         before = [[*watch.tokens] for watch in self._watches]
         plans = [self._plan(watch, topic) for watch in self._watches]
         tallies = [[_state(watched.tally) for watched in plan.due] if plan else [] for plan in plans]
-        found = list(self._step(event))
+        self._heard(topic, 1)
+        found = [violation for watch in self._watches for violation in watch.monitor.step(event)]
         which, groups = self._shaped(text, topic) if raw is topic else (-1, None)
         for watch, plan, old, tally in zip(self._watches, plans, before, tallies, strict=True):
             unreadable = {
                 v.clause for v in found if v.fault is Fault.MAPPING and v.node == watch.monitor.setup.node.name
             }
             self._look(watch, set(plan.names) - unreadable if plan else set(), which, groups)
-            if plan is not None and all(
-                _state(watched.tally) == (then[0] + 1, then[1] + 1, *then[2:])
-                for watched, then in zip(plan.due, tally, strict=True)
-            ):
-                own = {watch.slots[name] for name in plan.names}
-                key = tuple(watch.tokens[at] if at in own else old[at] for at in plan.key)
-                if None not in key:
-                    if len(plan.quiet) >= REMEMBERED:
-                        plan.quiet.clear()
-                    plan.quiet.add(key)  # type: ignore[arg-type]
+            if plan is not None:
+                _remember(watch, plan, old, tally, found)
         self._last[0] = b""
         self._clock[0] = max((watch.monitor.not_before for watch in self._watches), default=-math.inf)
         self._clock[1] = min((watch.monitor.deadline for watch in self._watches), default=math.inf)
-        return found
+        return list(self._told(found)) if found else []
+
+    def _again(self, known: list[tuple[Violation, ...]]) -> list[Violation]:
+        """What was told before of an event like the latest."""
+        self._count()
+        found: list[Violation] = []
+        raw = self._last[0].decode()
+        time = time_text(Decimal(raw) if "." in raw else int(raw))
+        monitors = {watch.monitor.setup.node.name: watch.monitor for watch in self._watches}
+        for violation in itertools.chain.from_iterable(known):
+            monitor = monitors[violation.node]
+            monitor.tallies[violation.clause].broken += 1
+            monitor.tallies[violation.clause].excused += violation.fault is Fault.EXCUSED
+            found.append(replace(violation, index=monitor.events, time=time))
+        return list(self._told(found))
 
     # -- the engine's state ------------------------------------------------------------------------------------------
 
+    def _count(self) -> None:
+        """Count what was passed over."""
+        for topic in self._topics.values():
+            count, topic.count = topic.count, 0
+            if not count:
+                continue
+            for watch in self._watches:
+                watch.monitor.events += count
+                plan = watch.plans.get(same_topic(topic.name))
+                if plan is None:
+                    continue
+                watch.monitor.relevant += count
+                for watched in plan.due:
+                    watched.tally.published += count
+                    watched.tally.judged += count
+            self._heard(topic.name, count)
+
     def _flush(self) -> None:
         """Bring the engine up to date with what was passed over."""
-        waiting = [topic for topic in self._topics.values() if topic.count]
+        self._count()
+        waiting = [topic for topic in self._topics.values() if topic.last is not None]
         if not waiting:
             return
-        total = sum(topic.count for topic in waiting)
-        events = []
-        for topic in waiting:
-            assert topic.last is not None
-            events.append((topic, event_of(topic.last.group(0)[:-1].decode(), "", 0)))
+        events = [event_of(topic.last.group(0)[:-1].decode(), "", 0) for topic in waiting if topic.last is not None]
         for watch in self._watches:
-            watch.monitor.events += total
-            for topic, event in events:
-                plan = watch.plans.get(same_topic(topic.name))
-                if plan is None or event is None:
-                    continue
-                watch.monitor.caught_up(event, topic.count)
-                for watched in plan.due:
-                    watched.tally.published += topic.count
-                    watched.tally.judged += topic.count
+            for topic, event in zip(waiting, events, strict=True):
+                if event is not None and watch.plans.get(same_topic(topic.name)) is not None:
+                    watch.monitor.caught_up(event)
             watch.monitor.settle_previous()
             for name, at in watch.slots.items():
                 watch.values[at] = watch.monitor.values.get(name)
         for topic in waiting:
-            self._passed(topic.name, topic.count)
-            topic.count = 0
+            topic.last = None
 
     def _look(self, watch: _Watch, read: set[str], which: int, groups: tuple[bytes, ...] | None) -> None:
         """Set the tokens by what the engine now knows; `read`: the variables of this event's message."""
@@ -266,19 +289,20 @@ class Compiled:
         for name in plan.names if plan else ():
             yield _leads(watch.monitor.setup.rules[name])
 
-    def _compile(self) -> tuple[re.Pattern[bytes], dict[int | None, Callable[[Match], bool]]]:
+    def _compile(self) -> tuple[re.Pattern[bytes], dict[int | None, Handler]]:
         scan, offsets = scanner(self._shapes)
-        handlers: dict[int | None, Callable[[Match], bool]] = {scan.groups: lambda match: False}
+        handlers: dict[int | None, Handler] = {scan.groups: lambda match: False}
         for which, (each, offset) in enumerate(zip(self._shapes, offsets, strict=True)):
             handlers[offset + len(each.paths)] = self._handler(which, each, offset)
         return scan, handlers
 
-    def _handler(self, which: int, made: Shape, offset: int) -> Callable[[Match], bool]:
+    def _handler(self, which: int, made: Shape, offset: int) -> Handler:
         """The code for one shape of line."""
         topic = self._topics.setdefault(made.topic, _Topic(made.topic))
         scope: dict[str, Any] = {"bisect": bisect, "clock": self._clock, "topic": topic, "last": self._last}
         checks: list[str] = []
         acts: list[str] = []
+        loud: list[str] = []
         used: set[int] = set()
         for number, watch in enumerate(self._watches):
             plan = self._plan(watch, made.topic)
@@ -307,9 +331,18 @@ class Compiled:
                 checks += [f"{variable} = k{number}_{at}.get({key})", f"if {variable} is None: return False"]
                 fresh[at] = variable
             if plan.due:
-                scope[f"quiet{number}"] = plan.quiet
-                parts = "".join(f"{fresh.get(at, f'tok{number}[{at}]')}, " for at in plan.key)
-                checks.append(f"if ({parts}) not in quiet{number}: return False")
+                scope |= {f"quiet{number}": plan.quiet, f"loud{number}": plan.loud}
+                parts, more = (
+                    "".join(f"{fresh.get(at, f'tok{number}[{at}]')}, " for at in slots)
+                    for slots in (plan.key, plan.excuse)
+                )
+                checks += [
+                    f"v{number} = None",
+                    f"if ({parts}) not in quiet{number}:",
+                    f"    v{number} = loud{number}.get(({more}))",
+                    f"    if v{number} is None: return False",
+                ]
+                loud.append(f"v{number}")
             acts += [f"tok{number}[{at}] = {variable}" for at, variable in fresh.items()]
             for name in plan.names:
                 if name in watch.monitor.setup.fresh:  # its next deadline, rounded down
@@ -333,10 +366,11 @@ class Compiled:
             "clock[0] = t",
             "topic.count += 1",
             "topic.last = match",
+            *([f"if {' or '.join(loud)}: return [v for v in ({', '.join(loud)},) if v]"] if loud else []),
             "return True",
         ]
         exec("def handle(match):\n" + "".join(f"    {each}\n" for each in code), scope)
-        handle: Callable[[Match], bool] = scope["handle"]
+        handle: Handler = scope["handle"]
         return handle
 
 
@@ -362,7 +396,43 @@ def _plan(watch: _Watch, topic: str) -> _Plan | None:
         if watched.held or watched.paired or not watched.outputs <= set(names):
             return None
     spoken = dict.fromkeys(name for watched in due.values() for name in watched.names)
-    return _Plan(monitor, names, tuple(due.values()), tuple(watch.slots[name] for name in spoken))
+    more = dict.fromkeys((*spoken, *monitor.assumed))
+    return _Plan(
+        monitor, names, tuple(due.values()), tuple(map(watch.slots.__getitem__, spoken)),
+        tuple(map(watch.slots.__getitem__, more)),
+    )  # fmt: skip
+
+
+def _remember(
+    watch: _Watch, plan: _Plan, old: list[Token | None], tallies: list[tuple[int, ...]], found: list[Violation]
+) -> None:
+    """Keep what an event has shown, if it was nothing but that clauses held or were broken."""
+    own = {watch.slots[name] for name in plan.names}
+    broken: set[str] = set()
+    for watched, then in zip(plan.due, tallies, strict=True):
+        now = _state(watched.tally)
+        if now[:2] != (then[0] + 1, then[1] + 1) or now[3:] != then[3:]:
+            return
+        if now[2] != then[2]:
+            broken.add(watched.clause.name)
+            if any(name in watch.regional for name in watched.names):
+                return  # what is told has the reading itself
+    told = tuple(v for v in found if v.node == watch.monitor.setup.node.name)
+    if {v.clause for v in told} != broken:
+        return
+
+    def key(slots: tuple[int, ...]) -> tuple[Token | None, ...]:
+        return tuple(watch.tokens[at] if at in own else old[at] for at in slots)
+
+    if None in key(plan.key):
+        return
+    if len(plan.quiet) + len(plan.loud) >= REMEMBERED:
+        plan.quiet.clear()
+        plan.loud.clear()
+    if told:
+        plan.loud[key(plan.excuse)] = told
+    else:
+        plan.quiet.add(key(plan.key))
 
 
 def _state(tally: Tally) -> tuple[int, ...]:

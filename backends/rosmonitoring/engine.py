@@ -194,9 +194,13 @@ class Monitor:
         """The clauses that are judged when a variable is published."""
         return self._clauses.get(name, ())
 
-    def caught_up(self, event: Mapping[str, Any], count: int) -> None:
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What the assumptions speak of."""
+        return tuple(dict.fromkeys(name for watched in self._assumptions for name in watched.names))
+
+    def caught_up(self, event: Mapping[str, Any]) -> None:
         """Take over the latest of some events of one topic that could all be read."""
-        self.relevant += count
         topic = same_topic(str(event["topic"]))
         for name, read in self._readers[topic]:
             old = self.values.get(name)

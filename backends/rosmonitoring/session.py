@@ -12,7 +12,7 @@ from avow.language.contract import ClauseKind
 from avow.system.plan import System
 from avow.system.schema import suggest
 
-from .bags import Event, Origin, is_bag
+from .bags import Origin, is_bag
 from .blame import Blame
 from .compiled import Compiled
 from .coverage import Tally
@@ -40,28 +40,27 @@ class Session:
         return any(monitor.listens(topic) for monitor in self.monitors)
 
     def step(self, event: Mapping[str, Any]) -> Iterator[Violation]:
-        self.events += 1
         topic = event.get("topic")
-        if isinstance(topic, str) and not self.listens(topic):
-            self.unheard[topic] = self.unheard.get(topic, 0) + 1
-        yield from self._told([v for monitor in self.monitors for v in monitor.step(event)])
+        self.heard(topic if isinstance(topic, str) else "", 1)
+        yield from self.told([v for monitor in self.monitors for v in monitor.step(event)])
 
-    def passed(self, topic: str, count: int) -> None:
-        """So many events of a topic needed no judging."""
+    def heard(self, topic: str, count: int) -> None:
+        """So many events of a topic (without a name: of none) have come."""
         self.events += count
-        if not self.listens(topic):
+        if topic and not self.listens(topic):
             self.unheard[topic] = self.unheard.get(topic, 0) + count
 
     def run(self, path: Path) -> Iterator[tuple[int, Violation]]:
         """Judge a whole trace: what was found, each with the line (0 in a bag) of its event. Raises Rejected."""
         line = 0
-        for line, found in judge(self.monitors, self.step, self.passed, path, origin(self.system)):
+        for line, found in judge(self.monitors, path, origin(self.system), self.told, self.heard):
             for violation in found:
                 yield line, violation
         for violation in self.finish():
             yield line, violation
 
-    def _told(self, violations: list[Violation]) -> Iterator[Violation]:
+    def told(self, violations: list[Violation]) -> Iterator[Violation]:
+        """What was found at one event, with who is to blame."""
         if not violations:
             return
         if self._blame is None:
@@ -72,7 +71,7 @@ class Session:
 
     def finish(self) -> Iterator[Violation]:
         """What is judged only once the run is over."""
-        yield from self._told([v for monitor in self.monitors for v in monitor.finish()])
+        yield from self.told([v for monitor in self.monitors for v in monitor.finish()])
 
     def unmonitored(self) -> list[str]:
         """The clauses, of the nodes that are to be monitored, of whose publications too few were decided."""
@@ -146,17 +145,19 @@ class Session:
 
 def judge(
     monitors: Sequence[Monitor],
-    step: Callable[[Event], Iterable[Violation]],
-    passed: Callable[[str, int], None],
     path: Path,
     where: Origin,
+    told: Callable[[list[Violation]], Iterable[Violation]] = lambda found: found,
+    heard: Callable[[str, int], None] = lambda topic, count: None,
 ) -> Iterator[tuple[int, list[Violation]]]:
-    """Feed a trace to some monitors: lines, and what was found there (often nothing). Raises Rejected."""
+    """Feed a trace to some monitors: lines, and what was found there (often nothing). `told` and `heard` are those of
+    `Compiled`. Raises Rejected."""
     if not is_bag(path):
-        yield from Compiled(monitors, step, passed).run(path)
+        yield from Compiled(monitors, told, heard).run(path)
         return
     for recorded in read_trace(path, where, lambda topic: any(monitor.listens(topic) for monitor in monitors)):
-        yield recorded.line, list(step(recorded.event))
+        heard(str(recorded.event["topic"]), 1)
+        yield recorded.line, list(told([v for monitor in monitors for v in monitor.step(recorded.event)]))
 
 
 def _asked(kind: ClauseKind, tally: Tally) -> int:
