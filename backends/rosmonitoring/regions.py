@@ -27,9 +27,7 @@ from avow.language.terms import (
 from avow.ros.definitions import FLOATS, Scalar
 
 from .rules import Fields, Rule
-
-_LARGEST = 3.0e38
-"""Beyond it a float32 has no room."""
+from .wires import LARGEST_SINGLE
 
 
 def regions(rule: Rule, formulas: Iterable[Term]) -> list[float] | None:
@@ -52,7 +50,7 @@ def regions(rule: Rule, formulas: Iterable[Term]) -> list[float] | None:
     except OverflowError:
         return None
     spans = [(middle - room, middle + room) for middle, room in near]
-    return _merged([(-math.inf, -_LARGEST), *spans, (_LARGEST, math.inf)])
+    return _merged([(-math.inf, -LARGEST_SINGLE / 2), *spans, (LARGEST_SINGLE / 2, math.inf)])
 
 
 def _merged(spans: list[tuple[float, float]]) -> list[float]:

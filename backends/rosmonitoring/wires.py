@@ -176,7 +176,7 @@ def _of_float(value: float, wide: bool) -> Fraction:
     return _held(Fraction(value if wide else _single(value)), wide=wide)
 
 
-_LARGEST_SINGLE = (2 - 2.0**-23) * 2.0**127
+LARGEST_SINGLE = (2 - 2.0**-23) * 2.0**127
 """What a float32 holds at most."""
 
 
@@ -207,7 +207,7 @@ def _held(value: Fraction, *, wide: bool) -> Fraction:
     if not wide:
         bits = struct.pack("<f", near)
         shorter = (float(f"{near:.{places}g}") for places in range(1, 9))
-        fitting = (t for t in shorter if abs(t) <= _LARGEST_SINGLE and struct.pack("<f", t) == bits)
+        fitting = (t for t in shorter if abs(t) <= LARGEST_SINGLE and struct.pack("<f", t) == bits)
         digits = next(map(repr, fitting), digits)
     return Binary.held(value, digits.removesuffix(".0"))
 

@@ -26,6 +26,7 @@ NOT_TUNED = {
     ("avow/base/process.py", "_PR_SET_PDEATHSIG"),  # Linux names its calls by numbers
     ("avow/base/process.py", "_PR_SET_DUMPABLE"),
     ("avow/base/process.py", "_PR_SET_CHILD_SUBREAPER"),
+    ("backends/rosmonitoring/wires.py", "LARGEST_SINGLE"),  # IEEE 754
     ("avow/base/rendering.py", "_TAB"),  # columns of a drawing
     ("avow/formulas/ltl.py", "_START"),  # a node that is none
     ("avow/language/format.py", "WIDTH"),  # the canonical layout
