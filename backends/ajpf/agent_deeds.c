@@ -1,147 +1,141 @@
 /* The second half of a cycle: one deed of the current intention. Part of agent.c. */
 
-typedef struct {
-    Intention x;   /* the current intention, which the deed changes */
-    Frame *f;      /* its top frame */
-    const Deed *d; /* the deed; none where an initial goal or a percept is taken up */
-    int kind, t;   /* what the deed does; its term, or -1 where that has a free variable */
-} Doing;
+typedef struct { /* what a deed is for others */
+    int action, to, letter; /* interned, or -1 */
+} Told;
 
-static int gw_fits(const Frame *f, int t) { return f->isgoal && f->event == t; }
-static void gw_keep(S *s, Doing *o) { s->cur = gw_intention(&o->x); }
-static void gw_done(S *s, Doing *o) {
-    gw_tail(s, &o->x);
-    gw_keep(s, o);
+static void gw_done(Mind *m, Intention *x) {
+    gw_tail(m, x);
+    m->cur = gw_store(x);
 }
-/* Whether a ground term is believed, or the head of a rule whose body holds */
-static int gw_derives(const S *s, int t) {
-    short none[MAXVARS], b[MAXVARS];
-    int i, met = gw_has(s, t);
-    gw_unbound(none);
-    for (i = 0; i < NRULES && !met; i++)
-        if (gw_ground(rules[i].head, none) == t) {
-            memcpy(b, none, sizeof b);
-            met = gw_holds(s, rules[i].body, rules[i].n, b, 1);
-        }
-    return met;
+static int gw_bound(int t, int at, int value) {
+    int result = gw_arg(t, at);
+    if (!gw_isvar(result)) gw_give_up("a result that is no free variable");
+    return gw_unify(result, value);
 }
-
-static int gw_act(S *s, Doing *o, int way) {
-    int name = pats[o->d->pat].functor, silent = name == PRINT, row = gw_narrowing(name), had, k, found[NGROUPS + 1];
-    if (o->t < 0 && !silent) gw_give_up("an action with a free variable");
-    for (k = 0; k < NQUIET && quiet[k] != name; k++);
-    if (silent || k < NQUIET) row = 0;
-    if (way < 0) return row ? gw_count(row) : 1;
-    gw_done(s, o);
-    s->planned = s->waited = 0;
-    if (!silent) s->last = o->t;
-    if (row) {
-        had = gw_offered(s->now, found) > 0;
-        gw_draw(s, row, way);
-        s->fresh = s->fresh || had || gw_offered(s->now, found) > 0;
+/* Actions that compute bind their last argument */
+static void gw_compute(int t) {
+    int name = gw_functor(t), n = gw_arity(t);
+    if (n >= 3 && (name == SUM || name == MINUS || name == TIMES || name == DIVIDE)) {
+        double x, y;
+        if (!gw_number(gw_arg(t, 0), &x) || !gw_number(gw_arg(t, 1), &y)) gw_give_up("no number to compute with");
+        gw_bound(t, 2, gw_numeral(name == SUM ? x + y : name == MINUS ? x - y : name == TIMES ? x * y : x / y));
+    } else if (n >= 3 && name == APPEND) {
+        const char *a = gw_quoted(gw_arg(t, 0)), *b = gw_quoted(gw_arg(t, 1));
+        if (!a || !b) gw_give_up("no text to append");
+        char *text = gw_join("\"", a + 1, "");
+        text[strlen(text) - 1] = 0;
+        text = gw_longer(text, b + 1, "");
+        text[strlen(text) - 1] = '"';
+        gw_bound(t, 2, gw_atom(text));
+        free(text);
+    } else if (n >= 2 && name == TOSTRING) {
+        int shown = gw_export(gw_arg(t, 0), 0);
+        if (!gw_shown[shown].ground) gw_give_up("the text of a variable");
+        char *text = gw_join("\"", gw_shown[shown].text, "\"");
+        gw_bound(t, 1, gw_atom(text));
+        free(text);
     }
-    return 1;
 }
 
-static void gw_add_belief(S *s, Doing *o) {
-    int known;
-    if (o->t < 0) gw_give_up("a belief with a free variable");
-    known = gw_derives(s, o->t);
-    gw_add(s, o->t, o->x.f[0].plan == PERCEIVES);
-    gw_done(s, o);
-    gw_wake(s, o->t);
-    if (!known) gw_put(s, gw_single(o->t, 0, 0, 0, OPEN));
+static void gw_add_belief(Mind *m, Intention *x, int t) {
+    int known = gw_believes(m, t, 0, 0), seen = x->f[0].plan == PERCEIVES;
+    gw_undo(0);
+    t = gw_export(t, 0);
+    gw_add(m, t, seen);
+    gw_done(m, x);
+    gw_wake(m, t);
+    if (!known) gw_put(m, gw_single(t, 0, 0, OPEN));
 }
 
-static void gw_drop_belief(S *s, Doing *o) {
-    int i, gone = 0, lost[MAXBEL];
-    short b[MAXVARS], first[MAXVARS];
-    for (i = 0; i < s->nb;) {
-        memcpy(b, o->f->b, sizeof b);
-        if (o->t >= 0 ? s->bel[i] == o->t : gw_match(o->d->pat, s->bel[i], b)) {
-            if (!gone) memcpy(first, b, sizeof b);
-            lost[gone++] = s->bel[i];
-            gw_rid(s, i);
-        } else
+static void gw_drop_belief(Mind *m, Intention *x, int t) {
+    int i, gone = 0, first = -1, event;
+    t = gw_deref(t);
+    event = gw_export(t, 0);
+    for (i = 0; !gw_isvar(t) && i < m->nb;) {
+        if (!gw_unifies(t, gw_import(m->bel[i], 0))) {
             i++;
+            continue;
+        }
+        if (!gone++) first = m->bel[i];
+        gw_rid(m, i);
     }
-    if (o->t < 0 && gone) { /* the event keeps the variable: it may be another only if no plan asks for it */
-        for (i = 0; i < NPLANS; i++)
-            if (plans[i].drop && !plans[i].isgoal && pats[plans[i].trigger].functor == pats[o->d->pat].functor)
-                gw_give_up("a plan for a dropped belief with a free variable");
-        memcpy(o->f->b, first, sizeof first);
-    }
-    gw_done(s, o);
-    if (o->t >= 0) gw_wake(s, o->t);
-    for (i = 0; o->t < 0 && i < s->nq; i++)
-        if (gw_its[s->q[i]].waiting) gw_give_up("waiting for a belief with a free variable");
-    for (i = 0; i < gone; i++) gw_put(s, gw_single(lost[i], 1, 0, 0, OPEN));
+    if (gone) gw_unify(t, gw_import(first, 0));
+    gw_done(m, x);
+    gw_undo(0);
+    gw_wake(m, event);
+    while (gone--) gw_put(m, gw_single(event, 1, 0, OPEN));
 }
 
-static void gw_wait(S *s, Doing *o) {
-    short b[MAXVARS];
-    int met, i, j, k;
-    memcpy(b, o->f->b, sizeof b);
-    met = gw_believes(s, o->d->pat, b, 0, 0, 0);
-    if (o->kind == WAITS ? met : !met) {
-        if (o->kind == WAITS) memcpy(o->f->b, b, sizeof b);
-        gw_done(s, o);
-        return;
+static void gw_suspend(Mind *m, Intention *x) {
+    int i, j, k;
+    x->waiting = 1;
+    m->cur = gw_store(x);
+    if (!gw_sift(m)) {
+        gw_put(m, m->cur);
+        m->cur = NOBODY;
+        m->asleep = 1;
     }
-    o->x.waiting = 1;
-    gw_keep(s, o);
-    if (!gw_ready(s)) {
-        gw_put(s, s->cur);
-        o->x.n = 0;
-        gw_keep(s, o);
-        s->asleep = 1;
-    }
-    gw_sift(s);
-    for (k = 0; k < s->nq && !gw_its[s->q[k]].waiting; k++);
-    for (i = k + 1; i < s->nq; i++) { /* those that wait are sorted by their weights */
-        int it = s->q[i];
-        for (j = i; j > k && gw_lighter(it, s->q[j - 1]); j--) s->q[j] = s->q[j - 1];
-        s->q[j] = it;
+    k = gw_sift(m);
+    for (i = k + 1; i < m->nq; i++) { /* those that wait are sorted by their weights */
+        int it = m->q[i];
+        for (j = i; j > k && gw_lighter(it, m->q[j - 1]); j--) m->q[j] = m->q[j - 1];
+        m->q[j] = it;
     }
 }
-
-/* Whether an achieve goal is believed already; it then leaves the goal base, unless another intention is at it */
-static int gw_achieved(S *s, Doing *o) {
-    short b[MAXVARS];
-    int i, k, elsewhere = 0;
-    memcpy(b, o->f->b, sizeof b);
-    if (!(o->d ? gw_believes(s, o->d->pat, b, 0, 0, 0) : gw_derives(s, o->t))) return 0;
-    if (o->t < 0) gw_give_up("an achieved goal with a free variable");
-    for (i = 0; i < s->nq; i++)
-        for (k = 0; k < gw_its[s->q[i]].n; k++) elsewhere |= gw_fits(&gw_its[s->q[i]].f[k], o->t);
-    memcpy(o->f->b, b, sizeof b);
-    gw_done(s, o);
-    if (!elsewhere) gw_unwant(s, o->t, 1);
-    return 1;
+static void gw_wait(Mind *m, Intention *x, int t, int not) {
+    int met = gw_believes(m, t, 0, 0);
+    if (not) gw_undo(0);
+    if (met != not)
+        gw_done(m, x);
+    else
+        gw_suspend(m, x);
 }
 
-static void gw_add_goal(S *s, Doing *o) {
-    int kind = o->d ? o->d->kind : o->f->kind;
-    if (kind && gw_achieved(s, o)) return;
-    if (o->t < 0) gw_give_up("a goal with a free variable");
-    if (kind && gw_wants(s, o->t, 1) >= 0) {
-        gw_done(s, o);
-        return;
+/* Whether a frame is about the goal */
+static int gw_fits(const Frame *f, int t) {
+    return f->isgoal && gw_unifies(f->event, t);
+}
+/* An achieve goal that is believed already leaves the goal base, unless another intention is at it; one that is wanted
+   already is left to who is at it. */
+static int gw_achieved(Mind *m, Intention *x, int t) {
+    Intention y;
+    int i, k, elsewhere = 0, exact = gw_export(t, 0);
+    if (gw_believes(m, t, 0, 0)) {
+        gw_done(m, x);
+        gw_undo(0);
+        for (i = 0; i < m->nq; i++) {
+            gw_load(&y, m->q[i]);
+            for (k = 0; k < y.n; k++) elsewhere |= gw_fits(&y.f[k], gw_import(exact, 0));
+        }
+        if (!elsewhere) gw_unwant(m, exact, 1);
+        return 1;
     }
-    gw_want(s, o->t, kind);
-    if (o->x.n == MAXFRAMES) gw_give_up("too many goals on goals");
-    o->f->fresh = 0;
+    for (i = 0; i < m->ng; i++)
+        if (m->goal[i] % 2 && gw_unify(t, gw_import(m->goal[i] / 2, 0))) {
+            gw_done(m, x);
+            return 1;
+        } else
+            gw_undo(0);
+    return 0;
+}
+static void gw_add_goal(Mind *m, Intention *x, int t, int kind) {
+    Frame *f = &x->f[x->n - 1];
+    if (gw_isvar(gw_deref(t))) gw_give_up("a goal that is no more than a variable");
+    if (kind && gw_achieved(m, x, t)) return;
+    gw_want(m, gw_export(t, 0), kind);
+    f->fresh = 0;
     if (!kind) {
-        o->f->at++;
-        o->f->null = 1;
+        f->at++;
+        f->null = 1;
     }
-    o->x.f[o->x.n++] = fresh_frame(o->t, 0, 1, kind, OPEN);
-    gw_keep(s, o);
+    gw_push(x, t, 0, 1, kind, OPEN);
+    m->cur = gw_store(x);
 }
 
 /* Cut off what stands on the goal, and the deed that posted it; where only its kind or sign differs, that deed alone.
    Whether it was there at all. */
-static int gw_cut(S *s, Intention *x, int t, int kind) {
+static int gw_cut(Mind *m, Intention *x, int t, int kind) {
     int i, exact = -1, loose = 0;
     for (i = x->n - 1; i >= 0; i--)
         if (gw_fits(&x->f[i], t)) {
@@ -150,76 +144,107 @@ static int gw_cut(S *s, Intention *x, int t, int kind) {
         }
     if (!loose) return 0;
     if (exact >= 0) x->n = exact;
-    x->waiting = 0;
-    gw_tail(s, x);
     return 1;
 }
-/* Whether the next deed of the frame posts the goal */
-static int gw_posts(const Frame *f, int t) {
-    const Deed *d;
+static int gw_posts(Frame *f, int t) { /* whether its next deed posts the goal */
     if (f->null) return 0;
-    if (f->plan == STARTS) return !f->at && f->event == t;
-    if (f->plan < 0) return 0;
-    d = &plans[f->plan].deeds[f->at];
-    return d->what == ADDGOAL && gw_ground(d->pat, f->b) == t;
+    if (f->plan == STARTS) return !f->at && gw_unifies(f->event, t);
+    return f->plan >= 0 && plans[f->plan].deeds[f->at].what == ADDGOAL && gw_unifies(gw_deed_term(f), t);
 }
-static void gw_drop_goal(S *s, Doing *o) {
-    int i, j, kind = o->d->kind;
-    Intention lost, was = o->x;
-    memset(&lost, 0, sizeof lost);
-    if (o->t < 0) gw_give_up("a dropped goal with a free variable");
-    gw_unwant(s, o->t, kind);
-    if (gw_cut(s, &o->x, o->t, kind))
-        lost = was;
-    else {
-        for (j = 0; j < s->nq;) {
-            Intention y = gw_its[s->q[j]];
-            was = y;
-            if (gw_cut(s, &y, o->t, kind))
-                lost = was;
-            else if (!kind && gw_posts(&y.f[y.n - 1], o->t))
-                gw_tail(s, &y);
-            if (y.n)
-                s->q[j++] = gw_intention(&y);
+static int gw_goals(const Intention *x, int *goals) { /* twice the terms' numbers, and the kinds */
+    int i, n = 0;
+    for (i = 0; i < x->n; i++)
+        if (x->f[i].isgoal) goals[n++] = 2 * gw_export(x->f[i].event, 0) + x->f[i].kind;
+    return n;
+}
+static void gw_drop_goal(Mind *m, Intention *x, int t, int kind) {
+    int i, j, n, lost[MAXFRAMES], nlost = 0, goals[MAXFRAMES], exact = gw_export(t, 0);
+    Intention y;
+    gw_unwant(m, exact, kind);
+    n = gw_goals(x, goals);
+    if (gw_cut(m, x, t, kind)) {
+        memcpy(lost, goals, sizeof lost);
+        nlost = n;
+    } else
+        for (j = 0; j < m->nq;) {
+            gw_load(&y, m->q[j]);
+            n = gw_goals(&y, goals);
+            if (gw_cut(m, &y, gw_import(exact, 0), kind)) {
+                memcpy(lost, goals, sizeof lost);
+                nlost = n;
+                y.waiting = 0;
+                gw_tail(m, &y);
+                m->q[j] = gw_store(&y);
+            } else if (!kind && gw_posts(&y.f[y.n - 1], gw_import(exact, 0))) {
+                gw_tail(m, &y);
+                m->q[j] = gw_store(&y);
+            }
+            if (m->q[j] == NOBODY)
+                gw_take(m, j);
             else
-                gw_take(s, j);
+                j++;
         }
-        gw_tail(s, &o->x);
-    }
-    for (i = 0; i < lost.n; i++)
-        if (lost.f[i].isgoal) gw_unwant(s, lost.f[i].event, lost.f[i].kind);
-    gw_keep(s, o);
+    gw_done(m, x);
+    for (i = 0; i < nlost; i++) gw_unwant(m, lost[i] / 2, lost[i] % 2);
 }
 
-static int gw_deed(S *s, int way) { /* the ways that there are; does it if way >= 0 */
-    Doing o;
-    o.x = gw_its[s->cur];
-    o.f = &o.x.f[o.x.n - 1];
-    o.d = o.f->plan >= 0 ? &plans[o.f->plan].deeds[o.f->at] : 0;
-    if (o.f->plan == OPEN || o.f->null) { /* no plan, and none will come; or nothing left of a goal that was posted */
-        if (way < 0) return 1;
-        s->planned = 0;
-        if (o.f->plan != OPEN) gw_done(s, &o);
-        return 1;
+static void gw_send(Mind *m, Intention *x, int t, Told *told) {
+    int me = progname(m->of), message = gw_node(SENT, 4), letter = gw_node(RECEIVED, 4), action = gw_node(SEND, 2);
+    int to = gw_export(gw_inner(gw_arg(t, 0)), 0), i, sent;
+    for (i = 1; i < 3; i++) {
+        int part = gw_arg(t, i);
+        NODE(message).args[i + 1] = NODE(letter).args[i + 1] = part;
     }
-    o.kind = o.f->plan == STARTS ? ADDGOAL : o.f->plan == PERCEIVES ? o.f->drop ? DROPBEL : ADDBEL : o.d->what;
-    o.t = !o.d ? o.f->event : o.d->pat < 0 ? -1 : gw_ground(o.d->pat, o.f->b);
-    if (o.kind == ACT) return gw_act(s, &o, way);
-    if (way < 0) return 1;
-    s->planned = 0;
-    switch (o.kind) {
-    case ADDBEL: gw_add_belief(s, &o); break;
-    case DROPBEL: gw_drop_belief(s, &o); break;
+    NODE(message).args[0] = gw_import(to, 0);
+    NODE(letter).args[1] = gw_import(to, 0);
+    NODE(message).args[1] = NODE(letter).args[0] = me;
+    NODE(action).args[0] = gw_arg(t, 2);
+    NODE(action).args[1] = gw_arg(t, 0);
+    sent = gw_export(message, 0);
+    told->action = gw_export(action, 0);
+    told->to = to;
+    told->letter = gw_single(gw_export(letter, 0), 0, 0, OPEN);
+    gw_add(m, sent, 0);
+    gw_done(m, x);
+    gw_put(m, gw_single(sent, 0, 0, OPEN));
+}
+
+/* Does the next deed. An intention without a plan, for which none will come, has none. */
+static Told gw_deed(Mind *m) {
+    Told told = {-1, -1, -1};
+    Intention x;
+    Frame *f;
+    int what, t;
+    gw_top = gw_ntrail = 0;
+    gw_load(&x, m->cur);
+    f = &x.f[x.n - 1];
+    m->planned = 0;
+    if (f->plan == OPEN) return told;
+    if (f->null) {
+        gw_done(m, &x);
+        return told;
+    }
+    what = f->plan == STARTS ? ADDGOAL : f->plan == PERCEIVES ? f->drop ? DROPBEL : ADDBEL : plans[f->plan].deeds[f->at].what;
+    if (what == LOCKS || what == UNLOCKS) {
+        x.locked = what == LOCKS;
+        gw_done(m, &x);
+        return told;
+    }
+    t = f->plan < 0 ? f->event : gw_deed_term(f);
+    if (what != ADDGOAL && what != DROPGOAL) t = gw_deref(gw_computed(t));
+    if ((what == ADDBEL || what == ACT) && gw_isvar(t)) t = gw_atom("_");
+    switch (what) {
+    case ADDBEL: gw_add_belief(m, &x, t); break;
+    case DROPBEL: gw_drop_belief(m, &x, t); break;
     case WAITS:
-    case WAITSNOT: gw_wait(s, &o); break;
-    case ADDGOAL: gw_add_goal(s, &o); break;
-    case DROPGOAL: gw_drop_goal(s, &o); break;
-    case LOCKS:
-    case UNLOCKS:
-        o.x.locked = o.kind == LOCKS;
-        gw_done(s, &o);
-        break;
-    default: gw_give_up("a deed that is not known");
+    case WAITSNOT: gw_wait(m, &x, t, what == WAITSNOT); break;
+    case ADDGOAL: gw_add_goal(m, &x, t, f->plan == STARTS ? f->kind : plans[f->plan].deeds[f->at].kind); break;
+    case DROPGOAL: gw_drop_goal(m, &x, t, plans[f->plan].deeds[f->at].kind); break;
+    case SENDS: gw_send(m, &x, t, &told); break;
+    default:
+        told.action = gw_export(t, 0);
+        gw_compute(t);
+        gw_done(m, &x);
     }
-    return 1;
+    return told;
 }

@@ -1,279 +1,198 @@
-/* Terms, intentions, beliefs, goals and the queue of intentions. Part of agent.c. */
+/* Minds and intentions: interned as rows of numbers, and as they are worked on. Part of agent.c. */
 
-/* Ground terms */
-typedef struct {
-    int functor, n, args[MAXARGS];
-    char *text;
-} Term;
-static Term *gw_terms;
-static int gw_nterms, gw_room;
-
-/* Terms and intentions are found by their hashes; a slot holds a number and 1 more. More slots than numbers. */
-#define SLOTS 65536
-static int gw_term_at[SLOTS], gw_its_at[SLOTS];
-static unsigned gw_hash(const void *data, size_t size, unsigned hash) {
-    const unsigned char *c = data;
-    while (size--) hash = (hash ^ *c++) * 16777619u;
-    return hash;
-}
-static void gw_unbound(short *b) {
-    int i;
-    for (i = 0; i < MAXVARS; i++) b[i] = -1;
-}
-
-static char *gw_text_of(int functor, int n, const int *args) {
-    size_t size = strlen(names[functor]) + 3;
-    int i;
-    for (i = 0; i < n; i++) size += strlen(gw_terms[args[i]].text) + 1;
-    char *text = malloc(size);
-    strcpy(text, names[functor]);
-    if (n) {
-        strcat(text, "(");
-        for (i = 0; i < n; i++) {
-            if (i) strcat(text, ",");
-            strcat(text, gw_terms[args[i]].text);
-        }
-        strcat(text, ")");
-    }
-    return text;
-}
-static int gw_term(int functor, int n, const int *args) {
-    unsigned at = gw_hash(args, n * sizeof(int), gw_hash(&functor, sizeof functor, 2166136261u)) % SLOTS;
-    const Term *known;
-    for (; gw_term_at[at]; at = (at + 1) % SLOTS) {
-        known = &gw_terms[gw_term_at[at] - 1];
-        if (known->functor == functor && known->n == n && !memcmp(known->args, args, n * sizeof(int)))
-            return gw_term_at[at] - 1;
-    }
-    if (gw_nterms == MAXTERMS) gw_give_up("too many terms");
-    if (gw_nterms == gw_room) {
-        gw_room = gw_room ? 2 * gw_room : 256;
-        gw_terms = realloc(gw_terms, gw_room * sizeof(Term));
-    }
-    Term t;
-    memset(&t, 0, sizeof t);
-    t.functor = functor;
-    t.n = n;
-    memcpy(t.args, args, n * sizeof(int));
-    t.text = gw_text_of(functor, n, args);
-    gw_terms[gw_nterms] = t;
-    gw_term_at[at] = gw_nterms + 1;
-    return gw_nterms++;
-}
-/* Patterns: a variable has functor -1 and its number in args[0] */
-static int gw_ground(int p, const short *b) {
-    int i, args[MAXARGS];
-    if (pats[p].functor < 0) return b[pats[p].args[0]];
-    for (i = 0; i < pats[p].n; i++)
-        if ((args[i] = gw_ground(pats[p].args[i], b)) < 0) return -1;
-    return gw_term(pats[p].functor, pats[p].n, args);
-}
-static int gw_match(int p, int t, short *b) {
-    int i;
-    if (pats[p].functor < 0) {
-        int v = pats[p].args[0];
-        if (b[v] < 0) {
-            b[v] = t;
-            return 1;
-        }
-        return b[v] == t;
-    }
-    if (pats[p].functor != gw_terms[t].functor || pats[p].n != gw_terms[t].n) return 0;
-    for (i = 0; i < pats[p].n; i++)
-        if (!gw_match(pats[p].args[i], gw_terms[t].args[i], b)) return 0;
-    return 1;
-}
-
-/* Intentions */
+/* Intentions: frames, the bottom one first. `null` is what is left of a deed that posted a goal to be performed. */
 enum { STARTS = -2, PERCEIVES = -3, OPEN = -1 };
 typedef struct {
-    short event, drop, isgoal, kind, plan, at, null, fresh, b[MAXVARS];
+    int event, drop, isgoal, kind, plan, at, null, fresh, env[MAXVARS]; /* event, env: of the heap */
 } Frame;
 typedef struct {
-    short n, waiting, locked;
+    int n, waiting, locked;
     Frame f[MAXFRAMES];
 } Intention;
-static Intention *gw_its;
-static int gw_nits, gw_itroom;
-static int gw_intention(Intention *x) {
-    unsigned at;
-    if (!x->n) memset(x, 0, sizeof *x);
-    memset(&x->f[x->n], 0, (MAXFRAMES - x->n) * sizeof(Frame));
-    at = gw_hash(x, (char *)&x->f[x->n] - (char *)x, 2166136261u) % SLOTS;
-    for (; gw_its_at[at]; at = (at + 1) % SLOTS)
-        if (!memcmp(&gw_its[gw_its_at[at] - 1], x, sizeof *x)) return gw_its_at[at] - 1;
-    if (gw_nits == 32000) gw_give_up("too many intentions");
-    if (gw_nits == gw_itroom) {
-        gw_itroom = gw_itroom ? 2 * gw_itroom : 256;
-        gw_its = realloc(gw_its, gw_itroom * sizeof *gw_its);
+#define FRAME (8 + MAXVARS)
+static Pool gw_its;
+#define NOBODY 0 /* the intention without frames */
+
+static void gw_load(Intention *x, int number) {
+    int i, v, n, own[MAXFREE];
+    const int *row = gw_row(&gw_its, number, &n);
+    for (i = 0; i < MAXFREE; i++) own[i] = UNBOUND;
+    x->waiting = row[0];
+    x->locked = row[1];
+    x->n = (n - 2) / FRAME;
+    for (i = 0, row += 2; i < x->n; i++, row += FRAME) {
+        memcpy(&x->f[i], row, FRAME * sizeof(int));
+        x->f[i].event = gw_import(row[0], own);
+        for (v = 0; v < MAXVARS; v++) x->f[i].env[v] = row[8 + v] < 0 ? UNBOUND : gw_import(row[8 + v], own);
     }
-    gw_its[gw_nits] = *x;
-    gw_its_at[at] = gw_nits + 1;
-    return gw_nits++;
 }
-static Frame fresh_frame(int event, int drop, int isgoal, int kind, int plan) {
-    Frame f;
-    memset(&f, 0, sizeof f);
-    f.event = event;
-    f.drop = drop;
-    f.isgoal = isgoal;
-    f.kind = kind;
-    f.plan = plan;
-    gw_unbound(f.b);
-    return f;
+static int gw_store(const Intention *x) {
+    int i, v, row[2 + MAXFRAMES * FRAME], *to = row + 2;
+    Order order;
+    order.n = 0;
+    row[0] = x->waiting;
+    row[1] = x->locked;
+    if (!x->n) row[0] = row[1] = 0;
+    for (i = 0; i < x->n; i++, to += FRAME) {
+        const Frame *f = &x->f[i];
+        unsigned long long live = 0;
+        if (f->plan >= 0 && f->at < plans[f->plan].n) live = plans[f->plan].deeds[f->at].live;
+        memcpy(to, f, 8 * sizeof(int));
+        to[0] = gw_export(f->event, &order);
+        for (v = 0; v < MAXVARS; v++)
+            to[8 + v] = live >> v & 1 && f->env[v] != UNBOUND ? gw_export(f->env[v], &order) : -1;
+    }
+    return gw_intern(&gw_its, row, 2 + x->n * FRAME);
 }
-static int gw_single(int event, int drop, int isgoal, int kind, int plan) {
+static void gw_push(Intention *x, int event, int drop, int isgoal, int kind, int plan) {
+    Frame *f = &x->f[x->n];
+    if (x->n++ == MAXFRAMES) gw_give_up("too many goals on goals");
+    f->event = event;
+    f->drop = drop;
+    f->isgoal = isgoal;
+    f->kind = kind;
+    f->plan = plan;
+    f->at = f->null = f->fresh = 0;
+    gw_unbound(f->env);
+}
+static int gw_single(int event, int drop, int kind, int plan) { /* about a belief; the term is interned */
     Intention x;
     memset(&x, 0, sizeof x);
-    x.n = 1;
-    x.f[0] = fresh_frame(event, drop, isgoal, kind, plan);
-    return gw_intention(&x);
+    gw_push(&x, gw_import(event, 0), drop, 0, kind, plan);
+    return gw_store(&x);
 }
 static int gw_left(const Frame *f) {
     if (f->plan == OPEN) return -1;
     if (f->plan < 0) return f->at ? f->null : 1;
     return plans[f->plan].n - f->at + f->null;
 }
+/* The current deed's term; of what is waited for, too */
+static int gw_deed_term(Frame *f) { return gw_build(plans[f->plan].deeds[f->at].pat, f->env); }
+static int gw_waits(int it) {
+    int n;
+    return gw_row(&gw_its, it, &n)[0];
+}
+static int gw_locks(int it) {
+    int n;
+    return gw_row(&gw_its, it, &n)[1];
+}
 
-/* Mind */
-static int gw_before(int t, int u) { return strcmp(gw_terms[t].text, gw_terms[u].text) < 0; }
-static int gw_has(const S *s, int t) {
+/* Minds */
+static Pool gw_minds;
+static void gw_recall(Mind *m, int number, const Agent *of) {
+    int n;
+    const int *row = gw_row(&gw_minds, number, &n);
+    memcpy(m, row, 7 * sizeof(int));
+    row += 7;
+    memcpy(m->bel, row, m->nb * sizeof(int));
+    memcpy(m->seen, row + m->nb, m->nb * sizeof(int));
+    memcpy(m->goal, row + 2 * m->nb, m->ng * sizeof(int));
+    memcpy(m->q, row + 2 * m->nb + m->ng, m->nq * sizeof(int));
+    m->of = of;
+}
+static int gw_keep(const Mind *m) {
+    int row[8 + 2 * MAXBEL + MAXGOALS + MAXQUEUE], *to = row + 7;
+    memcpy(row, m, 7 * sizeof(int));
+    memcpy(to, m->bel, m->nb * sizeof(int));
+    memcpy(to + m->nb, m->seen, m->nb * sizeof(int));
+    memcpy(to + 2 * m->nb, m->goal, m->ng * sizeof(int));
+    memcpy(to + 2 * m->nb + m->ng, m->q, m->nq * sizeof(int));
+    to += 2 * m->nb + m->ng + m->nq;
+    *to++ = m->of - agents; /* one agent's mind is not another's */
+    return gw_intern(&gw_minds, row, to - row);
+}
+static int gw_has(const Mind *m, int t) {
     int i;
-    for (i = 0; i < s->nb; i++)
-        if (s->bel[i] == t) return 1;
+    for (i = 0; i < m->nb; i++)
+        if (m->bel[i] == t) return 1;
     return 0;
 }
-static void gw_add(S *s, int t, int seen) {
+static void gw_add(Mind *m, int t, int seen) {
     int i;
-    if (gw_has(s, t)) return;
-    if (s->nb == MAXBEL) gw_give_up("too many beliefs");
-    for (i = s->nb++; i && gw_before(t, s->bel[i - 1]); i--) {
-        s->bel[i] = s->bel[i - 1];
-        s->seen[i] = s->seen[i - 1];
+    if (gw_has(m, t)) return;
+    if (m->nb == MAXBEL) gw_give_up("too many beliefs");
+    for (i = m->nb++; i && gw_before(t, m->bel[i - 1]); i--) {
+        m->bel[i] = m->bel[i - 1];
+        m->seen[i] = m->seen[i - 1];
     }
-    s->bel[i] = t;
-    s->seen[i] = seen;
+    m->bel[i] = t;
+    m->seen[i] = seen;
 }
-static void gw_rid(S *s, int at) {
-    int i;
-    for (i = at; i + 1 < s->nb; i++) {
-        s->bel[i] = s->bel[i + 1];
-        s->seen[i] = s->seen[i + 1];
-    }
-    s->nb--;
-    s->bel[s->nb] = 0;
-    s->seen[s->nb] = 0;
+static void gw_rid(Mind *m, int at) {
+    m->nb--;
+    memmove(m->bel + at, m->bel + at + 1, (m->nb - at) * sizeof(int));
+    memmove(m->seen + at, m->seen + at + 1, (m->nb - at) * sizeof(int));
 }
-static int gw_wants(const S *s, int t, int kind) {
+/* Goals: twice the term's number, and 1 more for one to achieve */
+static int gw_wants(const Mind *m, int t, int kind) {
     int i;
-    for (i = 0; i < s->ng; i++)
-        if (s->goal[i] == 2 * t + kind) return i;
+    for (i = 0; i < m->ng; i++)
+        if (m->goal[i] == 2 * t + kind) return i;
     return -1;
 }
-static void gw_want(S *s, int t, int kind) {
-    int i, g = 2 * t + kind;
-    if (gw_wants(s, t, kind) >= 0) return;
-    if (s->ng == MAXGOALS) gw_give_up("too many goals");
-    for (i = s->ng++; i && (gw_before(t, s->goal[i - 1] / 2) || (t == s->goal[i - 1] / 2 && g < s->goal[i - 1])); i--)
-        s->goal[i] = s->goal[i - 1];
-    s->goal[i] = g;
-}
-static void gw_unwant(S *s, int t, int kind) {
-    int i = gw_wants(s, t, kind);
-    if (i < 0) return;
-    for (; i + 1 < s->ng; i++) s->goal[i] = s->goal[i + 1];
-    s->goal[--s->ng] = 0;
-}
-static int gw_holds(const S *s, const Cond *c, int n, short *b, int depth);
-/* The first way to believe p such that the other conditions hold: bindings stay in b. */
-static int gw_believes(const S *s, int p, short *b, int depth, const Cond *more, int n) {
-    short old[MAXVARS];
-    int i, g;
-    memcpy(old, b, sizeof old);
-    for (i = 0; i < s->nb; i++) {
-        if (gw_match(p, s->bel[i], b) && gw_holds(s, more, n, b, depth)) return 1;
-        memcpy(b, old, sizeof old);
-    }
-    if (depth > 60) gw_give_up("rules without end");
-    for (i = 0; i < NRULES; i++) {
-        short own[MAXVARS];
-        gw_unbound(own);
-        g = gw_ground(rules[i].head, own);
-        if (gw_match(p, g, b) && gw_holds(s, rules[i].body, rules[i].n, own, depth + 1) &&
-            gw_holds(s, more, n, b, depth))
-            return 1;
-        memcpy(b, old, sizeof old);
-    }
-    return 0;
-}
-static int gw_holds(const S *s, const Cond *c, int n, short *b, int depth) {
-    short old[MAXVARS];
+static void gw_want(Mind *m, int t, int kind) {
     int i;
-    if (!n) return 1;
-    memcpy(old, b, sizeof old);
-    if (c->isgoal) {
-        int met = 0;
-        for (i = 0; i < s->ng; i++) {
-            if ((c->kind < 0 || s->goal[i] % 2 == c->kind) && gw_match(c->pat, s->goal[i] / 2, b)) {
-                if (!c->positive) {
-                    met = 1;
-                    break;
-                }
-                if (gw_holds(s, c + 1, n - 1, b, depth)) return 1;
-            }
-            memcpy(b, old, sizeof old);
-        }
-        memcpy(b, old, sizeof old);
-        return c->positive ? 0 : !met && gw_holds(s, c + 1, n - 1, b, depth);
+    if (gw_wants(m, t, kind) >= 0) return;
+    if (m->ng == MAXGOALS) gw_give_up("too many goals");
+    for (i = m->ng++; i; i--) {
+        int u = m->goal[i - 1] / 2;
+        if (u == t ? kind : !gw_before(t, u)) break;
+        m->goal[i] = m->goal[i - 1];
     }
-    if (c->positive) return gw_believes(s, c->pat, b, depth, c + 1, n - 1);
-    i = gw_believes(s, c->pat, b, depth, 0, 0);
-    memcpy(b, old, sizeof old);
-    return !i && gw_holds(s, c + 1, n - 1, b, depth);
+    m->goal[i] = 2 * t + kind;
+}
+static void gw_unwant(Mind *m, int t, int kind) {
+    int i = gw_wants(m, t, kind);
+    if (i < 0) return;
+    m->ng--;
+    memmove(m->goal + i, m->goal + i + 1, (m->ng - i) * sizeof(int));
 }
 
 /* The queue */
-static void gw_put(S *s, int it) {
-    if (s->nq == MAXQUEUE) gw_give_up("too many intentions at once");
-    s->q[s->nq++] = it;
+static void gw_put(Mind *m, int it) {
+    if (m->nq == MAXQUEUE) gw_give_up("too many intentions at once");
+    m->q[m->nq++] = it;
 }
-static int gw_take(S *s, int at) {
-    int i, it = s->q[at];
-    for (i = at; i + 1 < s->nq; i++) s->q[i] = s->q[i + 1];
-    s->q[--s->nq] = 0;
+static int gw_take(Mind *m, int at) {
+    int it = m->q[at];
+    m->nq--;
+    memmove(m->q + at, m->q + at + 1, (m->nq - at) * sizeof(int));
     return it;
 }
-static void gw_sift(S *s) { /* those that can go on, then those that wait */
-    short q[MAXQUEUE];
-    int i, k = 0;
-    for (i = 0; i < s->nq; i++)
-        if (!gw_its[s->q[i]].waiting) q[k++] = s->q[i];
-    for (i = 0; i < s->nq; i++)
-        if (gw_its[s->q[i]].waiting) q[k++] = s->q[i];
-    memcpy(s->q, q, s->nq * sizeof(short));
+static int gw_sift(Mind *m) { /* those that can go on, then those that wait; how many can */
+    int q[MAXQUEUE], i, k = 0, ready;
+    for (i = 0; i < m->nq; i++)
+        if (!gw_waits(m->q[i])) q[k++] = m->q[i];
+    ready = k;
+    for (i = 0; i < m->nq; i++)
+        if (gw_waits(m->q[i])) q[k++] = m->q[i];
+    memcpy(m->q, q, m->nq * sizeof(int));
+    return ready;
 }
-static int gw_ready(const S *s) {
-    int i;
-    for (i = 0; i < s->nq; i++)
-        if (!gw_its[s->q[i]].waiting) return 1;
-    return 0;
+/* An intention that waited for what has changed goes on */
+static int gw_woken(const Mind *m, int it, int t) {
+    Intention x;
+    Frame *f;
+    int trail = gw_ntrail, wakes, wanted;
+    if (!gw_waits(it)) return it;
+    gw_load(&x, it);
+    f = &x.f[x.n - 1];
+    wanted = gw_computed(gw_deed_term(f));
+    if (EDGE)
+        wakes = gw_believes(m, wanted, 0, 0) != (plans[f->plan].deeds[f->at].what == WAITSNOT);
+    else
+        wakes = gw_unify(wanted, gw_import(t, 0));
+    gw_undo(trail);
+    if (!wakes) return it;
+    x.waiting = 0;
+    return gw_store(&x);
 }
-static void gw_wake(S *s, int t) { /* those that waited for what has changed */
+static void gw_wake(Mind *m, int t) {
     int i;
-    for (i = 0; i < s->nq; i++) {
-        Intention x = gw_its[s->q[i]];
-        short b[MAXVARS];
-        Frame *f = &x.f[x.n - 1];
-        if (!x.waiting) continue;
-        memcpy(b, f->b, sizeof b);
-        if (gw_match(plans[f->plan].deeds[f->at].pat, t, b)) {
-            x.waiting = 0;
-            s->q[i] = gw_intention(&x);
-        }
-    }
+    for (i = 0; i < m->nq; i++) m->q[i] = gw_woken(m, m->q[i], t);
 }
 /* Without its next deed; a goal whose frame goes leaves the goal base */
-static void gw_tail(S *s, Intention *x) {
+static void gw_tail(Mind *m, Intention *x) {
     Frame *f = &x->f[x->n - 1];
     if (f->null)
         f->null = 0;
@@ -281,29 +200,37 @@ static void gw_tail(S *s, Intention *x) {
         f->at++;
     f->fresh = 0;
     if (gw_left(f) > 0) return;
-    if (f->isgoal) gw_unwant(s, f->event, f->kind);
+    if (f->isgoal) gw_unwant(m, gw_export(f->event, 0), f->kind);
     x->n--;
 }
+/* The order of those that wait: rows, then the text of the event */
 static int gw_rows(const Intention *x) {
     int i, n = 0;
     for (i = 0; i < x->n; i++) n += gw_left(&x->f[i]) > 1 && !x->f[i].fresh ? 2 : 1;
     return n;
 }
-/* The order of u followed by x, and v followed by y */
-static int gw_order(const char *u, const char *x, const char *v, const char *y) {
-    for (;; u++, v++) {
-        if (!*u && x) u = x, x = 0;
-        if (!*v && y) v = y, y = 0;
-        if (*u != *v || !*u) return (unsigned char)*u - (unsigned char)*v;
+static char *gw_event(const Frame *f) {
+    static const char *const kinds[] = {" [perform]", " [achieve]"};
+    int t = gw_export(f->event, 0);
+    char *text = gw_join(f->drop ? "-" : "+", f->isgoal ? "!" : "", "");
+    if (gw_functor(t) == RECEIVED || gw_functor(t) == SENT) {
+        text = gw_longer(text, gw_names[gw_functor(t)], "(:");
+        text = gw_longer(text, gw_shown[gw_export(gw_arg(t, 2), 0)].text, ",");
+        return gw_longer(text, gw_shown[gw_export(gw_arg(t, 3), 0)].text, ")");
     }
+    return gw_longer(text, gw_shown[t].text, f->isgoal ? kinds[f->kind] : "");
 }
 static int gw_lighter(int a, int b) {
-    static const char *const kinds[] = {" [perform]", " [achieve]"};
-    const Intention *x = &gw_its[a], *y = &gw_its[b];
-    const Frame *f = &x->f[x->n - 1], *g = &y->f[y->n - 1];
-    if (gw_rows(x) != gw_rows(y)) return gw_rows(x) < gw_rows(y);
-    if (f->drop != g->drop) return g->drop;       /* + before - */
-    if (f->isgoal != g->isgoal) return f->isgoal; /* ! before the first character of any term */
-    return gw_order(gw_terms[f->event].text, f->isgoal ? kinds[f->kind] : "", gw_terms[g->event].text,
-                    g->isgoal ? kinds[g->kind] : "") < 0;
+    Intention x, y;
+    char *u, *v;
+    int less;
+    gw_load(&x, a);
+    gw_load(&y, b);
+    if (gw_rows(&x) != gw_rows(&y)) return gw_rows(&x) < gw_rows(&y);
+    u = gw_event(&x.f[x.n - 1]);
+    v = gw_event(&y.f[y.n - 1]);
+    less = gw_order(u, v) < 0;
+    free(u);
+    free(v);
+    return less;
 }

@@ -1,5 +1,5 @@
-"""An agent's program for Spin: tables of its plans, rules and percepts for `agent.c`, which runs the reasoning cycle by
-itself. Of our own interpreter Spin sees nothing, so that its opinion is a second one."""
+"""Agents' programs for Spin: tables of their plans, rules and percepts for `agent.c`, which runs the reasoning cycle
+and the scheduler by itself. Of our own interpreter Spin sees nothing, so that its opinion is a second one."""
 
 from __future__ import annotations
 
@@ -7,12 +7,30 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .builtin import COMPUTING
 from .environment import Environment
+from .explore import System
+from .interpreter import PRINT, Semantics
 from .psl import Atom, Modality
-from .syntax import Condition, DeedKind, GoalKind, Program, Struct, Term, Var, is_ground
+from .syntax import (
+    CONS,
+    RECEIVED,
+    SENT,
+    Condition,
+    DeedKind,
+    GoalKind,
+    Program,
+    Struct,
+    Term,
+    Var,
+    is_ground,
+    variables,
+)
+from .tuning import RULE_DEPTH
 
-RUNNER = tuple(Path(__file__).with_name(name) for name in ("agent.c", "agent_mind.c", "agent_deeds.c"))
+RUNNER = tuple(
+    Path(__file__).with_name(name)
+    for name in ("agent.c", "agent_terms.c", "agent_reason.c", "agent_mind.c", "agent_deeds.c")
+)
 _DEEDS = {
     DeedKind.ACTION: "ACT",
     DeedKind.ADD_BELIEF: "ADDBEL",
@@ -23,9 +41,32 @@ _DEEDS = {
     DeedKind.WAIT_NOT: "WAITSNOT",
     DeedKind.LOCK: "LOCKS",
     DeedKind.UNLOCK: "UNLOCKS",
+    DeedKind.SEND: "SENDS",
 }
-_ATOMS = {Modality.BELIEVES: "B", Modality.DID: "D", Modality.WANTS: "G", Modality.PERCEPT: "P"}
+_ATOMS = {
+    Modality.BELIEVES: "B",
+    Modality.DID: "D",
+    Modality.WANTS: "G",
+    Modality.PERCEPT: "P",
+    Modality.INTENDS: "I",
+    Modality.INTENDS_TO_DO: "T",
+}
+_NAMES = {
+    "PRINT": PRINT,
+    "CONS": CONS,
+    "SENT": SENT,
+    "RECEIVED": RECEIVED,
+    "SEND": "send",
+    "SUM": "sum",
+    "MINUS": "minus",
+    "TIMES": "times",
+    "DIVIDE": "div",
+    "APPEND": "append",
+    "TOSTRING": "toString",
+}
 _QUIESCENCE = {"never": 0, "once": 1, "repeatedly": 2}
+_VARIABLES = 64
+"""Of one plan: which of them are still needed is a number of so many bits."""
 
 
 class NotTranslated(Exception):  # noqa: N818 - it names a state, not a fault
@@ -34,125 +75,127 @@ class NotTranslated(Exception):  # noqa: N818 - it names a state, not a fault
 
 @dataclass(slots=True)
 class _Tables:
-    """Patterns by their numbers; a variable is known by its number in its plan."""
+    """Patterns by their numbers; a variable is known by its number in its plan. `parts` are tables that others name."""
 
     names: dict[str, int] = field(default_factory=dict)
-    patterns: dict[tuple[int, int, tuple[int, ...]], int] = field(default_factory=dict)
+    patterns: dict[tuple[int, int, bool, tuple[int, ...]], int] = field(default_factory=dict)
+    parts: list[str] = field(default_factory=list)
     variables: int = 1
-    arguments: int = 1
+    arguments: int = 4
 
     def name(self, functor: str) -> int:
         return self.names.setdefault(functor, len(self.names))
 
     def pattern(self, term: Term, scope: dict[str, int]) -> int:
-        key: tuple[int, int, tuple[int, ...]]
+        key: tuple[int, int, bool, tuple[int, ...]]
         if isinstance(term, Var):
             number = scope.setdefault(term.name, len(scope))
             self.variables = max(self.variables, len(scope))
-            key = (-1, 0, (number,))
+            if number >= _VARIABLES:
+                raise NotTranslated(f"more than {_VARIABLES} variables in one plan")
+            key = (-1, 0, False, (number,))
         else:
             args = tuple(self.pattern(arg, scope) for arg in term.args)
             self.arguments = max(self.arguments, len(args))
-            key = (self.name(term.functor), len(args), args)
+            key = (self.name(term.functor), len(args), is_ground(term), args)
         return self.patterns.setdefault(key, len(self.patterns))
 
-    def conditions(self, conditions: Sequence[Condition], scope: dict[str, int]) -> str:
-        rows = []
-        for c in conditions:
-            if c.term is None or c.test is not None or c.group or c.is_cut:
-                raise NotTranslated("a comparison, a cut or a denied group")
-            if isinstance(c.term, Struct) and c.term.functor.startswith("."):
-                raise NotTranslated("messages")
-            rows.append(f"{{{self.pattern(c.term, scope)}, {int(c.positive)}, {int(c.is_goal)}, {_kind(c.goal)}}}")
-        return _table(rows, "{0, 1, 0, -1}")
+    def part(self, kind: str, rows: Sequence[str], empty: str) -> str:
+        """The name of a table of its own."""
+        name = f"part_{len(self.parts)}"
+        self.parts.append(f"static const {kind} {name}[] = {_table(rows, empty)};")
+        return name
+
+    def conditions(self, conditions: Sequence[Condition], scope: dict[str, int]) -> tuple[int, str]:
+        """How many there are, and their table."""
+        rows = [self.condition(c, scope) for c in conditions if c.term is not None or c.group or c.is_cut]
+        return len(rows), self.part("Cond", rows, "{0}")
+
+    def condition(self, c: Condition, scope: dict[str, int]) -> str:
+        if c.is_cut:
+            return "{CUT, 0, 1, -1, 0, 0}"
+        if c.group:
+            number, name = self.conditions(c.group, scope)
+            return f"{{GROUP, 0, 0, -1, {number}, {name}}}"
+        assert c.term is not None
+        what = "BELIEF"
+        if c.is_goal:
+            what = "GOAL"
+        elif c.test is not None:
+            what = "LESS" if c.test == "<" else "SAME"
+        elif isinstance(c.term, Struct) and c.term.functor == SENT:
+            what = "TOLD"
+        return f"{{{what}, {self.pattern(c.term, scope)}, {int(c.positive)}, {_kind(c.goal)}, 0, 0}}"
 
 
-def header(program: Program, environment: Environment, wanted: Sequence[Atom], *, probed: bool) -> str:
-    """The tables of `agent.c`. Raises NotTranslated."""
-    tables = _Tables()
-    known = [_fact(tables, belief) for belief in program.beliefs]
-    goals = [f"{{{_fact(tables, goal.term)}, {_kind(goal.kind)}}}" for goal in program.goals]
-    rules, plans, parts = [], [], []
-    for at, rule in enumerate(program.rules):
-        if not is_ground(rule.head):
-            raise NotTranslated("a reasoning rule with variables in its head")
-        parts.append(f"static const Cond body_{at}[] = {tables.conditions(rule.body, {})};")
-        rules.append(f"{{{_fact(tables, rule.head)}, {len(rule.body)}, body_{at}}}")
-    for at, plan in enumerate(program.plans):
-        scope: dict[str, int] = {}
-        trigger = tables.pattern(plan.event.term, scope)
-        if isinstance(plan.event.term, Struct) and plan.event.term.functor.startswith("."):
-            raise NotTranslated("messages")
-        parts.append(f"static const Cond guard_{at}[] = {tables.conditions(plan.guard, scope)};")
-        deeds = []
-        for deed in plan.deeds:
-            if deed.kind not in _DEEDS or (isinstance(deed.term, Struct) and deed.term.functor in COMPUTING):
-                raise NotTranslated("messages, or actions that compute")
-            bare = deed.kind in (DeedKind.LOCK, DeedKind.UNLOCK)
-            term = -1 if bare else tables.pattern(deed.term, scope)
-            deeds.append(f"{{{_DEEDS[deed.kind]}, {term}, {_kind(deed.goal)}}}")
-        parts.append(f"static const Deed deeds_{at}[] = {_table(deeds, '{0, 0, 0}')};")
-        loose = int(not is_ground(plan.event.term))
-        kind = f"{_kind(plan.event.goal)}, {loose}"
-        event = f"{int(plan.event.sign == '-')}, {int(plan.event.is_goal)}, {kind}, {trigger}"
-        plans.append(f"{{{event}, {len(plan.guard)}, {len(deeds)}, guard_{at}, deeds_{at}}}")
+def header(system: System, wanted: Sequence[Atom]) -> str:
+    """The tables of `agent.c`: of the agents, their environment and what properties ask. Raises NotTranslated."""
+    tables, environment = _Tables(), system.environment
+    macros = {name: tables.name(text) for name, text in _NAMES.items()}
+    plans: list[str] = []
+    agents = [_agent(tables, agent.program, plans) for agent in system.agents]
     percepts, rows = _environment(tables, environment)
-    said = []
-    for atom in wanted:
-        if atom.modality not in _ATOMS:
-            raise NotTranslated("intentions")
-        said.append(f"{{'{_ATOMS[atom.modality]}', {tables.pattern(_apart(atom.term), {})}}}")
+    places = {agent.program.name: at for at, agent in enumerate(system.agents)}
+    said = [
+        f"{{'{_ATOMS[a.modality]}', {places.get(a.agent, 0)}, {tables.pattern(_apart(a.term), {})}}}" for a in wanted
+    ]
+    for fair in environment.fair:
+        percept = tables.pattern(fair.percept, {})
+        said += [f"{{'W', 0, {percept}}}", f"{{'F', 0, {percept}}}"]
     after = [0, *(tables.name(action) for action in sorted(environment.after))]
     quiet = [tables.name(action) for action in sorted(environment.quiet)]
-    sizes = {
-        "PRINT": tables.name("print"),
+    sizes = macros | {
+        "NAGENTS": len(agents),
         "NGROUPS": max(1, len(environment.groups)),
-        "NBELIEFS": len(known),
-        "NGOALS": len(goals),
-        "NRULES": len(rules),
-        "NPLANS": len(plans),
         "NAFTER": len(environment.after),
         "NQUIET": len(quiet),
+        "NNAMES": len(tables.names),
+        "NPATS": max(1, len(tables.patterns)),
+        "NATOMS": max(1, len(said)),
         "AT_START": int(environment.at_start),
         "QUIESCENCE": _QUIESCENCE[environment.at_quiescence],
-        "PROBED": int(probed),
+        "PROBED": int(system.probed),
+        "EDGE": int(system.semantics is Semantics.EDGE),
+        "FAIR": int(bool(environment.fair)),
         "MAXVARS": tables.variables + 1,
         "MAXARGS": tables.arguments + 1,
-        "MAXTERMS": 15_000,
-        "MAXFRAMES": 16,
-        "MAXQUEUE": 48,
-        "MAXGOALS": 24,
-        "MAXBEL": 64 + 2 * len(known),
+        "MAXDEPTH": RULE_DEPTH,
+        "MAXFREE": 64,
+        "MAXFRAMES": 64,
+        "MAXQUEUE": 128,
+        "MAXGOALS": 64,
+        "MAXBEL": 256 + 2 * max(len(agent.program.beliefs) for agent in system.agents),
     }
-    patterns = [f"{{{f}, {n}, {{{', '.join(map(str, args)) or '0'}}}}}" for f, n, args in tables.patterns]
+    patterns = [f"{{{f}, {n}, {int(g)}, {_braced(args or (0,))}}}" for f, n, g, args in tables.patterns]
     names = ", ".join(f'"{_escaped(name)}"' for name in tables.names)
     return "\n".join(
         [
             "#ifndef AGENT_H",
             "#define AGENT_H",
             *(f"#define {name} {value}" for name, value in sizes.items()),
-            "enum { ACT, ADDBEL, DROPBEL, ADDGOAL, DROPGOAL, WAITS, WAITSNOT, LOCKS, UNLOCKS };",
-            "typedef struct { int functor, n, args[MAXARGS]; } Pat;",
-            "typedef struct { int pat, positive, isgoal, kind; } Cond;",
-            "typedef struct { int what, pat, kind; } Deed;",
+            "enum { ACT, ADDBEL, DROPBEL, ADDGOAL, DROPGOAL, WAITS, WAITSNOT, LOCKS, UNLOCKS, SENDS };",
+            "enum { BELIEF, GOAL, TOLD, LESS, SAME, GROUP, CUT };",
+            "typedef struct { int functor, n, ground, args[MAXARGS]; } Pat;",
+            "typedef struct Cond { int what, pat, positive, kind, n; const struct Cond *group; } Cond;",
+            "typedef struct { int what, pat, kind; unsigned long long live; } Deed;",
             "typedef struct { int head, n; const Cond *body; } Rule;",
             "typedef struct { int drop, isgoal, kind, loose, trigger, nguard, n;",
             "  const Cond *guard; const Deed *deeds; } Plan;",
-            "typedef struct { int what, pat; } Said;",
-            "typedef struct { short nb, bel[MAXBEL], ng, goal[MAXGOALS], nq, q[MAXQUEUE], cur, last, now[NGROUPS];",
-            "  unsigned char seen[MAXBEL], planned, fresh, begun, asleep, waited, over, up; } S;",
+            "typedef struct { int name, first, last, nbeliefs, ngoals, nrules;",
+            "  const int *beliefs, (*goals)[2]; const Rule *rules; } Agent;",
+            "typedef struct { int what, agent, pat; } Said;",
+            "typedef struct { int mind[NAGENTS], mail[NAGENTS], last; short now[NGROUPS];",
+            "  unsigned char awake[NAGENTS], turn, whose, changed, begun, waited, over, drawn, up; } S;",
             "int says(const S *, int), ways(const S *);",
             "void go(S *, int);",
             "#define HERE (&now.s)",  # Spin takes no calls in conditions, and does not look into macros
             *(f"#define SAYS_{at} says(HERE, {at})" for at in range(len(said))),
-            *(f"#define MORE_{way} (ways(HERE) > {way})" for way in range(most_ways(environment))),
+            *(f"#define MORE_{way} (ways(HERE) > {way})" for way in range(most_ways(system))),
             f"static const char *const names[] = {{{names}}};",
             f"static const Pat pats[] = {_table(patterns, '{0}')};",
-            *parts,
-            f"static const Rule rules[] = {_table(rules, '{0}')};",
+            *tables.parts,
             f"static const Plan plans[] = {_table(plans, '{0}')};",
-            f"static const int beliefs[] = {_table(map(str, known), '0')};",
-            f"static const int goals[][2] = {_table(goals, '{0}')};",
+            f"static const Agent agents[] = {_table(agents, '{0}')};",
             f"static const int after[] = {_table(map(str, after), '0')};",
             f"static const int quiet[] = {_table(map(str, quiet), '0')};",
             f"static const Said atoms[] = {_table(said, '{0}')};",
@@ -164,19 +207,52 @@ def header(program: Program, environment: Environment, wanted: Sequence[Atom], *
     )
 
 
-def most_ways(environment: Environment) -> int:
+def _agent(tables: _Tables, program: Program, plans: list[str]) -> str:
+    """An agent's row; its plans are added to those of all."""
+    first = len(plans)
+    known = tables.part("int", [str(tables.pattern(belief, {})) for belief in program.beliefs], "0")
+    goals = [f"{{{tables.pattern(goal.term, {})}, {_kind(goal.kind)}}}" for goal in program.goals]
+    wanted = f"part_{len(tables.parts)}"
+    tables.parts.append(f"static const int {wanted}[][2] = {_table(goals, '{0, 0}')};")
+    rules = []
+    for rule in program.rules:
+        scope: dict[str, int] = {}
+        head = tables.pattern(rule.head, scope)
+        number, body = tables.conditions(rule.body, scope)
+        rules.append(f"{{{head}, {number}, {body}}}")
+    ruled = tables.part("Rule", rules, "{0}")
+    for plan in program.plans:
+        scope = {}
+        trigger = tables.pattern(plan.event.term, scope)
+        number, guard = tables.conditions(plan.guard, scope)
+        deeds: list[str] = []
+        live = 0
+        bare = (DeedKind.LOCK, DeedKind.UNLOCK)
+        terms = [-1 if d.kind in bare else tables.pattern(d.term, scope) for d in plan.deeds]
+        for deed, term in zip(reversed(plan.deeds), reversed(terms), strict=True):
+            live |= sum(1 << scope[name] for name in set(variables(deed.term)) if name in scope)
+            deeds.insert(0, f"{{{_DEEDS[deed.kind]}, {term}, {_kind(deed.goal)}, {live}ULL}}")
+        listed = tables.part("Deed", deeds, "{0}")
+        event = f"{int(plan.event.sign == '-')}, {int(plan.event.is_goal)}, {_kind(plan.event.goal)}"
+        loose = int(not is_ground(plan.event.term))
+        plans.append(f"{{{event}, {loose}, {trigger}, {number}, {len(deeds)}, {guard}, {listed}}}")
+    sizes = f"{first}, {len(plans)}, {len(program.beliefs)}, {len(goals)}, {len(rules)}"
+    return f"{{{tables.name(program.name)}, {sizes}, {known}, {wanted}, {ruled}}}"
+
+
+def most_ways(system: System) -> int:
     """The most successors that a state has."""
-    most = 1
+    most, environment = 1, system.environment
     for narrowed in ({}, environment.start, *environment.after.values()):
         ways = 1
         for name, group in environment.groups:
             ways *= len(narrowed.get(name, group))
         most = max(most, ways)
-    return most
+    return most * len(system.agents)
 
 
 def _environment(tables: _Tables, environment: Environment) -> tuple[str, str]:
-    groups = [[-1 if p is None else _fact(tables, p) for p in words] for _, words in environment.groups] or [[-1]]
+    groups = [[-1 if p is None else tables.pattern(p, {}) for p in words] for _, words in environment.groups] or [[-1]]
     width = max(map(len, groups))
     percepts = _braced(map(_braced, groups))
     everything = {name: tuple(range(len(words))) for name, words in environment.groups}
@@ -188,12 +264,6 @@ def _environment(tables: _Tables, environment: Environment) -> tuple[str, str]:
         f"static const int percepts[NGROUPS][{width}] = {percepts};",
         f"static const int options[][NGROUPS][{longest}] = {cells};",
     )
-
-
-def _fact(tables: _Tables, term: Term) -> int:
-    if not is_ground(term):
-        raise NotTranslated("a belief or a goal with a variable")
-    return tables.pattern(term, {})
 
 
 def _apart(term: Term, names: list[int] | None = None) -> Term:

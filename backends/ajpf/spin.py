@@ -1,6 +1,5 @@
-"""A second opinion from Spin, in its own LTL: of the agent's program, run by a runner in C that shares nothing with our
-interpreter (`promela`); where that cannot run it, of the state graph that we explored, before our reductions.
-"""
+"""A second opinion from Spin, in its own LTL: of the agents' programs, run by a runner in C that shares nothing with
+our interpreter (`promela`)."""
 
 from __future__ import annotations
 
@@ -11,7 +10,6 @@ import shutil
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base.files import write
@@ -21,7 +19,6 @@ from avow.tuning.running import VERSION_SECONDS
 
 from . import promela, psl
 from .checker import Checker, Property
-from .interpreter import Semantics
 from .tuning import SPIN_DEPTH
 
 _ERRORS = re.compile(r"errors: (\d+)")
@@ -51,31 +48,15 @@ def tool() -> Tool:
     return Tool("spin", version(), shutil.which("spin"), "apt-get install spin gcc")
 
 
-@dataclass(frozen=True, slots=True)
-class Opinions:
-    """Key → whether the property holds, says Spin; `seen` is what it was asked of."""
-
-    holds: Mapping[str, bool]
-    seen: str
-
-
-def opinions(checker: Checker, properties: Sequence[Property], folder: Path, seconds: float) -> Opinions:
-    """Of the program, translated for Spin apart from our interpreter; where there is no translation, of the state graph
-    that we explored. Raises NoOpinion."""
+def opinions(checker: Checker, properties: Sequence[Property], folder: Path, seconds: float) -> dict[str, bool]:
+    """Key → whether the property holds, says Spin. Raises NoOpinion."""
     if version() is None:
         raise NoOpinion("spin or gcc is not installed")
-    deadline = time.monotonic() + seconds
     try:
         files = _translated(checker, properties)
-        said = _asked(files, checker, properties, folder, deadline)
-        return Opinions(said, "the program, by a translation of its own")
     except promela.NotTranslated as error:
-        reason = f"no translation of {error}"
-    except NoOpinion as error:
-        reason = error.reason
-    files = {"graph.h": _tables(checker), "agent.pml": _model(checker, properties)}
-    said = _asked(files, checker, properties, folder, deadline)
-    return Opinions(said, f"our state graph ({reason})")
+        raise NoOpinion(f"no translation of {error}") from None
+    return _asked(files, checker, properties, folder, time.monotonic() + seconds)
 
 
 def _asked(
@@ -84,9 +65,9 @@ def _asked(
     for name, text in files.items():
         write(folder / name, text)
     # The model's own code grows with the properties, and takes longer to optimize than it then saves.
-    runner = [["gcc", "-O2", "-w", "-c", "agent.c"]] if "agent.c" in files else []
-    model = ["gcc", "-O0", "-w", "-DNOREDUCE", "-o", "pan", "pan.c", *(["agent.o"] if runner else [])]
-    for command in (["spin", "-a", "agent.pml"], *runner, model):
+    runner = ["gcc", "-O2", "-w", "-c", "agent.c"]
+    model = ["gcc", "-O0", "-w", "-DNOREDUCE", "-o", "pan", "pan.c", "agent.o", "-lm"]
+    for command in (["spin", "-a", "agent.pml"], runner, model):
         try:
             done = run(command, cwd=folder, seconds=_left(deadline))
         except ToolMissing as error:
@@ -104,21 +85,19 @@ def _asked(
 
 def _translated(checker: Checker, properties: Sequence[Property]) -> dict[str, str]:
     system = checker.graph.system
-    if len(system.agents) > 1:
-        raise promela.NotTranslated("several agents")
-    (agent,) = system.agents
-    if agent.semantics is not Semantics.MCAPL:
-        raise promela.NotTranslated(f"'{agent.semantics}' percepts")
-    if agent.environment.fair:
-        raise promela.NotTranslated("fairness assumptions")
-    tables = promela.header(agent.program, agent.environment, checker.atoms, probed=agent.probed)
+    atoms, fair = len(checker.atoms), len(system.environment.fair)
+    tables = promela.header(system, checker.atoms)
     lines = ['c_decl {\n\\#include "agent.h"\n}', 'c_state "S s" "Global"', ""]
-    lines += [f"#define a{at} (c_expr {{ SAYS_{at} }})" for at in range(len(checker.atoms))]
+    lines += [f"#define a{at} (c_expr {{ SAYS_{at} }})" for at in range(atoms + 2 * fair)]
     lines += ["", "active proctype agent() {", "end: do"]
-    for way in range(promela.most_ways(agent.environment)):
+    for way in range(promela.most_ways(system)):
         lines.append(f"  :: atomic {{ c_expr {{ MORE_{way} }} -> c_code {{ go(HERE, {way}); }} }}")
     lines += ["  od", "}", ""]
-    lines += [f"ltl c{number} {{ {_ltl(p.formula, checker.places)} }}" for number, p in enumerate(properties)]
+    premise = [f"((<> ([] (!a{atoms + 2 * at}))) || ([] (<> a{atoms + 2 * at + 1})))" for at in range(fair)]
+    for number, p in enumerate(properties):
+        formula = _ltl(p.formula, checker.places)
+        whole = f"(!({' && '.join(premise)})) || ({formula})" if premise else formula
+        lines.append(f"ltl c{number} {{ {whole} }}")
     runner = {path.name: path.read_text(encoding="utf-8") for path in promela.RUNNER}
     return {"agent.h": tables, **runner, "agent.pml": "\n".join(lines) + "\n"}
 
@@ -140,49 +119,6 @@ def _verdict(folder: Path, claim: str, deepest: int, deadline: float) -> bool:
     if done.timed_out or found is None or "too small" in text or ("Search not completed" in text and found[1] == "0"):
         raise NoOpinion(f"pan gave no answer: {text.strip()[:200]}")
     return found[1] == "0"
-
-
-def _model(checker: Checker, properties: Sequence[Property]) -> str:
-    degrees = [checker.graph.offsets[s + 1] - checker.graph.offsets[s] for s in range(len(checker.graph))]
-    most = max([*degrees, len(checker.graph.initial)])
-    lines = ['c_decl {\n\\#include "graph.h"\n}', "int s = 0;", ""]
-    atoms = len(checker.atoms)
-    fair = len(checker.graph.system.environment.fair)
-    for bit in range(atoms + 2 * fair):
-        lines.append(f"#define a{bit} (c_expr {{ (label[now.s * WORDS + {bit // 32}] >> {bit % 32}) & 1 }})")
-    lines += ["", "active proctype agent() {", "end: do"]
-    for way in range(most):
-        step = f"c_code {{ now.s = target[offset[now.s] + {way}]; }}"
-        lines.append(f"  :: atomic {{ c_expr {{ offset[now.s + 1] - offset[now.s] > {way} }} -> {step} }}")
-    lines += ["  od", "}", ""]
-    premise = [f"((<> ([] (!a{atoms + 2 * at}))) || ([] (<> a{atoms + 2 * at + 1})))" for at in range(fair)]
-    for number, p in enumerate(properties):
-        formula = _ltl(p.formula, checker.places)
-        whole = f"(!({' && '.join(premise)})) || ({formula})" if premise else formula
-        lines.append(f"ltl c{number} {{ {whole} }}")
-    return "\n".join(lines) + "\n"
-
-
-def _tables(checker: Checker) -> str:
-    """State 0 stands before the initial states, with their label: stuttering, as they must all have the same one."""
-    graph = checker.graph
-    first = {checker.labels[s] for s in graph.initial}
-    if len(first) != 1:
-        raise NoOpinion("the initial states differ in what the properties look at")
-    words = max(1, (len(checker.atoms) + 2 * len(graph.system.environment.fair) + 31) // 32)
-    labels = [next(iter(first)), *checker.labels]
-    cells = [label >> (32 * w) & 0xFFFFFFFF for label in labels for w in range(words)]
-    offsets = [0, *(o + len(graph.initial) for o in graph.offsets)]
-    targets = [s + 1 for s in (*graph.initial, *graph.targets)]
-    return "\n".join(
-        [
-            f"#define WORDS {words}",
-            f"static const unsigned int label[] = {{ {', '.join(f'{c}u' for c in cells)} }};",
-            f"static const int offset[] = {{ {', '.join(map(str, offsets))} }};",
-            f"static const int target[] = {{ {', '.join(map(str, targets))} }};",
-            "",
-        ]
-    )
 
 
 def _ltl(formula: psl.Formula, places: Mapping[psl.Atom, int]) -> str:
