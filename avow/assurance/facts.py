@@ -102,6 +102,7 @@ def facts_of_system(
             discharging.get(node.name, ()),
         )
         for node in system.contract.nodes
+        if not node.relay
     )
     return Facts(
         system=plan.system,

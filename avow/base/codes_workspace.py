@@ -224,6 +224,12 @@ WORKSPACE_CODES = register(
         "Name another folder.",
     ),
     declare("CLI010", "language server not installed", "`avow lsp` needs pygls.", "`pip install 'avow[lsp]'`."),
+    declare(
+        "CLI011",
+        "nothing to draft from",
+        "What `avow init` is to draft a system from cannot be read, or has no node with a topic.",
+        "Give a bag, the output of `rosnode info` or `ros2 node info`, or the address of a running master.",
+    ),
 )
 
 CORE_CODES: Mapping[str, Code] = register(

@@ -41,7 +41,7 @@ class Resting:
         """Every guarantee, what discharges every assumption, and what makes their values belong together."""
         frame = self.composition.frame
         for node in frame.system.contract.nodes:
-            yield from (self.guarantee(node.name, clause.name) for clause in node.guarantees)
+            yield from (h for clause in node.guarantees for h in self.guarantee(node.name, clause.name))
             yield from (self.discharging(node.name, clause.name) for clause in node.assumptions)
         yield from (self.composed(f"environment.{assumed.port}") for assumed in frame.assumed)
         yield from self.together(frame.graph.nodes, None, optional=True)
@@ -50,7 +50,7 @@ class Resting:
         match need.kind:
             case How.GUARANTEE:
                 name = self.named(Claimed.GUARANTEE, need.digest, need.node)
-                return (self.guarantee(*name.split(".")),)
+                return self.guarantee(*name.split("."))
             case How.ENVIRONMENT:
                 assumed = self.composition.certificates.known.find(need.digest, Claimed.ENVIRONMENT, need.node)
                 if assumed is not None:
@@ -67,10 +67,13 @@ class Resting:
         assert found is not None, "the kernel has looked it up"
         return f"{found.node}.{found.name}"
 
-    def guarantee(self, node: str, clause: str) -> Hypothesis:
+    def guarantee(self, node: str, clause: str) -> tuple[Hypothesis, ...]:
+        """What has to be shown of it: nothing of what stands for a topic's wiring, as of any link."""
         owner = self.composition.frame.node(node)
+        if owner.relay:
+            return ()
         mark = node_digest(owner, owner.clause(clause))
-        return Hypothesis(HypothesisKind.CLAIM, f"{node}/{Kind.GUARANTEE}/{clause}", mark)
+        return (Hypothesis(HypothesisKind.CLAIM, f"{node}/{Kind.GUARANTEE}/{clause}", mark),)
 
     def discharging(self, node: str, clause: str) -> Hypothesis:
         """The obligation that settles an assumption of a node."""

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 @json_option("see docs/schemas/compose.schema.json")
 @click.option("--latex", "as_latex", is_flag=True, help="The derivations as LaTeX, nothing else.")
 @click.option("--rcl", "as_rcl", is_flag=True, help="The derived system-level contract as RCL, nothing else.")
-@click.option("--graph", "as_graph", is_flag=True, help="The dataflow graph as text, nothing else.")
 @seconds_option(10.0)
 @seed_option()
 def command(
@@ -33,7 +32,6 @@ def command(
     as_json: bool,
     as_latex: bool,
     as_rcl: bool,
-    as_graph: bool,
     seconds: float,
     seed: int,
 ) -> int:
@@ -61,12 +59,6 @@ def command(
         raise Rejected(Diagnostic("CLI005", f"there is no derivation '{unknown[0]}'", hint=hint))
 
     chosen = [goal for goal in composition.goals if not goals or goal.name in goals]
-    if as_graph:
-        from avow.system.folding import seen
-        from avow.system.graph_svg import texts
-
-        click.echo(texts(seen(system, composition.frame.graph)))
-        return 0
     if as_latex:
         from avow.calculus.notation import write_goal
 

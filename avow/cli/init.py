@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import click
@@ -41,22 +42,66 @@ _MONITOR = """\
 
 @click.command()
 @click.argument("directory", type=PathArgument(file_okay=False))
-@click.option("--template", type=click.Choice(["ros1", "ros2", "plain"]), default="plain", show_default=True)
+@click.option("--template", type=click.Choice(["ros1", "ros2", "plain"]), help="What the new system is.  [plain]")
+@click.option("--from-bag", "bag", type=PathArgument(exists=True), help="Draft the system from a ROS bag.")
+@click.option(
+    "--from-graph",
+    "graph",
+    metavar="SOURCE",
+    help="Draft it from a running ROS 1 master (`ros1`, or its http://… address), or from a file with what "
+    "`rosnode info` or `ros2 node info` say of its nodes, or JSON.",
+)
+@click.option("--distro", help="The ROS distribution whose message types hold: noetic, humble, jazzy, …")
 @json_option()
-def command(directory: Path, template: str, as_json: bool) -> int:
+def command(
+    directory: Path, template: str | None, bag: Path | None, graph: str | None, distro: str | None, as_json: bool
+) -> int:
     """Make DIRECTORY a workspace with one system that verifies. Nothing that exists is overwritten.
 
     With a template for ROS it is a package, too, whose test runs `avow verify`, and a monitor judges a recorded run.
+    With --from-bag or --from-graph (or both) the system is drafted from what was recorded or runs: nodes, ports,
+    topics, types and mapping, for you to correct; what a node promises is left to write. Where DIRECTORY is a new
+    folder in a workspace's contracts/, only the system is made.
     """
-    from importlib import resources
-
     from avow.base.diagnostics import Diagnostic, Rejected
-    from avow.base.files import write
+    from avow.ros.sources import DISTRIBUTIONS
 
     if directory.exists() and any(directory.iterdir()):
         raise Rejected(
             Diagnostic("CLI007", f"{directory} is not empty", hint="give the name of a new folder, or of an empty one")
         )
+    drafted = bag is not None or graph is not None
+    if drafted and template is not None:
+        raise click.UsageError("a draft has no template: leave --template out")
+    if distro is not None and (not drafted or distro not in DISTRIBUTIONS):
+        known = ", ".join(DISTRIBUTIONS)
+        raise click.UsageError(f"--distro goes with --from-bag or --from-graph, and is one of {known}")
+    if drafted:
+        return _drafted(directory, bag, graph, distro, as_json)
+    _from_template(directory, template or "plain")
+    _workspace(directory)
+    return _told(directory, "thermostat", "doit verify", as_json)
+
+
+def _drafted(directory: Path, bag: Path | None, graph: str | None, distro: str | None, as_json: bool) -> int:
+    from avow.base.workspace import find_workspace
+    from avow.cli.from_ros import draft_system
+
+    outer = find_workspace(directory.resolve().parent)
+    within = outer is not None and directory.resolve().parent == outer.contracts.resolve()
+    name = re.sub(r"[^A-Za-z0-9_-]", "_", bag.stem if bag is not None else "robot").lstrip("_-0123456789") or "robot"
+    draft_system(bag, graph, distro, directory if within else directory / "contracts" / name)
+    if not within:
+        _workspace(directory)
+    name = directory.name if within else name
+    return _told(directory, name, f"avow check {name}", as_json)
+
+
+def _from_template(directory: Path, template: str) -> None:
+    from importlib import resources
+
+    from avow.base.files import write
+
     for part in ("template", *(("template_ros",) if template != "plain" else ())):
         origin = Path(str(resources.files("avow.cli") / part))
         for source in sorted(origin.rglob("*")):
@@ -66,14 +111,26 @@ def command(directory: Path, template: str, as_json: bool) -> int:
     if template != "plain":
         plan = directory / "contracts/thermostat/plan.yaml"
         write(plan, plan.read_text("utf-8").replace("\n\npolicy:", f"\n{_MONITOR.format(template)}\npolicy:"))
+
+
+def _workspace(directory: Path) -> None:
+    """What every workspace has."""
+    from importlib import resources
+
+    from avow.base.files import write
+
+    ignored = Path(str(resources.files("avow.cli") / "template/gitignore.txt"))
+    write(directory / ".gitignore", ignored.read_bytes())
     write(directory / "dodo.py", _DODO)
     for folder in ("artifacts", "reports"):
         write(directory / folder / "README.md", f"Made by `doit verify`: see Avow's documentation of {folder}/.\n")
+
+
+def _told(directory: Path, system: str, next_: str, as_json: bool) -> int:
     if as_json:
-        click.echo(
-            json.dumps({"workspace": str(directory), "systems": ["thermostat"], "next": "doit verify"}, indent=1)
-        )
+        click.echo(json.dumps({"workspace": str(directory), "systems": [system], "next": next_}, indent=1))
         return 0
     go = "" if directory.resolve() == Path.cwd() else f"  cd {directory}\n"
-    click.echo(f"{directory}: a workspace with one system, contracts/thermostat\n\nnext:\n{go}  doit verify")
+    where = system if directory.name == system else f"contracts/{system}"
+    click.echo(f"{directory}: a workspace with one system, {where}\n\nnext:\n{go}  {next_}")
     return 0

@@ -31,12 +31,13 @@ def graph_svg(system: System) -> str:
 
 
 def _view(system: System, written: Written) -> Derivation:
+    wiring = {node.name for node in system.contract.nodes if node.relay}  # nothing of it has to be shown
     return Derivation(
         written.name,
         written.rule,
         written.text,
         written.conclusion,
-        written.premises,
+        tuple(name for name in written.premises if name not in wiring),
         tuple(
             SideCondition(c.text, f"{system.name}/{c.obligation}" if c.obligation else "")
             for c in written.side_conditions

@@ -267,7 +267,7 @@ def catalogue(system: System) -> Catalogue:
     texts = texts_digest(system)
     works = (
         language_work(system),
-        *(sanity_work(composition.frame, node) for node in system.contract.nodes),
+        *(sanity_work(composition.frame, node) for node in system.contract.nodes if not node.relay),
         compose_work(composition),
         *method_works(system),
     )
@@ -276,7 +276,8 @@ def catalogue(system: System) -> Catalogue:
         replace(work, texts=texts, limits=replace(work.limits, seconds=asked, asked=True) if asked else work.limits)
         for work in works
     )
-    guarantees = (guarantee(system, node, c.name) for node in system.contract.nodes for c in node.guarantees)
+    own = (node for node in system.contract.nodes if not node.relay)  # a relay is wiring, as a link is
+    guarantees = (guarantee(system, node, c.name) for node in own for c in node.guarantees)
     every = {o.id: o for work in works if work.is_engine for o in work.obligations}
     every |= {o.id: o for o in guarantees}
     return Catalogue(system, tuple(every.values()), works)

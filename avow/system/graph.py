@@ -49,6 +49,8 @@ class Graph:
     dangling: tuple[Endpoint, ...]
     deadlocks: tuple[tuple[str, ...], ...]
     findings: tuple[Diagnostic, ...]
+    relays: frozenset[str]
+    """Nodes that stand for a topic of several publishers."""
     by_target: Mapping[Endpoint, Edge] = field(compare=False, repr=False)
     by_consumer: Mapping[str, tuple[Edge, ...]] = field(compare=False, repr=False)
     by_provider: Mapping[str, tuple[Edge, ...]] = field(compare=False, repr=False)
@@ -122,6 +124,7 @@ def wired(
         dangling,
         deadlocks,
         (*faults, *told),
+        frozenset(node.name for node in nodes if node.relay),
         {edge.target: edge for edge in edges},
         {name: tuple(found) for name, found in by_consumer.items()},
         {name: tuple(found) for name, found in by_provider.items()},

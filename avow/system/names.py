@@ -126,10 +126,11 @@ def _goals(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnost
 
 def _nodes(plan: Plan, root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
     piece = root.at("nodes")
+    own = [name for name, node in nodes.items() if not node.relay]  # of a topic's wiring there is nothing to show
     for entry in plan.nodes:
         node = nodes.get(entry.node)
-        if node is None:
-            yield _unknown("nodes: node", entry.node, nodes, piece.key_span(entry.node) if piece else root.span)
+        if node is None or node.relay:
+            yield _unknown("nodes: node", entry.node, own, piece.key_span(entry.node) if piece else root.span)
             continue
         known = [g.name for g in node.guarantees]
         for method in entry.methods:

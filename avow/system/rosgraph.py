@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.ros.listing import is_info, parse_info
 from avow.system.graph import Graph
 from avow.system.plan import System
 from avow.system.schema import suggest
@@ -25,9 +26,6 @@ _TOKEN = re.compile(
     re.DOTALL,
 )
 _LINE = re.compile(r"\s*(/?[\w/.-]+)\s*->\s*(/?[\w/.-]+)\s*(?::\s*(\S+))?\s*\Z")
-_HEADER = re.compile(r"(?:Node\s+\[(?P<ros1>[^\]]+)\]|(?P<ros2>/\S*))\s*\Z")
-_SECTION = re.compile(r"\s*(Publications|Publishers|Subscriptions|Subscribers|[A-Z][A-Za-z ]*)\s*:")
-_TOPIC = re.compile(r"\s+(?:\*\s+)?(/\S+?)(?::|\s|\Z)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +59,7 @@ def read_ros_graph(path: Path) -> RosGraph:
         raise Rejected(_fault(path, 1, f"the ROS graph has more than {ROS_GRAPH_BYTES} bytes"))
     if re.search(r"\b(di)?graph\b[^{\n]*\{", text):
         return _from_dot(text, path)
-    if any(_HEADER.match(line) for line in text.splitlines()):
+    if is_info(text):
         return _from_info(text)
     return _from_lines(text, path)
 
@@ -75,9 +73,11 @@ def account(system: System, dataflow: Graph) -> Account | None:
     dropped: dict[str, str] = dict(model.get("dropped", {}))
     external: dict[str, str] = dict(model.get("external", {}))
     compound = {name: [m] if isinstance(m, str) else list(m) for name, m in dict(model.get("compound", {})).items()}
-    known = {node.name for node in system.contract.nodes}
+    known = {node.name for node in system.contract.nodes if not node.relay}
     at = system.plan.model.at
-    home: dict[str, str] = {node: node for node in graph.nodes if node in known}
+    names = system.plan.ros.names
+    called = {names.placed(name).name.lstrip("/"): name for name in known}
+    home: dict[str, str] = {node: called.get(node, node) for node in graph.nodes if node in called or node in known}
     findings: list[Diagnostic] = []
     for name, members in compound.items():
         for k, member in enumerate(members):
@@ -106,7 +106,7 @@ def account(system: System, dataflow: Graph) -> Account | None:
         findings.append(Diagnostic("PLAN127", message, at("graph"), Severity.WARNING))
     made = set(home.values()) | set(external)
     for node in system.contract.nodes:
-        if node.name not in made:
+        if node.name not in made and not node.relay:
             message = f"{node.name} is not on the ROS graph, is no compound and is not external"
             findings.append(Diagnostic("PLAN127", message, at("graph"), Severity.WARNING))
     findings += _flows(graph, home, external, dataflow, at("graph"))
@@ -118,6 +118,7 @@ def _flows(
 ) -> Iterator[Diagnostic]:
     """Data that flows between two nodes of the model according to ROS alone."""
     linked = {(edge.source.node, edge.target.node) for edge in dataflow.edges}
+    linked |= {(one, end) for one, middle in linked for start, end in linked if start == middle in dataflow.relays}
     found: dict[tuple[str, str], dict[str, None]] = {}
     for publisher, subscriber, topic in graph.arcs:
         one, other = home.get(publisher), home.get(subscriber)
@@ -194,26 +195,15 @@ def _dot_tokens(text: str, path: Path) -> Iterator[tuple[str, str]]:
 
 
 def _from_info(text: str) -> RosGraph:
-    nodes: dict[str, None] = {}
-    publishes: list[tuple[str, str]] = []
-    subscribes: list[tuple[str, str]] = []
-    current, into = "", None
-    for line in text.splitlines():
-        header = _HEADER.match(line)
-        if header:
-            current = (header["ros1"] or header["ros2"]).lstrip("/")
-            nodes[current] = None
-            into = None
-            continue
-        section = _SECTION.match(line)
-        topic = _TOPIC.match(line)
-        if section and not topic:
-            kind = section[1]
-            into = publishes if kind.startswith("Publi") else subscribes if kind.startswith("Subscri") else None
-        elif topic and into is not None and current:
-            into.append((current, topic[1]))
-    arcs = [(p, s, topic) for p, topic in publishes for s, other in subscribes if other == topic]
-    return RosGraph(tuple(nodes), tuple(dict.fromkeys(arcs)))
+    found = parse_info(text)
+    arcs = (
+        (p.name.lstrip("/"), s.name.lstrip("/"), topic)
+        for p in found.nodes
+        for topic in p.publishes
+        for s in found.nodes
+        if topic in s.subscribes
+    )
+    return RosGraph(tuple(node.name.lstrip("/") for node in found.nodes), tuple(dict.fromkeys(arcs)))
 
 
 def _from_lines(text: str, path: Path) -> RosGraph:

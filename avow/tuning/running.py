@@ -41,3 +41,9 @@ RECHECK_SECOND = 1.0
 
 VERSION_SECONDS = 20.0
 """For a tool to say its version: one that runs on Java or .NET takes seconds on a loaded machine."""
+
+MASTER_SECONDS = 5.0
+"""For a ROS master to answer: one on the same network does within milliseconds."""
+
+DRAFT_MESSAGES = 200_000
+"""Messages of a bag that a draft looks at for its comments: seconds, and the ranges of what follows are no others."""

@@ -105,3 +105,9 @@ SUBSYSTEMS_DRAWN = 40
 
 RECORDS = 8
 """Records that `avow explain` lists of one file or digest; the ledger has all."""
+
+DRAFTED_FIELDS = 12
+"""Fields of one topic's messages that `avow init` drafts ports for: a person removes those that are not needed."""
+
+DRAFTED_WORDS = 6
+"""Different words of a field that a draft lists beside it."""

@@ -17,6 +17,7 @@ from avow.calculus.composition import compose
 from avow.calculus.notation import as_html, write_goal
 from avow.calculus.obligations import composition_obligations, discharge
 from avow.cli.compose import command as compose_command
+from avow.cli.graph import command as graph_command
 from avow.cli.refines import command as refines_command
 from avow.cli.simulate import command as simulate_command
 from avow.system.graph import dataflow
@@ -64,7 +65,7 @@ def test_compose_json(tmp_path: Path) -> None:
 def test_compose_other_outputs(tmp_path: Path) -> None:
     make(tmp_path, GOOD)
     assert invoke(compose_command, str(tmp_path), "--latex")[1].startswith("\\textbf{R1 (whole)}")
-    assert "← x of a" in invoke(compose_command, str(tmp_path), "--graph")[1]
+    assert "← x of a" in invoke(graph_command, str(tmp_path), "--flow")[1]
     assert "guarantee b_G1" in invoke(compose_command, str(tmp_path), "--rcl")[1]
 
 

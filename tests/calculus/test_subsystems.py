@@ -16,6 +16,7 @@ from avow.calculus.export import derived_contract
 from avow.calculus.notation import write_goal
 from avow.calculus.obligations import composition_obligations
 from avow.cli.compose import command
+from avow.cli.graph import command as graph_command
 from avow.language.load import check_text
 from avow.language.translate import to_rcl
 from avow.system.folding import seen
@@ -340,7 +341,7 @@ def test_the_graph_shows_subsystems_as_nodes(tmp_path: Path) -> None:
     drawn = sheet(parts)
     assert drawn.count("<svg") == 1
     assert drawn.count(">inside ") == 3
-    code, shown = invoke(command, str(tmp_path), "--graph")
+    code, shown = invoke(graph_command, str(tmp_path), "--flow")
     assert (code, shown.strip()) == (0, texts(parts).strip())
 
 

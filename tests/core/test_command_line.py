@@ -21,7 +21,20 @@ SERVERS = {"lsp", "worker"}
 
 NO_QUESTIONS = {
     *SERVERS,
-    *("agent run", "audit", "check", "diff", "doctor", "explain", "fmt", "init", "monitor", "recheck", "report"),
+    *(
+        "agent run",
+        "audit",
+        "check",
+        "diff",
+        "doctor",
+        "explain",
+        "fmt",
+        "graph",
+        "init",
+        "monitor",
+        "recheck",
+        "report",
+    ),
     *("requirements", "review sign", "review stamp", "sign", "translate"),
 }
 """They ask no solver and run no tool that a time would bound (`recheck`: the kernel counts steps, not seconds)."""

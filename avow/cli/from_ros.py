@@ -1,0 +1,128 @@
+"""``avow init --from-bag`` and ``--from-graph``: a system drafted from what was recorded, or from what runs."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.tuning.running import DRAFT_MESSAGES
+
+if TYPE_CHECKING:
+    from avow.ros.bags import Carried
+    from avow.ros.listing import Listing
+
+_MASTER = re.compile(r"https?://[^/\s]+/?\Z|ros1\Z")
+
+
+def draft_system(bag: Path | None, graph: str | None, distro: str | None, folder: Path) -> None:
+    """Write the system's folder. Raises Rejected for what cannot be read; nothing is written then."""
+    from avow.base.files import write
+    from avow.language.format import format_text
+    from avow.language.lexer import KEYWORDS
+    from avow.ros.bags import NoBag, Origin, carried, messages
+    from avow.ros.definitions import Definitions
+    from avow.ros.drafting import Given, draft, watch
+    from avow.ros.listing import Listing
+    from avow.ros.sources import definitions
+
+    known, wrong = definitions((), distro)
+    if wrong:
+        raise Rejected(*wrong)
+    listing = _listing(graph) if graph is not None else None
+    origins: list[str] = []
+    given = Given(folder.name, "", listing or Listing(()), known, frozenset(KEYWORDS), distro=distro)
+    if bag is not None:
+        try:
+            found = carried(bag, Origin(distro))
+            known = Definitions({**known.messages, **found.known})
+            seen, note = watch(known, found.types)
+            for event in islice(messages(bag, Origin(distro)), DRAFT_MESSAGES):
+                note(event)
+        except NoBag as no:
+            raise Rejected(Diagnostic("CLI011", str(no), hint=no.hint and no.hint.replace(*_OPTION))) from None
+        listing = _together(listing, found)
+        given = replace(
+            given, known=known, seen=seen, ros2=found.ros2, counts=found.counts, traces=(f"traces/{bag.name}",)
+        )
+        given = replace(given, publishers_known=graph is not None or any(found.publishers.values()))
+        origins.append(bag.name)
+    assert listing is not None
+    if graph is not None:
+        origins.append("the running graph" if _MASTER.match(graph) else Path(graph).name)
+    listing = _sound(listing)
+    if not any(node.publishes or node.subscribes for node in listing.nodes):
+        raise Rejected(Diagnostic("CLI011", f"{' and '.join(origins)}: there is no node with a topic"))
+    graph_file = "models/rosgraph.txt" if graph is not None else None
+    given = replace(given, listing=listing, origin=" and ".join(origins), graph=graph_file)
+    made = draft(given)
+    write(folder / "system.rcl", format_text(made.contract, str(folder / "system.rcl")))
+    write(folder / "plan.yaml", made.plan)
+    if graph is not None:
+        write(folder / "models/rosgraph.txt", listing.text())
+    if bag is not None:
+        (folder / "traces").mkdir(parents=True, exist_ok=True)
+        (shutil.copytree if bag.is_dir() else shutil.copyfile)(bag, folder / "traces" / bag.name)
+
+
+_OPTION = (
+    "name the distribution, `ros: {distro: humble}`, and `messages:`",
+    "name the distribution: `--distro humble`",
+)
+
+
+def _listing(graph: str) -> Listing:
+    from avow.ros.listing import NoListing, ask_master, parse_listing
+    from avow.tuning.sizes import ROS_GRAPH_BYTES
+
+    try:
+        if _MASTER.match(graph):
+            return ask_master(os.environ.get("ROS_MASTER_URI", "http://localhost:11311") if graph == "ros1" else graph)
+        data = Path(graph).read_bytes()
+        if len(data) > ROS_GRAPH_BYTES:
+            raise NoListing(f"it has more than {ROS_GRAPH_BYTES} bytes")
+        return parse_listing(data.decode("utf-8"))
+    except (NoListing, UnicodeDecodeError) as no:
+        raise Rejected(Diagnostic("CLI011", f"{graph}: {no}")) from None
+    except OSError as error:
+        raise Rejected(Diagnostic("CLI011", f"{graph} cannot be read: {error.strerror or error}")) from None
+
+
+def _together(listing: Listing | None, found: Carried) -> Listing:
+    """What a bag says of who publishes, beside what a graph does. Where neither does, all of it is one node's."""
+    from avow.ros.drafting import is_plumbing
+    from avow.ros.listing import Listed, Listing
+
+    nodes = listing.nodes if listing is not None else ()
+    known = {topic for node in nodes for topic in node.publishes}
+    callers: dict[str, list[str]] = {}
+    for topic, names in found.publishers.items():
+        for name in names if topic not in known else ():
+            callers.setdefault(name, []).append(topic)
+    if listing is None and not callers:
+        callers["/robot"] = [topic for topic in found.types if not is_plumbing(topic)]
+    nodes = tuple(replace(n, publishes=(*n.publishes, *callers.pop(n.name, ()))) for n in nodes)
+    nodes += tuple(Listed(name, tuple(topics)) for name, topics in callers.items())
+    return Listing(nodes, {**(listing.types if listing is not None else {}), **found.types})
+
+
+def _sound(listing: Listing) -> Listing:
+    """Without names and types that ROS would not take: they come from a file."""
+    from avow.ros.listing import Listing
+    from avow.ros.names import is_name
+
+    def kept(names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(name for name in dict.fromkeys(names) if name.startswith("/") and is_name(name))
+
+    nodes = tuple(
+        replace(n, publishes=kept(n.publishes), subscribes=kept(n.subscribes), serves=kept(n.serves))
+        for n in listing.nodes
+        if kept((n.name,))
+    )
+    types = {t: kind for t, kind in listing.types.items() if re.fullmatch(r"[A-Za-z]\w*/[A-Za-z]\w*", kind, re.ASCII)}
+    return Listing(nodes, types)

@@ -1,0 +1,47 @@
+"""``avow graph``: how a system is wired: nodes, topics, types, and what is the environment's."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from avow.cli.options import ContractArgument, json_option
+
+
+@click.command()
+@click.argument("path", metavar="SYSTEM", type=ContractArgument())
+@click.option("--svg", "as_svg", is_flag=True, help="The dataflow as a picture, nothing else.")
+@click.option("--flow", "as_flow", is_flag=True, help="What each node gets from where, providers first.")
+@json_option()
+def command(path: Path, as_svg: bool, as_flow: bool, as_json: bool) -> int:
+    """Show how a system is wired.
+
+    SYSTEM is a system's name or folder, or an .rcl file. Of each node the name under which it runs and its remappings;
+    of each topic its type, who publishes it and who listens, what comes from the environment, and what arrives one
+    step later. Several publishers of one topic are heard each, at any step.
+    """
+    from avow.base.diagnostics import Rejected
+    from avow.base.workspace import system_folder
+    from avow.system.folding import seen
+    from avow.system.graph import dataflow
+    from avow.system.graph_svg import sheet, texts
+    from avow.system.load import load_path
+    from avow.system.wiring import wiring
+
+    system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
+    graph = dataflow(system)
+    errors = [finding for finding in graph.findings if finding.is_error]
+    if errors:
+        raise Rejected(*errors)
+    found = wiring(system, graph)
+    if as_json:
+        click.echo(json.dumps({"system": system.name, **found.json()}, indent=1, ensure_ascii=False))
+    elif as_svg:
+        click.echo(sheet(seen(system, graph)))
+    elif as_flow:
+        click.echo(texts(seen(system, graph)))
+    else:
+        click.echo(found.text())
+    return 0

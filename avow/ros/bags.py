@@ -1,0 +1,143 @@
+"""ROS 1 and ROS 2 bags through the package rosbags: who published what, what it is made of, and the messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from avow.ros.definitions import Message, canonical
+from avow.ros.sources import DISTRIBUTIONS, from_store, message_files
+
+Event = Mapping[str, Any]
+
+SUFFIXES = (".bag", ".db3", ".mcap")
+
+
+class NoBag(Exception):  # noqa: N818 - it is what was found wrong
+    """What is no bag that can be read, and why. `missing`: the package that reads bags is."""
+
+    def __init__(self, message: str, hint: str | None = None, *, missing: bool = False) -> None:
+        super().__init__(message)
+        self.hint = hint
+        self.missing = missing
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """What a plan says of message types, for bags that say nothing themselves."""
+
+    distro: str | None = None
+    messages: tuple[Path, ...] = ()
+
+
+NOWHERE = Origin()
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What a bag says of its topics: the type of each, and how the types are made."""
+
+    types: Mapping[str, str]
+    known: Mapping[str, Message]
+    publishers: Mapping[str, tuple[str, ...]]
+    """Topic → the nodes that published it, by their whole names: a ROS 1 bag knows them, a ROS 2 bag does not."""
+    counts: Mapping[str, int]
+    """Topic → how many messages."""
+    ros2: bool = False
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a trace is a bag: by its name, or since it is a folder."""
+    return path.is_dir() or path.suffix in SUFFIXES
+
+
+def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
+    """Raises NoBag, also for a bag whose types nothing defines."""
+    with _opened(path, origin) as reader:
+        types: dict[str, str] = {}
+        publishers: dict[str, dict[str, None]] = {}
+        counts: dict[str, int] = {}
+        for connection in reader.connections:
+            topic = connection.topic
+            types[topic] = canonical(connection.msgtype)
+            counts[topic] = counts.get(topic, 0) + connection.msgcount
+            caller = getattr(connection.ext, "callerid", None)
+            publishers.setdefault(topic, {}).update({caller: None} if caller else {})
+        known = from_store(reader.typestore.fielddefs, str(path))
+        told = {topic: tuple(found) for topic, found in publishers.items()}
+        return Carried(types, known, told, counts, bool(getattr(reader, "is2", False)))
+
+
+def messages(
+    path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
+) -> Iterator[Event]:
+    """The messages as events, in the order in which they were recorded; of topics that are not wanted, only that there
+    was one. Raises NoBag."""
+    with _opened(path, origin) as reader:
+        plain = _plainer(reader.typestore.fielddefs)
+        for connection, time, raw in reader.messages():
+            event: dict[str, Any] = {}
+            if wanted(connection.topic):
+                event = plain(reader.deserialize(raw, connection.msgtype))
+            event["topic"] = connection.topic
+            event["time"] = time / 1e9
+            yield event
+
+
+@contextmanager
+def _opened(path: Path, origin: Origin) -> Iterator[Any]:
+    try:
+        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.serde import SerdeError
+        from rosbags.typesys import TypesysError
+    except ImportError:
+        text = "reading bags needs the package rosbags"
+        raise NoBag(text, "pip install 'avow[bags]'", missing=True) from None
+    try:
+        with AnyReader([path], default_typestore=_types(origin)) as reader:
+            yield reader
+    except (AnyReaderError, SerdeError) as error:
+        hint = None
+        if "type definition" in str(error):
+            hint = "the bag holds no definitions: name the distribution, `ros: {distro: humble}`, and `messages:`"
+        raise NoBag(f"{path} is no bag that can be read: {error}", hint) from None
+    except (OSError, ValueError, KeyError, RuntimeError, TypesysError) as error:
+        raise NoBag(f"{path} cannot be read as a bag: {error}") from None
+
+
+def _types(origin: Origin) -> Any:
+    """What the plan says of types, for a bag that holds no definitions; None where it says nothing."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    if origin.distro is None:
+        return None
+    store = get_typestore(Stores(DISTRIBUTIONS[origin.distro]))
+    for file in message_files(origin.messages):
+        if file.suffix == ".msg":
+            package = file.parent.parent.name if file.parent.name == "msg" else file.parent.name
+            store.register(get_types_from_msg(file.read_text(encoding="utf-8"), f"{package}/msg/{file.stem}"))
+    return store
+
+
+def _plainer(fielddefs: Mapping[str, Any]) -> Callable[[Any], Any]:
+    """Deserialised messages as the JSON that ROSMonitoring would write of them; floats as they are. Fields have their
+    own names, also those that are words of Python's, to which rosbags puts an underscore."""
+    names: dict[type, tuple[tuple[str, str], ...]] = {}
+
+    def plain(message: Any) -> Any:
+        kind = type(message)
+        fields = names.get(kind)
+        if fields is None:
+            declared = getattr(kind, "__dataclass_fields__", {})  # first the fields, then the constants
+            own = [name for name, _ in fielddefs[getattr(kind, "__msgtype__", "")][1]] if declared else []
+            fields = names[kind] = tuple(zip(own, declared, strict=False))
+        if fields:
+            return {name: plain(getattr(message, attribute)) for name, attribute in fields}
+        if hasattr(message, "tolist"):
+            return message.tolist()
+        return [plain(item) for item in message] if isinstance(message, list | tuple) else message
+
+    return plain

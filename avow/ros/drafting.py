@@ -1,0 +1,376 @@
+"""A first contract and plan of what runs or was recorded: nodes, ports, topics, types and the mapping, for a person to
+correct. What is drafted says what is there; what a node promises it does not guess.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from avow.ros.definitions import FLOATS, INTEGERS, Array, Definitions, Message, Scalar, Wire
+from avow.ros.listing import Listed, Listing
+from avow.tuning.shown import DRAFTED_FIELDS, DRAFTED_WORDS
+
+Path = tuple[str, ...]
+
+_TOOLS = {
+    r"/(rosout|record_\d+|rosbag2?_.*|play_\d+)": "records, plays or logs",
+    r"/(rqt_.*|rviz2?(_.*)?|_ros2cli.*|rostopic_.*|foxglove_bridge.*)": "shows what others publish",
+}
+"""Nodes that are tools, and what they do."""
+_PLUMBING = re.compile(r"/(rosout|rosout_agg|parameter_events|clock)\Z|.*/_|.*/parameter_(descriptions|updates)\Z")
+"""Topics that carry ROS's own business."""
+
+
+@dataclass(slots=True)
+class Seen:
+    """What a record holds of one field: for comments, never for a contract."""
+
+    count: int = 0
+    least: float = math.inf
+    greatest: float = -math.inf
+    odd: Counter[str] = field(default_factory=Counter)
+    """NaN and infinities."""
+    words: dict[str, None] = field(default_factory=dict)
+
+    def note(self, value: Any) -> None:
+        self.count += 1
+        if isinstance(value, str):
+            if len(self.words) <= DRAFTED_WORDS:
+                self.words[value[:40]] = None
+        elif isinstance(value, float) and not math.isfinite(value):
+            self.odd["NaN" if math.isnan(value) else "inf"] += 1
+        elif isinstance(value, int | float):
+            self.least, self.greatest = min(self.least, value), max(self.greatest, value)
+
+    def __str__(self) -> str:
+        parts = []
+        if self.least <= self.greatest:
+            parts.append(f"{self.least:g}" if self.least == self.greatest else f"{self.least:g} … {self.greatest:g}")
+        parts += [f"{count} × {word}" for word, count in self.odd.items()]
+        if self.words:
+            more = ", …" if len(self.words) > DRAFTED_WORDS else ""
+            parts.append(", ".join(json.dumps(w, ensure_ascii=False) for w in [*self.words][:DRAFTED_WORDS]) + more)
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Drafted:
+    """The texts of a draft: the contract, the plan, and what was left out, for the plan's `model`."""
+
+    contract: str
+    plan: str
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What a draft is made of. `origin`: in words; `traces`: paths in the system's folder; `graph`: that of the graph's
+    text, where there is one."""
+
+    name: str
+    origin: str
+    listing: Listing
+    known: Definitions
+    keywords: frozenset[str]
+    ros2: bool = False
+    distro: str | None = None
+    traces: tuple[str, ...] = ()
+    graph: str | None = None
+    seen: Mapping[tuple[str, Path], Seen] = field(default_factory=dict)
+    counts: Mapping[str, int] = field(default_factory=dict)
+    publishers_known: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class _Port:
+    """A value that a topic carries: the port's name and type, and how it is read."""
+
+    name: str
+    type_name: str
+    mapping: str
+    comment: str
+
+
+def draft(given: Given) -> Drafted:
+    """The contract and the plan."""
+    return _Draft(given).made()
+
+
+def is_plumbing(topic: str) -> bool:
+    """Whether a topic carries ROS's own business."""
+    return _PLUMBING.match(topic) is not None
+
+
+@dataclass(slots=True)
+class _Draft:
+    given: Given
+    taken: set[str] = field(default_factory=set)
+    types: dict[str, str] = field(default_factory=dict)
+    """Declared types: name → what they are."""
+    elements: set[str] = field(default_factory=set)
+    ports: dict[str, tuple[_Port, ...]] = field(default_factory=dict)
+    """Topic → what it carries."""
+
+    def made(self) -> Drafted:
+        nodes, dropped = self.nodes()
+        topics = dict.fromkeys(t for n in nodes.values() for t in (*n.publishes, *n.subscribes) if not is_plumbing(t))
+        short = _short(topics, self.given.keywords)
+        for topic in topics:
+            self.ports[topic] = tuple(self.of_topic(topic, short[topic]))
+        bodies = "\n".join(self.node(name, node) for name, node in nodes.items())
+        context = "".join(f"  {name} : {what};\n" for name, what in self.types.items())
+        head = (
+            f"// Drafted from {self.given.origin}. It says what is there, and nothing of what the nodes promise:\n"
+            "// replace each guarantee `to_write`, remove the ports that no clause needs, and say what is assumed.\n\n"
+        )
+        whole = head + (f"context {{\n{context}}}\n\n" if context else "") + bodies
+        return Drafted(whole, self.plan(nodes, dropped))
+
+    def nodes(self) -> tuple[dict[str, Listed], dict[str, str]]:
+        """The nodes to model, by their names in the contract; and those that are tools, with the reason."""
+        kept: list[Listed] = []
+        dropped: dict[str, str] = {}
+        for node in self.given.listing.nodes:
+            why = next((why for form, why in _TOOLS.items() if re.fullmatch(form, node.name)), None)
+            if why is None:
+                kept.append(node)
+            else:
+                dropped[node.name] = why
+        short = _short([node.name for node in kept], self.given.keywords)
+        return {short[node.name]: node for node in kept}, dropped
+
+    # -- ports ---------------------------------------------------------------------------------------------------------
+
+    def of_topic(self, topic: str, short: str) -> Iterator[_Port]:
+        kind = self.given.listing.types.get(topic, "")
+        message = self.given.known.get(kind) if kind else None
+        if message is None or self.given.known.missing(message):
+            return
+        leaves = [leaf for leaf in self.given.known.leaves(message) if self.sort(leaf[1]) is not None]
+        for path, wire, holder in leaves[:DRAFTED_FIELDS]:
+            name = short if len(leaves) == 1 else f"{short}_{'_'.join(path)}"
+            yield self.port(topic, self.free(name), path, wire, holder)
+
+    def port(self, topic: str, name: str, path: Path, wire: Wire, holder: Message) -> _Port:
+        dotted = ".".join(path)
+        seen = self.given.seen.get((topic, path))
+        said = f"{wire} {dotted}" + (f", recorded: {seen}" if seen is not None and str(seen) else "")
+        if isinstance(wire, Array):
+            take = "min" if isinstance(wire.item, Scalar) and wire.item.name in FLOATS else "count"
+            mapping = f"{{field: {dotted}, take: {take}}}"
+            hint = "; `nan: none, inf: none, elsewhere: …` leaves those out" if take == "min" else ""
+            return _Port(name, self.sort(wire) or "", mapping, f"the {take} of {said}{hint}")
+        constants = _constants(wire, path[-1], holder)
+        if constants:
+            return self.enumeration(name, dotted, constants, said)
+        mapping = dotted
+        if seen is not None and seen.odd:
+            said += "; with `{nan: none, inf: none, elsewhere: …}` those are no reading"
+        return _Port(name, self.sort(wire) or "", mapping, said)
+
+    def enumeration(self, name: str, dotted: str, constants: Mapping[str, str], said: str) -> _Port:
+        """A number of which the definition says what it means."""
+        elements: dict[str, str] = {}
+        for constant, word in constants.items():
+            element = word.lower()
+            if element in self.elements | self.given.keywords or not element.isidentifier():
+                element = f"{name}_{element}"
+            self.elements.add(element)
+            elements[constant] = element
+        type_name = self.free(name[:1].upper() + name[1:])
+        self.types[type_name] = f"{{{', '.join(elements.values())}}}"
+        values = ", ".join(f"{constant}: {element}" for constant, element in elements.items())
+        return _Port(name, type_name, f"{{field: {dotted}, values: {{{values}}}}}", said)
+
+    def sort(self, wire: Wire) -> str | None:
+        """The type in the contract; None of what is not drafted."""
+        match wire:
+            case Array(item=Scalar(name=name)) if name in FLOATS:
+                return "REAL"
+            case Array():
+                return "NATURAL"
+            case Scalar(name=name) if name in FLOATS or name in ("time", "duration"):
+                return "REAL"
+            case Scalar(name=name) if name in INTEGERS:
+                return "NATURAL" if name.startswith("u") else "INTEGER"
+            case Scalar(name="bool"):
+                return "BOOL"
+            case Scalar():
+                return "STRING"
+            case _:
+                return None
+
+    def free(self, name: str) -> str:
+        found, count = name, 1
+        while found in self.taken or found in self.given.keywords:
+            count += 1
+            found = f"{name}_{count}"
+        self.taken.add(found)
+        return found
+
+    # -- texts ---------------------------------------------------------------------------------------------------------
+
+    def node(self, name: str, node: Listed) -> str:
+        published = [t for t in node.publishes if not is_plumbing(t)]
+        heard = [t for t in node.subscribes if not is_plumbing(t) and t not in published]
+        own = [t for t in node.subscribes if t in published]
+        lines = [f"node {name} {{"]
+        if not self.given.publishers_known:
+            lines.insert(
+                0, "// This record does not say who publishes: make a node of each, and move its topics there."
+            )
+        lines += [f"  // {topic}: it hears what it publishes itself, which wants a delayed connection" for topic in own]
+        lines += self.side("inputs", heard) + self.side("outputs", published)
+        topics = [*self.topics(heard, "in"), *self.topics(published, "out")]
+        lines.append("  topics(" + ("\n    " + ",\n    ".join(topics) + "\n  )" if topics else " )"))
+        lines.append('  guarantee to_write "What this node promises is still to be written" ( TRUE )')
+        return "\n".join([*lines, "}", ""])
+
+    def side(self, word: str, topics: Iterable[str]) -> list[str]:
+        ports = [port for topic in topics for port in self.ports[topic]]
+        if not ports:
+            return [f"  {word}( )"]
+        last = len(ports) - 1
+        return [
+            f"  {word}(",
+            *(
+                f"    {p.name} : {p.type_name}{',' if k < last else ''}  // {_line(p.comment)}"
+                for k, p in enumerate(ports)
+            ),
+            "  )",
+        ]
+
+    def topics(self, topics: Iterable[str], role: str) -> Iterator[str]:
+        for topic in topics:
+            kind = self.given.listing.types.get(topic) or "unknown/Type"
+            if not self.ports[topic]:
+                yield f"{kind} {topic}"
+            for port in self.ports[topic]:
+                yield f"{kind} {topic} matches({role}.{port.name})"
+
+    def plan(self, nodes: Mapping[str, Listed], dropped: Mapping[str, str]) -> str:
+        given = self.given
+        lines = [
+            f"# Drafted from {_line(given.origin)}: for you to correct.",
+            f"system: {given.name}",
+            "",
+            "ros:",
+            *([f"  distro: {given.distro}"] if given.distro else []),
+            "  nodes:",
+            *(f"    {name}: {{name: {json.dumps(node.name)}}}" for name, node in nodes.items()),
+        ]
+        if given.graph is not None:
+            lines += ["", "model:", f"  graph: {given.graph}"]
+            if dropped:
+                lines += ["  dropped:", *(f"    {json.dumps(name)}: {why}" for name, why in dropped.items())]
+        lines += ["", *self.environment(nodes), "nodes:"]
+        for name, node in nodes.items():
+            lines += self.methods(name, node)
+        return "\n".join([*lines, ""])
+
+    def environment(self, nodes: Mapping[str, Listed]) -> list[str]:
+        published = {topic for node in nodes.values() for topic in node.publishes}
+        open_ = dict.fromkeys(t for n in nodes.values() for t in n.subscribes if t not in published)
+        ports = [(topic, port.name) for topic in open_ if topic in self.ports for port in self.ports[topic]]
+        if not ports:
+            return []
+        return [
+            "# environment:                         # what no node publishes: what may be assumed of it, and why",
+            *(f'#   in.{name}: {{assume: "…", because: "…"}}  # {topic}' for topic, name in ports),
+            "",
+        ]
+
+    def methods(self, name: str, node: Listed) -> list[str]:
+        sides = (("in", node.subscribes), ("out", node.publishes))
+        entries: dict[str, str] = {}
+        for role, topics in sides:
+            for topic in topics:
+                if role == "out" or topic not in node.publishes:
+                    entries |= {f"{role}.{port.name}": port.mapping for port in self.ports.get(topic, ())}
+        lines = [f"  {name}:", "    criticality: medium"]
+        if not entries:
+            return [*lines, "    methods: []"]
+        lines += ["    methods:", "      - rosmonitoring:", f"          ros_version: ros{2 if self.given.ros2 else 1}"]
+        if self.given.traces:
+            lines.append(f"          traces: [{', '.join(json.dumps(t) for t in self.given.traces)}]")
+        if any(key.startswith("in.") for key in entries) and any(key.startswith("out.") for key in entries):
+            lines += [
+                "          # Which input did an answer answer? Until this is said, what is judged is no evidence:",
+                f"          # answers: {self.answers(node)}",
+            ]
+        lines.append("          mapping:")
+        return [*lines, *(f"            {key}: {value}" for key, value in entries.items())]
+
+    def answers(self, node: Listed) -> str:
+        """By stamp where all that it hears and says is stamped."""
+        topics = [t for t in (*node.subscribes, *node.publishes) if self.ports.get(t)]
+        kinds = [self.given.known.get(self.given.listing.types.get(t, "")) for t in topics]
+        stamped = all(kind is not None and kind.field("header") is not None for kind in kinds)
+        return "{by: stamp}" if stamped else "{latency: 10 ms, jitter: 2 ms, because: …}"
+
+
+def _constants(wire: Wire, name: str, holder: Message) -> dict[str, str]:
+    """The constants that say what a whole number means, and the word that each is: those whose names begin with the
+    field's, else all, where the message has one such number."""
+    if not isinstance(wire, Scalar) or wire.name not in INTEGERS:
+        return {}
+    kinds = [(constant, value) for constant, kind, value in holder.constants if kind == wire.name]
+    prefix = f"{name.upper()}_"
+    mine = {c: (c.removeprefix(prefix), value) for c, value in kinds if c.startswith(prefix)}
+    if not mine and [f.wire for f in holder.fields].count(wire) == 1:
+        mine = {c: (c, value) for c, value in kinds}
+    values = [value for _, value in mine.values()]
+    return {c: word for c, (word, _) in mine.items()} if len(mine) > 1 and len(set(values)) == len(values) else {}
+
+
+def _short(names: Iterable[str], keywords: frozenset[str]) -> dict[str, str]:
+    """For each of ROS's names one that the contract may use: its last part, with those before it where it takes them to
+    tell two apart."""
+    every = list(names)
+    parts = {name: re.sub(r"[^A-Za-z0-9_/]", "_", name).strip("/").split("/") for name in every}
+    found: dict[str, str] = {}
+    for name in every:
+        depth = 1
+        while depth < len(parts[name]) and any(
+            other != name and parts[other][-depth:] == parts[name][-depth:] for other in every
+        ):
+            depth += 1
+        word = "_".join(parts[name][-depth:])
+        word = word if word[:1].isalpha() or word[:1] == "_" else f"n{word}"
+        word = f"{word}_" if word in keywords else word
+        while word in found.values():
+            word += "_"
+        found[name] = word
+    return found
+
+
+def _line(text: str) -> str:
+    """Text of a record as part of one line."""
+    return " ".join(text.split())
+
+
+def watch(known: Definitions, types: Mapping[str, str]) -> tuple[dict[tuple[str, Path], Seen], Callable[[Any], None]]:
+    """What a record holds of each field that may be drafted, and what to call with each message of it."""
+    seen: dict[tuple[str, Path], Seen] = {}
+    paths: dict[str, list[Path]] = {}
+    for topic, kind in types.items():
+        message = known.get(kind)
+        if message is None or known.missing(message) or is_plumbing(topic):
+            continue
+        leaves = [path for path, wire, _ in known.leaves(message) if isinstance(wire, Scalar)]
+        paths[topic] = leaves[:DRAFTED_FIELDS]
+        seen |= {(topic, path): Seen() for path in paths[topic]}
+
+    def note(event: Any) -> None:
+        for path in paths.get(event["topic"], ()):
+            value = event
+            for step in path:
+                value = value.get(step) if isinstance(value, dict) else None
+            seen[event["topic"], path].note(value)
+
+    return seen, note

@@ -1,0 +1,163 @@
+"""Who publishes and who listens: from ``rosnode info`` or ``ros2 node info``, from JSON, from a ROS 1 master.
+
+A master is asked by its XML-RPC interface alone (http://wiki.ros.org/ROS/Master_API): no ROS has to be installed.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import xmlrpc.client
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from http.client import HTTPConnection, HTTPException
+from typing import Any
+from xml.parsers.expat import ExpatError
+
+from avow.ros.definitions import canonical
+from avow.ros.names import is_name
+from avow.tuning.running import MASTER_SECONDS
+
+
+class NoListing(Exception):  # noqa: N818 - it is what was found wrong
+    """What is no listing of a ROS graph, or a master that does not answer; the text says how."""
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """A running node, by its whole name, and its topics and services, by theirs."""
+
+    name: str
+    publishes: tuple[str, ...] = ()
+    subscribes: tuple[str, ...] = ()
+    serves: tuple[str, ...] = ()
+    calls: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """A ROS graph. `types`: topic or service → type (``package/Type``), as far as it is said."""
+
+    nodes: tuple[Listed, ...]
+    types: Mapping[str, str] = field(default_factory=dict)
+
+    def text(self) -> str:
+        """As ``rosnode info`` writes it."""
+        lines: list[str] = []
+        for node in self.nodes:
+            lines.append(f"Node [{node.name}]")
+            for title, names in (
+                ("Publications", node.publishes),
+                ("Subscriptions", node.subscribes),
+                ("Services", node.serves),
+            ):
+                lines.append(f"{title}:")
+                lines += [f" * {name} [{self.types.get(name, 'unknown type')}]" for name in names]
+            lines.append("")
+        return "\n".join(lines)
+
+
+HEADER = re.compile(r"(?:Node\s+\[(?P<ros1>/[^\]\s]*)\]|(?P<ros2>/[^\s:]*))\s*\Z")
+_SECTION = re.compile(r"\s*([A-Z][A-Za-z ]*):(?:\s|\Z)")
+_ENTRY = re.compile(r"\s+(?:\*\s+)?(?P<name>/[^\s:\[]+):?\s*\[?(?P<type>[^\]\s]*/[^\]\s]+)?")
+_SIDES = {
+    "publications": "publishes",
+    "publishers": "publishes",
+    "subscriptions": "subscribes",
+    "subscribers": "subscribes",
+    "services": "serves",
+    "service servers": "serves",
+    "service clients": "calls",
+}
+
+
+def is_info(text: str) -> bool:
+    """Whether a text is the output of ``rosnode info`` or ``ros2 node info``."""
+    return any(HEADER.match(line) for line in text.splitlines())
+
+
+def parse_listing(text: str) -> Listing:
+    """Raises NoListing."""
+    if text.lstrip().startswith("{"):
+        return _of_json(text)
+    if not is_info(text):
+        raise NoListing("it is neither the output of `rosnode info` or `ros2 node info`, nor a JSON object")
+    return parse_info(text)
+
+
+def parse_info(text: str) -> Listing:
+    """What ``rosnode info`` or ``ros2 node info`` say of each node, one after another."""
+    found: dict[str, dict[str, dict[str, None]]] = {}
+    types: dict[str, str] = {}
+    sides: dict[str, dict[str, None]] = {}
+    into: dict[str, None] | None = None
+    for line in text.splitlines():
+        if header := HEADER.match(line):
+            sides = found.setdefault(header["ros1"] or header["ros2"], {})
+            into = None
+        elif (entry := _ENTRY.match(line)) and into is not None:
+            into[entry["name"]] = None
+            if entry["type"]:
+                types[entry["name"]] = canonical(entry["type"])
+        elif section := _SECTION.match(line):
+            side = _SIDES.get(section[1].strip().lower())
+            into = sides.setdefault(side, {}) if side is not None else None
+    return Listing(tuple(_listed(name, {k: tuple(v) for k, v in s.items()}) for name, s in found.items()), types)
+
+
+def _listed(name: str, sides: Mapping[str, Iterable[str]]) -> Listed:
+    return Listed(name, *(tuple(sides.get(side, ())) for side in ("publishes", "subscribes", "serves", "calls")))
+
+
+def _of_json(text: str) -> Listing:
+    """``{"/a": {"publishers": {"/t": "std_msgs/Float64"}, "subscribers": {…}, "services": {…}, "clients": {…}}}``."""
+    words = {"publishers": "publishes", "subscribers": "subscribes", "services": "serves", "clients": "calls"}
+    try:
+        data = json.loads(text)
+        nodes: list[Listed] = []
+        types: dict[str, str] = {}
+        for name, said in data.items():
+            sides: dict[str, tuple[str, ...]] = {}
+            for word, names in said.items():
+                sides[words[word]] = tuple(names)
+                if isinstance(names, dict):
+                    types |= {topic: canonical(kind) for topic, kind in names.items() if kind}
+            nodes.append(_listed(name, sides))
+    except (ValueError, AttributeError, TypeError, RecursionError) as error:
+        raise NoListing(f"it is no JSON of nodes and their topics: {error}") from None
+    except KeyError as error:
+        raise NoListing(f"{error} is none of {', '.join(words)}") from None
+    wrong = [n for node in nodes for n in (node.name, *node.publishes, *node.subscribes) if not is_name(n)]
+    if wrong:
+        raise NoListing(f"{wrong[0][:60]!r} is no name that ROS takes")
+    return Listing(tuple(nodes), types)
+
+
+class _Patient(xmlrpc.client.Transport):
+    """One that does not wait for ever."""
+
+    def make_connection(self, host: Any) -> HTTPConnection:
+        connection = super().make_connection(host)
+        connection.timeout = MASTER_SECONDS
+        return connection
+
+
+def ask_master(uri: str) -> Listing:
+    """The graph that a running ROS 1 master knows. Raises NoListing where none answers."""
+    try:
+        with xmlrpc.client.ServerProxy(uri, transport=_Patient()) as master:
+            graph: Any = master.getSystemState("/avow")
+            topics: Any = master.getTopicTypes("/avow")
+    except (OSError, HTTPException, ExpatError, xmlrpc.client.Error, ValueError, TypeError) as error:
+        raise NoListing(f"no ROS 1 master answers at {uri}: {error}") from None
+    try:
+        sides: dict[str, dict[str, list[str]]] = {}
+        for side, entries in zip(("publishes", "subscribes", "serves"), graph[2], strict=True):
+            for topic, names in entries:
+                for name in names:
+                    sides.setdefault(str(name), {}).setdefault(side, []).append(str(topic))
+        types = {str(topic): canonical(str(kind)) for topic, kind in topics[2] if kind != "*"}
+    except (TypeError, ValueError, LookupError) as error:
+        raise NoListing(f"what answers at {uri} is no ROS 1 master: {error}") from None
+    listed = (_listed(name, {k: sorted(v) for k, v in found.items()}) for name, found in sorted(sides.items()))
+    return Listing(tuple(listed), types)

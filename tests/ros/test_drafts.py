@@ -1,0 +1,156 @@
+"""`avow init --from-bag` and `--from-graph`: what is drafted is what is there, and it passes `avow check`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from avow.base.diagnostics import Rejected
+from avow.cli.check import command as check
+from avow.cli.init import command as init
+from avow.system.graph import dataflow
+from avow.system.load import load_system
+
+pytest.importorskip("rosbags")
+
+STATUS = "std_msgs/Header header\nuint8 GREEN=0\nuint8 RED=2\nuint8 level\nfloat32 rate\nstring in\n"
+GRAPH = """\
+/robot1/geiger
+  Publishers:
+    /geiger/rate: std_msgs/msg/Float64
+    /rosout: rcl_interfaces/msg/Log
+/robot1/sensor
+  Subscribers:
+    /geiger/rate: std_msgs/msg/Float64
+    /goal: geometry_msgs/msg/Point
+    /odd: nobody/msg/Knows
+  Publishers:
+    /robot1/status: geiger/msg/Status
+/rviz2
+  Subscribers:
+    /robot1/status: geiger/msg/Status
+"""
+
+
+def make_bag(path: Path, form: str, *, bare: bool = False) -> Path:
+    """Two topics: a rate with a NaN, and a status of a type of its own. `bare`: without definitions, as Humble's."""
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if form == "ros1" else Stores.ROS2_HUMBLE)
+    store.register(get_types_from_msg(STATUS, "geiger/msg/Status"))
+    types = store.types
+    stamp = types["builtin_interfaces/msg/Time"](sec=1, nanosec=0)
+    header = types["std_msgs/msg/Header"](**({"seq": 1} if form == "ros1" else {}), stamp=stamp, frame_id="f")
+    rates = [types["std_msgs/msg/Float64"](data=value) for value in (0.5, float("nan"), 7.0)]
+    status: Any = types["geiger/msg/Status"](header=header, level=2, rate=1.5, in_="ok")
+    said = [("/geiger/rate", "std_msgs/msg/Float64", "/robot1/geiger", rate) for rate in rates]
+    said += [("/robot1/status", "geiger/msg/Status", "/robot1/sensor", status)] if not bare else []
+    if form == "ros1":
+        path = path.with_suffix(".bag")
+        with Writer1(path) as writer:
+            known: dict[str, Any] = {}
+            for k, (topic, kind, caller, message) in enumerate(said, start=1):
+                if topic not in known:
+                    known[topic] = writer.add_connection(topic, kind, typestore=store, callerid=caller)
+                writer.write(known[topic], k * 10**9, store.serialize_ros1(message, kind))
+        return path
+    plugin = StoragePlugin.MCAP if form == "mcap" else StoragePlugin.SQLITE3
+    with Writer2(path, version=8 if bare else 9, storage_plugin=plugin) as writer2:
+        known = {}
+        for k, (topic, kind, _, message) in enumerate(said, start=1):
+            if topic not in known:
+                known[topic] = writer2.add_connection(topic, kind, typestore=store)
+            writer2.write(known[topic], k * 10**9, store.serialize_cdr(message, kind))
+    if bare:
+        import sqlite3
+
+        with sqlite3.connect(next(path.glob("*.db3"))) as data:
+            data.execute("delete from message_definitions")
+    return path
+
+
+def run(folder: Path, *options: str) -> Path:
+    result = CliRunner().invoke(init, [str(folder), *options], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    (system,) = (folder / "contracts").iterdir()
+    checked = CliRunner().invoke(check, [str(system)], standalone_mode=False, catch_exceptions=False)
+    assert checked.return_value == 0, checked.output
+    assert "error" not in checked.output
+    return system
+
+
+def test_a_ros1_bag_knows_who_publishes(tmp_path: Path) -> None:
+    system = run(tmp_path / "w", "--from-bag", str(make_bag(tmp_path / "run", "ros1")))
+    text = (system / "system.rcl").read_text()
+    assert "rate : REAL  // float64 data, recorded: 0.5 … 7, 1 × NaN" in text
+    assert "Status_level : {green, red};" in text
+    assert 'status_in : STRING  // string in, recorded: "ok"' in text
+    loaded = load_system(system)
+    assert [node.name for node in loaded.contract.nodes] == ["geiger", "sensor"]
+    assert loaded.plan.ros.names.placed("sensor").name == "/robot1/sensor"
+    plan = (system / "plan.yaml").read_text()
+    assert "out.status_level: {field: level, values: {GREEN: green, RED: red}}" in plan
+    assert "out.status_in: in" in plan
+
+
+@pytest.mark.parametrize("form", ["sqlite3", "mcap"])
+def test_a_ros2_bag_does_not_know_who_publishes(form: str, tmp_path: Path) -> None:
+    system = run(tmp_path / "w", "--from-bag", str(make_bag(tmp_path / "run", form)))
+    loaded = load_system(system)
+    (node,) = loaded.contract.nodes
+    assert [p.name for p in node.outputs] == ["rate", "status_level", "status_rate", "status_in"]
+    assert "does not say who publishes" in (system / "system.rcl").read_text()
+
+
+@pytest.mark.parametrize("form", ["ros1", "sqlite3", "mcap"])
+def test_a_bag_and_a_graph(form: str, tmp_path: Path) -> None:
+    (tmp_path / "graph.txt").write_text(GRAPH, encoding="utf-8")
+    bag = make_bag(tmp_path / "run", form)
+    options = ("--from-bag", str(bag), "--from-graph", str(tmp_path / "graph.txt"), "--distro", "humble")
+    loaded = load_system(run(tmp_path / "w", *options))
+    graph = dataflow(loaded)
+    assert [str(edge) for edge in graph.edges] == ["geiger.rate → sensor.rate"]
+    assert {at.port for at in graph.environment} == {"goal_x", "goal_y", "goal_z"}
+    assert loaded.plan.model.data["dropped"] == {"/rviz2": "shows what others publish"}
+
+
+def test_a_bag_without_definitions_wants_a_distribution(tmp_path: Path) -> None:
+    bag = make_bag(tmp_path / "run", "sqlite3", bare=True)
+    with pytest.raises(Rejected) as caught:
+        CliRunner().invoke(init, [str(tmp_path / "v"), "--from-bag", str(bag)], catch_exceptions=False)
+    assert "--distro humble" in (caught.value.diagnostics[0].hint or "")
+    assert not (tmp_path / "v").exists()
+    run(tmp_path / "w", "--from-bag", str(bag), "--distro", "humble")
+
+
+def test_within_a_workspace_only_the_system_is_made(tmp_path: Path) -> None:
+    run(tmp_path / "w", "--from-bag", str(make_bag(tmp_path / "run", "ros1")))
+    folder = tmp_path / "w/contracts/other"
+    result = CliRunner().invoke(init, [str(folder), "--from-bag", str(tmp_path / "run.bag")], catch_exceptions=False)
+    assert result.exit_code == 0
+    assert (folder / "plan.yaml").is_file()
+    assert not (folder / "dodo.py").exists()
+
+
+@pytest.mark.parametrize("text", ["", "a -> b", "/a\n  Publishers:\n", '{"/a": {"publishers": {"/t\\nx": "a/B"}}}'])
+def test_what_is_no_graph_drafts_nothing(tmp_path: Path, text: str) -> None:
+    (tmp_path / "graph.txt").write_text(text, encoding="utf-8")
+    options = ["--from-graph", str(tmp_path / "graph.txt")]
+    with pytest.raises(Rejected) as caught:
+        CliRunner().invoke(init, [str(tmp_path / "w"), *options], catch_exceptions=False)
+    assert [d.code for d in caught.value.diagnostics] == ["CLI011"]
+    assert not (tmp_path / "w").exists()
+
+
+def test_names_of_a_graph_are_data(tmp_path: Path) -> None:
+    graph = '{"/node": {"publishers": {"/in": "std_msgs/Bool", "/a}//b": "x/Y", "/REAL": "std_msgs/Int32"}}}'
+    (tmp_path / "g.json").write_text(graph.replace("/a}//b", "/ok"), encoding="utf-8")
+    loaded = load_system(run(tmp_path / "w", "--from-graph", str(tmp_path / "g.json"), "--distro", "noetic"))
+    assert [node.name for node in loaded.contract.nodes] == ["node_"]
+    assert [p.name for p in loaded.contract.nodes[0].outputs] == ["in_", "REAL_"]
