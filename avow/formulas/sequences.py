@@ -9,32 +9,27 @@ only together with `defined`: that no element outside a sequence matters.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Generic, TypeVar
 
-from avow.formulas.formula import conjunction, free_variables, negation
+from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.renaming import map_children
 from avow.formulas.traversal import depth, subterms
 from avow.formulas.values import FunctionValue, Value
 from avow.formulas.values import Sequence as SequenceValue
-from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, FunctionSort, SequenceSort, SetSort, Sort
+from avow.language.sorts import INTEGER, NATURAL, FunctionSort, SequenceSort, SetSort, Sort
 from avow.language.terms import (
-    TRUE,
     And,
     Apply,
     Arithmetic,
     Compare,
-    Conditional,
-    Iff,
     Implies,
     In,
     Index,
     Length,
     Literal,
     Not,
-    Or,
     Quantified,
     Quantifier,
     Role,
@@ -172,58 +167,3 @@ def _position(within: Term) -> Variable:
     while name in taken:
         name += "'"
     return Variable(Role.BOUND, name, NATURAL)
-
-
-def defined(term: Term, sequences: Collection[Variable] | None = None) -> Term:
-    """A condition under which it does not matter to a formula what lies outside these sequences; without them: outside
-    any partial operation."""
-    match term:
-        case Not(body=body):
-            return defined(body, sequences)
-        case And(items=items):
-            return _in_turn(items, items, sequences)
-        case Or(items=items):
-            return _in_turn(items, tuple(map(negation, items)), sequences)
-        case Implies(left=left, right=right):
-            return _in_turn((left, right), (left, negation(right)), sequences)
-        case Iff(left=left, right=right):
-            return conjunction((defined(left, sequences), defined(right, sequences)))
-        case Quantified(variables=variables, body=body):
-            inner = defined(body, sequences)
-            return inner if inner == TRUE else Quantified(Quantifier.FORALL, variables, inner)
-        case Conditional(condition=condition, then=then, otherwise=otherwise):
-            yes, no = defined(then, sequences), defined(otherwise, sequences)
-            branches = (Implies(condition, yes), Implies(negation(condition), no))
-            safe = (branch for branch, inner in zip(branches, (yes, no), strict=True) if inner != TRUE)
-            return conjunction((defined(condition, sequences), *safe))
-        case _:  # an atom: all of it matters
-            return conjunction(_risks(term, sequences))
-
-
-def _in_turn(items: Sequence[Term], guards: Sequence[Term], sequences: Collection[Variable] | None) -> Term:
-    """Each of the items matters only where the guards of the safe ones, and of those before it, hold."""
-    conditions = [defined(item, sequences) for item in items]
-    safe = [guard for guard, condition in zip(guards, conditions, strict=True) if condition == TRUE]
-    found = []
-    for guard, condition in zip(guards, conditions, strict=True):
-        if condition != TRUE:
-            found.append(Implies(conjunction(safe), condition) if safe else condition)
-            safe.append(guard)
-    return conjunction(found)
-
-
-def _risks(atom: Term, sequences: Collection[Variable] | None) -> Iterator[Term]:
-    """What an atom needs to be defined; of a formula within it, what that formula needs."""
-    match atom:
-        case Index(sequence=sequence, index=index) if sequences is None or sequence in sequences:
-            yield Compare("<=", Literal(0, INTEGER), index)
-            yield Compare("<", index, Length(sequence, NATURAL))
-        case Arithmetic(operator="/", right=right) if sequences is None and not isinstance(right, Literal):
-            yield Compare("!=", right, Literal(Fraction(0), REAL))
-    for part in atom.children:
-        if part.sort == BOOL or isinstance(part, Conditional):
-            inner = defined(part, sequences)
-            if inner != TRUE:
-                yield inner
-        else:
-            yield from _risks(part, sequences)

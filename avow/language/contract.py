@@ -23,11 +23,14 @@ class Clause:
     name: str
     position: int
     formula: Term
+    """What it says: the formula as written, and that it has a value (`avow.language.definedness`)."""
     sentence: str | None = None
     text: str = field(default="", compare=False)
     """The formula as written in the file."""
     span: Span | None = field(default=None, compare=False, repr=False)
     sentence_span: Span | None = field(default=None, compare=False, repr=False)
+    written: Term | None = field(default=None, compare=False, repr=False)
+    """The formula without that, where it was read from a file: for what is said of the text."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from avow.base.diagnostics import Span
 from avow.language.checker import Checker
 from avow.language.contract import Clause, ClauseKind, Node, Port, Topic
 from avow.language.declarations import Declarations
+from avow.language.definedness import with_value
 from avow.language.environment import did_you_mean
 from avow.language.flat import flat
 from avow.language.lexer import Token, unquote
@@ -107,7 +108,8 @@ def _clause(
     sentence = unquote(syntax.sentence.text) if syntax.sentence is not None else None
     whole = reports.source.span(syntax.start, syntax.end)
     quoted = reports.source.span(syntax.sentence.start, syntax.sentence.end) if syntax.sentence is not None else None
-    return Clause(syntax.kind, name, position, formula, sentence, text, whole, quoted)
+    said = with_value(formula)
+    return Clause(syntax.kind, name, position, said, sentence, text, whole, quoted, formula)
 
 
 def _is_small(formula: Term, place: Token, scope: Scope, reports: Reports) -> bool:

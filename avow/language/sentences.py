@@ -49,7 +49,7 @@ class Mismatch:
 def mismatches(clause: Clause, elements: Mapping[str, str]) -> Iterator[Mismatch]:
     """What the clause's sentence is seen to say otherwise than its formula; `elements` are those of its node."""
     if clause.sentence is not None:
-        yield from differences(clause.sentence, clause.formula, elements)
+        yield from differences(clause.sentence, clause.written or clause.formula, elements)
 
 
 def differences(sentence: str, formula: Term, elements: Mapping[str, str]) -> Iterator[Mismatch]:

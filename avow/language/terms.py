@@ -153,7 +153,7 @@ class Apply:
 
 @dataclass(frozen=True, slots=True)
 class Index:
-    """``s(i)``: the element of a sequence at position i, counted from 0; unspecified outside the sequence."""
+    """``s(i)``: the element of a sequence at position i, counted from 0; without a value outside the sequence."""
 
     sequence: Term
     index: Term

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from avow.formulas.formula import conjunction, normalise
+from avow.language.definedness import with_value
 from avow.language.sorts import REAL, EnumSort, RealSort
 from avow.language.terms import (
     And,
@@ -44,7 +45,8 @@ def mutants(formula: Term) -> tuple[Mutant, ...]:
     """Every mutant of a formula, in reading order, each meaning once, the original's meaning not at all."""
     seen = {normalise(formula)}
     found = []
-    for mutant in (Mutant("the whole is negated", _negated(formula)), *_everywhere(formula)):
+    changed = (Mutant("the whole is negated", _negated(formula)), *_everywhere(formula))
+    for mutant in (Mutant(each.change, with_value(each.formula)) for each in changed):
         meaning = normalise(mutant.formula)
         if meaning not in seen:
             seen.add(meaning)

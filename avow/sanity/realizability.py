@@ -18,8 +18,9 @@ from dataclasses import dataclass, field, replace
 from avow.base.verdict import Verdict
 from avow.formulas.formula import conjunction, free_variables, substitute
 from avow.formulas.pointwise import pointwise
-from avow.formulas.sequences import defined, flatten
+from avow.formulas.sequences import flatten
 from avow.formulas.tuples import untupled
+from avow.language.definedness import defined
 from avow.language.sorts import SequenceSort
 from avow.language.terms import Apply, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.proofs import confirmed, implied, refutes

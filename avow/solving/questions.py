@@ -17,9 +17,10 @@ from itertools import chain
 
 from avow.base.verdict import Counterexample, Verdict
 from avow.formulas.formula import conjunction, free_variables, negation
-from avow.formulas.sequences import defined, flatten
+from avow.formulas.sequences import flatten
 from avow.formulas.traversal import subterms
 from avow.formulas.values import FunctionValue, Value
+from avow.language.definedness import defined
 from avow.language.sorts import (
     BOOL,
     FunctionSort,

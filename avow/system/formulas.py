@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Node
+from avow.language.definedness import with_value
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Term, Variable
 from avow.system.folding import holders
@@ -156,4 +157,4 @@ def ports_of(term: Term) -> tuple[Variable, ...]:
 def _parse(system: System, text: str, node: str, span: Span | None) -> Term:
     from avow.language.load import parse_formula  # the grammar is slow to import
 
-    return parse_formula(text, system.contract.node(node), system.contract, span)
+    return with_value(parse_formula(text, system.contract.node(node), system.contract, span))

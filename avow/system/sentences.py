@@ -8,7 +8,7 @@ from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.language.contract import Contract
 from avow.language.sentences import differences, elements_of
 from avow.system.plan import System
-from avow.system.temporal import parse_state
+from avow.system.temporal import written_state
 
 
 def requirement_sentences(system: System) -> Iterator[Diagnostic]:
@@ -26,5 +26,5 @@ def said_otherwise(
 ) -> Iterator[Diagnostic]:
     """What a requirement's sentence says otherwise than its formula; `elements` are the contract's (`elements_of`).
     Raises Rejected where that is no formula."""
-    for found in differences(text, parse_state(formula, contract, span), elements):
+    for found in differences(text, written_state(formula, contract, span), elements):
         yield Diagnostic(found.code, found.message, span, Severity.WARNING, found.hint)

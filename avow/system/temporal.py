@@ -15,6 +15,7 @@ from itertools import pairwise
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.language.contract import Contract
+from avow.language.definedness import unless_without_value, with_value
 from avow.language.terms import Term
 from avow.tuning.sizes import PROPERTY_DEPTH, PROPERTY_LENGTH
 
@@ -67,11 +68,11 @@ class _Token:
 
 
 def parse_property(text: str, contract: Contract, span: Span | None = None) -> Property:
-    """A temporal property. Raises Rejected with every fault found."""
+    """A temporal property, as a claim. Raises Rejected with every fault found."""
     if len(text) > PROPERTY_LENGTH:
         raise Rejected(Diagnostic("PLAN114", "the property is too long", span))
     parser = _Parser(text, contract, span, _tokens(text))
-    return parser.parse(0, len(parser.tokens), 0)
+    return _claimed(parser.parse(0, len(parser.tokens), 0), span)
 
 
 def show_property(formula: Property) -> str:
@@ -100,8 +101,14 @@ def is_temporal(text: str) -> bool:
 
 
 def parse_state(text: str, contract: Contract, span: Span | None = None) -> Term:
-    """A formula over a system's ports, written ``node.port``. Where a node has an input and an output of one name,
-    the output is meant, unless the text says ``node.in.port`` somewhere. Raises Rejected."""
+    """A claim over a system's ports, written ``node.port``: the formula, and that it has a value. Where a node has an
+    input and an output of one name, the output is meant, unless the text says ``node.in.port`` somewhere. Raises
+    Rejected."""
+    return with_value(written_state(text, contract, span))
+
+
+def written_state(text: str, contract: Contract, span: Span | None = None) -> Term:
+    """As `parse_state`, of the formula alone."""
     from dataclasses import replace
 
     from avow.language.load import parse_formula  # the grammar is slow to import
@@ -118,6 +125,24 @@ def parse_state(text: str, contract: Contract, span: Span | None = None) -> Term
         for node in contract.nodes
     )
     return parse_formula(text, None, replace(contract, nodes=nodes), span)
+
+
+def _claimed(formula: Property, span: Span | None, positive: bool = True) -> Property:
+    """What a property says as a claim: a state that has no value counts against it, also under a `not`."""
+    match formula:
+        case State(term=term, text=text):
+            return State(with_value(term) if positive else unless_without_value(term), text)
+        case Temporal(operator=Operator.NOT, parts=parts):
+            return Temporal(Operator.NOT, tuple(_claimed(part, span, not positive) for part in parts))
+        case Temporal(operator=Operator.IMPLIES, parts=(left, right)):
+            return Temporal(Operator.IMPLIES, (_claimed(left, span, not positive), _claimed(right, span, positive)))
+        case Temporal(operator=Operator.IFF):
+            if any(with_value(state.term) != state.term for state in states_of(formula)):
+                message = "temporal property: a part of `<=>` must always have a value; write two `->`"
+                raise Rejected(Diagnostic("PLAN114", message, span))
+            return formula
+        case Temporal(operator=operator, parts=parts):
+            return Temporal(operator, tuple(_claimed(part, span, positive) for part in parts))
 
 
 def _mixed(part: Property) -> bool:
@@ -210,7 +235,7 @@ class _Parser:
     def state(self, start: int, end: int) -> State:
         first, last = self.tokens[start].start, self.tokens[end - 1].end
         text = self.text[first:last]
-        return State(parse_state(text, self.contract, self.span), text)
+        return State(written_state(text, self.contract, self.span), text)
 
     def fault(self, message: str, at: int) -> Rejected:
         offset = self.tokens[min(at, len(self.tokens) - 1)].start if self.tokens else 0

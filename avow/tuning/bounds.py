@@ -168,3 +168,7 @@ SUPPORT_STEPS = 2_000_000
 
 VALUES_LOOKED_AT = 500
 """So many values of one domain or column are looked at; a table may have a million."""
+
+GUARDS = 32
+"""Guards of a partial operation that are tried, two at a time, to give its condition: more stand at no place that a
+person wrote; what is not found is asked of the claim itself."""

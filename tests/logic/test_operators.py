@@ -20,10 +20,10 @@ from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.cases import TooManyCases, lifted
 from avow.formulas.formula import digest, normalise
 from avow.formulas.negation_normal_form import push_negations
-from avow.formulas.sequences import defined
 from avow.formulas.traversal import subterms
 from avow.kernel.text import Text
 from avow.language.contract import Node
+from avow.language.definedness import defined
 from avow.language.load import check_text, parse_formula
 from avow.language.operators import OPERATORS, Operator, Why, definition
 from avow.language.printer import show_term

@@ -1,0 +1,244 @@
+"""That a claim has a value: partial operations (a quotient by zero, an element that a sequence does not have) are
+written out as conditions of the claim itself, so that every engine asks for them.
+
+A claim that has no value is not met. `1 / in.x == 1 or 1 / in.x != 1` says `in.x != 0` as well; what its own guards
+exclude (``in.x != 0 -> 1 / in.x < 2``) asks for nothing. A part of a conjunction (disjunction, implication) need not
+have a value where another part, which always has one or stands before it, makes the whole false (true).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from fractions import Fraction
+from itertools import combinations
+
+from avow.language.bounds import constant
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
+from avow.language.terms import (
+    FALSE,
+    TRUE,
+    And,
+    Arithmetic,
+    Compare,
+    Conditional,
+    Iff,
+    Implies,
+    In,
+    Index,
+    Length,
+    Literal,
+    Negative,
+    Not,
+    Or,
+    Quantified,
+    Quantifier,
+    SequenceRange,
+    SequenceTerm,
+    Term,
+    Variable,
+    Widen,
+    subterms,
+)
+from avow.tuning.bounds import GUARDS
+
+Facts = tuple[Term, ...]
+_ZERO = Literal(0, NATURAL)
+
+
+def with_value(claim: Term) -> Term:
+    """The claim, and that it has a value. The same of what it gives is that again."""
+    needed, parts = _needed(claim), _parts(claim)
+    rest = ((k, And(parts[k:]) if k + 1 < len(parts) else parts[k]) for k in range(1, len(parts)))
+    asked = (parts[:k] == _parts(_needed(term)) for k, term in rest)
+    return claim if needed == TRUE or any(asked) else And((*_parts(needed), *parts), claim.span)
+
+
+def unless_without_value(claim: Term) -> Term:
+    """The claim, or that it has no value: what is meant where it stands under a `not`."""
+    needed = _needed(claim)
+    return claim if needed == TRUE else Implies(needed, claim, claim.span)
+
+
+def _needed(claim: Term) -> Term:
+    return defined(claim) if _is_partial(claim) else TRUE
+
+
+def _is_partial(term: Term) -> bool:
+    return any(isinstance(p, Index) or (isinstance(p, Arithmetic) and p.operator == "/") for p in subterms(term))
+
+
+def defined(term: Term, sequences: Collection[Variable] | None = None, facts: Facts = ()) -> Term:
+    """A condition under which it does not matter to a formula what lies outside any partial operation; with
+    `sequences`, outside these. `facts` hold where it is asked."""
+    match term:
+        case Not(body=body):
+            found = defined(body, sequences, facts)
+        case And(items=items):
+            found = _in_turn(items, items, sequences, facts)
+        case Or(items=items):
+            found = _in_turn(items, tuple(map(_denial, items)), sequences, facts)
+        case Implies(left=left, right=right):
+            found = _in_turn((left, right), (left, _denial(right)), sequences, facts)
+        case Iff(left=left, right=right):
+            found = _all((defined(left, sequences, facts), defined(right, sequences, facts)))
+        case Quantified(variables=variables, body=body):
+            inner = defined(body, sequences, facts)
+            found = inner if inner == TRUE else Quantified(Quantifier.FORALL, variables, inner, term.span)
+        case Conditional(condition=condition, then=then, otherwise=otherwise):
+            branches = ((condition, then), (_denial(condition), otherwise))
+            needed = [(guard, defined(part, sequences, (*facts, *_parts(guard)))) for guard, part in branches]
+            safe = (Implies(guard, inner, term.span) for guard, inner in needed if inner != TRUE)
+            found = _all((defined(condition, sequences, facts), *safe))
+        case _:  # an atom: all of it matters
+            found = _all(_risks(term, sequences, facts))
+    return _all(part for part in _parts(found) if part not in facts)
+
+
+def _in_turn(
+    items: Sequence[Term], guards: Sequence[Term], sequences: Collection[Variable] | None, facts: Facts
+) -> Term:
+    """Each of the items matters only where the guards of those hold that always have a value, and of those before."""
+    partial = [_is_partial(item) for item in items]
+    safe = [guard for guard, doubtful in zip(guards, partial, strict=True) if not doubtful]
+    found, asked = list[Term](), list[Term]()
+    for item, guard, doubtful in zip(items, guards, partial, strict=True):
+        if doubtful:
+            inner = defined(item, sequences, (*facts, *_parts(_all((*safe, *asked)))))
+            asked += _parts(inner)  # what is asked once may be taken for granted further on
+            if inner != TRUE:
+                found.append(Implies(_all(safe), inner, item.span) if safe else inner)
+            safe.append(guard)
+    return _all(found)
+
+
+def _risks(atom: Term, sequences: Collection[Variable] | None, facts: Facts) -> Iterator[Term]:
+    """What an atom needs to be defined; of a formula within it, what that formula needs."""
+    match atom:
+        case Index(sequence=sequence, index=index) if sequences is None or sequence in sequences:
+            asked = [Compare("<=", _ZERO, index, atom.span)] if index.sort != NATURAL else []
+            asked.append(Compare("<", index, Length(sequence, NATURAL), atom.span))
+            yield from (each for each in asked if not _follows(each, facts))
+        case Arithmetic(operator="/", right=right) if sequences is None:
+            asked = [Compare(sign, right, Literal(Fraction(0), REAL), atom.span) for sign in ("!=", ">", "<")]
+            if not any(_follows(each, facts) for each in asked):
+                yield asked[0]
+    for part in atom.children:
+        if part.sort == BOOL or isinstance(part, Conditional):
+            yield from _parts(defined(part, sequences, facts))
+        else:
+            yield from _risks(part, sequences, facts)
+
+
+def _parts(term: Term) -> tuple[Term, ...]:
+    return term.items if isinstance(term, And) else () if term == TRUE else (term,)
+
+
+def _all(terms: Iterable[Term]) -> Term:
+    parts = tuple(dict.fromkeys(part for term in terms for part in _parts(term)))
+    return TRUE if not parts else parts[0] if len(parts) == 1 else And(parts, parts[0].span)
+
+
+def _denial(term: Term) -> Term:
+    match term:
+        case Not(body=body):
+            return body
+        case Or(items=items):
+            return _all(map(_denial, items))
+        case Implies(left=left, right=right):
+            return _all((left, _denial(right)))
+        case Compare(operator=sign, left=left, right=right):
+            return Compare(_DENIED[sign], left, right, term.span)
+        case Literal(value=bool() as value):
+            return FALSE if value else TRUE
+    return Not(term, term.span)
+
+
+# -- what plainly follows from guards: sums of numbers that are compared -----------------------------------------------
+
+_Sum = dict[Term, Fraction]
+_ONE = Literal(1, INTEGER)
+"""Its coefficient is the constant of a sum."""
+_DENIED = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
+
+
+def _follows(goal: Compare, facts: Facts) -> bool:
+    """Whether one or two of the facts plainly give the goal, by adding them up."""
+    facts = tuple(_denial(fact.body) if isinstance(fact, Not) else fact for fact in facts)
+    if goal in facts:
+        return True
+    if goal.operator == "!=":
+        return constant(goal.left) not in (None, 0)
+    (wanted,) = _below(goal)
+    given = [each for fact in facts[-GUARDS:] for each in _below(fact)]
+    chosen = (sums for count in (0, 1, 2) for sums in combinations(given, count))
+    return any(_at_most_zero(_added(wanted, *(_times(each, -1) for each in sums))) for sums in chosen)
+
+
+def _at_most_zero(rest: _Sum) -> bool:
+    """Whether a sum is at most zero whatever the values are of the naturals in it."""
+    signed = (_ONE, _TINY)
+    return all(n <= 0 if term in signed or term.sort == NATURAL else n == 0 for term, n in rest.items())
+
+
+def _below(fact: Term) -> list[_Sum]:
+    """Sums that are at most zero where a comparison holds."""
+    match fact:
+        case Compare(operator="<" | "<=" as sign, left=left, right=right):
+            return [_added(_sum(left), _times(_sum(right), -1), _strict(sign, left, right))]
+        case Compare(operator=">" | ">=" as sign, left=left, right=right):
+            return _below(Compare("<" if sign == ">" else "<=", right, left))
+        case Compare(operator="==", left=left, right=right) if _is_number(left):
+            return [*_below(Compare("<=", left, right)), *_below(Compare("<=", right, left))]
+        case Compare(operator="!=", left=left, right=right):
+            for one, other in ((left, right), (right, left)):
+                if one.sort == NATURAL and isinstance(other, Literal) and other.value == 0:
+                    return _below(Compare("<", other, one))
+                if isinstance(other, SequenceTerm) and not other.items:
+                    return _below(Compare("<", _ZERO, Length(one, NATURAL)))
+        case In(item=item, collection=SequenceRange(low=low, high=high)):
+            return [*_below(Compare("<=", low, item)), *_below(Compare("<=", item, high))]
+    return []
+
+
+_TINY = Literal(0, REAL)
+"""As a summand, some positive number: by it one side of a strict comparison of reals is smaller than the other."""
+
+
+def _strict(sign: str, left: Term, right: Term) -> _Sum:
+    if sign == "<=":
+        return {}
+    whole = all(part.sort in (INTEGER, NATURAL) for part in (left, right))
+    return {_ONE: Fraction(1)} if whole else {_TINY: Fraction(1)}
+
+
+def _is_number(term: Term) -> bool:
+    return term.sort in (INTEGER, NATURAL, REAL)
+
+
+def _sum(term: Term) -> _Sum:
+    match term:
+        case Widen(term=inner):
+            return _sum(inner)
+        case Negative(term=inner):
+            return _times(_sum(inner), -1)
+        case Arithmetic(operator="+", left=left, right=right):
+            return _added(_sum(left), _sum(right))
+        case Arithmetic(operator="-", left=left, right=right):
+            return _added(_sum(left), _times(_sum(right), -1))
+        case Literal(value=int() | Fraction() as value) if not isinstance(value, bool):
+            return {_ONE: Fraction(value)}
+        case Length(sequence=SequenceTerm(items=items)):
+            return {_ONE: Fraction(len(items))}
+    return {term: Fraction(1)}
+
+
+def _times(sum_: _Sum, factor: int) -> _Sum:
+    return {term: number * factor for term, number in sum_.items()}
+
+
+def _added(*sums: _Sum) -> _Sum:
+    found: _Sum = {}
+    for each in sums:
+        for term, number in each.items():
+            found[term] = found.get(term, Fraction(0)) + number
+    return found
