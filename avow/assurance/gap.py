@@ -242,12 +242,15 @@ def _wants_a_reason(view: ObligationView) -> bool:
 
 
 def _reason_wanted(name: str) -> str:
-    goal, _, key = name.rpartition(".")
+    goal, _, key = name.partition(".")
+    if name.startswith("start."):
+        return "say what a delayed edge of the loop carries first: `connections: [{…, delayed: true, initial: …}]`"
     if name.startswith("environment."):
         about = name.removeprefix("environment.")
         key = about if about.startswith("in.") else f"{about.partition('.')[0]}.INPUT"
         return f"say what is assumed of the input, and why: `environment: {{{key}: {{assume: …, because: …}}}}`"
-    return f"give a reason in the plan: `compose: {{{goal}: {{{key.replace('-', '_')}: {{because: …}}}}}}`"
+    key = "entered" if key.startswith(("loop.", "loop-of.")) else key.replace("-", "_")
+    return f"give a reason in the plan: `compose: {{{goal}: {{{key}: {{because: …}}}}}}`"
 
 
 def _planned(view: ObligationView, facts: Facts) -> Mapping[str, str]:

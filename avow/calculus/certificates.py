@@ -6,7 +6,7 @@ The engine's proofs are hints for `avow.calculus.finder`; certificates kept from
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -26,6 +26,10 @@ from avow.kernel.statements import Kind, Statement, Statements, statements
 if TYPE_CHECKING:
     from avow.calculus.composition import Composition
     from avow.calculus.derivation import Goal
+
+
+POSSIBLE = frozenset({Kind.POSSIBLE, Kind.IMPOSSIBLE, Kind.START})
+"""Claims that something is possible, or (of which one is enough) left no room by a node alone."""
 
 
 @dataclass(slots=True)
@@ -87,14 +91,9 @@ class Certificates:
         """What an obligation says to be possible (`avow.calculus.existence`), in all its parts."""
         entries: list[Entry] = []
         for part in self.parts(name):
-            for claim in part:
-                shown = claim.kind is Kind.IMPOSSIBLE
-                entry = Entry(
-                    How.SHOWN if shown else How.POSSIBLE, "", claim.digest, step=Question() if shown else None
-                )
-                if self.established(Certificate(name, (entry,)), claim) is not None:
-                    entries.append(entry)
-                    break
+            tried = ((claim, attempt) for claim in part for attempt in self._examples(claim))
+            shown = (a for claim, a in tried if self.established(Certificate(name, a), claim) is not None)
+            entries += next(shown, ())
         scope = existence_scope(name)
         self.made[scope] = Certificate(scope, tuple(entries))
         return self._existing(self.made[scope], name)
@@ -111,30 +110,26 @@ class Certificates:
         established = [one for one in found if one is not None]
         return established if established and len(established) == len(found) else None
 
-    def beginnings(self, nodes: Collection[str]) -> tuple[str, ...]:
-        """What the environment is assumed to be where the outputs of some nodes have first values only so: none, where
-        they have them whatever its constant inputs are. Raises Refused where even then they may have none."""
-        known = self.known.every
-        initials = (s for s in known if s.kind is Kind.INITIAL and s.node in nodes)
-        marks = tuple(s.digest for s in initials if any(place.node is None for place in s.places.values()))
-        given = [s for s in known if s.kind is Kind.ENVIRONMENT]
-        for assumed in ([], given) if given else ([],):
-            entries = tuple(Entry(How.ENVIRONMENT, s.node, s.digest) for s in assumed)
-            kernel = Kernel(self.known, Certificate("beginning", entries), self.solvers)
-            try:
-                tuple(kernel.begins(Question(tuple(Use(k) for k in range(len(entries))), marks), 1))
-            except Refused:
-                if assumed or not given:
-                    raise
-            else:
-                return tuple(s.called for s in assumed)
-        return ()
+    def _examples(self, claim: Statement) -> Iterator[tuple[Entry, ...]]:
+        """Certificates to try, that something is possible or left no room. First values of a loop may be there only
+        where the environment is as it is assumed to be: without, if that is enough."""
+        match claim.kind:
+            case Kind.IMPOSSIBLE:
+                yield (Entry(How.SHOWN, "", claim.digest, step=Question()),)
+            case Kind.START:
+                known = (s for s in self.known.every if s.kind is Kind.ENVIRONMENT)
+                given = tuple(Entry(How.ENVIRONMENT, s.node, s.digest) for s in known)
+                for assumed in ((), given) if given else ((),):
+                    uses = tuple(Use(k) for k in range(len(assumed)))
+                    yield (*assumed, Entry(How.POSSIBLE, "", claim.digest, base=(Question(uses),)))
+            case _:
+                yield (Entry(How.POSSIBLE, "", claim.digest),)
 
     def parts(self, name: str) -> list[list[Statement]]:
         """The claims of an obligation that something is possible: of each part, those of which one is enough."""
         parts: dict[str, list[Statement]] = {}
         for claim in self.known.every:
-            if claim.kind in (Kind.POSSIBLE, Kind.IMPOSSIBLE) and possible_name(claim) == name:
+            if claim.kind in POSSIBLE and possible_name(claim) == name:
                 parts.setdefault(claim.name, []).append(claim)
         return list(parts.values())
 
@@ -153,7 +148,7 @@ class Certificates:
             places = self._places[certificate.scope] = {}
             for i, entry in enumerate(certificate.entries):
                 places.setdefault((entry.how, entry.node, entry.digest), []).append(i)
-        how = How.POSSIBLE if claim.kind is Kind.POSSIBLE else How.SHOWN
+        how = How.POSSIBLE if claim.kind in (Kind.POSSIBLE, Kind.START) else How.SHOWN
         for i in self._places[certificate.scope].get((how, claim.node, claim.digest), ()):
             try:
                 return kernel.establish(i, alone=claim.kind is Kind.ASSUMPTION)
@@ -211,7 +206,7 @@ def scope_of(claim: Statement) -> str | None:
     match claim.kind:
         case Kind.REQUIREMENT:
             return requirement_scope(claim.name)
-        case Kind.POSSIBLE | Kind.IMPOSSIBLE:
+        case Kind.POSSIBLE | Kind.IMPOSSIBLE | Kind.START:
             return existence_scope(possible_name(claim))
         case _:  # a clause or a formula of the plan: its derivation's, or none
             return None
@@ -219,7 +214,7 @@ def scope_of(claim: Statement) -> str | None:
 
 def possible_name(claim: Statement) -> str:
     """The obligation of which a claim that something is possible is a part."""
-    return claim.name if claim.name.startswith("start.") else claim.name.rpartition(".")[0]
+    return claim.name if claim.kind is Kind.START else claim.name.rpartition(".")[0]
 
 
 def existence_scope(name: str) -> str:

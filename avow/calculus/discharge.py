@@ -87,7 +87,7 @@ def would_hold(frame: Frame, goal: Goal, settled: Settled) -> tuple[tuple[Phase,
     for case in settled.cases:
         if case.verdict is not Verdict.REFUTED and case.counterexample is None:
             continue
-        hypotheses, claim = solver.question(condition, case.phase, same, before, len(attempts) > 1)
+        hypotheses, claim = solver.question(condition, case.phase, same, before, True)
         near = [name for name in condition.providers if name in same]
         places = [*providers(frame, dict.fromkeys((*near, *same)))]
         if case.phase is Phase.INITIAL:
@@ -122,14 +122,18 @@ class _Solver:
         attempts = list(self.attempts(condition, direct, allowed))
         if (close := self.close(condition, *attempts[0])) is not None:
             return close
+        asked: list[tuple[tuple[Phase, ...], list[tuple[Hypotheses, Term]]]] = []
         for number, (same, before) in enumerate(attempts):
+            phases = _phases(condition, before)
+            for wide in (False, True) if len(attempts) == 1 else (number > 0,):
+                found = (phases, [self.question(condition, phase, same, before, wide) for phase in phases])
+                asked += [found] if found not in asked else []
+        for number, (phases, questions) in enumerate(asked):
             # Only the widest question is worth the whole time: what a narrower one cannot settle, that may.
             patience = self.bounds.effort
-            if number < len(attempts) - 1:
+            if number < len(asked) - 1:
                 patience = min(patience, NARROW_EFFORT)
-
-            phases = _phases(condition, before)
-            cases = tuple(self.case(condition, phase, same, before, number > 0, patience) for phase in phases)
+            cases = tuple(self.ask(phase, *each, patience) for phase, each in zip(phases, questions, strict=True))
             answer = _settled(condition, cases)
             if answer.verdict is Verdict.PROVED:
                 return answer

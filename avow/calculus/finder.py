@@ -281,7 +281,7 @@ class Finder:
             kernel = Kernel(self.known, Certificate(self.scope, stand_ins), self.solvers)
             question = Question(tuple(Use(k, back) for k, (_, back) in enumerate(wider)), initials)
             try:
-                tuple(kernel.begins(question, at))
+                tuple(kernel.begins(question.uses, question.initials, at))
             except Refused:
                 continue
             return wider, initials

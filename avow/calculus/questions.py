@@ -16,7 +16,7 @@ from avow.calculus.existence import start_name
 from avow.calculus.repair import Offer
 from avow.calculus.variables import Frame
 from avow.formulas.formula import negation
-from avow.kernel.check import Established, Refused
+from avow.kernel.check import Established
 from avow.language.printer import show_term
 from avow.language.terms import Term
 from avow.sanity.claims import triggers
@@ -290,13 +290,9 @@ class StartQuestion:
                 )
                 if counted[0] is not Verdict.PROVED:
                     return _counted(counted)
-                try:
-                    within = composition.certificates.beginnings(self.members)
-                except Refused as refused:
-                    return Answer(Verdict.UNKNOWN, f"some values are as the plan says, but {refused}")
-                summary = f"delayed edges start it: {listed}"
-                told = Answer(Verdict.PROVED, summary, hypotheses=within, details={"initial": list(initials)})
-                return made_up(told, composition.certificates.existence(start_name(self.members)))
+                told = Answer(Verdict.PROVED, f"delayed edges start it: {listed}", details={"initial": list(initials)})
+                found = composition.certificates.existence(start_name(self.members))
+                return replace(made_up(told, found), established=found[0] if found else None)
             case "unsat":
                 summary = f"no values are as the plan says: {', '.join(solution.core)}"
                 return Answer(Verdict.REFUTED, summary, Counterexample(explanation=summary))

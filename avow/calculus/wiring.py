@@ -27,7 +27,7 @@ def wiring(frame: Frame) -> Wiring:
     for r in system.plan.requirements:
         if r.formula is not None:
             plan.append((Kind.REQUIREMENT, "", r.id, parse_state(r.formula, system.contract, r.formula_span)))
-    plan += [(Kind.POSSIBLE, "", start_name(group), beginning(frame, group)) for group in loops(frame)]
+    plan += [(Kind.START, "", start_name(group), beginning(frame, group)) for group in loops(frame)]
     for group in circles(frame):
         for node, clause in ((name, g.name) for name in group for g in frame.node(name).guarantees):
             for found in situations(frame, group, node, clause):

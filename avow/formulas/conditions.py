@@ -15,6 +15,7 @@ from itertools import product
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import depth
+from avow.language.definedness import demanded, with_value
 from avow.language.operators import definition
 from avow.language.sorts import BOOL, BoolSort
 from avow.language.terms import (
@@ -47,7 +48,7 @@ class Condition:
     @property
     def formula(self) -> Term:
         """That it comes about."""
-        whole = conjunction(self.parts)
+        whole = with_value(conjunction(self.parts))
         free = free_variables(whole)
         used = tuple(v for v in self.outer if v in free)
         return Quantified(Quantifier.EXISTS, used, whole) if used else whole
@@ -58,7 +59,7 @@ def conditions(formula: Term) -> tuple[Condition, ...]:
     if depth(formula) > CONDITION_DEPTH:
         return ()
     found: dict[Condition, None] = {}
-    for clause in _clauses(rename_apart(formula), True):
+    for clause in _clauses(rename_apart(demanded(formula)), True):
         parts = _parts(clause)
         if parts:
             found.setdefault(Condition(clause.outer, parts))

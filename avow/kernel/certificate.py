@@ -49,8 +49,7 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One claim, by its digest, and how it is known. `base` has a question for each of the first steps, `step` is about
-    every later one."""
+    """One claim, by its digest, and how it is known. `base`: a question for each of the first steps; `step`: later."""
 
     how: How
     node: str

@@ -61,7 +61,7 @@ class Answered(NamedTuple):
 
 KINDS = {How.SHOWN: (Kind.ASSUMPTION, Kind.REQUIREMENT, Kind.IMPOSSIBLE), How.GUARANTEE: (Kind.GUARANTEE,)}
 KINDS |= {How.ENVIRONMENT: (Kind.ENVIRONMENT, Kind.ASSUMPTION), How.OPEN: (Kind.ASSUMPTION,)}
-KINDS |= {How.POSSIBLE: (Kind.POSSIBLE,)}
+KINDS |= {How.POSSIBLE: (Kind.POSSIBLE, Kind.START)}
 
 
 @dataclass
@@ -73,8 +73,7 @@ class Kernel:
     solvers: Solvers
 
     def establish(self, goal: int, *, alone: bool = False) -> Established:
-        """The claim of an entry. `alone`: told with what its own questions name, as an implication; else with all that
-        it rests on. Raises Refused."""
+        """The claim of an entry, on all that it rests on; `alone`: on what its own questions name. Raises Refused."""
         entries, (answers, refused) = self.certificate.entries, self.checked
         if goal in refused or goal not in answers:
             raise refused.get(goal, Refused("there is no such entry"))
@@ -142,10 +141,13 @@ class Kernel:
                     if any(not 0 <= u.back <= step or (u.back == 0 and u.entry >= i) for u in question.uses):
                         raise Refused("circular: an entry uses, at its own step, what comes no earlier than itself")
                     yield self.answered(entry, question, step)
-                    yield from self.begins(question, step)
+                    yield from self.begins(question.uses, question.initials, step)
             case How.POSSIBLE:
                 body = (text := Text()).formula(claim.term, claim.symbols())
                 yield self._asked(text.script([body]), Said.SAT, f"{claim.called}: no values are shown to be so")
+                if claim.kind is Kind.START:  # one example is not enough where the environment has a say
+                    firsts = [s.digest for s in self.known.every if s.kind is Kind.INITIAL and s.node in claim.nodes]
+                    yield from self.begins([use for question in entry.base for use in question.uses], firsts, 1)
 
     def _claim(self, entry: Entry) -> Statement:
         """The claim of an entry as it is now. Raises Refused."""
@@ -201,12 +203,12 @@ class Kernel:
             raise Refused("stale, or no initial condition: it speaks of more than the state before the first step")
         return found
 
-    def begins(self, question: Question, step: int) -> Iterator[Answered]:
-        """`Begins`: initials say nothing of the environment: whatever constants the question's environment allows,
+    def begins(self, uses: Sequence[Use], marks: Sequence[str], step: int) -> Iterator[Answered]:
+        """`Begins`: initials say nothing of the environment: whatever constants the environment entries used allow,
         there is a first value of each output, its conditions taken together (`Apart`). Raises Refused."""
         initials = [each for each in self.known.every if each.kind is Kind.INITIAL]
-        given = [use for use in question.uses if self.certificate.entries[use.entry].how is How.ENVIRONMENT]
-        for mark in dict.fromkeys(question.initials):
+        given = [use for use in uses if self.certificate.entries[use.entry].how is How.ENVIRONMENT]
+        for mark in dict.fromkeys(marks):
             found = [self._initial(mark)]
             while more := [s for s in initials if s not in found and any(s.sources & f.sources for f in found)]:
                 found += map(self._initial, (each.digest for each in more))

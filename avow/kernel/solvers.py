@@ -1,4 +1,4 @@
-"""A question put to Z3 within a budget that does not depend on the machine, and to a second solver if there is one."""
+"""A question put to Z3 within a budget of its own steps, and to a second solver if there is one."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from avow.language.terms import Role, Term, Variable
 class Kind(StrEnum):
     """What a claim is: a clause of a node; what the plan assumes of the environment; what an output is before the first
     step, where delayed edges deliver it; of every step of the whole system (requirement); that some values are so, or
-    none (first values of a loop, a situation that a guarantee is about)."""
+    none (a situation that a guarantee is about); that a loop has first values."""
 
     ASSUMPTION = "assumption"
     GUARANTEE = "guarantee"
@@ -31,6 +31,7 @@ class Kind(StrEnum):
     REQUIREMENT = "requirement"
     POSSIBLE = "possible"
     IMPOSSIBLE = "impossible"
+    START = "start"
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,9 +129,8 @@ def statements(wiring: Wiring) -> Statements:
         found.append(claim)
         if kind is Kind.ASSUMPTION and (marks := assumptions[node]) is not None:
             marks.add(claim.digest)
-    return Statements(
-        tuple(found), {node: frozenset(marks) for node, marks in assumptions.items() if marks is not None}
-    )
+    complete = {node: frozenset(marks) for node, marks in assumptions.items() if marks is not None}
+    return Statements(tuple(found), complete)
 
 
 def _stated(wiring: Wiring, kind: Kind, node: str, name: str, term: Term) -> Statement:
@@ -146,5 +146,5 @@ def _stated(wiring: Wiring, kind: Kind, node: str, name: str, term: Term) -> Sta
 
     body = (text := Text()).formula(term, called)
     # that some values are so is another claim than that all are
-    said = [*text.declarations.values(), *(["possible"] if kind is Kind.POSSIBLE else []), body]
+    said = [*text.declarations.values(), *([kind] if kind in (Kind.POSSIBLE, Kind.START) else []), body]
     return Statement(kind, node, name, term, places, sha256("\n".join(said)))

@@ -55,7 +55,6 @@ class Text:
         return "\n".join(["(set-logic ALL)", *self.declarations.values(), *lines, ""])
 
     def declare(self, name: str, sort: s.Sort) -> None:
-        """A free variable."""
         if self.free.setdefault(name, sort) != sort:
             raise Untranslatable(f"{name} has two types")
         parameters, result = (sort.parameters, sort.result) if isinstance(sort, s.FunctionSort) else ((), sort)

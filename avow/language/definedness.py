@@ -47,10 +47,20 @@ _ZERO = Literal(0, NATURAL)
 
 def with_value(claim: Term) -> Term:
     """The claim, and that it has a value. The same of what it gives is that again."""
-    needed, parts = _needed(claim), _parts(claim)
-    rest = ((k, And(parts[k:]) if k + 1 < len(parts) else parts[k]) for k in range(1, len(parts)))
-    asked = (parts[:k] == _parts(_needed(term)) for k, term in rest)
-    return claim if needed == TRUE or any(asked) else And((*_parts(needed), *parts), claim.span)
+    needed = _needed(claim)
+    if needed == TRUE or demanded(claim) is not claim:
+        return claim
+    return And((*_parts(needed), *_parts(claim)), claim.span)
+
+
+def demanded(claim: Term) -> Term:
+    """What a claim demands beside that it has a value: the converse of `with_value`."""
+    parts = _parts(claim) if _is_partial(claim) else ()
+    for k in range(1, len(parts)):
+        rest = And(parts[k:], claim.span) if k + 1 < len(parts) else parts[k]
+        if parts[:k] == _parts(_needed(rest)):
+            return rest
+    return claim
 
 
 def unless_without_value(claim: Term) -> Term:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.language.contract import Node
 from avow.language.definedness import with_value
 from avow.language.sorts import BOOL
 from avow.language.terms import Role, Term, Variable
@@ -49,28 +48,32 @@ def initial_condition(system: System, edge: Edge) -> Term | None:
         except Rejected as rejected:
             failures.append(rejected)
             continue
-        fed = {c.target.port for c in system.plan.connections if c.target.node == node.name} | _fed_by_names(
-            system, node
-        )
-        held = {entry.port.partition(".")[2] for entry in system.plan.environment if entry.constant}
-        foreign = [
-            v
-            for v in ports_of(term)
-            if (v.role, v.name) != (Role.OUTPUT, port.name)
-            and (v.role is Role.OUTPUT or v.name in fed or v.name not in held)
-        ]
+        foreign = [v for v in ports_of(term) if v.role is Role.OUTPUT and v.name != port.name]
         if not foreign:
             return term
-        message = (
-            f"an initial value may speak of out.{port.name} and of constant inputs from the environment, "
-            f"not of {foreign[0].qualified}: what is assumed of that is for `environment:` to say"
-        )
-        failures.append(Rejected(Diagnostic("PLAN112", message, edge.span)))
+        failures.append(Rejected(_speaks_of(edge, foreign[0])))
     what = "; ".join(d.message for d in failures[0].diagnostics)
     message = (
         f"{text!r} is neither a value of {edge.source} ({port.type_name}) nor a formula about out.{port.name}: {what}"
     )
     raise Rejected(Diagnostic("PLAN112", message, edge.initial_span))
+
+
+def _speaks_of(edge: Edge, variable: Variable) -> Diagnostic:
+    message = (
+        f"an initial value may speak of out.{edge.source.port} and of constant inputs from the environment, "
+        f"not of {variable.qualified}: what is assumed of that is for `environment:` to say"
+    )
+    return Diagnostic("PLAN112", message, edge.span)
+
+
+def _changing(system: System, graph: Graph, edge: Edge, term: Term) -> Variable | None:
+    """An input of which an initial value speaks though it is no constant one of the environment."""
+    constant = {
+        each for entry in system.plan.environment if entry.constant for each in holders(system, graph, entry)
+    } & set(graph.environment)
+    inputs = (v for v in ports_of(term) if v.role is Role.INPUT)
+    return next((v for v in inputs if Endpoint(edge.source.node, v.name) not in constant), None)
 
 
 def environment_assumptions(system: System, graph: Graph) -> tuple[Assumed, ...]:
@@ -115,7 +118,9 @@ def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
     first: dict[Endpoint, Edge] = {}
     for edge in graph.edges:
         try:
-            initial_condition(system, edge)
+            term = initial_condition(system, edge)
+            changing = None if term is None else _changing(system, graph, edge, term)
+            faults += [] if changing is None else [_speaks_of(edge, changing)]
         except Rejected as rejected:
             faults += rejected.diagnostics
         if edge.delayed and first.setdefault(edge.source, edge).initial != edge.initial:
@@ -134,12 +139,6 @@ def check_formulas(system: System, graph: Graph) -> tuple[Diagnostic, ...]:
     except Rejected as rejected:
         faults += rejected.diagnostics
     return tuple(dict.fromkeys(faults))
-
-
-def _fed_by_names(system: System, node: Node) -> set[str]:
-    """The inputs of a node that another node's output of that name and type feeds."""
-    others = [(p.name, p.sort) for other in system.contract.nodes if other.name != node.name for p in other.outputs]
-    return {p.name for p in node.inputs if (p.name, p.sort) in others}
 
 
 def ports_of(term: Term) -> tuple[Variable, ...]:

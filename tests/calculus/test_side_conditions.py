@@ -230,3 +230,26 @@ def test_digests_follow_the_meaning(tmp_path: Path) -> None:
     delayed = "connections: [{from: a.x, to: b.x, delayed: true, initial: %s}]"
     assert digest("delayed", provider + consumer, delayed % 0) != base
     assert digest("initial", provider + consumer, delayed % 1) != digest("again", provider + consumer, delayed % 0)
+
+
+@pytest.mark.parametrize("name", ["in.home", "mem.home"])
+def test_what_is_assumed_of_the_environment_reaches_the_first_step(name: str, tmp_path: Path) -> None:
+    """Also where only an initial value speaks of it."""
+    text = node("mem", "last : REAL, home : REAL", "m : REAL", "A: in.last <= 10", "G: out.m == in.last or out.m < 9")
+    plan = f"""
+connections: [{{from: mem.m, to: mem.last, delayed: true, initial: "out.m <= in.home"}}]
+environment: {{{name}: {{assume: "in.home <= 10", because: it is near, constant: true}}}}
+"""
+    assert settled(make(tmp_path, text, plan))[1].verdict is Verdict.PROVED
+
+
+def test_a_constant_of_that_name_elsewhere_is_no_constant(tmp_path: Path) -> None:
+    text = node("a", "last : REAL, h : REAL", "m : REAL") + node("b", "h : REAL", "n : REAL")
+    plan = """
+connections: [{from: a.m, to: a.last, delayed: true, initial: "out.m <= in.h"}]
+environment: {b.h: {because: it does not move, constant: true}, a.h: {because: it moves}}
+"""
+    with pytest.raises(Rejected) as rejected:
+        make(tmp_path, text, plan)
+    assert [d.code for d in rejected.value.diagnostics] == ["PLAN112"]
+    make(tmp_path / "good", text, plan.replace("b.h", "b.o").replace("a.h", "b.h").replace("b.o", "a.h"))

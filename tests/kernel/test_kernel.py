@@ -242,6 +242,32 @@ def test_no_first_value_is_no_beginning(tmp_path: Path) -> None:
     assert certificates.requirement("R", Hint(()), Bounds()) is None
 
 
+MEMORY = node("mem", "last : REAL, home : REAL", "m : REAL", "A: in.last <= 10", "G: out.m in {in.last, in.home}")
+EDGE = 'connections: [{from: mem.m, to: mem.last, delayed: true, initial: "%s"}]\n'
+HOME = 'environment: {in.home: {assume: "in.home <= 10", because: it is near, constant: true}}\n'
+
+
+def test_a_beginning_that_hinges_on_the_environment_rests_on_it(tmp_path: Path) -> None:
+    """First values have to be there whatever the constant inputs are; where only for some, that these are meant is a
+    hypothesis, also when the claim is established again, and a certificate without it shows nothing."""
+    for at, (initial, needs) in enumerate([("out.m <= in.home", False), ("out.m <= 10 and in.home <= 10", True)]):
+        certificates = compose(make(tmp_path / str(at), MEMORY, EDGE % initial + HOME)).certificates
+        (found,) = certificates.existence("start.mem") or [None]
+        assert found is not None
+        assert [need.kind for need in found.hypotheses] == [How.ENVIRONMENT] * needs
+        again = Certificates(certificates.composition, kept=dict(certificates.made))
+        assert again.kept_existence("start.mem") == [found]
+        bare = Entry(How.POSSIBLE, "", certificates.made["existence start.mem"].entries[-1].digest)
+        kernel = Kernel(certificates.known, Certificate("existence start.mem", (bare,)), Solvers())
+        if needs:
+            with pytest.raises(Refused, match="constant"):
+                kernel.establish(0)
+        else:
+            assert kernel.establish(0).hypotheses == ()
+    none = compose(make(tmp_path / "none", MEMORY, EDGE % "out.m == 1 and in.home == 2" + HOME)).certificates
+    assert none.existence("start.mem") is None
+
+
 def test_room_in_a_circle(tmp_path: Path) -> None:
     certificates = compose(make(tmp_path / "room", CIRCLE)).certificates
     assert certificates.existence("joint.a.G1") is not None

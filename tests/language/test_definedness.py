@@ -20,7 +20,8 @@ from avow.language.printer import show_term
 from avow.language.terms import TRUE
 from avow.tuning.sizes import NESTING
 
-TEXT = "node n { inputs( x : REAL, i : INTEGER, k : NATURAL, s : <INTEGER>, b : BOOL ) outputs() topics() guarantee ( b or not b ) }"
+TEXT = "node n { inputs( x : REAL, i : INTEGER, k : NATURAL, s : <INTEGER>, b : BOOL ) outputs() topics() "
+TEXT += "guarantee ( b or not b ) }"
 POINTS: list[dict[str, Any]] = [
     {"x": Fraction(x), "i": i, "k": k, "s": s, "b": b}
     for x, i, k, s, b in product((-1, 0, 2), (-1, 0, 1, 2), (0, 1, 2), ((), (0,), (0, 1)), (False, True))
@@ -36,8 +37,8 @@ def own() -> Node:
 NODE = own()
 
 
-class NoValue(Exception):
-    """Of an atom."""
+class Valueless(Exception):  # noqa: N818 - it names what an atom is
+    """An atom has no value."""
 
 
 # a formula as the test has it: its text, and its truth (True, False, None: no value)
@@ -48,14 +49,14 @@ def atom(r: random.Random) -> Made:
     def element(text: str, at: Any) -> tuple[str, Any]:
         def value(p: dict[str, Any]) -> int:
             if not 0 <= at(p) < len(p["s"]):
-                raise NoValue
+                raise Valueless
             return int(p["s"][at(p)])
 
         return f"s({text})", value
 
     def quotient(p: dict[str, Any]) -> Fraction:
         if p["x"] == 0:
-            raise NoValue
+            raise Valueless
         return 1 / p["x"]
 
     shift = r.choice([0, 1])
@@ -91,7 +92,7 @@ def made(r: random.Random, depth: int) -> Made:
         def truth(p: dict[str, Any]) -> bool | None:
             try:
                 return bool(holds(p))
-            except NoValue:
+            except Valueless:
                 return None
 
         return text, truth
@@ -119,7 +120,7 @@ def made(r: random.Random, depth: int) -> Made:
             def conditional(p: dict[str, Any]) -> bool | None:
                 try:
                     return left(p) if chosen(p) else right(p)
-                except NoValue:
+                except Valueless:
                     return None
 
             return f"(if {test} then {one} else {two})", conditional

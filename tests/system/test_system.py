@@ -98,6 +98,7 @@ def test_faults_of_plan_and_contract_come_together(tmp_path: Path) -> None:
         ("expected: [{obligation: c/sanity/x, verdict: refuted}]", "PLAN106", 1, "'c'", "a, b, system"),
         ("connections: [{from: a.x, to: b.x, delayed: true, initial: blue}]", "PLAN112", 1, "blue", ""),
         ("connections: [{from: a.x, to: b.x, delayed: true, initial: out.x > in.q}]", "PLAN112", 1, "neither", ""),
+        ("connections: [{from: a.x, to: b.x, delayed: true, initial: out.x > in.r}]", "PLAN112", 1, "of in.r", ""),
     ],
 )
 def test_names_and_formulas_of_a_plan(tmp_path: Path, plan: str, code: str, line: int, words: str, hint: str) -> None:
