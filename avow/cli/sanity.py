@@ -81,6 +81,7 @@ def to_json(result: SanityResult) -> dict[str, Any]:
         "conflicts": [
             {"clauses": list(clauses), "counterexample": _counterexample(shown)} for clauses, shown in result.conflicts
         ],
+        "cut_short": result.cut_short,
         "because": result.because,
         "engine": result.engine,
         "bounded": result.bounded,
@@ -113,7 +114,8 @@ def _listing(results: list[SanityResult], everything: bool) -> None:
     from avow.base.verdict import Verdict
 
     console = Console(highlight=False)
-    shown = [r for r in results if everything or (r.verdict is not Verdict.PROVED and not r.because)]
+    folded = [] if everything else [r for r in results if _free(r)]
+    shown = [r for r in results if everything or not (r.verdict is Verdict.PROVED or r.because or r in folded)]
     node = ""
     for result in shown:
         if result.node != node:
@@ -130,6 +132,9 @@ def _listing(results: list[SanityResult], everything: bool) -> None:
         console.print(Padding(line, (0, 0, 0, 2)))
         for example in _examples(result):
             console.print(Padding(Text(example.text()), (0, 0, 0, 13)))
+    if folded:
+        names = ", ".join(f"{r.node}.{r.subject}" for r in folded)
+        console.print(Text(f"more than one value is allowed for the same inputs: {names} (--all shows which)", "dim"))
     refuted = [r for r in results if r.verdict is Verdict.REFUTED]
     unknown = sum(r.verdict is Verdict.UNKNOWN for r in results)
     errors = sum(r.fails for r in refuted)
@@ -139,6 +144,13 @@ def _listing(results: list[SanityResult], everything: bool) -> None:
         f"{len(results)} claims: {len(results) - len(refuted) - unknown} hold, "
         f"{len(refuted)} refuted ({errors} of them errors{consequences}), {unknown} unknown"
     )
+
+
+def _free(result: SanityResult) -> bool:
+    """Whether it says only that an output is the implementation's to choose."""
+    from avow.sanity.claims import Property
+
+    return result.about is Property.UNDETERMINED and result.verdict == "refuted" and not result.because
 
 
 def _style(result: SanityResult) -> str:

@@ -22,13 +22,12 @@ from avow.language.contract import ClauseKind, Contract, Node
 from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, claims, node_key, triggers
-from avow.sanity.results import Bounds, Patience, SanityResult, as_outcome, listing
+from avow.sanity.results import CUT_SHORT, Bounds, Patience, SanityResult, as_outcome, listing
 from avow.solving.limits import spent
 from avow.tuning.effort import CONSISTENT_EFFORT
 
 if TYPE_CHECKING:
-    from avow.sanity.conflicts import Conflict
-    from avow.sanity.realizability import Group, Realizability
+    from avow.sanity.realizability import Realizability
 
 __all__ = [
     "Bounds",
@@ -56,6 +55,7 @@ class _Finding:
     because: str | None = None
     engine: str = "z3"
     bounded: bool = False
+    cut_short: bool = False
 
 
 def analyse(
@@ -111,6 +111,7 @@ def _result(node: Node, claim: Claim, finding: _Finding, seconds: float) -> Sani
         finding.counterexample,
         finding.explanation,
         finding.conflicts,
+        finding.cut_short,
         finding.because,
         finding.engine,
         finding.bounded,
@@ -212,12 +213,14 @@ class _Analysis:
 
         if finding.verdict is not Verdict.REFUTED or not finding.clauses:
             return finding
-        sets = contradictions(formulas, finding.clauses, effort=self.patience.full // 2, seed=self.seed)
-        if len(sets) == 1:
+        sets, complete = contradictions(formulas, finding.clauses, effort=self.patience.full // 2, seed=self.seed)
+        if len(sets) == 1 and complete:
             return finding
         text = ", nor ".join((finding.explanation, *map(listing, sets[1:])))
         shown = tuple((s, Counterexample(explanation=f"nothing meets {listing(s)}")) for s in sets)
-        return replace(finding, explanation=text, conflicts=shown)
+        return replace(
+            finding, explanation=text + ("" if complete else CUT_SHORT), conflicts=shown, cut_short=not complete
+        )
 
     def _realizability(self) -> tuple[Realizability, bool]:
         """The answer, and whether it is about the scenario only."""
@@ -264,7 +267,6 @@ class _Analysis:
 
     def _realizable(self) -> _Finding:
         from avow.sanity.conflicts import conflicts
-        from avow.sanity.realizability import groups
 
         answer, bounded = self._realizability()
         if answer.verdict is Verdict.PROVED:
@@ -274,13 +276,15 @@ class _Analysis:
             return _Finding(verdict, _resting(answer.needed), answer.needed, engine=answer.engine, bounded=bounded)
         if answer.verdict is not Verdict.REFUTED:
             return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
-        found: list[Conflict] = []
-        for group in groups(self.guarantees, self.outputs):
-            at = answer.inputs if tuple(group.guarantees) == answer.group else self._refuting(group)
-            if at is not None:
-                limit = 2 * self.patience.full
-                found += conflicts(self.inputs, group, self.assumptions, at, effort=limit, seed=self.seed)
-        found.sort(key=lambda conflict: not set(conflict.clauses) <= set(answer.group))
+        found, complete = conflicts(
+            self.inputs,
+            self.outputs,
+            self.assumptions,
+            self.guarantees,
+            answer,
+            effort=2 * self.patience.full,
+            seed=self.seed,
+        )
         listed = tuple((conflict.clauses, conflict.counterexample()) for conflict in found)
         if not listed:
             from avow.solving.counterexample import show_values
@@ -290,18 +294,8 @@ class _Analysis:
         # A conflict between guarantees tells more than one guarantee that cannot be met by itself.
         clauses, shown = next((pair for pair in listed if len(pair[0]) > 1), listed[0])
         because = "consistent" if self._other("consistent").verdict is Verdict.REFUTED else None
-        text = f"for some inputs no output meets {listing(clauses)}"
-        return _Finding(Verdict.REFUTED, text, clauses, shown, listed, because, answer.engine)
-
-    def _refuting(self, group: Group) -> Mapping[Variable, Value] | None:
-        """An input for which no output meets these guarantees, which share no output with the others."""
-        from avow.sanity.realizability import realizable
-
-        limit = self.patience.full
-        answer = realizable(
-            self.inputs, group.outputs, self.assumptions, group.guarantees, effort=limit, seed=self.seed
-        )
-        return answer.inputs if answer.verdict is Verdict.REFUTED else None
+        text = f"for some inputs no output meets {listing(clauses)}{'' if complete else CUT_SHORT}"
+        return _Finding(Verdict.REFUTED, text, clauses, shown, listed, because, answer.engine, cut_short=not complete)
 
     # -- one clause ----------------------------------------------------------------------------------------------------
 

@@ -1,130 +1,248 @@
-"""Why a contract is not realizable: which guarantees conflict, at which inputs, and what each demands there.
+"""Why a contract is not realizable: which guarantees conflict, where, and what each demands there.
 
-A conflict is a set of guarantees that no output meets together at some allowed input, though without any one of them
-some output would. Different inputs can show different conflicts; each is shown once, with its input. Conflicts of more
-than three guarantees are found only at inputs that came up for another reason.
+A conflict is a set of guarantees that no output meets together at some allowed input, while every smaller set can be
+met at all of them. Every one is looked for (`avow.sanity.minimal_sets`); where the search was cut short, that is said.
+A guarantee that cannot be met by itself at some input would hide its conflicts at others: those that come up are listed
+too. What is shown of an input is what matters: the comparisons that make the conflict, and the inputs they speak of.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, field
 
 from avow.base.verdict import Counterexample, Verdict
-from avow.formulas.formula import free_variables
+from avow.formulas.formula import free_variables, negation
+from avow.formulas.traversal import subterms
 from avow.formulas.values import Data, Value, show
-from avow.language.sorts import DataSort, FunctionSort
-from avow.language.terms import Compare, Construct, Not, Quantified, Quantifier, Role, Term, Variable
-from avow.sanity.realizability import Formulas, Given, Group, Search
+from avow.language.operators import OPPOSITE
+from avow.language.printer import show_term
+from avow.language.sorts import BoolSort, DataSort, FunctionSort
+from avow.language.terms import Apply, Compare, Construct, In, Not, Quantified, Quantifier, Role, Term, Variable
+from avow.sanity.minimal_sets import UndecidedError, minimal_sets
+from avow.sanity.realizability import Formulas, Given, Group, Realizability, Search, groups, realizable
 from avow.solving.counterexample import show_values
 from avow.solving.limits import spent, until
-from avow.solving.questions import Unsupported, solve
+from avow.solving.questions import Unsupported, replay, solve
 from avow.solving.z3_module import z3
 from avow.tuning.bounds import CONFLICTS
-from avow.tuning.effort import CONFLICT_EFFORT
+from avow.tuning.effort import CONFLICT_EFFORT, CONFLICT_SEARCH_EFFORT
 
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """A minimal set of guarantees that cannot all be met, with an input and what each demands there."""
+    """A minimal set of guarantees that cannot all be met, with an input and what each demands there. `where` says of
+    which inputs this is true; None where that was not found out."""
 
     clauses: tuple[str, ...]
-    inputs: Mapping[Variable, Value]
+    inputs: Given
     demands: tuple[str, ...]
+    where: tuple[Term, ...] | None = None
 
     def counterexample(self) -> Counterexample:
-        return Counterexample(show_values(self.inputs), ", ".join(self.demands))
+        demands = ", ".join(self.demands)
+        region = " and ".join(map(show_term, self.where or ()))
+        return Counterexample(show_values(self.inputs), f"wherever {region}: {demands}" if region else demands)
 
 
 def conflicts(
     inputs: Sequence[Variable],
-    group: Group,
+    outputs: Sequence[Variable],
     assumptions: Formulas,
-    first: Mapping[Variable, Value],
+    guarantees: Formulas,
+    answer: Realizability,
     *,
-    given: Given | None = None,
     effort: int = 4_000,
     seed: int = 0,
-) -> tuple[Conflict, ...]:
-    """The conflicts among a group's guarantees: those at the input `first`, and others found within the time."""
-    deadline = until(effort)
-    found: dict[frozenset[str], Mapping[Variable, Value]] = {}
+) -> tuple[tuple[Conflict, ...], bool]:
+    """The conflicts among guarantees, of which `answer` has one: its own group's first, then those of fewest clauses;
+    and whether these are all. The effort is for each group of guarantees that share outputs."""
+    found: list[Conflict] = []
+    complete = True
+    for group in groups(guarantees, outputs):
+        at: Given | None = answer.inputs
+        if tuple(group.guarantees) != answer.group:
+            other = realizable(inputs, group.outputs, assumptions, group.guarantees, effort=effort // 2, seed=seed)
+            at = other.inputs if other.verdict is Verdict.REFUTED else None
+            complete = complete and other.verdict is not Verdict.UNKNOWN
+        if at is not None:
+            search = _Search(tuple(inputs), group, assumptions, until(effort), seed, [at])
+            complete = search.run() and complete
+            found += search.conflicts()
+    found.sort(key=lambda conflict: not set(conflict.clauses) <= set(answer.group))
+    return tuple(found), complete
 
-    def learn(at: Mapping[Variable, Value]) -> None:
-        for clauses in _minimal_sets(group, at, deadline, seed):
-            found.setdefault(clauses, at)
 
-    learn(first)
-    labels = tuple(group.guarantees)
-    # Two guarantees against each other are what people want to see first, and what happens most.
-    for size, patience in ((2, 1_000), (1, 400), (3, 400)):
-        for chosen in combinations(labels, size):
-            left = int(deadline - spent())
-            if frozenset(chosen) in found or left <= 0:
-                continue
-            formulas = {label: group.guarantees[label] for label in chosen}
-            possible = [{other: formulas[other] for other in chosen if other != label} for label in chosen if size > 1]
-            mentioned = frozenset(v for formula in formulas.values() for v in free_variables(formula))
-            outputs = tuple(v for v in group.outputs if v in mentioned)
-            limit = min(left, patience)
-            search = Search(inputs, Group(formulas, outputs), assumptions, given or {}, limit, seed)
-            try:
-                answer = search.refute(possible, limit)
-            except (Unsupported, z3.Z3Exception):  # what is not found is only not shown
-                continue
-            if answer is not None and answer.verdict is Verdict.REFUTED:
-                learn(answer.inputs)
-    order = {label: k for k, label in enumerate(labels)}
-    listed = sorted(found.items(), key=lambda pair: (len(pair[0]), sorted(order[label] for label in pair[0])))
-    return tuple(_explain(tuple(sorted(clauses, key=order.__getitem__)), group, at, seed) for clauses, at in listed)
+@dataclass(slots=True)
+class _Search:
+    """One group's conflicts."""
+
+    inputs: tuple[Variable, ...]
+    group: Group
+    assumptions: Formulas
+    deadline: float
+    seed: int
+    shown: list[Given]
+    """Allowed inputs for which no output meets all of the group."""
+    refuted: dict[frozenset[str], Given] = field(default_factory=dict)
+    """Sets of guarantees that no output meets, and where."""
+    found: list[frozenset[str]] = field(default_factory=list)
+
+    def run(self) -> bool:
+        """Whether every conflict was found."""
+        labels = tuple(self.group.guarantees)
+        sets = minimal_sets(labels, self._core, most=CONFLICTS, ended=self._ended)
+        self.found += sets.sets
+        alone = [label for label in labels if frozenset((label,)) in self.found]
+        for pair in (frozenset((label, other)) for label in alone for other in labels if label != other):
+            if not self._ended() and pair not in self.found:
+                self._beside(pair)
+        for at in self.shown if alone else ():
+            self._learn(at)
+        return sets.complete
+
+    def conflicts(self) -> list[Conflict]:
+        labels = tuple(self.group.guarantees)
+        ordered = [tuple(label for label in labels if label in chosen) for chosen in self.found]
+        ordered.sort(key=lambda clauses: (len(clauses), [labels.index(label) for label in clauses]))
+        return [self._explain(clauses, self.refuted[frozenset(clauses)]) for clauses in ordered]
+
+    def _ended(self) -> bool:
+        return spent() > self.deadline
+
+    def _core(self, chosen: frozenset[str]) -> frozenset[str] | None:
+        """Of these guarantees some that no output meets at some allowed input; None if all can always be met."""
+        for at in self.shown:
+            if (core := self._core_at(at, chosen)) is not None:
+                return core
+        left = min(CONFLICT_SEARCH_EFFORT, int(self.deadline - spent()))
+        if left <= 0:
+            raise UndecidedError
+        formulas, outputs = self._part(chosen)
+        found = realizable(self.inputs, outputs, self.assumptions, formulas, effort=left, seed=self.seed)
+        if found.verdict is Verdict.PROVED:
+            return None
+        if found.verdict is not Verdict.REFUTED:
+            raise UndecidedError
+        self.shown.append(found.inputs)
+        self.refuted.setdefault(chosen, found.inputs)
+        return self._core_at(found.inputs, chosen) or chosen
+
+    def _core_at(self, at: Given, chosen: frozenset[str]) -> frozenset[str] | None:
+        formulas, outputs = self._part(chosen)
+        answer = solve(formulas, given=at, variables=outputs, effort=CONFLICT_EFFORT, seed=self.seed, shown=False)
+        if answer.status != "unsat":
+            return None
+        core = frozenset(answer.core)
+        self.refuted.setdefault(core, at)
+        return core
+
+    def _part(self, chosen: frozenset[str]) -> tuple[dict[str, Term], tuple[Variable, ...]]:
+        formulas = {label: formula for label, formula in self.group.guarantees.items() if label in chosen}
+        mentioned = frozenset[Variable]().union(*map(free_variables, formulas.values()))
+        return formulas, tuple(v for v in self.group.outputs if v in mentioned)
+
+    def _beside(self, pair: frozenset[str]) -> None:
+        """Look for an input at which each of the two can be met, and not both."""
+        formulas, outputs = self._part(pair)
+        limit = min(CONFLICT_SEARCH_EFFORT, int(self.deadline - spent()))
+        search = Search(self.inputs, Group(formulas, outputs), self.assumptions, {}, limit, self.seed)
+        try:
+            answer = search.refute([{label: formula} for label, formula in formulas.items()], limit)
+        except (Unsupported, z3.Z3Exception):  # what is not found is only not shown
+            return
+        if answer is not None and answer.verdict is Verdict.REFUTED:
+            self.shown.append(answer.inputs)
+
+    def _learn(self, at: Given) -> None:
+        """The sets that are minimal at this input, but for those that hold others of several guarantees."""
+        sets = minimal_sets(
+            tuple(self.group.guarantees), lambda c: self._core_at(at, c), most=CONFLICTS, ended=self._ended
+        )
+        for chosen in sets.sets:
+            if chosen not in self.found and not any(len(other) > 1 and other < chosen for other in self.found):
+                self.refuted[chosen] = at
+                self.found.append(chosen)
+
+    def _explain(self, clauses: tuple[str, ...], at: Given) -> Conflict:
+        demands = tuple(
+            f"guarantee {label} {_demand(self.group.guarantees[label], self.group.outputs, at, self.seed)}"
+            for label in clauses
+        )
+        wanted = {**self.assumptions, **self._part(frozenset(clauses))[0]}
+        where, matter = _region(self.inputs, wanted, at, self.seed)
+        return Conflict(clauses, {v: value for v, value in at.items() if v in matter}, demands, where)
 
 
 def contradictions(
-    formulas: Mapping[str, Term], first: Iterable[str], *, effort: int, seed: int = 0
-) -> tuple[tuple[str, ...], ...]:
-    """The minimal sets of formulas that cannot hold together, `first` before the others that are found within the time
-    (eight at most): a set other than these lacks a formula of each of them (Reiter, "A theory of diagnosis from first
-    principles", 1987)."""
+    formulas: Formulas, first: Iterable[str], *, effort: int, seed: int = 0
+) -> tuple[tuple[tuple[str, ...], ...], bool]:
+    """The minimal sets of formulas that cannot hold together, `first` before the others; and whether these are all."""
     deadline = until(effort)
-    found = [frozenset(first)]
-    waiting: list[frozenset[str]] = [frozenset()]
-    for without in waiting:  # which grows
-        if spent() > deadline or len(found) >= CONFLICTS:
+    known = frozenset(first)
+
+    def core(chosen: frozenset[str]) -> frozenset[str] | None:
+        if known <= chosen:
+            return known
+        kept = {label: formula for label, formula in formulas.items() if label in chosen}
+        answer = solve(kept, effort=min(CONFLICT_EFFORT, effort), seed=seed, shown=False)
+        if answer.status == "unknown":
+            raise UndecidedError
+        return frozenset(answer.core) if answer.status == "unsat" else None
+
+    sets = minimal_sets(tuple(formulas), core, most=CONFLICTS, ended=lambda: spent() > deadline)
+    ordered = sorted(sets.sets, key=lambda chosen: chosen != known)
+    return tuple(tuple(label for label in formulas if label in chosen) for chosen in ordered), sets.complete
+
+
+def _region(
+    inputs: Sequence[Variable], wanted: Formulas, at: Given, seed: int
+) -> tuple[tuple[Term, ...] | None, frozenset[Variable]]:
+    """Comparisons of the formulas, true at this input, wherever which no output meets them; and the inputs that these
+    speak of, with those whose very value it takes."""
+    known = [v for v in inputs if v in at]
+    found = (_reading(atom, at) for atom in _about(wanted.values(), known))
+    readings: list[Term] = list(dict.fromkeys(reading for reading in found if reading is not None))
+    labelled: dict[str, Term] = {f"where {k}": reading for k, reading in enumerate(readings)}
+    fixed: list[Variable] = []
+    for tried in ([], [v for v in known if not isinstance(v.sort, FunctionSort)], known):
+        fixed = tried
+        answer = solve({**wanted, **labelled}, given={v: at[v] for v in fixed}, effort=CONFLICT_EFFORT, seed=seed)
+        if answer.status == "unsat":
             break
-        core = next((known for known in found if not known & without), None)
-        if core is None:
-            kept = {label: formula for label, formula in formulas.items() if label not in without}
-            answer = solve(kept, effort=min(500, effort), seed=seed, shown=False)
-            if answer.status != "unsat":
-                continue
-            core = frozenset(answer.core)
-            found.append(core)
-        further = (without | {label} for label in formulas if label in core)
-        waiting.extend(labels for labels in further if labels not in waiting)
-    return tuple(tuple(label for label in formulas if label in core) for core in found)
+    else:
+        return None, frozenset(known)
+    for variable in list(fixed):
+        fewer = {v: at[v] for v in fixed if v != variable}
+        without = solve({**wanted, **labelled}, given=fewer, effort=CONFLICT_EFFORT, seed=seed)
+        if without.status == "unsat":
+            fixed.remove(variable)
+            answer = without
+    where = tuple(labelled[label] for label in answer.core if label in labelled)
+    return where, frozenset(fixed).union(*map(free_variables, where))
 
 
-def _minimal_sets(group: Group, at: Mapping[Variable, Value], deadline: float, seed: int) -> Iterable[frozenset[str]]:
-    """The minimal sets of guarantees that no output meets at this input, smallest first."""
-    minimal: list[frozenset[str]] = []
-    for size in range(1, len(group.guarantees) + 1):
-        for chosen in map(frozenset, combinations(group.guarantees, size)):
-            if any(smaller <= chosen for smaller in minimal):
-                continue
-            if spent() > deadline and size > 2:
-                return minimal
-            formulas = {label: group.guarantees[label] for label in group.guarantees if label in chosen}
-            if solve(formulas, given=at, variables=group.outputs, effort=CONFLICT_EFFORT, seed=seed).status == "unsat":
-                minimal.append(chosen)
-    return minimal
-
-
-def _explain(clauses: tuple[str, ...], group: Group, at: Mapping[Variable, Value], seed: int) -> Conflict:
-    demands = tuple(
-        f"guarantee {label} {_demand(group.guarantees[label], group.outputs, at, seed)}" for label in clauses
+def _about(formulas: Iterable[Term], inputs: Sequence[Variable]) -> list[Term]:
+    """The comparisons in the formulas that speak of inputs only."""
+    found = (
+        part
+        for formula in formulas
+        for part in subterms(formula)
+        if isinstance(part, Compare | In | Apply | Variable) and isinstance(part.sort, BoolSort)
     )
-    return Conflict(clauses, at, demands)
+    return [part for part in dict.fromkeys(found) if (used := free_variables(part)) and used <= set(inputs)]
+
+
+def _reading(atom: Term, at: Given) -> Term | None:
+    """The comparison, or what holds in its place, as it is true at this input; None where it has no value there."""
+    if replay((atom,), at, effort=CONFLICT_EFFORT) is True:
+        return atom
+    match atom:
+        case Compare(operator=sign, left=left, right=right):
+            other: Term = Compare(OPPOSITE[sign], left, right)
+        case _:  # not a comparison of two values
+            other = negation(atom)
+    return other if replay((other,), at, effort=CONFLICT_EFFORT) is True else None
 
 
 def _demand(formula: Term, outputs: Sequence[Variable], at: Mapping[Variable, Value], seed: int) -> str:

@@ -37,6 +37,8 @@ class SanityResult:
     explanation: str = ""
     conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
     """Every conflict found: a minimal set of clauses that cannot all be met, with an input and what each demands."""
+    cut_short: bool = False
+    """The search for conflicts was: there may be others, or smaller ones."""
     because: str | None = None
     """The name of the result of which this one is a mere consequence."""
     engine: str = "z3"
@@ -67,6 +69,7 @@ class Patience:
         return max(1, int(self.full * share) // (1 if serious else 3))
 
 
+CUT_SHORT = "; the search for conflicts was cut short: there may be others"
 WITHIN = "scenario: inputs and quantified variables have the values that the plan's scenario gives them, and no others"
 
 
@@ -80,6 +83,8 @@ def as_outcome(identity: str, node: str, name: str, result: SanityResult | None)
         details["because"] = result.because
     if result.conflicts:
         details["conflicts"] = [{"clauses": list(c), "counterexample": e.text()} for c, e in result.conflicts]
+    if result.cut_short:
+        details["cut_short"] = True
     return Outcome(
         identity,
         result.verdict,

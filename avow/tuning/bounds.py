@@ -123,8 +123,8 @@ CHAIN_BLOCK = 8
 """How many terms are put together at each level of a long chain. 8 ** 7 is more than a text may have tokens, and a
 spine of 7 levels is 7 * 8 < CHAIN terms long."""
 
-CONFLICTS = 8
-"""Conflicts that are looked for: whoever mends eight asks again."""
+CONFLICTS = 64
+"""Conflicts that are looked for: whoever mends so many asks again."""
 
 SIZES_TRIED = (1, 2, 3)
 """Sizes of an unspecified type that a contract should allow, beside larger ones: with one element nothing differs, two

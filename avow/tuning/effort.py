@@ -117,6 +117,9 @@ WITNESS_PATIENT_EFFORT = 300
 """From this much effort on for one attempt, all that is known of the chosen constants is told: short attempts are
 quicker without."""
 
+CONFLICT_SEARCH_EFFORT = 1_000
+"""For whether some set of guarantees can be met at every input: small sets are decided soon, or mostly not at all."""
+
 CONFLICT_EFFORT = 500
 """For each of the questions that make a conflict smaller: there are many, and none of them decides anything."""
 

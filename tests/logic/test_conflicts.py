@@ -1,0 +1,164 @@
+"""Every minimal conflict, and where it is, against enumeration."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable
+from itertools import combinations, product
+
+import pytest
+
+from avow.base.verdict import Verdict
+from avow.formulas.values import Value
+from avow.language.terms import Role, Variable
+from avow.sanity.conflicts import Conflict, conflicts
+from avow.sanity.minimal_sets import UndecidedError, minimal_sets
+from avow.sanity.realizability import realizable
+
+from .contracts import contract
+from .enumeration import Enumeration
+
+holds = Enumeration().holds
+LABELS = tuple("abcdefg")
+
+
+def subsets(labels: Iterable[str]) -> list[frozenset[str]]:
+    listed = tuple(labels)
+    return [frozenset(c) for size in range(1, len(listed) + 1) for c in combinations(listed, size)]
+
+
+def least(failing: Iterable[frozenset[str]]) -> set[frozenset[str]]:
+    listed = list(failing)
+    return {s for s in listed if not any(other < s for other in listed)}
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_every_minimal_set_is_found(seed: int) -> None:
+    draw = random.Random(seed)
+    wanted = least(frozenset(draw.sample(LABELS, draw.randint(1, 4))) for _ in range(draw.randint(0, 9)))
+
+    def core(chosen: frozenset[str]) -> frozenset[str] | None:
+        having = [s for s in wanted if s <= chosen]
+        return draw.choice([*having, chosen]) if having else None
+
+    found = minimal_sets(LABELS, core, most=100, ended=lambda: False)
+    assert (set(found.sets), len(found.sets), found.complete) == (wanted, len(wanted), True)
+    if len(wanted) > 1:
+        cut = minimal_sets(LABELS, core, most=len(wanted) - 1, ended=lambda: False)
+        assert not cut.complete
+        assert set(cut.sets) < wanted
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_undecided_makes_the_list_incomplete_and_nothing_in_it_wrong(seed: int) -> None:
+    draw = random.Random(seed)
+    wanted = least(frozenset(draw.sample(LABELS, 2)) for _ in range(4))
+    hard = {s for s in subsets(LABELS) if draw.random() < 0.2}
+    asked: set[frozenset[str]] = set()
+
+    def core(chosen: frozenset[str]) -> frozenset[str] | None:
+        if chosen in hard:
+            asked.add(chosen)
+            raise UndecidedError
+        return next((s for s in sorted(wanted, key=sorted) if s <= chosen), None) and chosen
+
+    found = minimal_sets(LABELS, core, most=100, ended=lambda: False)
+    assert all(any(s <= one for s in wanted) for one in found.sets)
+    assert found.complete == (not asked)
+
+
+def found_of(text: str) -> tuple[tuple[Conflict, ...], bool]:
+    (node,) = contract(text).nodes
+    inputs, outputs = (tuple(p.variable for p in ports) for ports in (node.inputs, node.outputs))
+    assumptions, guarantees = ({c.name: c.formula for c in kind} for kind in (node.assumptions, node.guarantees))
+    answer = realizable(inputs, outputs, assumptions, guarantees)
+    if answer.verdict is not Verdict.REFUTED:
+        return (), True
+    return conflicts(inputs, outputs, assumptions, guarantees, answer, effort=40_000)
+
+
+def drawn(draw: random.Random) -> str:
+    names = ["in.a", "in.b", "in.c", "out.x", "out.y", "out.z"]
+
+    def literal(choice: list[str]) -> str:
+        return draw.choice(("", "not ")) + draw.choice(choice)
+
+    guarantees = "\n".join(
+        f"guarantee g{k} ( {literal(names[:3])} and {literal(names[:3])} -> {literal(names[3:])} or {literal(names)} )"
+        if draw.random() < 0.5
+        else f"guarantee g{k} ( {literal(names[:3])} -> {literal(names[3:])} )"
+        for k in range(7)
+    )
+    assume = f"assume( {literal(names[:3])} or {literal(names[:3])} )"
+    ports = "inputs( a : BOOL, b : BOOL, c : BOOL ) outputs( x : BOOL, y : BOOL, z : BOOL ) topics()"
+    return f"node n {{ {ports} {assume} {guarantees} }}"
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_conflicts_are_those_of_enumeration_and_are_wherever_it_is_said(seed: int) -> None:
+    text = drawn(random.Random(seed))
+    (node,) = contract(text).nodes
+    bools: tuple[Value, ...] = (False, True)
+    inputs = [p.variable for p in node.inputs]
+    outputs = [p.variable for p in node.outputs]
+    formulas = {c.name: c.formula for c in node.guarantees}
+    allowed = [
+        at
+        for values in product(bools, repeat=3)
+        if all(holds(c.formula, at := dict(zip(inputs, values, strict=True))) for c in node.assumptions)
+    ]
+    met = {
+        tuple(at.values()): [
+            frozenset(g for g, f in formulas.items() if holds(f, {**at, **dict(zip(outputs, chosen, strict=True))}))
+            for chosen in product(bools, repeat=3)
+        ]
+        for at in allowed
+    }
+
+    def fails(chosen: frozenset[str], at: dict[Variable, Value]) -> bool:
+        return not any(chosen <= some for some in met[tuple(at.values())])
+
+    failing = [s for s in subsets(formulas) if any(fails(s, at) for at in allowed)]
+    found, complete = found_of(text)
+    sets = [frozenset(conflict.clauses) for conflict in found]
+    assert complete
+    assert len(set(sets)) == len(sets)
+    assert least(failing) <= set(sets)
+    for conflict in found:
+        chosen = frozenset(conflict.clauses)
+        assert any(fails(chosen, at) and not any(fails(chosen - {g}, at) for g in chosen) for at in allowed)
+        assert conflict.where is not None
+        for at in allowed:
+            same = all(at[v] == value for v, value in conflict.inputs.items())
+            if same or (conflict.where and all(holds(term, at) for term in conflict.where)):
+                assert fails(chosen, at), (conflict, at)
+
+
+def test_inputs_that_do_not_matter_are_left_out_and_numbers_have_a_region() -> None:
+    text = """
+    node n {
+      inputs( r : REAL, s : REAL, on : BOOL ) outputs( v : REAL ) topics()
+      guarantee low ( in.r > 3 -> out.v > 3 ) guarantee high ( in.r > 4 -> out.v < 2 )
+    }"""
+    ((conflict,), complete) = found_of(text)
+    assert complete
+    assert conflict.clauses == ("low", "high")
+    assert [v.qualified for v in conflict.inputs] == ["in.r"]
+    assert conflict.counterexample().explanation.startswith("wherever in.r > 4: guarantee low ")
+    assert all(v.role is Role.INPUT for v in conflict.inputs)
+
+
+def test_all_of_many_are_found() -> None:
+    """Twenty guarantees, four of which exclude each other in twos."""
+    modes = ", ".join(f"m{k}" for k in range(4))
+    wanted = [f"guarantee g{k} ( in.p{k} -> out.mode == m{k} )" for k in range(4)]
+    rest = [f"guarantee r{k} ( in.p{k % 4} and in.q -> out.v > {k} )" for k in range(16)]
+    text = f"""
+    context {{ Mode : {{ {modes} }}; }}
+    node n {{
+      inputs( {", ".join(f"p{k} : BOOL" for k in range(4))}, q : BOOL ) outputs( mode : Mode, v : REAL ) topics()
+      {" ".join(wanted + rest)}
+    }}"""
+    found, complete = found_of(text)
+    assert complete
+    assert {frozenset(c.clauses) for c in found} == set(map(frozenset, combinations([f"g{k}" for k in range(4)], 2)))
