@@ -10,11 +10,13 @@ from avow.calculus.certificates import Certificates
 from avow.calculus.derivation import ClauseName, Goal, Settled, SideCondition
 from avow.calculus.discharge import Answers, Bounds, settle
 from avow.calculus.hierarchy import Level, composed_node, innermost, level, shown_contract, with_persistence
+from avow.calculus.kept_answers import ask_once
 from avow.calculus.meaning import Meanings
 from avow.calculus.rules import WHOLE, derive
 from avow.calculus.scenario import world
 from avow.calculus.transition import Machine
 from avow.calculus.variables import Frame, frame
+from avow.kernel.solvers import Solvers
 from avow.language.contract import Node
 from avow.language.terms import Role
 from avow.system.folding import face, fold, inner_first, leaves, outermost, parents
@@ -70,7 +72,7 @@ class Composition:
     def certificates(self) -> Certificates:
         """What the kernel has established of these derivations."""
         if self._certificates is None:
-            self._certificates = Certificates(self)
+            self._certificates = Certificates(self, solvers=Solvers(z3=ask_once))
         return self._certificates
 
     def frame_of(self, goal: Goal) -> Frame:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from avow.base.verdict import Verdict
+from avow.calculus.kept_answers import entailed_before, keep_entailed
 from avow.formulas.formula import substitute
 from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
 from avow.solving.questions import Entailment, entails
@@ -19,7 +20,16 @@ from avow.tuning.effort import QUICK_EFFORT
 
 
 def implied(hypotheses: Mapping[str, Term], goal: Term, *, effort: int, seed: int = 0) -> Entailment:
-    """As `avow.solving.questions.entails`: the quick question first, then with witnesses, then at length."""
+    """As `avow.solving.questions.entails`: the quick question first, then with witnesses, then at length. What was
+    proved before is not asked again, within `avow.calculus.kept_answers.keeping`."""
+    mark, answer = entailed_before(hypotheses, goal, effort, seed)
+    if answer is None:
+        answer = _implied(hypotheses, goal, effort, seed)
+        keep_entailed(mark, answer)
+    return answer
+
+
+def _implied(hypotheses: Mapping[str, Term], goal: Term, effort: int, seed: int) -> Entailment:
     quick = min(QUICK_EFFORT, effort)
     answer = entails(hypotheses, goal, effort=quick, seed=seed)
     if answer.verdict is not Verdict.UNKNOWN:

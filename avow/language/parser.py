@@ -7,12 +7,11 @@ It is iterative: no nesting, however deep, can exhaust the stack.
 from __future__ import annotations
 
 import functools
-import os
-import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, overload
 
+from avow.base.grammars import lark_of
 from avow.language.lexer import Token
 from avow.language.source import Reports
 from avow.language.syntax import (
@@ -211,36 +210,15 @@ def _accepted(start: str, tokens: Iterable[Token], bad: Token) -> frozenset[str]
 
 @functools.cache
 def _lark() -> Any:
-    from lark import Lark
-
-    grammar = Path(__file__).with_name("grammar.lark")
-    options: dict[str, Any] = {
-        "parser": "lalr",
-        "lexer": "basic",
-        "start": list(STARTS),
-        "maybe_placeholders": False,
-        "transformer": _Build(),
-    }
-    cache = _cache_file()
-    if cache is not None:
-        try:
-            return Lark(grammar.read_text("utf-8"), cache=str(cache), **options)
-        except (OSError, ValueError, EOFError, AttributeError, KeyError):
-            pass
-    return Lark(grammar.read_text("utf-8"), **options)
-
-
-def _cache_file() -> Path | None:
-    """Where the tables are kept between runs; a folder of the user's own, since Lark's cache is a pickle."""
-    try:
-        base = os.environ.get("XDG_CACHE_HOME")
-        folder = (Path(base) if base else Path.home() / ".cache") / "avow"
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if folder.stat().st_uid != os.getuid() or not os.access(folder, os.W_OK):
-            return None
-    except (OSError, AttributeError, RuntimeError):
-        return None
-    return folder / f"rcl-{sys.version_info.major}{sys.version_info.minor}.lark"
+    return lark_of(
+        Path(__file__).with_name("grammar.lark"),
+        "rcl",
+        parser="lalr",
+        lexer="basic",
+        start=list(STARTS),
+        maybe_placeholders=False,
+        transformer=_Build(),
+    )
 
 
 def _deepest(parts: Iterable[Any]) -> int:

@@ -37,13 +37,14 @@ def run(
     folder: Path,
     altered: Altered | None = None,
     kept: Mapping[str, Sequence[Any]] | None = None,
+    earlier: str = "",
 ) -> Report:
-    """Settle the obligations in a process of their own, here or elsewhere; `kept` are cases that refuted them once.
-    Never raises for what that process does."""
+    """Settle the obligations in a process of their own, here or elsewhere; `kept` are cases that refuted them once, and
+    `earlier` what the engine kept for itself. Never raises for what that process does."""
     if lacking := _lacking(work):
         return _failed(obligations, work, Verdict.NOT_RUN, f"no worker of the cluster offers {', '.join(lacking)}", {})
     try:
-        request = replace(request_of(workspace, work, obligations, folder, altered), kept=kept or {})
+        request = replace(request_of(workspace, work, obligations, folder, altered), kept=kept or {}, earlier=earlier)
     except OSError as error:
         return _failed(obligations, work, Verdict.ERROR, f"{type(error).__name__}: {error}", {})
     asked, came = _desk(workspace, request).ask(request)

@@ -23,6 +23,7 @@ from avow.evidence.record import CASE, RETRY, Evidence
 from avow.isolation.level import Isolation
 from avow.isolation.observed import ISOLATION, OBSERVED, to_json
 from avow.pipeline import asking
+from avow.pipeline.answers import earlier
 from avow.pipeline.export import folder
 from avow.pipeline.recheck import still_counts
 from avow.pipeline.run_info import Run
@@ -67,7 +68,9 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     report = (
         _language(todo)
         if work.engine == LANGUAGE
-        else asking.run(workspace, work, todo, place, kept=_kept(workspace, work, todo))
+        else asking.run(
+            workspace, work, todo, place, kept=_kept(workspace, work, todo), earlier=earlier(workspace, work, run)
+        )
     )
     seconds = time.monotonic() - clock
     outputs = _keep_logs(workspace, work, todo, report)

@@ -14,7 +14,7 @@ from avow.backend_kit.protocol import Limits, Report
 from avow.base.codec import Unreadable, from_json, to_json
 from avow.pipeline.mutant_systems import Altered
 
-_TEXTS = ("system", "node", "method", "engine", "home", "root", "folder")
+_TEXTS = ("system", "node", "method", "engine", "home", "root", "folder", "earlier")
 
 Tools = tuple[tuple[str, ...], ...]
 """Name, version, … of each outside tool, as the keys have them; no version where it is missing."""
@@ -45,6 +45,8 @@ class Request:
     altered: Altered | None = None
     kept: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Obligation → cases that refuted it once, as its backend wrote them (`record.CASE`): to be tried first."""
+    earlier: str = ""
+    """What the engine kept for itself when it was asked last (`avow.calculus.kept_answers`): hints."""
 
     @property
     def wanted(self) -> Tools:

@@ -3,6 +3,7 @@ the stages themselves are in `avow.pipeline.stages`."""
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -15,6 +16,7 @@ from avow.base.workspace import Workspace
 from avow.pipeline.reporter import reporter_of
 from avow.pipeline.run_info import FRESH
 from avow.pipeline.state import State
+from avow.tuning.running import COLLECTED
 
 Task = dict[str, Any]
 
@@ -28,6 +30,7 @@ class Pipeline:
 
     def __init__(self, root: Path, asked: Sequence[str], answer: IO[str] | None = None) -> None:
         leave_here()
+        gc.set_threshold(COLLECTED)  # a run makes much that stays, and little that has to be looked for
         if _runs(asked) and not {"-a", "--always-execute"}.isdisjoint(asked):
             os.environ[FRESH] = "1"  # believe no earlier run: else each stage would find that there is nothing to do
         if asked[:1] == ["forget"]:

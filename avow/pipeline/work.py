@@ -123,7 +123,7 @@ def sanity_claims(cut: SanitySlice) -> tuple[tuple[Obligation, ...], Mapping[str
         for claim, digest in (*of_the_node, *of_its_providers)
     )
     scenario = encode((cut.given, cut.ranges), Path()).decode()
-    return obligations, _keys(obligations, SANITY, _z3_version(), scenario)
+    return obligations, _keys(obligations, SANITY, engine_identity(), scenario)
 
 
 def compose_work(composition: Composition) -> Work:
@@ -133,7 +133,7 @@ def compose_work(composition: Composition) -> Work:
 
     system = composition.frame.system
     obligations = all_obligations(composition)
-    parts = (_z3_version(), _scenario(system))
+    parts = (engine_identity(), _scenario(system))
     return _work(system, SYSTEM_LEVEL, COMPOSE, obligations, *parts, cut=lambda: compose_slice(system))
 
 
@@ -348,6 +348,7 @@ def _scenario(system: System) -> str:
 
 
 @functools.cache
-def _z3_version() -> str:
+def engine_identity() -> str:
+    """The core's engines with their solver, in every key of theirs."""
     # importing z3 to ask it would cost more than all the rest of a run with nothing to do
     return f"avow {engine_digest()}, z3 {metadata.version('z3-solver')}"

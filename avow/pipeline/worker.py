@@ -26,10 +26,13 @@ from avow.base.diagnostics import Rejected
 from avow.base.files import write
 from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import compose
+from avow.calculus.kept_answers import keeping
 from avow.calculus.obligations import settle_all
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import RETRY
 from avow.pipeline import recheck
+from avow.pipeline.answers import FILE as ANSWERS
+from avow.pipeline.answers import read_answers, write_answers
 from avow.pipeline.asking import CHANGED
 from avow.pipeline.blobs import Garbled, decode
 from avow.pipeline.engines import discharge_sanity
@@ -118,8 +121,11 @@ def _execute(request: Request, root: Path) -> Report:
             composition = compose(cut.system)
             work = compose_work(composition)
             claims = _claims(request, work.obligations, work.keys)
-            outcomes = settle_all(composition, claims, request.limits)
+            answers = read_answers(request.earlier)
+            with keeping(answers):
+                outcomes = settle_all(composition, claims, request.limits)
             kept = {recheck.FILE: recheck.written(composition.certificates)} if composition.certificates.made else {}
+            kept |= {ANSWERS: write_answers(answers)} if answers.now else {}
             return Report(outcomes, "z3", z3_version(), logs=kept)
         case MethodSlice(system=system, node=node, method=method):
             return _discharge(request, system, _method_work(system, node, method))

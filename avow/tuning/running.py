@@ -47,3 +47,7 @@ MASTER_SECONDS = 5.0
 
 DRAFT_MESSAGES = 200_000
 """Messages of a bag that a draft looks at for its comments: seconds, and the ranges of what follows are no others."""
+
+COLLECTED = 100_000
+"""Objects made before Python looks for those that hold each other: at its 700, that takes a twelfth of a run with much
+to do."""

@@ -100,3 +100,6 @@ LAUNCH_DEPTH = 60
 
 PACKAGES_SEARCHED = 20_000
 """Folders of a workspace that are searched for packages: a robot's has some hundreds."""
+
+ANSWERS_KEPT = 20_000
+"""Proved entailments that are carried from run to run: some 2 MB."""

@@ -9,11 +9,12 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from lark import Lark, Token, v_args
+from lark import Token, v_args
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken, VisitError
 from lark.visitors import Transformer_NonRecursive
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.base.grammars import lark_of
 
 from .layout import Layout, span_of
 from .syntax import (
@@ -117,10 +118,10 @@ _KEYWORDS = frozenset(
 
 
 @functools.cache
-def _lark() -> Lark:
-    grammar = (Path(__file__).parent / "imp.lark").read_text()
-    return Lark(
-        grammar,
+def _lark() -> Any:
+    return lark_of(
+        Path(__file__).with_name("imp.lark"),
+        "imp",
         parser="lalr",
         lexer="basic",
         start=["program", "expression"],

@@ -486,7 +486,7 @@ def test_another_backend_tool_or_solver_reruns_what_it_answered(
         patch.setattr(hoare, "tools", lambda self: tuple(replace(t, version="0.0") for t in tools(self)))
         assert {method for _, method in changed(before, keys(folder))} == {"hoare"}
     with monkeypatch.context() as patch:
-        patch.setattr(work, "_z3_version", lambda: "another")
+        patch.setattr(work, "engine_identity", lambda: "another")
         assert {method for _, method in changed(before, keys(folder))} == {"sanity", "compose"}
     assert changed(before, keys(folder)) == set()
 

@@ -1,0 +1,112 @@
+"""What was proved before, by what was asked: after an edit only other questions are put to the solver.
+
+An answer depends on the question alone: the hypotheses with their labels, the goal, effort and seed; or a script of the
+kernel. Proofs are kept, and what the kernel was told; what was refuted or left open is asked again. All of it is a hint
+as any proof of the engines: whether a claim is proved decides the kernel, which asks everything itself in every run
+(`avow.pipeline.recheck`).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from typing import Any
+
+from avow.base.files import digest as sha256
+from avow.base.verdict import Verdict
+from avow.formulas.formula import digest
+from avow.kernel.solvers import Said, ask_z3
+from avow.language.terms import Term
+from avow.solving.questions import Entailment
+from avow.tuning.sizes import ANSWERS_KEPT
+
+
+@dataclass(slots=True)
+class KeptAnswers:
+    """`before`: what earlier runs left; `now`: what was used or found in this one. What a proof needs and whether its
+    premises contradict, or what a solver said of a script."""
+
+    before: dict[str, tuple[tuple[str, ...], bool] | Said] = field(default_factory=dict)
+    now: dict[str, tuple[tuple[str, ...], bool] | Said] = field(default_factory=dict)
+    asked: int = 0
+    """Questions that were put to the solver."""
+
+    @classmethod
+    def read(cls, text: str) -> KeptAnswers:
+        """What cannot be read is nothing."""
+        try:
+            return cls({str(mark): _read(said) for mark, said in json.loads(text).items()})
+        except (ValueError, TypeError, AttributeError):
+            return cls()
+
+    def written(self) -> str:
+        """For the next run: those of this one, and as many of the earlier ones as there is room for."""
+        return json.dumps(dict(list({**self.before, **self.now}.items())[-ANSWERS_KEPT:]))
+
+    def find(self, mark: str) -> tuple[tuple[str, ...], bool] | Said | None:
+        found = self.now.get(mark) or self.before.pop(mark, None)
+        if found is not None:
+            self.now[mark] = found
+        else:
+            self.asked += 1
+        return found
+
+
+def _read(said: Any) -> tuple[tuple[str, ...], bool] | Said:
+    """Raises ValueError, TypeError."""
+    if isinstance(said, list):
+        needed, vacuous = said
+        return tuple(map(str, needed)), vacuous is True
+    return Said(said)
+
+
+_kept: ContextVar[KeptAnswers | None] = ContextVar("kept answers", default=None)
+
+
+@contextmanager
+def keeping(answers: KeptAnswers) -> Iterator[None]:
+    """What is asked within the block is looked up there first."""
+    token = _kept.set(answers)
+    try:
+        yield
+    finally:
+        _kept.reset(token)
+
+
+def entailed_before(
+    hypotheses: Mapping[str, Term], goal: Term, effort: int, seed: int
+) -> tuple[str, Entailment | None]:
+    """The question's mark, none outside such a block; and the answer, if it was proved before."""
+    kept = _kept.get()
+    if kept is None:
+        return "", None
+    asked = [[label, digest(term)] for label, term in hypotheses.items()]
+    mark = sha256(json.dumps([asked, digest(goal), effort, seed]))
+    found = kept.find(mark)
+    if not isinstance(found, tuple):
+        return mark, None
+    needed, vacuous = found
+    return mark, Entailment(Verdict.PROVED, needed=needed, vacuous=vacuous)
+
+
+def keep_entailed(mark: str, answer: Entailment) -> None:
+    kept = _kept.get()
+    if kept is not None and answer.verdict is Verdict.PROVED:
+        kept.now[mark] = answer.needed, answer.vacuous
+
+
+def ask_once(script: str, budget: int) -> Said:
+    """As `avow.kernel.solvers.ask_z3`, while it is only to be found out what the kernel will say."""
+    kept = _kept.get()
+    if kept is None:
+        return ask_z3(script, budget)
+    mark = sha256(f"{budget}\n{script}")
+    found = kept.find(mark)
+    if not isinstance(found, Said):
+        found = ask_z3(script, budget)
+        if found is not Said.UNKNOWN:
+            kept.now[mark] = found
+    return found

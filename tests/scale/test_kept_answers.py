@@ -1,0 +1,122 @@
+"""After an edit only questions that are others now are put to the solver; what was kept decides nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.backend_kit.protocol import Limits
+from avow.base.verdict import Verdict
+from avow.base.workspace import Workspace
+from avow.calculus import entailment
+from avow.calculus.composition import compose
+from avow.calculus.kept_answers import KeptAnswers, keeping
+from avow.calculus.obligations import all_obligations, reestablished, settle_all
+from avow.evidence.ledger import ledger_of
+from avow.kernel.solvers import Said
+from avow.pipeline.answers import earlier, read_answers
+from avow.pipeline.discharge import discharge
+from avow.pipeline.recheck import still_counts
+from avow.pipeline.run_info import Run
+from avow.pipeline.work import COMPOSE, catalogue
+from avow.solving.questions import Entailment
+from avow.system.load import load_path, load_system
+
+from .made import chain, fan
+
+
+def settle(folder: Path, text: str, answers: KeptAnswers) -> dict[str, Verdict]:
+    """Obligation → verdict."""
+    path = folder / "system.rcl"
+    path.write_text(text)
+    composition = compose(load_path(path))
+    obligations = all_obligations(composition)
+    with keeping(answers):
+        outcomes = settle_all(composition, obligations, Limits(seconds=20))
+    return {o.obligation.rpartition("/")[2]: o.verdict for o in outcomes}
+
+
+def again(answers: KeptAnswers) -> KeptAnswers:
+    return KeptAnswers.read(answers.written())
+
+
+EDITS = {
+    "nothing": ("x", "x", 0),
+    "a guarantee far upstream": ("out.x0 >= 0", "out.x0 >= 3", 3),  # of one consumer: the engine's, the kernel's two
+    "a name": ("guarantee g0 ( out.x0", "guarantee first ( out.x0", 3),
+    "the last one": ("out.x9 >= in.x8", "out.x9 >= in.x8 + 1", 0),  # nobody reads it
+}
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_an_edit_asks_only_what_is_another_question_now(tmp_path: Path, name: str) -> None:
+    old, new, most = EDITS[name]
+    text, first = chain(10), KeptAnswers()
+    before = settle(tmp_path, text, first)
+    assert first.asked >= 9
+    later = again(first)
+    after = settle(tmp_path, text.replace(old, new), later)
+    assert later.asked <= most
+    assert set(before.values()) == set(after.values()) == {Verdict.PROVED}
+
+
+def test_one_consumer_of_many(tmp_path: Path) -> None:
+    first = KeptAnswers()
+    settle(tmp_path, fan(12), first)
+    later = again(first)
+    settle(tmp_path, fan(12).replace("out.y7 >= in.x", "out.y7 >= in.x + 1"), later)
+    assert 0 < later.asked <= 3 < first.asked
+
+
+def test_what_does_not_hold_is_asked_again_and_never_kept(tmp_path: Path) -> None:
+    wrong, first = chain(5).replace("out.x0 >= 0", "out.x0 >= -1"), KeptAnswers()
+    before = settle(tmp_path, wrong, first)
+    assert before["whole.n1.a0"] is Verdict.REFUTED
+    later = again(first)
+    assert settle(tmp_path, wrong, later) == before
+    assert later.asked > 0
+
+
+def test_what_cannot_be_read_is_nothing() -> None:
+    for text in ("", "[]", "{", '{"a": 1}', '{"a": [1]}', '{"a": ["b", 2, 3]}', '{"a": "yes"}', "null"):
+        assert not KeptAnswers.read(text).before
+        assert not read_answers(text).before
+    assert not read_answers('{"engine": "another", "answers": "{}"}').before
+
+
+def test_a_lie_that_was_kept_proves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kernel asks by itself, in every run."""
+    path = tmp_path / "system.rcl"
+    path.write_text(chain(3).replace("out.x0 >= 0", "out.x0 >= -1"))
+    system = load_path(path)
+    composition = compose(system)
+    with monkeypatch.context() as patch:
+        said = ("", Entailment(Verdict.PROVED, needed=("n0.g0",)))
+        patch.setattr(entailment, "entailed_before", lambda *_: said)
+        patch.setattr(KeptAnswers, "find", lambda *_: Said.UNSAT)
+        with keeping(KeptAnswers()):
+            outcomes = settle_all(composition, all_obligations(composition), Limits(seconds=20))
+    lied = next(o for o in outcomes if o.obligation.endswith("whole.n1.a0"))
+    assert lied.verdict is Verdict.PROVED
+    from avow.calculus.certificates import Certificates
+
+    assert reestablished(Certificates(compose(system), composition.certificates.made), lied.obligation) is None
+
+
+def test_answers_are_kept_beside_the_evidence_and_bound_to_it(tmp_path: Path) -> None:
+    workspace, folder = Workspace(tmp_path), tmp_path / "contracts" / "made"
+    folder.mkdir(parents=True)
+    (folder / "system.rcl").write_text(chain(3))
+    (folder / "plan.yaml").write_text("system: made\ncontract: system.rcl\n")
+    work = next(w for w in catalogue(load_system(folder)).works if w.engine == COMPOSE)
+    assert earlier(workspace, work, Run("first", False)) == ""
+    discharge(workspace, work, Run("first", False))
+    kept = earlier(workspace, work, Run("second", False))
+    assert read_answers(kept).before
+    assert earlier(workspace, work, Run("second", True)) == ""  # a fresh run believes no earlier one
+    record = ledger_of(workspace.ledger("made")).records()[-1].evidence
+    assert still_counts(record, tmp_path, work.system)
+    path = tmp_path / next(p for p in record.outputs if p.endswith("/answers.json"))
+    path.write_text(kept.replace("unsat", "sat"))
+    assert earlier(workspace, work, Run("third", False)) == ""
