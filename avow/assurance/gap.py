@@ -137,6 +137,10 @@ def _disregarded(item: Evidence, demand: Demand, policy: Policy, today: date) ->
             return f"{', '.join(sorted(strangers))} may not review under this policy"
     elif demand.links and support is not Status.JUSTIFIED and item.link not in demand.links:
         return f"the tie is {item.link}, {' or '.join(demand.links)} is asked"
+    if demand.of and item.of not in demand.of:
+        return f"it is of a {item.of}, {' or '.join(demand.of)} is asked"
+    if demand.numbers and item.numbers not in demand.numbers:
+        return f"a REAL is {item.numbers} in it, {' or '.join(demand.numbers)} is asked"
     if demand.unconditional and item.hypotheses:
         return "rests on hypotheses"
     kept = item.details.get(ISOLATION)

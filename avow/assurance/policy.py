@@ -24,10 +24,10 @@ from typing import Any
 import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.verdict import Link, said, unsaid
+from avow.base.verdict import Link, Object, said, unsaid
 from avow.evidence.status import Status
 from avow.isolation.level import Isolation
-from avow.system.plan import Located
+from avow.system.plan import Located, Numbers
 
 CRITICALITIES = ("high", "medium", "low")
 _GIVEN = tuple(s.value for s in Status if s.supports)
@@ -49,6 +49,10 @@ class Demand:
     isolation: Isolation = Isolation.NONE
     """How far a program under test had to be kept from its judge; evidence for which nothing was run has no such
     level."""
+    of: tuple[Object, ...] = ()
+    """What has to have been verified; empty: anything."""
+    numbers: tuple[Numbers, ...] = ()
+    """What a REAL has to have been; empty: anything."""
 
     def max_age(self, status: Status) -> int | None:
         ages = dict(self.max_age_days)
@@ -63,6 +67,10 @@ class Demand:
             parts.append(f"by {self.methods} {'independent ' if self.independent else ''}methods")
         if self.links:
             parts.append(f"tie {' or '.join(self.links)}")
+        if self.of:
+            parts.append(f"of a {' or '.join(self.of)}")
+        if self.numbers:
+            parts.append(f"in {' or '.join(self.numbers)} numbers")
         if self.unconditional:
             parts.append("without hypotheses")
         if self.isolation is not Isolation.NONE:
@@ -148,7 +156,10 @@ def _profile(name: str, span: Span) -> tuple[Policy, list[Diagnostic]]:
 
 
 _KEYS = ("profile", "guarantees", "sanity", "composition", "requirements", "reviewers", "certified", "proved")
-_DEMAND_KEYS = ("one_of", "methods", "independent", "max_age_days", "reviewers", "ties", "unconditional", "isolation")
+_DEMAND_KEYS = (
+    *("one_of", "methods", "independent", "max_age_days", "reviewers", "ties", "unconditional", "isolation"),
+    *("of", "numbers"),
+)
 
 
 def _rules(located: Located) -> tuple[Policy, list[Diagnostic]]:
@@ -221,6 +232,10 @@ class _PolicyReader:
             links=tuple(Link(word) for word in self.words(data.get("ties", ()), tuple(Link), (*path, "ties"))),
             unconditional=self.flag(data.get("unconditional", False), (*path, "unconditional")),
             isolation=self.level(data.get("isolation", Isolation.NONE.value), (*path, "isolation")),
+            of=tuple(Object(word) for word in self.words(data.get("of", ()), tuple(Object), (*path, "of"))),
+            numbers=tuple(
+                Numbers(word) for word in self.words(data.get("numbers", ()), tuple(Numbers), (*path, "numbers"))
+            ),
         )
 
     def level(self, data: object, path: tuple[str | int, ...]) -> Isolation:

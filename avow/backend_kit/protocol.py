@@ -16,12 +16,12 @@ from typing import Any
 from avow.base.codes import Code
 from avow.base.diagnostics import Diagnostic
 from avow.base.tools import Tool
-from avow.base.verdict import Link, Outcome, Verdict
+from avow.base.verdict import Link, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation
 from avow.isolation.level import Isolation
 from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Contract, Node
-from avow.system.plan import Method, System
+from avow.system.plan import Method, Source, System
 
 __all__ = ["COMMON_OPTIONS", "Backend", "Job", "Limits", "Report", "Tool", "Translated", "lacks"]
 
@@ -52,6 +52,11 @@ class Job:
     def root(self) -> Path:
         """The system's folder: paths in the options are relative to it."""
         return self.system.plan.root
+
+    @property
+    def source(self) -> Source | None:
+        """The program that the plan says the node is."""
+        return self.system.plan.node(self.node.name).source
 
     @property
     def options(self) -> Mapping[str, Any]:
@@ -148,6 +153,11 @@ class Backend(ABC):
     remembers: bool = False
     """Whether it judges clauses that speak of other steps (`avow.temporal`), or does not read formulas at all. The
     others are never shown such a clause: what the plan asks of them is refused by name."""
+    uses_source: bool = False
+    """Whether an answer may depend on the node's `source:`, `numbers:` and `memory:`. Where it is False they are not
+    in the job at all."""
+    of: Object = Object.MODEL
+    """What is verified; an outcome may say otherwise for itself."""
     portable: bool = False
     """Whether an answer depends on the job and the bytes of `files` alone: not on the exported files, on other files of
     the system's folder, or on what they start. Such a work can be sent to another machine; others run where the
@@ -203,6 +213,8 @@ _REQUIRED: Mapping[str, type | tuple[type, ...]] = {
     "uses_steps": bool,
     "uses_wiring": bool,
     "remembers": bool,
+    "uses_source": bool,
+    "of": Object,
     "portable": bool,
     "codes": Mapping,
     "translations": Mapping,

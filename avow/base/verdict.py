@@ -78,6 +78,19 @@ class Link(StrEnum):
     """By a person's judgement."""
 
 
+class Object(StrEnum):
+    """What was verified. How it hangs together with the formula is its `Link`."""
+
+    MODEL = "model"
+    """Something written to be verified: a program in a small language, an agent, a formula."""
+    SOURCE = "source"
+    """The node's declared source, byte for byte, and nothing else."""
+    BINARY = "binary"
+    """A program that was made of the source."""
+    RECORDING = "recording"
+    """What a running node was seen to do."""
+
+
 @dataclass(frozen=True, slots=True)
 class Counterexample:
     """Why a claim is false, in the contract's own words.
@@ -142,3 +155,7 @@ class Outcome:
     vacuous: bool = False
     """The claim held, but its trigger was never met: it supports nothing."""
     rests_on: tuple[Hypothesis, ...] = ()
+    of: Object | None = None
+    """What was verified; None: what the method always verifies."""
+    numbers: str = "exact"
+    """What a REAL was, as plans have it under `numbers`."""

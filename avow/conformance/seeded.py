@@ -33,6 +33,8 @@ class Seeded:
     """Path in the system's folder → text: programs, data, mappings. The answer depends on each of them."""
     plan: Mapping[str, Any] = field(default_factory=dict)
     """More keys of plan.yaml: a scenario, connections, …"""
+    declared: Mapping[str, Any] = field(default_factory=dict)
+    """More of the node's entry in plan.yaml: its source, numbers and memory."""
     prepare: Callable[[Path], None] | None = None
     """Called with the system's folder when all is written: for what is made from the rest, such as digests."""
 
@@ -50,7 +52,8 @@ class Seeded:
         options = self.options
         if isinstance(options, Mapping):
             options = {"guarantees": list(self.verdicts), **options}
-        plan = {**self.plan, "contract": "system.rcl", "nodes": {self.node: {"methods": [{backend.name: options}]}}}
+        node = {**self.declared, "methods": [{backend.name: options}]}
+        plan = {**self.plan, "contract": "system.rcl", "nodes": {self.node: node}}
         write(folder / "plan.yaml", yaml.safe_dump(plan, allow_unicode=True, sort_keys=False))
         if self.prepare is not None:
             self.prepare(folder)
@@ -85,6 +88,7 @@ class Seeded:
             verdicts={text(name): verdict for name, verdict in self.verdicts.items()},
             files={text(name): text(content) for name, content in self.files.items()},
             plan=value(self.plan),
+            declared=value(self.declared),
         )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from avow.base.codec import LATER
-from avow.base.verdict import Counterexample, Hypothesis, Link, Verdict
+from avow.base.verdict import Counterexample, Hypothesis, Link, Object, Verdict
 
 RETRY = "retry"
 """Among the details of an answer that the next run must not be content with: what asked for it was cut short."""
@@ -65,6 +65,10 @@ class Evidence:
     """Id of the run that produced it."""
     rests_on: tuple[Hypothesis, ...] = field(default=(), metadata=LATER)
     """What the answer rests on: claims of the case, and suppositions that a person has to accept."""
+    of: Object = field(default=Object.MODEL, metadata=LATER)
+    """What was verified."""
+    numbers: str = field(default="exact", metadata=LATER)
+    """What a REAL was in it, as plans have it under `numbers`."""
 
     @property
     def tool_told(self) -> str:

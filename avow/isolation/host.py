@@ -112,7 +112,8 @@ def coded(value: Any, depth: int = 0) -> Any:
     return {"?": f"a value of type {type(value).__name__}"}
 
 
-def load(path: str, function: str) -> Any:
+def load(path: str, function: str, drive: Any = None) -> Any:
+    """The function of the file; with `drive`, the class that the JSON in `function` names, driven."""
     spec = importlib.util.spec_from_loader("avow_subject", _FromSource("avow_subject", path))
     if spec is None or spec.loader is None:
         raise ImportError(f"{path} is no Python module")
@@ -121,6 +122,9 @@ def load(path: str, function: str) -> Any:
     sys.modules["avow_subject"] = module
     sys.path.insert(0, os.path.dirname(path))  # noqa: PTH120 - its own neighbours, as if it were run
     spec.loader.exec_module(module)
+    if drive is not None:
+        driven = json.loads(function)
+        return drive.driver(getattr(module, driven["class"]), driven)
     return getattr(module, function)
 
 
@@ -168,11 +172,12 @@ _NETWORK = ("socket.", "urllib.", "http.", "ftplib.", "smtplib.", "telnetlib.", 
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
-def _senses() -> Any:
-    """The module beside this one, which is no package's here."""
-    place = os.path.join(os.path.dirname(__file__), "senses.py")  # noqa: PTH118, PTH120
-    loader = importlib.machinery.SourceFileLoader("avow_senses", place)
-    spec = importlib.util.spec_from_loader("avow_senses", loader)
+def _beside(file: str) -> Any:
+    """A module near this one, which is no package's here."""
+    place = os.path.join(os.path.dirname(__file__), file)  # noqa: PTH118, PTH120
+    name = "avow_" + os.path.basename(file).partition(".")[0]  # noqa: PTH119
+    loader = importlib.machinery.SourceFileLoader(name, place)
+    spec = importlib.util.spec_from_loader(name, loader)
     module = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
     loader.exec_module(module)
     return module
@@ -269,7 +274,7 @@ def watch(scratch: str, end: Callable[[str], None]) -> tuple[list[list[str]], Ca
         elif event.startswith(_NETWORK):
             told("outside", "the network")
 
-    drawn = _senses().watch_all(told)
+    drawn = _beside("senses.py").watch_all(told)
     sys.addaudithook(hook)
     return seen, drawn
 
@@ -312,6 +317,7 @@ def main() -> None:
     sys.argv[:], sys.orig_argv[:] = [path], [sys.executable, path]  # the same at every run
     look = posix.access  # without an audit event: for whoever traces system calls
     with os.fdopen(source, "r", encoding="utf-8") as requests, os.fdopen(sink, "w", encoding="utf-8") as answers:
+        drive = _beside("../drive/steps.py") if function.startswith("{") else None
         read_sources_only(os.path.realpath(root))
         dumps, write, leave = json.dumps, os.write, os._exit
 
@@ -328,7 +334,7 @@ def main() -> None:
 
         look(f"{mark}-begin", os.F_OK)
         try:
-            subject = load(path, function)
+            subject = load(path, function, drive)
             known = accepted(subject)
             ready: dict[str, Any] = {"ready": True}
         except BaseException as error:

@@ -167,7 +167,7 @@ class Subject:
         }
         if self.isolation is Isolation.SEALED:
             environment["TMPDIR"] = _SCRATCH
-            shown = (self.root, host.parent, Path(sys.prefix), Path(sys.base_prefix))
+            shown = (self.root, host.parent, host.parent.parent / "drive", Path(sys.prefix), Path(sys.base_prefix))
             command = sealed(command, shown, _SCRATCH)
         else:
             self._scratch = tempfile.TemporaryDirectory(prefix="avow-subject-")

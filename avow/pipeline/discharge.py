@@ -14,7 +14,7 @@ from typing import Any
 from avow import __version__
 from avow.backend_kit.protocol import Report
 from avow.base.files import digest, digest_file, is_intact, write
-from avow.base.verdict import Link, Outcome, Verdict
+from avow.base.verdict import Link, Object, Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.currency import outlived
 from avow.evidence.ledger import Ledger, ledger_of
@@ -74,7 +74,7 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
     )
     seconds = time.monotonic() - clock
     outputs = _keep_logs(workspace, work, todo, report)
-    strength, link = _promise(work)
+    strength, link, of = _promise(work)
     inputs = _inputs(workspace, work)
     by_id = {o.id: o for o in todo}
     records = []
@@ -105,6 +105,8 @@ def discharge(workspace: Workspace, work: Work, run: Run) -> tuple[Outcome, ...]
                 vacuous=outcome.vacuous,
                 run=run.id,
                 rests_on=outcome.rests_on,
+                of=outcome.of or of,
+                numbers=outcome.numbers,
             )
         )
     ledger_of(workspace.ledger(work.system.name)).append_all(records)
@@ -135,12 +137,12 @@ def _language(obligations: tuple[Obligation, ...]) -> Report:
     return Report(outcomes, "avow", __version__)
 
 
-def _promise(work: Work) -> tuple[Verdict, Link]:
+def _promise(work: Work) -> tuple[Verdict, Link, Object]:
     if work.is_engine:
-        return Verdict.PROVED, Link.GENERATED
+        return Verdict.PROVED, Link.GENERATED, Object.MODEL
     method = planned_method(work)
     tool = method_backend(work.system, method)
-    return tool.strength, tool.link
+    return tool.strength, tool.link, tool.of
 
 
 def _inputs(workspace: Workspace, work: Work) -> dict[str, str]:

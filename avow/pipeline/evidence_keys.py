@@ -88,6 +88,10 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
         parts.append(scenario.digest if tool.uses_steps else scenario.content)
     if tool.uses_wiring:
         parts.append(_wiring(job.system, job.node, tool.name))
+    if tool.uses_source and job.source is not None:
+        declared = job.source
+        texts = (declared.python, declared.class_name, declared.cpp, declared.parameters, declared.numbers.value)
+        parts.append(["source", *texts, sorted(declared.memory.items())])
     return json.dumps(parts)
 
 

@@ -21,7 +21,7 @@ from avow.language.terms import TRUE, Variable
 from avow.pipeline.evidence_keys import Named, method_options
 from avow.pipeline.work import is_portable
 from avow.system.graph import Edge, dataflow
-from avow.system.plan import Connection, Located, NodePlan, Plan, Ros, System
+from avow.system.plan import Connection, Located, Method, NodePlan, Plan, Ros, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def compose_slice(system: System) -> ComposeSlice:
         model=_NOTHING,
         messages=(),
         requirements=tuple(replace(r, confirmed=None, linked="") for r in system.plan.requirements),
-        nodes=tuple(replace(node, methods=()) for node in system.plan.nodes),
+        nodes=tuple(replace(node, methods=(), source=None) for node in system.plan.nodes),
         policy=_NOTHING,
         expected=None,
         accepted=(),
@@ -100,7 +100,7 @@ def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodS
     cut = replace(
         _bare(plan),
         nodes=(
-            replace(plan.node(job.node.name), methods=(job.method,)),
+            _planned(tool, plan.node(job.node.name), job.method),
             *(_told(plan.node(name), tool.name) for name in sorted(sources)),
         ),
         connections=tuple(_connection(edge) for edge in edges),
@@ -127,9 +127,13 @@ def _own(job: Job, named: Named, sentences: bool) -> Node:
     return replace(job.node, assumptions=tuple(assumed), guarantees=tuple(promised))
 
 
+def _planned(tool: Backend, node: NodePlan, method: Method) -> NodePlan:
+    return replace(node, methods=(method,), source=node.source if tool.uses_source else None)
+
+
 def _told(node: NodePlan, backend: str) -> NodePlan:
     """A source: what the same backend is told of it."""
-    return replace(node, criticality="", methods=tuple(m for m in node.methods if m.backend == backend))
+    return replace(node, criticality="", source=None, methods=tuple(m for m in node.methods if m.backend == backend))
 
 
 def _connection(edge: Edge) -> Connection:

@@ -10,6 +10,7 @@ from avow.language.sorts import BOOL, FunctionSort
 from avow.system.plan import Plan
 from avow.system.scenario_values import BASE_SORTS, domain_sort, unusable
 from avow.system.schema import suggest
+from avow.system.source_plan import check_memory
 from avow.system.strict_yaml import Piece
 
 
@@ -27,6 +28,7 @@ def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic
         *_scenario(plan, root, contract, nodes),
         *_findings(root, nodes),
         *_suppositions(plan, root),
+        *check_memory(plan, nodes),
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -151,6 +152,37 @@ class Method:
     guarantees: tuple[str, ...]
 
 
+class Numbers(StrEnum):
+    """What a REAL is where a node's source runs."""
+
+    EXACT = "exact"
+    """A number as in the contract: nothing is rounded."""
+    FLOAT64 = "float64"
+    """An IEEE 754 double, rounded to nearest, ties to even."""
+    FLOAT32 = "float32"
+    """Likewise, of 32 bits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The program that is the node, declared once for every method that looks at it.
+
+    Paths are relative to the system's folder; empty: there is none. `memory` maps an input of the node (and the output
+    of its name, if there is one) to the attribute that holds it between two steps: its value before, and after.
+    """
+
+    python: str = ""
+    class_name: str = ""
+    cpp: str = ""
+    """The adapter header of the C++ source."""
+    parameters: str = ""
+    """A YAML file: one mapping, which the class is made with."""
+    numbers: Numbers = Numbers.FLOAT64
+    memory: Mapping[str, str] = field(default_factory=dict)
+    """Port → attribute, without ``self.``."""
+    place: Located = field(default=Located({}, Span("", 1, 1, 1, 1)), compare=False, repr=False)
+
+
 @dataclass(frozen=True, slots=True)
 class NodePlan:
     node: str
@@ -159,6 +191,7 @@ class NodePlan:
     span: Span | None = field(default=None, compare=False, repr=False)
     title: str = ""
     """What people call it, in a report's first screen; empty: its name, taken apart into words."""
+    source: Source | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,6 +34,7 @@ from avow.system.plan import (
     Requirement,
     Ros,
     Scenario,
+    Source,
     Statement,
     Subsystem,
     Table,
@@ -41,6 +42,7 @@ from avow.system.plan import (
 )
 from avow.system.ros_plan import read_ros
 from avow.system.schema import check_shape, without_faults
+from avow.system.source_plan import files_of, read_source
 from avow.system.statements import read_statements
 from avow.system.strict_yaml import Piece, read_yaml
 from avow.system.tables import domain, interpretation, plain, read_csv, read_rows
@@ -398,7 +400,16 @@ class _PlanReader:
                 if method is not None:
                     methods.append(method)
             level = criticality.text if criticality else "medium"
-            yield NodePlan(name, level, tuple(methods), piece.span, " ".join(title.text.split()) if title else "")
+            words = " ".join(title.text.split()) if title else ""
+            yield NodePlan(name, level, tuple(methods), piece.span, words, self.source(name, piece))
+
+    def source(self, name: str, piece: Piece) -> Source | None:
+        found, faults = read_source(name, piece)
+        self.faults += faults
+        for part in files_of(piece):
+            path = self.resolve(part)
+            _ = path is not None and self.present(part, path)
+        return found
 
     def method(self, node: str, item: Piece, used: set[str]) -> Method | None:
         if item.entries is None:

@@ -15,6 +15,7 @@ from avow.backends.dafny import BACKEND as DAFNY
 from avow.backends.experiment import BACKEND as EXPERIMENT
 from avow.backends.hoare import BACKEND as HOARE
 from avow.backends.hypothesis import BACKEND as HYPOTHESIS
+from avow.backends.python import BACKEND as PYTHON
 from avow.backends.review import BACKEND as REVIEW
 from avow.backends.review.stamp import stamp
 from avow.backends.rosmonitoring import BACKEND as ROSMONITORING
@@ -58,6 +59,41 @@ class TestHoare(Conformance):
             {"program": "models/sensor.imp"},
             one_refuted(Verdict.PROVED),
             {"models/sensor.imp": "IF (r > 121) THEN high := TRUE ELSE high := FALSE\n"},
+        ),
+    )
+
+
+STEP = """\
+class Node:
+    def __init__(self, params):
+        self.limit = params["limit"]
+
+    def step(self, r):
+        return r > self.limit
+"""
+DECLARED = {"source": {"python": "src/node.py", "class": "Node", "parameters": "config/node.yaml"}}
+
+
+@pytest.mark.slow
+class TestPython(Conformance):
+    backend = PYTHON
+    seeded = (
+        Seeded(
+            "right",
+            CONTRACT,
+            {},
+            both(Verdict.PROVED),
+            {"src/node.py": STEP, "config/node.yaml": "limit: 100.0\n"},
+            SCENARIO,
+            DECLARED,
+        ),
+        Seeded(
+            "wrong",
+            CONTRACT,
+            {},
+            one_refuted(Verdict.PROVED),
+            {"src/node.py": STEP, "config/node.yaml": "limit: 120.5\n"},
+            declared=DECLARED,
         ),
     )
 

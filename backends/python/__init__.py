@@ -1,0 +1,57 @@
+"""A node's own Python class: verification conditions of its step, proved in the numbers that it computes with."""
+
+from __future__ import annotations
+
+from importlib import metadata
+from pathlib import Path
+
+from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.verdict import Link, Object, Verdict
+
+from .codes import CODES
+
+
+class PythonBackend(Backend):
+    """See `docs/backends/python.md`."""
+
+    name = "python"
+    title = "Verification conditions of the node's own Python class, in doubles"
+    version = "1"
+    strength = Verdict.PROVED
+    link = Link.GENERATED
+    of = Object.SOURCE
+    uses_scenario = False
+    uses_wiring = False
+    uses_source = True
+    options_schema = {"type": "object", "properties": {}, "additionalProperties": False}
+    codes = CODES
+    green_means = (
+        "Every call of this file's `step`, from any state that its assumptions allow and on any finite inputs, gives "
+        "outputs that meet the guarantee, in the meaning that CPython gives the text; REAL is what the plan's "
+        "`numbers` says. It says nothing of threads, of what else the robot's process does, or of other files."
+    )
+
+    def tools(self) -> tuple[Tool, ...]:
+        return (Tool("z3", metadata.version("z3-solver"), None, "pip install z3-solver", optional=False),)
+
+    def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        from .reading import load
+
+        try:
+            return load(job).remarks()
+        except Rejected as rejected:
+            return rejected.diagnostics
+
+    def files(self, job: Job) -> tuple[Path, ...]:
+        from .reading import files
+
+        return files(job)
+
+    def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+        from .settle import settle
+
+        return settle(job, limits)
+
+
+BACKEND = PythonBackend()

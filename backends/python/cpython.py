@@ -1,0 +1,134 @@
+"""CPython's word: the declared class, run in isolation by a process that nothing of it can reach.
+
+As a script (``python cpython.py CHANNEL FILE``) it asks a class the cases in a file, and says what came back.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from avow.drive.steps import coded
+from avow.isolation import judge
+from avow.isolation.level import Isolation
+from avow.isolation.observed import Observed, from_json, to_json
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """The class, and how it is made."""
+
+    root: Path
+    file: Path
+    class_name: str
+    params: Mapping[str, Any]
+    memory: Mapping[str, str]
+    attributes: tuple[str, ...]
+    """Whose values after `__init__` are wanted."""
+
+    @property
+    def spec(self) -> str:
+        spec = {
+            "class": self.class_name,
+            "params": coded(dict(self.params)),
+            "memory": dict(self.memory),
+            "attributes": list(self.attributes),
+        }
+        return json.dumps(spec)
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What came back: a reply a case (None: none), or `fault`, for which nothing of it counts."""
+
+    replies: tuple[Any, ...]
+    fault: str
+    observed: tuple[Observed, ...]
+    isolation: Isolation
+
+
+def case_of(inputs: Mapping[str, Any], memory: Mapping[str, Any]) -> str:
+    """One step from that memory."""
+    return json.dumps(
+        {
+            "memory": {name: coded(value) for name, value in memory.items()},
+            "steps": [{name: coded(value) for name, value in inputs.items()}],
+        }
+    )
+
+
+def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: int) -> Told:
+    """Run the cases, each on an object of its own. Raises ToolMissing."""
+    from .tuning import BATCH
+
+    with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
+        place = Path(scratch) / "cases.json"
+        question = {
+            "root": str(subject.root),
+            "file": str(subject.file),
+            "spec": subject.spec,
+            "cases": list(cases),
+            "seconds": seconds,
+            "batch": BATCH,
+        }
+        place.write_text(json.dumps(question), encoding="utf-8")
+        done, answer = judge.ask(
+            str(Path(__file__).resolve()),
+            [str(place)],
+            cwd=Path(scratch),
+            seconds=seconds,
+            megabytes=megabytes,
+            env={"PYTHONHASHSEED": "0"},
+        )
+    if answer is None:
+        why = "took too long" if done.timed_out else f"ended without an answer (code {done.code})"
+        last = done.stderr.strip().splitlines()[-1:]
+        return Told((), f"running the class {why}{': ' + last[0][:200] if last else ''}", (), Isolation.NONE)
+    replies = tuple(json.loads(r) if isinstance(r, str) else r for r in answer["replies"])
+    return Told(replies, str(answer["fault"]), from_json(answer["observed"]), Isolation(answer["isolation"]))
+
+
+def main() -> None:
+    from avow.base.process import adopt_orphans
+    from avow.isolation.subject import Subject as Process
+    from avow.isolation.subject import SubjectFailed
+    from avow.tuning.running import SUBJECT_PATIENCE
+
+    channel = int(sys.argv[1])
+    os.set_inheritable(channel, False)
+    adopt_orphans()
+    question = json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))
+    process = Process(
+        Path(question["file"]),
+        question["spec"],
+        max(1.0, min(SUBJECT_PATIENCE, question["seconds"] / 3)),
+        Path(question["root"]),
+    )
+    replies: list[Any] = []
+    fault = ""
+    try:
+        cases, batch = question["cases"], question["batch"]
+        for at in range(0, len(cases), batch):
+            found = process.ask_all([{"case": case} for case in cases[at : at + batch]])
+            failed = [str(r) for r in found if isinstance(r, SubjectFailed)]
+            if failed:
+                fault = failed[0]
+                break
+            replies += found
+    finally:
+        fault = process.close() or fault
+    observed = to_json(process.observed())
+    judge.say(
+        channel,
+        {"replies": replies, "fault": fault, "observed": observed, "isolation": process.isolation.value},
+    )
+
+
+if __name__ == "__main__":
+    main()

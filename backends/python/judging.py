@@ -1,0 +1,132 @@
+"""The contract's word on what CPython answered: exact, whatever the program computes with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from avow.drive.steps import plain
+from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
+from avow.evaluation.truth import judge
+from avow.formulas.values import Binary, Element, Sequence, Value, show
+from avow.language.contract import Clause, Node
+from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort
+from avow.language.terms import Term
+from avow.tuning.effort import JUDGE_EFFORT
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A clause, ready to be judged often."""
+
+    name: str
+    term: Term
+    evaluator: Evaluator | None
+
+    @classmethod
+    def of(cls, clause: Clause) -> Formula:
+        try:
+            return cls(clause.name, clause.formula, compile_term(clause.formula))
+        except NotEvaluable:
+            return cls(clause.name, clause.formula, None)
+
+    def holds(self, values: Mapping[str, Value]) -> bool | None:
+        if self.evaluator is not None:
+            try:
+                return bool(self.evaluator(values))
+            except NotEvaluable:
+                pass
+        return judge(self.term, values, effort=JUDGE_EFFORT)
+
+
+class NoValue(ValueError):  # noqa: N818 - it says what it is
+    """What came back is no value of the port's type."""
+
+
+def exact(value: Any) -> Value:
+    """An input as the contract has it."""
+    match value:
+        case bool():
+            return value
+        case float():
+            return Binary.held(Fraction(value), repr(value))
+        case str():
+            return Element(value)
+        case list():
+            return Sequence(tuple(exact(item) for item in value))
+        case _:  # an int or a fraction
+            return value  # type: ignore[no-any-return]
+
+
+def returned(name: str, value: Any, sort: Sort) -> Value:
+    """An output as the contract has it. Raises NoValue."""
+    match sort, value:
+        case BoolSort(), bool():
+            return value
+        case RealSort(), float() if math.isfinite(value):
+            return Binary.held(Fraction(value), repr(value))
+        case RealSort(), int() | Fraction() if not isinstance(value, bool):
+            return Fraction(value)
+        case IntegerSort() | NaturalSort(), int() if not isinstance(value, bool):
+            if isinstance(sort, IntegerSort) or value >= 0:
+                return value
+        case EnumSort(members=members), str() if value in members:
+            return Element(value)
+    raise NoValue(f"out.{name} is {value!r}, which is no value of its type")
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """One case and what came of it: values by qualified name, or in `wrong` why there are none."""
+
+    values: Mapping[str, Value]
+    wrong: str = ""
+
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        return tuple((name, show(value)) for name, value in self.values.items())
+
+
+def seen(node: Node, memory: Mapping[str, str], case: Mapping[str, Any], reply: Any) -> Seen:
+    """The reply to a case of one step, in the contract's words."""
+    values: dict[str, Value] = {f"in.{name}": exact(value) for name, value in case.items()}
+    (answer,) = reply["steps"]
+    if "error" in answer:
+        return Seen(values, f"the step raises {answer['why']}")
+    others = {p.name: p for p in node.outputs if p.name not in memory}
+    try:
+        value = _plain(answer["value"])
+        given = value if isinstance(value, dict) else {next(iter(others)): value} if len(others) == 1 else None
+        if given is None or set(given) != set(others):
+            raise NoValue(f"the step returns {value!r}; it has to return {', '.join(sorted(others)) or 'nothing'}")
+        for name, port in others.items():
+            values[f"out.{name}"] = returned(name, given[name], port.sort)
+        for port in node.outputs:
+            if port.name in memory:
+                held = _plain(answer["memory"][port.name])
+                values[f"out.{port.name}"] = returned(port.name, held, port.sort)
+    except NoValue as error:
+        return Seen(values, str(error))
+    return Seen(values)
+
+
+def _plain(data: Any) -> Any:
+    try:
+        return plain(data)
+    except ValueError:
+        raise NoValue(f"the step returns {data.get('?', data) if isinstance(data, dict) else data}") from None
+
+
+Meets = Callable[[Mapping[str, Any]], bool]
+
+
+def meets(assumptions: tuple[Formula, ...]) -> Meets:
+    """Whether inputs are certainly allowed."""
+
+    def allowed(case: Mapping[str, Any]) -> bool:
+        values = {f"in.{name}": exact(value) for name, value in case.items()}
+        return all(a.holds(values) is True for a in assumptions)
+
+    return allowed

@@ -1,0 +1,156 @@
+"""The declared class, read: its file, its parameters, and its step as a small program, or why there is none."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from avow.backend_kit.protocol import Job
+from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.system.paths import inside
+from avow.system.plan import Numbers, Source
+from avow.system.strict_yaml import read_yaml
+
+from .cpython import Subject
+from .program import Step
+from .translate import Translator
+from .whole_file import Refusal, read
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A job's class. `step` is None where something is refused."""
+
+    job: Job
+    source: Source
+    file: Path
+    text: str
+    params: Mapping[str, Any]
+    step: Step | None
+    refused: tuple[Refusal, ...]
+
+    @property
+    def subject(self) -> Subject:
+        return Subject(
+            self.job.root.resolve(),
+            self.file.resolve(),
+            self.source.class_name,
+            self.params,
+            dict(self.source.memory),
+            tuple(self.step.start) if self.step is not None else (),
+        )
+
+    @property
+    def exact(self) -> bool:
+        return self.source.numbers is Numbers.EXACT
+
+    def remarks(self) -> tuple[Diagnostic, ...]:
+        """A warning for everything that is refused."""
+        return tuple(
+            Diagnostic("PYTHON200", r.why, Span(str(self.file), r.line, 1, r.line, 1), Severity.WARNING)
+            for r in self.refused
+        )
+
+
+def files(job: Job) -> tuple[Path, ...]:
+    """The source's files, also where they are not there."""
+    source = job.source
+    named = (source.python, source.parameters) if source is not None else ()
+    return tuple(path for name in named if name and (path := inside(job.root, name)) is not None)
+
+
+def load(job: Job) -> Reading:
+    """Raises Rejected with everything that is wrong with the declaration."""
+    source, place = job.source, job.method.options.span
+    if source is None or not source.python:
+        hint = "source: {python: src/node.py, class: Node}"
+        message = f"{job.node.name} has no Python source: the plan does not say which program it is"
+        raise Rejected(Diagnostic("PYTHON100", message, place, hint=hint))
+    faults: list[Diagnostic] = []
+    if source.numbers is Numbers.FLOAT32:
+        message = "Python's floats are float64: numbers: float32 is not what this source computes with"
+        faults.append(Diagnostic("PYTHON100", message, source.place.at("numbers")))
+    path = inside(job.root, source.python)
+    text, tree = "", None
+    try:
+        assert path is not None
+        text = path.read_text(encoding="utf-8")
+        tree = ast.parse(text, filename=path.name)
+    except SyntaxError as error:
+        at = error.lineno or 1
+        faults.append(Diagnostic("PYTHON100", f"this is no Python: {error.msg}", Span(str(path), at, 1, at, 2)))
+    except (OSError, ValueError, RecursionError, MemoryError, AssertionError) as error:
+        message = f"`{source.python}` cannot be read: {error}"
+        faults.append(Diagnostic("PYTHON100", message, source.place.at("source", "python")))
+    params, wrong = parameters(job.root, source)
+    faults += wrong
+    if faults or tree is None or path is None:
+        raise Rejected(*faults)
+    step, refused = _step(job, source, tree, path, text, params)
+    return Reading(job, source, path, text, params, step, refused)
+
+
+def _step(
+    job: Job, source: Source, tree: ast.Module, path: Path, text: str, params: Mapping[str, Any]
+) -> tuple[Step | None, tuple[Refusal, ...]]:
+    try:
+        parts, refused = read(tree, source.class_name, path)
+        if parts is None or refused:
+            return None, refused
+        return Translator(parts, job.node, source.memory, params, text).step(), ()
+    except Refusal as refusal:
+        return None, (refusal,)
+    except RecursionError:
+        return None, (Refusal(1, "the program is nested too deeply"),)
+
+
+def parameters(root: Path, source: Source) -> tuple[Mapping[str, Any], tuple[Diagnostic, ...]]:
+    """What the class is made with. A YAML that another reader may take otherwise is refused."""
+    if not source.parameters:
+        return {}, ()
+    place, path = source.place.at("source", "parameters"), inside(root, source.parameters)
+    try:
+        assert path is not None
+        data = path.read_bytes()
+        piece, faults = read_yaml(data, str(path))
+        loaded = yaml.safe_load(data)
+    except Rejected as rejected:
+        return {}, rejected.diagnostics
+    except (OSError, AssertionError, ValueError, yaml.YAMLError, RecursionError) as error:
+        return {}, (Diagnostic("PYTHON101", f"`{source.parameters}` cannot be read: {error}", place),)
+    if faults:
+        return {}, faults
+    if not isinstance(loaded, dict):
+        return {}, (Diagnostic("PYTHON101", f"`{source.parameters}` is no mapping", place),)
+    wrong = tuple(
+        Diagnostic("PYTHON101", f"`{source.parameters}`: {why}", place) for why in _unclear(piece.data, loaded, "")
+    )
+    return loaded, wrong
+
+
+def _unclear(strict: Any, loaded: Any, where: str) -> Iterator[str]:
+    """Where YAML's own reader takes a text otherwise than it looks, or has what no parameter is."""
+    if isinstance(loaded, dict):
+        if not isinstance(strict, dict) or set(strict) != set(loaded):
+            yield f"{where or 'the mapping'} has keys that are no plain texts"
+            return
+        for key, value in loaded.items():
+            yield from _unclear(strict[key], value, f"{where}.{key}" if where else key)
+    elif isinstance(loaded, bool | int | float | str):
+        if isinstance(loaded, float) and not math.isfinite(loaded):
+            yield f"{where} is {loaded}, which is no REAL"
+        elif type(strict) is not type(loaded) and not (type(strict) is int and type(loaded) is float):
+            yield f"{where} is read as {loaded!r} by some, and as {strict!r} by others: write it in quotes, or plainly"
+        elif strict != loaded:
+            yield f"{where} is read as {loaded!r} by some, and as {strict!r} by others"
+    elif loaded is not None or strict is not None:
+        yield f"{where} is a {type(loaded).__name__}; numbers, truth values, texts and mappings of them are parameters"
+
+
+__all__ = ["Reading", "files", "load", "parameters"]

@@ -1,0 +1,160 @@
+"""Inputs on which a class is run beside its translation: at and beside every number that contract, program and
+parameters write down, one double to either side, as far apart as these say, and at the ends of what a double holds."""
+
+from __future__ import annotations
+
+import math
+import random
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from avow.formulas.traversal import subterms
+from avow.language.bounds import constant
+from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
+from avow.language.terms import Term
+
+from .rounding import around
+from .tuning import LENGTHS, TRIES
+
+
+@dataclass(frozen=True, slots=True)
+class Pool:
+    """What is drawn from."""
+
+    floats: tuple[float, ...]
+    steps: tuple[float, ...]
+    """Distances at which something happens."""
+    ints: tuple[int, ...]
+    lengths: tuple[int, ...]
+
+
+def numbers_of(formulas: Iterable[Term]) -> frozenset[Fraction]:
+    """The numbers that formulas write down."""
+    found = set[Fraction]()
+    for formula in formulas:
+        for part in subterms(formula):
+            number = constant(part)
+            if number is not None:
+                found.add(number)
+    return frozenset(found)
+
+
+def pool(numbers: Iterable[Fraction]) -> Pool:
+    exact = sorted(set(numbers) | {-n for n in numbers})
+    doubles = {d for n in exact for d in around(n) if math.isfinite(d)}
+    beside = {math.nextafter(d, end) for d in doubles for end in (-math.inf, math.inf)}
+    near = {d + s for d in doubles for s in (-1.0, -0.001, 0.001, 1.0)}
+    plain = {0.0, 1.0, -1.0, 0.5, 2.0, 3.0, 10.0, 100.0, 1000.0}
+    floats = tuple(sorted(f for f in doubles | beside | near | plain if math.isfinite(f)))
+    whole = {math.floor(n) for n in exact} | {math.ceil(n) for n in exact}
+    ints = tuple(sorted({*range(-2, 5), *(n + d for n in whole for d in (-1, 0, 1))}))
+    counted = {n + d for n in whole if 0 <= n <= 64 for d in (-1, 0, 1)}
+    lengths = tuple(sorted({*LENGTHS, *(n for n in counted if n >= 0)}))
+    return Pool(floats, tuple(sorted(doubles | {0.0})), ints, lengths)
+
+
+EXTREME = (
+    -0.0,
+    5e-324,
+    -5e-324,
+    sys.float_info.min,
+    1e-300,
+    1e-17,
+    1e15,
+    2.0**53,
+    1e300,
+    sys.float_info.max,
+    -sys.float_info.max,
+    -1e300,
+)
+
+
+@dataclass(slots=True)
+class Drawing:
+    """Draws cases from a seed."""
+
+    pool: Pool
+    sorts: Mapping[str, Sort]
+    chance: random.Random
+
+    def cases(self, number: int, meets: Callable[[Mapping[str, Any]], bool]) -> Iterator[dict[str, Any]]:
+        """So many cases, most of which meet the assumptions where that is not rare."""
+        for _ in range(number):
+            for _ in range(TRIES):
+                case = self.case()
+                if meets(case):
+                    break
+            yield case
+
+    def case(self) -> dict[str, Any]:
+        related = self.chance.random() < 0.6
+        wild = self.chance.random() < 0.08
+        base = self.chance.choice(self.pool.floats)
+        if related and self.chance.random() < 0.5:
+            base = abs(self.chance.choice((1.0, 2.0, 3.0, 7.0, 10.0, 1e3, 1e6)) + self.chance.choice((0.0, base)))
+        return {name: self.value(sort, base if related else None, wild) for name, sort in self.sorts.items()}
+
+    def value(self, sort: Sort, base: float | None, wild: bool) -> Any:
+        match sort:
+            case BoolSort():
+                return self.chance.random() < 0.5
+            case EnumSort(members=members):
+                return self.chance.choice(members)
+            case IntegerSort():
+                return self.whole(wild)
+            case NaturalSort():
+                return abs(self.whole(wild))
+            case RealSort():
+                return self.float(base, wild)
+            case SequenceSort(item=item):
+                length = self.chance.choice(self.pool.lengths)
+                if length > 12 and self.chance.random() < 0.7:
+                    length = self.chance.choice(LENGTHS)
+                return [self.value(item, base, wild) for _ in range(length)]
+        raise TypeError(f"no value of {sort} is drawn")
+
+    def whole(self, wild: bool) -> int:
+        if wild and self.chance.random() < 0.3:
+            return self.chance.choice((2**31 - 1, 2**31, -(2**31), 2**53 + 1, 2**63, 10**20))
+        return self.chance.choice(self.pool.ints)
+
+    def float(self, base: float | None, wild: bool) -> float:
+        if wild and self.chance.random() < 0.5:
+            return self.chance.choice(EXTREME)
+        if base is None:
+            kind = self.chance.random()
+            if kind < 0.6:
+                return self.chance.choice(self.pool.floats)
+            scale = abs(self.chance.choice(self.pool.floats)) or 1.0
+            return self.chance.uniform(-1.5, 1.5) * min(scale, 1e300)
+        found = base + self.chance.choice((-1, 1, 1, 0)) * self.chance.choice(self.pool.steps)
+        turn = self.chance.random()
+        if turn < 0.3:
+            found = math.nextafter(found, -math.inf if turn < 0.15 else math.inf)
+        return found if math.isfinite(found) else base
+
+
+def beside(case: Mapping[str, Any], sorts: Mapping[str, Sort]) -> Iterator[dict[str, Any]]:
+    """Cases whose numbers are the doubles around those of an exact case: a solver's numbers need not be doubles."""
+
+    def ends(value: Any) -> list[Any]:
+        if isinstance(value, Fraction):
+            low, high = around(value)
+            return [d for d in dict.fromkeys((low, high)) if math.isfinite(d)] or [0.0]
+        return [value]
+
+    names = list(case)
+    choices = [
+        [[ends(item)[0] for item in case[n]], [ends(item)[-1] for item in case[n]]]
+        if isinstance(case[n], list)
+        else ends(case[n])
+        for n in names
+    ]
+    del sorts
+    found: list[dict[str, Any]] = [{}]
+    for name, options in zip(names, choices, strict=True):
+        found = [{**one, name: option} for one in found for option in options][:64]
+    yield from found

@@ -1,0 +1,363 @@
+"""Settling a node's guarantees of its own class: run it, compare it with its translation, prove, or show the fault."""
+
+from __future__ import annotations
+
+import ast
+import json
+import math
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any
+
+from avow.backend_kit.given import told
+from avow.backend_kit.protocol import Job, Limits, Report
+from avow.base.diagnostics import Rejected
+from avow.base.process import ToolMissing
+from avow.base.verdict import Counterexample, Object, Outcome, Verdict
+from avow.drive.steps import coded
+from avow.evidence.obligation import Obligation
+from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
+from avow.formulas.formula import free_variables
+from avow.formulas.values import Element
+from avow.formulas.values import Sequence as SequenceValue
+from avow.isolation.level import Isolation, Unavailable, available
+from avow.isolation.observed import Observed
+from avow.language.sorts import RealSort, SequenceSort
+from avow.language.terms import Variable
+from avow.solving.limits import from_seconds, until
+from avow.solving.questions import z3_version
+from avow.tuning.bounds import CASES_KEPT
+
+from .conditions import Conditions, Found
+from .cpython import Told, ask, case_of
+from .judging import Formula, Seen, exact, meets, seen
+from .machine import fraction, run
+from .reading import Reading, load
+from .samples import Drawing, beside, numbers_of, pool
+from .translate import kind_of
+from .tuning import RUN_SECONDS, VALIDATED
+
+TOOL = "python conditions"
+NOT_FINITE = "inputs are finite"
+
+
+def settle(job: Job, limits: Limits) -> Report:
+    """One outcome for each obligation."""
+    version = f"z3 {z3_version()}"
+    try:
+        available()
+        reading = load(job)
+    except Unavailable as missing:
+        return Report.alike(job, Verdict.NOT_RUN, str(missing), TOOL, version)
+    except Rejected as rejected:
+        return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), TOOL, version)
+    if not job.obligations:
+        return Report((), TOOL, version)
+    try:
+        work = Work(reading, limits)
+        outcomes = work.outcomes()
+    except ToolMissing as missing:
+        return Report.alike(job, Verdict.NOT_RUN, str(missing), TOOL, version)
+    what = {"of": Object.SOURCE, "numbers": reading.source.numbers.value}
+    outcomes = tuple(replace(o, **what, details={**o.details, **work.said}) for o in outcomes)  # type: ignore[arg-type]
+    return Report(outcomes, TOOL, version, (), work.logs, tuple(work.observed), work.isolation)
+
+
+@dataclass(slots=True)
+class Work:
+    """One reading, and what was found of it."""
+
+    reading: Reading
+    limits: Limits
+    observed: dict[Observed, None] = field(default_factory=dict)
+    isolation: Isolation = Isolation.SEALED
+    logs: dict[str, str] = field(default_factory=dict)
+    said: dict[str, object] = field(default_factory=dict)
+    ran: int = 0
+    broken: dict[str, Counterexample] = field(default_factory=dict)
+    """Guarantee → the first case of it that CPython showed."""
+    unkept: tuple[str, ...] = ()
+    """What is assumed of memory and not shown of every step."""
+    allowed: int = 0
+    """Cases that met the assumptions."""
+
+    @property
+    def job(self) -> Job:
+        return self.reading.job
+
+    def outcomes(self) -> tuple[Outcome, ...]:
+        job, reading = self.job, self.reading
+        formulas = {o.id: Formula.of(job.clause(o)) for o in job.obligations}
+        assumed = tuple(map(Formula.of, job.node.assumptions))
+        cases = self.cases(assumed)
+        if cases is None:
+            return self.alike(Verdict.UNKNOWN, self.refusals())
+        fault = self.try_all(cases, formulas, assumed)
+        if fault and reading.step is None:
+            return self.alike(Verdict.UNKNOWN, f"{self.refusals()} ({fault})")
+        if fault:
+            return self.alike(Verdict.ERROR, fault)
+        if reading.step is None:
+            return tuple(self.refuted(o) or Outcome(o.id, Verdict.UNKNOWN, self.refusals()) for o in job.obligations)
+        begun = self.begins(assumed)
+        if begun is not None:
+            return tuple(self.refuted(o) or replace(begun, obligation=o.id) for o in job.obligations)
+        still = [o for o in job.obligations if o.id not in self.broken]
+        found: dict[str, Found] = {}
+        if still:
+            numbers = self.numbers(with_program=True)
+            conditions = Conditions(reading, reading.step, numbers, until(from_seconds(self.limits.seconds)))
+            found = conditions.settle([(o.id, job.clause(o)) for o in still])
+            self.unkept = conditions.unkept
+            self.logs["conditions.log"] = conditions.log()
+            shown = [case for f in found.values() for case in f.models]
+            wanted = [c for model in shown for c in self.near(model)]
+            if wanted:
+                fault = self.try_all(wanted, formulas, assumed)
+                if fault:
+                    return self.alike(Verdict.ERROR, fault)
+        return tuple(self.refuted(o) or self.settled(o, found[o.id]) for o in job.obligations)
+
+    def alike(self, verdict: Verdict, summary: str) -> tuple[Outcome, ...]:
+        return tuple(Outcome(o.id, verdict, summary) for o in self.job.obligations)
+
+    def refusals(self) -> str:
+        name = self.reading.file.name
+        said = [f"{name}:{r.line}: {r.why}" for r in self.reading.refused[:3]]
+        more = len(self.reading.refused) - len(said)
+        return f"not understood: {'; '.join(said)}" + (f"; and {more} more" if more > 0 else "")
+
+    # -- running -----------------------------------------------------------------------------------------
+
+    def numbers(self, *, with_program: bool) -> frozenset[Fraction]:
+        """What contract, parameters and, where it is asked, the program write down."""
+        clauses = (*self.job.node.assumptions, *(self.job.clause(o) for o in self.job.obligations))
+        found = set(numbers_of(c.formula for c in clauses))
+        found |= set(_leaves(self.reading.params))
+        if with_program:
+            found |= set(_written(self.reading.text))
+        return frozenset(found)
+
+    def cases(self, assumed: tuple[Formula, ...]) -> list[dict[str, Any]] | None:
+        """Inputs to be tried; None where this method draws none of the node's types."""
+        sorts = {p.name: p.sort for p in self.job.node.inputs}
+        for sort in sorts.values():
+            if kind_of(sort.item if isinstance(sort, SequenceSort) else sort) is None:
+                return None
+        drawn = Drawing(pool(self.numbers(with_program=True)), sorts, random.Random(self.limits.seed))
+        return list(drawn.cases(VALIDATED, meets(assumed)))
+
+    def try_all(
+        self,
+        cases: Sequence[Mapping[str, Any]],
+        formulas: Mapping[str, Formula],
+        assumed: tuple[Formula, ...],
+        exactly: bool = False,
+    ) -> str:
+        """Ask CPython, compare with the translation, judge; why nothing counts, if nothing does. Where the plan has
+        exact numbers, what is judged are runs on fractions in which no float came in between."""
+        memory = self.reading.source.memory
+        asked = [
+            case_of({n: v for n, v in case.items() if n not in memory}, {n: v for n, v in case.items() if n in memory})
+            for case in cases
+        ]
+        seconds = max(2.0, min(RUN_SECONDS, self.limits.seconds))
+        subject = self.reading.subject
+        if exactly:
+            subject = replace(subject, params=_exactly(subject.params))
+        found = ask(subject, asked, seconds=seconds, megabytes=self.limits.megabytes)
+        self.keep(found)
+        if found.fault or len(found.replies) != len(cases):
+            return found.fault or "the class did not answer every case"
+        allowed = meets(assumed)
+        for case, reply in zip(cases, found.replies, strict=True):
+            if not isinstance(reply, dict) or "steps" not in reply:
+                return f"the class cannot be driven: {_reason(reply)}"
+            why = self.differs(case, reply) if not exactly else ""
+            if why:
+                return why
+            if self.reading.exact and not (exactly and self.agrees(case, reply)):
+                continue
+            if allowed(case):
+                self.allowed += 1
+                self.judge(seen(self.job.node, memory, case, reply), formulas)
+        if exactly:
+            return ""
+        self.ran += len(cases)
+        self.said["validated"] = {"cases": self.ran, "seed": self.limits.seed}
+        return self.try_all([_exactly(case) for case in cases], formulas, assumed, True) if self.reading.exact else ""
+
+    def keep(self, found: Told) -> None:
+        self.observed.update(dict.fromkeys(found.observed))
+        self.isolation = min(self.isolation, found.isolation, key=lambda level: level.rank)
+
+    def differs(self, case: Mapping[str, Any], reply: Mapping[str, Any]) -> str:
+        """How class and translation differ on a case, bit for bit."""
+        step = self.reading.step
+        if step is None:
+            return ""
+        start = {name: coded(value) for name, value in step.start.items()}
+        if reply["start"] != {**start, **{a: reply["start"].get(a) for a in step.memory.values()}}:
+            return f"class and translation differ in what __init__ makes: {_short(reply['start'])}, not {_short(start)}"
+        memory = {n: v for n, v in case.items() if n in step.memory}
+        ours = run(step, {n: v for n, v in case.items() if n not in step.memory}, memory)
+        (theirs,) = reply["steps"]
+        if theirs["changed"]:
+            return f"a step changes {', '.join(theirs['changed'])}, which the text does not show"
+        if "error" in theirs or ours.error:
+            if theirs.get("error", "") == ours.error:
+                return ""
+            what = theirs.get("why", "no exception")
+            return f"class and translation differ on {_short(case)}: {what}, and {ours.error or 'none'}"
+        outputs = {name: coded(value) for name, value in ours.outputs.items()}
+        value = theirs["value"]
+        given = dict(value["d"]) if isinstance(value, dict) and "d" in value else None
+        same = given == outputs if given is not None else [value] == list(outputs.values())
+        held = {name: coded(v) for name, v in ours.memory.items()}
+        if not same or theirs["memory"] != held:
+            return f"class and translation differ on {_short(case)}: {_short(value)}, and {_short(outputs)}"
+        return ""
+
+    def agrees(self, case: Mapping[str, Any], reply: Mapping[str, Any]) -> bool:
+        """Whether CPython's answer on fractions is the translation's, as numbers."""
+        step = self.reading.step
+        if step is None:
+            return False
+        memory = {n: v for n, v in case.items() if n in step.memory}
+        ours = run(step, {n: v for n, v in case.items() if n not in step.memory}, memory, exact=True)
+        (theirs,) = reply["steps"]
+        if ours.error or "error" in theirs:
+            return bool(ours.error == theirs.get("error", ""))
+        outputs = {name: coded(fraction(v)) for name, v in ours.outputs.items()}
+        value = _in_fractions(theirs["value"])
+        given = dict(value["d"]) if isinstance(value, dict) and "d" in value else None
+        same = given == outputs if given is not None else [value] == list(outputs.values())
+        held = {name: _in_fractions(v) for name, v in theirs["memory"].items()}
+        return same and held == {name: coded(fraction(v)) for name, v in ours.memory.items()}
+
+    def judge(self, case: Seen, formulas: Mapping[str, Formula]) -> None:
+        for name, formula in formulas.items():
+            if name in self.broken:
+                continue
+            if case.wrong:
+                self.broken[name] = Counterexample(case.pairs(), f"{case.wrong}: there is no output")
+            elif formula.holds(case.values) is False:
+                why = f"CPython answers so, and guarantee {formula.name} does not hold of it"
+                self.broken[name] = Counterexample(case.pairs(), why)
+
+    def begins(self, assumed: tuple[Formula, ...]) -> Outcome | None:
+        """Whether what `__init__` makes meets what is assumed of memory alone."""
+        step = self.reading.step
+        assert step is not None
+        values = {f"in.{port}": exact(step.start[attribute]) for port, attribute in step.memory.items()}
+        for formula in assumed:
+            names = {v.qualified for v in free_variables(formula.term)}
+            if names and names <= values.keys() and formula.holds(values) is False:
+                pairs = Seen({name: values[name] for name in sorted(names)}).pairs()
+                why = f"this is what __init__ makes, and assumption {formula.name} does not hold of it"
+                shown = Counterexample(pairs, why)
+                return Outcome("", Verdict.REFUTED, shown.text(), shown)
+        return None
+
+    def near(self, model: Mapping[Variable, Any]) -> list[dict[str, Any]]:
+        """A solver's values as cases of doubles."""
+        case: dict[str, Any] = {}
+        sorts = {p.name: p.sort for p in self.job.node.inputs}
+        for port in self.job.node.inputs:
+            value = model.get(port.variable)
+            plain = _plain(value)
+            if plain is None:
+                return []
+            case[port.name] = plain
+        if self.reading.exact:
+            return [case]
+        return list(beside(case, sorts))[:CASES_KEPT]
+
+    # -- outcomes ----------------------------------------------------------------------------------------
+
+    def refuted(self, obligation: Obligation) -> Outcome | None:
+        shown = self.broken.get(obligation.id)
+        return None if shown is None else Outcome(obligation.id, Verdict.REFUTED, shown.text(), shown)
+
+    def settled(self, obligation: Obligation, found: Found) -> Outcome:
+        if found.verdict is not Verdict.PROVED:
+            return Outcome(obligation.id, found.verdict, found.why, details=found.details)
+        summary = (
+            f"{found.conditions} verification conditions of the source proved; "
+            f"CPython and their translation agree on {self.ran} inputs, bit for bit"
+        )
+        if not self.allowed:
+            vacuous = "none of the inputs tried meets the assumptions"
+            return Outcome(obligation.id, Verdict.PROVED, f"{summary}; but {vacuous}", vacuous=True)
+        details = {**found.details, OUTPUT_FOR_EVERY_INPUT: True}
+        return Outcome(obligation.id, Verdict.PROVED, summary, hypotheses=self.hypotheses(), details=details)
+
+    def hypotheses(self) -> tuple[str, ...]:
+        def real(sort: object) -> bool:
+            return isinstance(sort.item if isinstance(sort, SequenceSort) else sort, RealSort)
+
+        names = [f"in.{p.name}" for p in self.job.node.inputs if real(p.sort)]
+        if not names or self.reading.exact:
+            return self.unkept
+        return (f"{NOT_FINITE}: {', '.join(names)}: no NaN, no infinity", *self.unkept)
+
+
+def _plain(value: Any) -> Any:
+    match value:
+        case None:
+            return None
+        case Element(name=name):
+            return name
+        case SequenceValue(items=items):
+            return [_plain(item) for item in items]
+        case _:  # a number or truth value
+            return value
+
+
+def _exactly(data: Any) -> Any:
+    """With the fraction that it is in the place of every float."""
+    match data:
+        case dict():
+            return {key: _exactly(value) for key, value in data.items()}
+        case list():
+            return [_exactly(item) for item in data]
+        case _:  # a value
+            return fraction(data)
+
+
+def _in_fractions(data: Any) -> Any:
+    match data:
+        case {"f": str(text)}:
+            number = float.fromhex(text)
+            return coded(Fraction(number)) if math.isfinite(number) else data
+        case {"d": pairs}:
+            return {"d": [[key, _in_fractions(value)] for key, value in pairs]}
+        case _:  # no float
+            return data
+
+
+def _leaves(data: Any) -> list[Fraction]:
+    match data:
+        case bool():
+            return []
+        case int() | float():
+            return [Fraction(data)]
+        case dict():
+            return [n for value in data.values() for n in _leaves(value)]
+    return []
+
+
+def _written(text: str) -> list[Fraction]:
+    values = [node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)]
+    numbers = [v for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
+    return [Fraction(n) for n in numbers if math.isfinite(n)]
+
+
+def _reason(reply: Any) -> str:
+    return str(reply.get("error", reply) if isinstance(reply, dict) else reply)[:300]
+
+
+def _short(data: Any) -> str:
+    return json.dumps(data, default=str)[:200]

@@ -1,0 +1,445 @@
+"""Verification conditions of a step: its program run on variables.
+
+Every value is given a name, and what is known of it is a fact; where paths meet, a name has the value of the path that
+was taken. A check is made of the facts known when it is met, never of later ones. A loop is one turn from any state
+that its invariants allow; that they hold before the first turn and after each are checks too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from avow.formulas.formula import conjunction, disjunction, negation
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, EnumSort, FunctionSort, Sort
+from avow.language.terms import (
+    TRUE,
+    Apply,
+    Arithmetic,
+    Conditional,
+    EnumValue,
+    Iff,
+    Implies,
+    Literal,
+    Negative,
+    Not,
+    Role,
+    Term,
+    Variable,
+    Widen,
+)
+from avow.language.terms import Compare as Comparison
+
+from .program import (
+    Assign,
+    Binary,
+    Choice,
+    Compare,
+    Const,
+    Convert,
+    Expr,
+    Extreme,
+    For,
+    Give,
+    If,
+    Inlined,
+    Item,
+    Junction,
+    Leave,
+    Length,
+    Name,
+    Statement,
+    Step,
+    Unary,
+    assigned,
+)
+from .rounding import finite, gaps, no_overflow, rounded
+from .tuning import MOST_NAMES
+
+ZERO = Literal(0, INTEGER)
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """`goal` follows from the first `facts` of the facts, where `guard` holds."""
+
+    facts: int
+    guard: Term
+    goal: Term
+    what: str
+    line: int
+    candidate: Candidate | None = None
+    """The invariant whose beginning or keeping this is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A formula that may hold whenever a loop's next turn is decided on; `build` makes it of the loop's state."""
+
+    loop: str
+    text: str
+    build: Callable[[Turn], Term | None] = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A loop at some moment: the names' values, how many turns are done, and what the names were before the first."""
+
+    values: Mapping[str, Term]
+    done: Term
+    entry: Mapping[str, Term]
+    loop: For
+    carried: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """A way out of the step: where `guard` holds, with the first `facts` of the facts."""
+
+    facts: int
+    guard: Term
+    outputs: Mapping[str, Term]
+    line: int
+
+
+@dataclass(slots=True)
+class State:
+    path: Term
+    values: dict[str, Term]
+
+
+class TooMuch(Exception):  # noqa: N818 - it names what happened
+    """More facts than this method handles."""
+
+
+@dataclass(slots=True)
+class Run:
+    """One symbolic run of a step."""
+
+    step: Step
+    sorts: Mapping[str, EnumSort]
+    """Element → its enumeration."""
+    exact: bool
+    """Nothing is rounded."""
+    thresholds: tuple[float, ...]
+    """Doubles at which a rounded result is told apart."""
+    gaps: tuple[Fraction, ...]
+    """Numbers of the contract that may be no doubles."""
+    candidates: Sequence[Candidate]
+    facts: list[Term] = field(default_factory=list)
+    checks: list[Check] = field(default_factory=list)
+    ends: list[End] = field(default_factory=list)
+    loops: list[tuple[For, Turn]] = field(default_factory=list)
+    rounds: list[int] = field(default_factory=list)
+    """Lines where something is rounded."""
+    _fresh: int = 0
+    _exits: list[list[tuple[State, Term | None]]] = field(default_factory=list)
+    _left: list[list[tuple[State, str]]] = field(default_factory=list)
+
+    # -- naming ------------------------------------------------------------------------------------------
+
+    def fresh(self, hint: str, sort: Sort) -> Variable:
+        self._fresh += 1
+        if self._fresh > MOST_NAMES:
+            raise TooMuch
+        return Variable(Role.BOUND, f"{hint}.{self._fresh}", sort)
+
+    def named(self, hint: str, term: Term) -> Term:
+        """A name for a term, unless it is short anyhow."""
+        if isinstance(term, Variable | Literal | EnumValue) or (
+            isinstance(term, Widen | Negative | Not) and isinstance(term.children[0], Variable)
+        ):
+            return term
+        name = self.fresh(hint, INTEGER if term.sort == NATURAL else term.sort)
+        self.facts.append(same(name, term))
+        return name
+
+    def check(self, state: State, goal: Term, what: str, line: int, candidate: Candidate | None = None) -> None:
+        if goal != TRUE:
+            self.checks.append(Check(len(self.facts), state.path, goal, what, line, candidate))
+
+    # -- the step ----------------------------------------------------------------------------------------
+
+    def whole(self, inputs: Mapping[str, Term]) -> None:
+        """`inputs` are the names that a step starts with: ``in.x``, ``self.x``; of a sequence ``in.s#`` its length."""
+        values = dict(inputs)
+        for name, value in self.step.start.items():
+            values.setdefault(f"self.{name}", self.constant(value))
+        for term in inputs.values():
+            if term.sort == REAL:
+                self.double(term)
+        self._exits.append([])
+        self.block(self.step.body, State(TRUE, values), top=True)
+        self._exits.pop()
+
+    def double(self, term: Term) -> None:
+        """What is known of any double."""
+        if not self.exact:
+            self.facts += [finite(term), *gaps(term, self.gaps)]
+
+    def block(self, body: Sequence[Statement], state: State, top: bool = False) -> State | None:
+        """The state after the statements; None where no path comes there."""
+        current: State | None = state
+        for statement in body:
+            if current is None:
+                return None
+            current = self.statement(statement, current, top)
+        return current
+
+    def statement(self, statement: Statement, state: State, top: bool) -> State | None:
+        match statement:
+            case Assign(name=name, value=value):
+                found = self.named(name, self.value(value, state))
+                state.values[name] = found
+                return state
+            case If(test=test, then=then, otherwise=otherwise):
+                condition = self.named("test", self.value(test, state))
+                yes = self.block(then, self.split(state, condition), top)
+                no = self.block(otherwise, self.split(state, negation(condition)), top)
+                return self.meet(yes, no)
+            case For():
+                return self.loop(statement, state, top)
+            case Give(values=values, line=line):
+                given = {name: self.named("result", self.value(v, state)) for name, v in values}
+                if top:
+                    outputs = {f"out.{name}": term for name, term in given.items()}
+                    held = {port: state.values[f"self.{a}"] for port, a in self.step.memory.items()}
+                    outputs |= {f"{side}.{port}": term for port, term in held.items() for side in ("out", "memory")}
+                    self.ends.append(End(len(self.facts), state.path, outputs, line))
+                else:
+                    self._exits[-1].append((state, given[""]))
+                return None
+            case Leave(word=word):
+                self._left[-1].append((state, word))
+                return None
+
+    def split(self, state: State, condition: Term) -> State:
+        return State(self.named("path", conjunction((state.path, condition))), dict(state.values))
+
+    def meet(self, one: State | None, other: State | None) -> State | None:
+        """Where two paths, of which a run takes at most one, come together."""
+        if one is None or other is None:
+            return one or other
+        values: dict[str, Term] = {}
+        for name in one.values.keys() & other.values.keys():
+            a, b = one.values[name], other.values[name]
+            values[name] = a if a == b else self.named(name, Conditional(one.path, a, b, wider(a.sort, b.sort)))
+        return State(self.named("path", disjunction((one.path, other.path))), values)
+
+    # -- loops -------------------------------------------------------------------------------------------
+
+    def loop(self, loop: For, state: State, top: bool) -> State | None:
+        count = self.named("count", self.value(loop.count, state))
+        names = set(assigned(loop.body))
+        carried = tuple(sorted(name for name in names if name in state.values))
+        entry = dict(state.values)
+        own = [c for c in self.candidates if c.loop == loop.counter]
+        first = Turn(entry, ZERO, entry, loop, carried)
+        self.loops.append((loop, first))
+        for candidate in own:
+            goal = candidate.build(first)
+            if goal is not None:
+                self.check(state, goal, f"at first {candidate.text}", loop.line, candidate)
+        head = dict(state.values)
+        for name in carried:
+            head[name] = self.fresh(name, widest(head[name].sort))
+        done = self.fresh("done", INTEGER)
+        at = Turn(head, done, entry, loop, carried)
+        assumed: list[Term] = [Comparison("<=", ZERO, done), Comparison("<=", done, count)]
+        before = len(self.facts)
+        for name in carried:
+            if head[name].sort == REAL:
+                self.double(head[name])
+        assumed += [goal for c in own if (goal := c.build(at)) is not None]
+        doubles, self.facts[before:] = self.facts[before:], []
+        self.facts += [Implies(state.path, fact) for fact in (*assumed, *doubles)]
+        # where no turn is left to be done
+        over = self.split(State(state.path, head), Comparison("==", done, count))
+        over.values = {name: over.values[name] for name in state.values}
+        turn = self.split(State(state.path, head), Comparison("<", done, count))
+        turn.values[loop.counter] = done
+        self._left.append([])
+        end = self.block(loop.body, turn, top)
+        leaving = self._left.pop()
+        for gone, word in (*leaving, *(((end, "continue"),) if end is not None else ())):
+            if word == "continue":
+                after = Turn(gone.values, plus_one(done), entry, loop, carried)
+                for candidate in own:
+                    goal = candidate.build(after)
+                    if goal is not None:
+                        self.check(gone, goal, f"each turn keeps {candidate.text}", loop.line, candidate)
+        result: State | None = over
+        for gone, word in leaving:
+            if word == "break":
+                gone.values = {name: gone.values[name] for name in state.values}
+                result = self.meet(result, gone)
+        return result
+
+    # -- expressions -------------------------------------------------------------------------------------
+
+    def constant(self, value: bool | int | float | str) -> Term:
+        match value:
+            case bool():
+                return Literal(value, BOOL)
+            case int():
+                return Literal(value, INTEGER)
+            case float():
+                return Literal(Fraction(value), REAL)
+            case str():
+                return EnumValue(value, self.sorts[value])
+
+    def value(self, expression: Expr, state: State) -> Term:
+        match expression:
+            case Const(value=value):
+                return self.constant(value)
+            case Name(name=name):
+                return state.values[name]
+            case Convert(body=body, line=line):
+                return self.rounded(Widen(self.value(body, state), REAL), (), False, state, line)
+            case Unary(operator="-", body=body):
+                term = self.value(body, state)
+                return Negative(term, INTEGER if term.sort == NATURAL else term.sort)
+            case Unary(operator="abs", body=body):
+                term = self.named("value", self.value(body, state))
+                return Conditional(Comparison("<", term, zero(term)), Negative(term, term.sort), term, term.sort)
+            case Unary(body=body):
+                return negation(self.value(body, state))
+            case Binary():
+                return self.arithmetic(expression, state)
+            case Compare(operator=operator, left=left, right=right):
+                one, other = self.value(left, state), self.value(right, state)
+                return self.compared(operator, one, other)
+            case Junction(operator=operator, items=items):
+                return self.junction(operator, items, state)
+            case Choice(test=test, then=then, otherwise=otherwise):
+                condition = self.named("test", self.value(test, state))
+                yes = self.value(then, self.split(state, condition))
+                no = self.value(otherwise, self.split(state, negation(condition)))
+                return Conditional(condition, yes, no, wider(yes.sort, no.sort))
+            case Extreme(operator=operator, items=items):
+                found = [self.named("value", self.value(item, state)) for item in items]
+                best = found[0]
+                for item in found[1:]:
+                    nearer = Comparison("<" if operator == "min" else ">", item, best)
+                    best = self.named(operator, Conditional(nearer, item, best, wider(item.sort, best.sort)))
+                return best
+            case Length(view=view):
+                whole = state.values[f"in.{view.sequence}#"]
+                if view.stop is not None:
+                    stop = Literal(view.stop, INTEGER)
+                    whole = Conditional(Comparison("<", whole, stop), whole, stop, INTEGER)
+                if not view.start:
+                    return whole
+                rest = self.named("rest", Arithmetic("-", whole, Literal(view.start, INTEGER), INTEGER))
+                return Conditional(Comparison("<", rest, ZERO), ZERO, rest, INTEGER)
+            case Item(view=view, index=index, line=line):
+                at = self.named("index", self.value(index, state))
+                size = self.value(Length(view), state)
+                inside = conjunction((Comparison("<=", ZERO, at), Comparison("<", at, size)))
+                self.check(state, inside, "the index lies in the sequence", line)
+                place = Arithmetic("+", Literal(view.start, INTEGER), at, INTEGER) if view.start else at
+                elements = state.values[f"in.{view.sequence}"]
+                assert isinstance(elements.sort, FunctionSort)
+                item = self.named("item", Apply(elements, (place,), elements.sort.result))
+                before = len(self.facts)
+                if item.sort == REAL:
+                    self.double(item)
+                if elements.sort.result == NATURAL:
+                    self.facts.append(Comparison(">=", item, ZERO))
+                self.facts[before:] = [Implies(inside, fact) for fact in self.facts[before:]]
+                return item
+            case Inlined(body=body):
+                return self.inlined(body, state)
+
+    def inlined(self, body: Sequence[Statement], state: State) -> Term:
+        self._exits.append([])
+        inside = State(state.path, dict(state.values))
+        self.block(body, inside)
+        exits = self._exits.pop()
+        found, result = exits[0]
+        assert result is not None
+        for other, value in exits[1:]:
+            assert value is not None
+            result = (
+                result
+                if result == value
+                else self.named("result", Conditional(found.path, result, value, wider(result.sort, value.sort)))
+            )
+            met = self.meet(found, other)
+            assert met is not None
+            found = met
+        # its own names are gone; every path of it comes back, so that the caller's path is what it was
+        state.values.update({name: found.values[name] for name in state.values if name in found.values})
+        return result
+
+    def junction(self, operator: str, items: Sequence[Expr], state: State) -> Term:
+        """Cut short: an item is only looked at where those before it do not decide."""
+        found: list[Term] = []
+        current = state
+        for item in items:
+            term = self.named("truth", self.value(item, current))
+            found.append(term)
+            current = self.split(current, term if operator == "and" else negation(term))
+        return conjunction(found) if operator == "and" else disjunction(found)
+
+    def compared(self, operator: str, one: Term, other: Term) -> Term:
+        if one.sort == BOOL:
+            alike = Iff(one, other)
+            return alike if operator == "==" else Not(alike)
+        if one.sort != other.sort and REAL in (one.sort, other.sort):
+            one, other = (t if t.sort == REAL else Widen(t, REAL) for t in (one, other))
+        return Comparison(operator, one, other)
+
+    def arithmetic(self, expression: Binary, state: State) -> Term:
+        one = self.named("left", self.value(expression.left, state))
+        other = self.named("right", self.value(expression.right, state))
+        operator, line = expression.operator, expression.line
+        if operator == "/":
+            self.check(state, Comparison("!=", other, zero(other)), "the divisor is not zero", line)
+            doubles = (one, other) if one.sort == REAL else ()
+            one, other = (t if t.sort == REAL else Widen(t, REAL) for t in (one, other))
+            if isinstance(other, Literal) and other.value:
+                inverse = Literal(1 / Fraction(other.value), REAL)
+                quotient: Term = Arithmetic("*", one, inverse, REAL)
+            else:
+                quotient = self.fresh("quotient", REAL)
+                product = Arithmetic("*", quotient, other, REAL)
+                self.facts.append(Implies(Comparison("!=", other, zero(other)), Comparison("==", product, one)))
+            return self.rounded(quotient, doubles, True, state, line)
+        whole = one.sort != REAL
+        exact = Arithmetic(operator, one, other, INTEGER if whole else REAL)
+        return exact if whole else self.rounded(exact, (one, other), operator == "*", state, line)
+
+    def rounded(self, exact: Term, doubles: Sequence[Term], products: bool, state: State, line: int) -> Term:
+        """The double next to an exact result, and the condition that there is one."""
+        if self.exact:
+            return exact
+        self.rounds.append(line)
+        exact = self.named("exact", exact)
+        self.check(state, no_overflow(exact), "the result is no infinity", line)
+        result = self.fresh("rounded", REAL)
+        variables = [t for t in doubles if not isinstance(t, Literal)]
+        self.facts.append(rounded(result, exact, products=products, beside=variables, at=self.thresholds))
+        self.facts += gaps(result, self.gaps)
+        return result
+
+
+def same(one: Term, other: Term) -> Term:
+    return Iff(one, other) if one.sort == BOOL else Comparison("==", one, other)
+
+
+def zero(term: Term) -> Literal:
+    return Literal(Fraction(0), REAL) if term.sort == REAL else ZERO
+
+
+def plus_one(term: Term) -> Term:
+    return Arithmetic("+", term, Literal(1, INTEGER), INTEGER)
+
+
+def wider(one: Sort, other: Sort) -> Sort:
+    return INTEGER if {one, other} == {INTEGER, NATURAL} else one
+
+
+def widest(sort: Sort) -> Sort:
+    return INTEGER if sort == NATURAL else sort

@@ -1,0 +1,457 @@
+"""From the abstract syntax of a Python class to the small program of its step.
+
+What is not in the subset is a `Refusal` with its line. Names are resolved as Python does (a name that a function binds
+is local in all of it), a local may be read only where every path has bound it, and every path of a step returns.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from avow.language.contract import Node
+from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
+
+from .expressions import Expressions
+from .machine import Failed, run_block
+from .program import (
+    Assign,
+    Binary,
+    Compare,
+    Const,
+    Expr,
+    Extreme,
+    For,
+    Give,
+    If,
+    Inlined,
+    Item,
+    Kind,
+    Leave,
+    Length,
+    Name,
+    Scalar,
+    Statement,
+    Step,
+    View,
+    assigned,
+)
+from .tuning import INLINED_DEPTH
+from .whole_file import Parts, Refusal
+
+
+def kind_of(sort: Sort) -> Kind | None:
+    """What a value of the sort is in Python; None: nothing that a step may have."""
+    match sort:
+        case BoolSort():
+            return Kind.BOOL
+        case RealSort():
+            return Kind.FLOAT
+        case IntegerSort() | NaturalSort():
+            return Kind.INT
+        case EnumSort():
+            return Kind.TEXT
+        case _:  # held by no number, truth value or text
+            return None
+
+
+@dataclass(slots=True)
+class Scope:
+    """A function's names: those that it binds, those bound on every path so far, and the kind of each."""
+
+    suffix: str
+    own: frozenset[str]
+    receiver: str
+    """What the method calls its object."""
+    bound: set[str] = field(default_factory=set)
+    sequences: dict[str, View] = field(default_factory=dict)
+    aliases: dict[str, Any] = field(default_factory=dict)
+    """Names that stand for a constant mapping: the parameters."""
+
+
+class Translator(Expressions):
+    """Reads one class for one node. Raises Refusal."""
+
+    def __init__(self, parts: Parts, node: Node, memory: Mapping[str, str], params: Mapping[str, Any], text: str):
+        super().__init__(parts, params)
+        self.node, self.memory = node, dict(memory)
+        self.lines = tuple(text.splitlines())
+        self.calls: list[str] = []
+        self.made = 0
+        self.making = True
+        """`__init__` is read, not `step`."""
+        self.changed: dict[str, int] = {}
+
+    def step(self) -> Step:
+        """The whole class."""
+        start = self._start()
+        sequences = self._inputs()
+        self.making = False
+        self.start = start
+        for port, attribute in self.memory.items():
+            if attribute not in start:
+                line = self.parts.node.lineno
+                raise Refusal(line, f"__init__ does not set self.{attribute}, which is the memory {port}")
+            wanted = kind_of(self.node.input(port).sort)
+            if self.kinds[f"self.{attribute}"] is not wanted:
+                have = self.kinds[f"self.{attribute}"]
+                raise Refusal(
+                    self.parts.node.lineno, f"__init__ makes self.{attribute} {_a(have)}, and {port} is {_a(wanted)}"
+                )
+        body = self._method("step", {})
+        unknown = sorted(set(self.changed) - set(self.memory.values()))
+        if unknown:
+            line = self.changed[unknown[0]]
+            raise Refusal(line, f"self.{unknown[0]} is changed by a step and is not among the node's memory")
+        return Step(body, start, dict(self.memory), sequences, self.lines)
+
+    # -- the object --------------------------------------------------------------------------------------
+
+    def _start(self) -> dict[str, Scalar]:
+        init = self.parts.methods.get("__init__")
+        if init is None:
+            return {}
+        arguments = _plain_arguments(init)
+        if len(arguments) > 2:
+            raise Refusal(init.lineno, "__init__ takes one mapping of parameters, or nothing")
+        scope = Scope("@init", _bound_names(init), arguments[0])
+        for name in arguments[1:]:
+            scope.aliases[name] = self.params
+        self.scope = scope
+        self.calls.append("__init__")
+        body, completes = self.block(init.body)
+        self.calls.pop()
+        if not completes:
+            raise Refusal(init.lineno, "__init__ returns something, or never ends")
+        values: dict[str, Any] = {}
+        try:
+            run_block(body, values)
+        except Failed as fault:
+            raise Refusal(init.lineno, f"__init__ ends in {fault}") from None
+        found = {name.removeprefix("self."): v for name, v in values.items() if name.startswith("self.")}
+        for name in [n for n in self.kinds if n.startswith("self.")]:
+            if name.removeprefix("self.") not in found:
+                raise Refusal(init.lineno, f"{name} is not set on every path of __init__")
+        return found
+
+    def _inputs(self) -> dict[str, Kind]:
+        step = self.parts.methods.get("step")
+        if step is None:
+            raise Refusal(self.parts.node.lineno, f"the class {self.parts.node.name} has no method step")
+        given = {p.name: p for p in self.node.inputs if p.name not in self.memory}
+        names = _plain_arguments(step)[1:]
+        for name in names:
+            if name not in given:
+                raise Refusal(step.lineno, f"step wants {name}, which is no input of {self.node.name}")
+        missing = [name for name in given if name not in names]
+        if missing:
+            raise Refusal(step.lineno, f"step does not take the input {missing[0]}")
+        sequences: dict[str, Kind] = {}
+        for name, port in given.items():
+            item = kind_of(port.sort.item) if isinstance(port.sort, SequenceSort) else None
+            kind = kind_of(port.sort)
+            if item is not None:
+                sequences[name] = item
+            elif kind is None:
+                raise Refusal(step.lineno, f"the input {name} is {port.type_name}, which this method does not know")
+            else:
+                self.kinds[f"in.{name}"] = kind
+        self.items = sequences
+        for port in self.node.outputs:
+            if kind_of(port.sort) is None:
+                raise Refusal(
+                    step.lineno, f"the output {port.name} is {port.type_name}, which this method does not know"
+                )
+        return sequences
+
+    # -- methods -----------------------------------------------------------------------------------------
+
+    def _method(self, name: str, given: Mapping[str, Expr]) -> tuple[Statement, ...]:
+        method = self.parts.methods[name]
+        arguments = _plain_arguments(method)
+        if not arguments:
+            raise Refusal(method.lineno, f"{name} has no argument for its object")
+        scope = Scope("", _bound_names(method), arguments[0])
+        if arguments[0] in scope.own:
+            raise Refusal(method.lineno, f"{arguments[0]} is bound anew in {name}")
+        self.scope = scope
+        first: list[Statement] = []
+        for argument in arguments[1:]:
+            if argument in self.items:
+                if argument in scope.own:
+                    raise Refusal(method.lineno, f"the sequence {argument} is bound anew")
+                scope.sequences[argument] = View(argument)
+            else:
+                kind = self.kinds[f"in.{argument}"]
+                first.append(self.assign(argument, Name(f"in.{argument}", kind), method.lineno))
+        self.calls.append(name)
+        body, completes = self.block(method.body)
+        self.calls.pop()
+        if completes:
+            raise Refusal(method.lineno, f"{name} can end without a return: it then gives None")
+        return (*first, *body)
+
+    def inline(self, definition: ast.FunctionDef, arguments: Sequence[ast.expr], method: bool, line: int) -> Expr:
+        """A call of an own method, or of a function of the module."""
+        name = definition.name
+        if name in self.calls or len(self.calls) > INLINED_DEPTH:
+            raise Refusal(line, f"{name} calls itself, or calls go deeper than {INLINED_DEPTH}")
+        names = _plain_arguments(definition)
+        receiver, names = (names[0], names[1:]) if method and names else ("", names)
+        if len(names) != len(arguments) or any(isinstance(a, ast.Starred) for a in arguments):
+            raise Refusal(line, f"{name} is called with other arguments than it takes")
+        self.made += 1
+        scope = Scope(f"@{self.made}", _bound_names(definition), receiver)
+        if receiver in scope.own:
+            raise Refusal(definition.lineno, f"{receiver} is bound anew in {name}")
+        first: list[Statement] = []
+        caller = self.scope
+        for argument, value in zip(names, arguments, strict=True):
+            view = self.view(value)
+            if view is not None:
+                if argument in scope.own:
+                    raise Refusal(definition.lineno, f"the sequence {argument} is bound anew")
+                scope.sequences[argument] = view
+                continue
+            given = self.expression(value)
+            self.scope = scope
+            first.append(self.assign(argument, given, line))
+            self.scope = caller
+        self.scope = scope
+        self.calls.append(name)
+        outer, self.results = self.results, []
+        try:
+            body, completes = self.block(definition.body)
+        finally:
+            self.calls.pop()
+            self.scope = caller
+            results, self.results = self.results, outer
+        if completes or not results:
+            raise Refusal(definition.lineno, f"{name} can end without a return: it then gives None")
+        if len(set(results)) > 1:
+            raise Refusal(definition.lineno, f"{name} returns {' or '.join(sorted(map(_a, set(results))))}")
+        inlined = Inlined((*first, *body), results[0])
+        if self.conditional and any(n.startswith("self.") for n in assigned(inlined.body)):
+            raise Refusal(line, f"{name} changes an attribute, and is called only under a condition here")
+        return inlined
+
+    # -- statements --------------------------------------------------------------------------------------
+
+    def block(self, statements: Sequence[ast.stmt]) -> tuple[tuple[Statement, ...], bool]:
+        """The statements, and whether one can come to their end."""
+        found: list[Statement] = []
+        for statement in statements:
+            made, completes = self.statement(statement)
+            found += made
+            if not completes:
+                return tuple(found), False  # what stands below is never reached
+        return tuple(found), True
+
+    def statement(self, statement: ast.stmt) -> tuple[list[Statement], bool]:
+        line = statement.lineno
+        match statement:
+            case ast.Pass() | ast.Expr(value=ast.Constant()):
+                return [], True
+            case ast.Assign(targets=[target], value=value):
+                return [self.binding(target, value, line)], True
+            case ast.AnnAssign(target=target, value=ast.expr() as value):
+                return [self.binding(target, value, line)], True
+            case ast.AugAssign(target=ast.Name() | ast.Attribute() as target, op=op, value=value):
+                whole = ast.BinOp(_loaded(target), op, value)
+                return [self.binding(target, ast.copy_location(whole, statement), line)], True
+            case ast.If(test=test, body=body, orelse=orelse):
+                return self.branch(test, body, orelse, line)
+            case ast.For(orelse=[]):
+                return [self.loop(statement)], True
+            case ast.Return(value=value):
+                return [self.give(value, line)], False
+            case ast.Break():
+                return [Leave("break", line)], False
+            case ast.Continue():
+                return [Leave("continue", line)], False
+            case ast.Assert():
+                raise Refusal(line, "assert is not checked where Python runs with -O")
+        raise Refusal(line, f"{_word(statement)} is not in the subset")
+
+    def binding(self, target: ast.expr, value: ast.expr, line: int) -> Statement:
+        match target:
+            case ast.Name(id=name):
+                constant = self.constant(value)
+                if isinstance(constant, Mapping):
+                    raise Refusal(line, "a mapping is kept under another name")
+                return self.assign(name, self.expression(value), line)
+            case ast.Attribute(value=ast.Name(id=receiver), attr=attribute) if receiver == self.scope.receiver:
+                constant = self.constant(value) if self.making else None
+                if isinstance(constant, Mapping):
+                    self.mappings[attribute] = constant
+                    return If(Const(True, Kind.BOOL), (), (), line)
+                if not self.making:
+                    self.changed.setdefault(attribute, line)
+                return self.set_attribute(attribute, self.expression(value), line)
+        raise Refusal(line, "only a name, or an attribute of the object itself, is assigned to")
+
+    def assign(self, name: str, value: Expr, line: int) -> Statement:
+        full = f"{name}{self.scope.suffix}"
+        self.same_kind(full, name, value.kind, line)
+        self.scope.bound.add(name)
+        return Assign(full, value, line)
+
+    def set_attribute(self, attribute: str, value: Expr, line: int) -> Statement:
+        full = f"self.{attribute}"
+        if attribute in self.mappings:
+            raise Refusal(line, f"{full} is a mapping and a value")
+        self.same_kind(full, full, value.kind, line)
+        return Assign(full, value, line)
+
+    def same_kind(self, full: str, name: str, kind: Kind, line: int) -> None:
+        known = self.kinds.setdefault(full, kind)
+        if known is not kind:
+            numbers = {known, kind} == {Kind.INT, Kind.FLOAT}
+            hint = ": write 0.0 where a float is meant" if numbers else ""
+            raise Refusal(line, f"{name} is {_a(known)} elsewhere and {_a(kind)} here{hint}")
+
+    def branch(
+        self, test: ast.expr, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt], line: int
+    ) -> tuple[list[Statement], bool]:
+        condition = self.truth(test)
+        before = set(self.scope.bound)
+        then, one = self.block(body)
+        after = self.scope.bound
+        self.scope.bound = set(before)
+        otherwise, other = self.block(orelse)
+        match one, other:
+            case True, True:
+                self.scope.bound &= after
+            case True, False:
+                self.scope.bound = after
+            case _:  # what the second branch has bound, or nothing that matters
+                pass
+        return [If(condition, then, otherwise, line)], one or other
+
+    def loop(self, statement: ast.For) -> Statement:
+        line = statement.lineno
+        self.made += 1
+        counter = Name(f"#{self.made}", Kind.INT)
+        count, first, position = self.iterated(statement, counter, line)
+        before = set(self.scope.bound)
+        head = [self.assign(name, value, line) for name, value in first]
+        body, _ = self.block(statement.body)
+        self.scope.bound = before  # a loop may have no turn
+        here = range(line - 2, max(line, statement.end_lineno or line))
+        comments = tuple((k + 1, text) for k in here if (text := _invariant(self.lines, k)))
+        return For(counter.name, count, (*head, *body), line, comments, position)
+
+    def iterated(
+        self, statement: ast.For, counter: Name, line: int
+    ) -> tuple[Expr, list[tuple[str, Expr]], Name | None]:
+        """How often, what each turn begins with, and the loop's own name of its position."""
+        target, source = statement.target, statement.iter
+        view = self.view(source)
+        if view is not None and isinstance(target, ast.Name):
+            item = Item(view, counter, self.items[view.sequence], line)
+            return Length(view), [(target.id, item)], None
+        match source:
+            case ast.Call(func=ast.Name(id="range"), args=[*arguments], keywords=[]) if (
+                isinstance(target, ast.Name) and 1 <= len(arguments) <= 2 and "range" not in self.scope.own
+            ):
+                ends = [self.expression(a) for a in arguments]
+                if any(e.kind is not Kind.INT for e in ends):
+                    raise Refusal(line, "range of what is no int")
+                zero = Const(0, Kind.INT)
+                low, high = (zero, ends[0]) if len(ends) == 1 else (ends[0], ends[1])
+                if not isinstance(low, Const):
+                    raise Refusal(line, "range that starts at what is no constant")
+                size = high if low == zero else Binary("-", high, low, Kind.INT, line)
+                at: Expr = counter if low == zero else Binary("+", low, counter, Kind.INT, line)
+                name = Name(f"{target.id}{self.scope.suffix}", Kind.INT)
+                return Extreme("max", (zero, size), Kind.INT), [(target.id, at)], name if low == zero else None
+            case ast.Call(func=ast.Name(id="enumerate"), args=[inner], keywords=[]):
+                view = self.view(inner)
+                match target:
+                    case ast.Tuple(elts=[ast.Name(id=index), ast.Name(id=each)]) if view is not None and index != each:
+                        item = Item(view, counter, self.items[view.sequence], line)
+                        name = Name(f"{index}{self.scope.suffix}", Kind.INT)
+                        return Length(view), [(index, counter), (each, item)], name
+        raise Refusal(line, "a loop over something else than an input sequence, its part, range or enumerate")
+
+    def give(self, value: ast.expr | None, line: int) -> Statement:
+        if self.making:
+            raise Refusal(line, "__init__ returns early")
+        if len(self.calls) > 1 or self.calls[-1] != "step":
+            if value is None:
+                raise Refusal(line, f"{self.calls[-1]} returns None")
+            found = self.expression(value)
+            self.results.append(found.kind)
+            return Give((("", found),), line)
+        outputs = {p.name: p for p in self.node.outputs if p.name not in self.memory}
+        given: dict[str, ast.expr] = {}
+        match value:
+            case ast.Dict(keys=keys, values=values):
+                for key, part in zip(keys, values, strict=True):
+                    if not isinstance(key, ast.Constant) or not isinstance(key.value, str) or key.value in given:
+                        raise Refusal(line, "a dict whose keys are not texts, each once")
+                    given[key.value] = part
+            case ast.Call(func=ast.Name(id="dict"), args=[], keywords=keywords) if all(k.arg for k in keywords):
+                given = {str(k.arg): k.value for k in keywords}
+            case ast.expr() if len(outputs) == 1:
+                given = {next(iter(outputs)): value}
+            case _:
+                raise Refusal(line, f"a step returns a dict of {', '.join(sorted(outputs)) or 'nothing'}")
+        if set(given) != set(outputs):
+            raise Refusal(line, f"a step returns {', '.join(sorted(outputs))}, here {', '.join(sorted(given))}")
+        return Give(tuple((name, self.output(name, part, line)) for name, part in given.items()), line)
+
+    def output(self, name: str, value: ast.expr, line: int) -> Expr:
+        found, wanted = self.expression(value), kind_of(self.node.output(name).sort)
+        whole = wanted is Kind.FLOAT and found.kind is Kind.INT  # a REAL may well be an int: it is the same number
+        if found.kind is not wanted and not whole:
+            raise Refusal(line, f"the output {name} is {_a(wanted)}, here {_a(found.kind)}")
+        return found
+
+
+def _a(kind: Kind | None) -> str:
+    return f"{'an' if kind is Kind.INT else 'a'} {kind}"
+
+
+def _invariant(lines: Sequence[str], at: int) -> str:
+    text = lines[at].partition("#")[2].strip() if 0 <= at < len(lines) else ""
+    return text.removeprefix("invariant:").strip() if text.startswith("invariant:") else ""
+
+
+def _plain_arguments(function: ast.FunctionDef) -> list[str]:
+    a = function.args
+    if a.posonlyargs or a.kwonlyargs or a.vararg or a.kwarg or a.defaults:
+        raise Refusal(function.lineno, f"{function.name} has arguments other than plain ones without default")
+    return [argument.arg for argument in a.args]
+
+
+def _bound_names(function: ast.FunctionDef) -> frozenset[str]:
+    """The names that its body binds: local everywhere in it. Arguments that it leaves alone are not among them."""
+    found: set[str] = set()
+    for part in ast.walk(function):
+        if isinstance(part, ast.Name) and not isinstance(part.ctx, ast.Load):
+            found.add(part.id)
+        elif isinstance(part, ast.FunctionDef | ast.Lambda | ast.ClassDef | ast.NamedExpr) and part is not function:
+            raise Refusal(part.lineno, "a function, class or name bound within an expression or function")
+        elif isinstance(part, ast.Import | ast.ImportFrom | ast.comprehension):
+            raise Refusal(getattr(part, "lineno", function.lineno), "an import or comprehension within a function")
+    return frozenset(found)
+
+
+def _loaded(target: ast.Name | ast.Attribute) -> ast.expr:
+    match target:
+        case ast.Name(id=name):
+            return ast.copy_location(ast.Name(name, ast.Load()), target)
+        case ast.Attribute(value=value, attr=attribute):
+            return ast.copy_location(ast.Attribute(value, attribute, ast.Load()), target)
+
+
+def _word(statement: ast.stmt) -> str:
+    return {"While": "while", "Try": "try", "With": "with", "Raise": "raise", "For": "for … else"}.get(
+        type(statement).__name__, type(statement).__name__
+    )
+
+
+__all__ = ["Compare", "Scope", "Translator", "kind_of"]

@@ -1,0 +1,34 @@
+"""This backend's numbers, each with its reason."""
+
+VALIDATED = 1000
+"""Inputs on which class and translation are compared on every run: a tenth of a second's work."""
+
+TRIES = 12
+"""Draws for one case that meets the assumptions; then any is taken, which validates all the same."""
+
+LENGTHS = (0, 1, 2, 3, 4, 5, 8, 12)
+"""Lengths of drawn sequences: none, few, and more than any window of a filter that is written out."""
+
+BATCH = 100
+"""Cases in one message to the class' process: each message wakes another process."""
+
+INLINED_DEPTH = 8
+"""Calls within calls beyond which a step is refused; recursion is told at once."""
+
+MOST_NAMES = 4_000
+"""Names of values in a symbolic run: a step of a hundred lines has some hundreds."""
+
+CANDIDATES = 60
+"""Invariants tried of one loop: each is asked about at least twice."""
+
+CANDIDATE_SECONDS = 0.4
+"""Seconds' worth of effort for one question whether an invariant lasts: most are settled in a hundredth."""
+
+ROUNDS = 12
+"""Rounds in which candidates are dropped; each drops one at least, and mostly two or three do."""
+
+SHOWN_SECONDS = 2.0
+"""Seconds' worth of effort for the solver to show values where a proof fails."""
+
+RUN_SECONDS = 30.0
+"""For the class to answer all inputs, by the clock."""

@@ -1,0 +1,251 @@
+"""Whether a Python file means what its text says: nothing in it rebinds, decorates or patches what the step uses.
+
+The whole file is looked at before any of it is translated. What is refused is not wrong; it is not understood, and
+says so with its line.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+BUILTINS = frozenset({"min", "max", "abs", "len", "range", "enumerate", "float", "int", "bool", "dict", "object"})
+"""What a step may call; bound anywhere in the file, it means something else."""
+
+MODULES = frozenset({"__future__", "math", "typing", "collections.abc", "enum"})
+"""What may be imported: none of it changes what other code does."""
+
+_TREACHEROUS = frozenset(
+    {"setattr", "delattr", "exec", "eval", "globals", "locals", "vars", "compile", "__import__", "__builtins__"}
+    | {"breakpoint", "memoryview", "super", "type", "getattr", "open", "input"}
+)
+
+
+_MUTATING = frozenset(
+    {"update", "pop", "popitem", "clear", "setdefault", "append", "extend", "insert", "remove", "sort"}
+)
+
+
+class Refusal(Exception):  # noqa: N818 - it says what happened
+    """Something that this method does not understand; `line` is the file's."""
+
+    def __init__(self, line: int, why: str) -> None:
+        super().__init__(line, why)
+        self.line, self.why = line, why
+
+    def __str__(self) -> str:
+        return f"line {self.line}: {self.why}"
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What of a file the step may use."""
+
+    node: ast.ClassDef
+    methods: dict[str, ast.FunctionDef]
+    functions: dict[str, ast.FunctionDef]
+    constants: dict[str, ast.expr]
+    """Names of the module."""
+    of_class: dict[str, ast.expr]
+    """Names of the class."""
+
+
+def read(tree: ast.Module, class_name: str, file: Path) -> tuple[Parts | None, tuple[Refusal, ...]]:
+    """The file's parts, and everything in it that is refused; no parts where there is no one such class."""
+    refused = [*_statements(tree, class_name), *_imports(tree, file), *_everywhere(tree)]
+    classes = [s for s in tree.body if isinstance(s, ast.ClassDef) and s.name == class_name]
+    if len(classes) != 1:
+        where = classes[-1].lineno if classes else 1
+        refused.append(Refusal(where, f"there {'are several classes' if classes else 'is no class'} {class_name} here"))
+        return None, tuple(_sorted(refused))
+    node = classes[0]
+    refused += _class(node)
+    functions = {s.name: s for s in tree.body if isinstance(s, ast.FunctionDef)}
+    methods = {s.name: s for s in node.body if isinstance(s, ast.FunctionDef)}
+    parts = Parts(node, methods, functions, dict(_constants(tree.body)), dict(_constants(node.body)))
+    refused += _twice(tree.body, "this file")
+    refused += _twice(node.body, class_name)
+    refused += _written_elsewhere(tree, parts)
+    return parts, tuple(_sorted(refused))
+
+
+def _sorted(refused: list[Refusal]) -> list[Refusal]:
+    return [found for _, found in sorted({(r.line, r.why): r for r in refused}.items())]
+
+
+def _statements(tree: ast.Module, class_name: str) -> Iterator[Refusal]:
+    """At the top of a file, and of a class in it, stands nothing that does something."""
+    for statement in tree.body:
+        match statement:
+            case ast.Import() | ast.ImportFrom() | ast.FunctionDef() | ast.Pass():
+                pass
+            case ast.Expr(value=ast.Constant()):
+                pass
+            case ast.ClassDef(name=name):
+                if name != class_name:
+                    yield from _other_class(statement)
+            case ast.If() if _is_main(statement.test):
+                pass  # `_everywhere` looks at what is in it
+            case _:  # a constant's definition does nothing else
+                if next(_constants([statement]), None) is None:
+                    what = type(statement).__name__
+                    yield Refusal(statement.lineno, f"a statement that runs when the file is loaded ({what})")
+
+
+def _is_main(test: ast.expr) -> bool:
+    return isinstance(test, ast.Compare) and isinstance(test.left, ast.Name) and test.left.id == "__name__"
+
+
+def _other_class(node: ast.ClassDef) -> Iterator[Refusal]:
+    plain = all(isinstance(b, ast.Name) and b.id in {"object", "Enum"} for b in node.bases)
+    if node.decorator_list or node.keywords or not plain:
+        yield Refusal(node.lineno, f"the class {node.name} has a decorator, a base or a metaclass")
+    for inner in node.body:
+        simple = isinstance(inner, ast.FunctionDef | ast.Pass) or next(_constants([inner]), None) is not None
+        if not simple and not (isinstance(inner, ast.Expr) and isinstance(inner.value, ast.Constant)):
+            yield Refusal(inner.lineno, f"a statement that runs when the class {node.name} is made")
+
+
+def _class(node: ast.ClassDef) -> Iterator[Refusal]:
+    if node.decorator_list:
+        yield Refusal(node.lineno, f"the class {node.name} is decorated")
+    if node.keywords:
+        yield Refusal(node.lineno, f"the class {node.name} has a metaclass or other keywords")
+    if any(not (isinstance(base, ast.Name) and base.id == "object") for base in node.bases):
+        yield Refusal(node.lineno, f"the class {node.name} has a base class, whose methods may do anything")
+    for inner in node.body:
+        match inner:
+            case ast.FunctionDef(name=name):
+                if name.startswith("__") and name != "__init__":
+                    yield Refusal(inner.lineno, f"the method {name} changes what the class' own text means")
+            case ast.Pass() | ast.Expr(value=ast.Constant()):
+                pass
+            case _:  # likewise
+                if next(_constants([inner]), None) is None:
+                    yield Refusal(inner.lineno, f"a statement that runs when the class {node.name} is made")
+
+
+def _constants(body: list[ast.stmt]) -> Iterator[tuple[str, ast.expr]]:
+    """``NAME = number or text``."""
+    for statement in body:
+        match statement:
+            case ast.Assign(targets=[ast.Name(id=name)], value=value) if _is_constant(value):
+                yield name, value
+            case ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as value) if _is_constant(value):
+                yield name, value
+
+
+def _is_constant(value: ast.expr) -> bool:
+    match value:
+        case ast.Constant(value=bool() | int() | float() | str()):
+            return True
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float())):
+            return True
+    return False
+
+
+def _twice(body: list[ast.stmt], where: str) -> Iterator[Refusal]:
+    seen: set[str] = set()
+    for statement in body:
+        names = [name for name, _ in _constants([statement])]
+        if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+            names = [statement.name]
+        if isinstance(statement, ast.Import | ast.ImportFrom):
+            names = [(alias.asname or alias.name).partition(".")[0] for alias in statement.names]
+        for name in names:
+            if name in seen:
+                yield Refusal(statement.lineno, f"{name} is defined twice in {where}")
+            seen.add(name)
+
+
+def _imports(tree: ast.Module, file: Path) -> Iterator[Refusal]:
+    for part in ast.walk(tree):
+        if isinstance(part, ast.Import):
+            names = [alias.name for alias in part.names]
+            renamed = [alias for alias in part.names if alias.asname not in (None, alias.name)]
+        elif isinstance(part, ast.ImportFrom):
+            names = [part.module or "."] if not part.level else ["."]
+            renamed = [alias for alias in part.names if alias.name == "*" or alias.asname not in (None, alias.name)]
+        else:
+            continue
+        if renamed:
+            yield Refusal(part.lineno, "an import of everything, or under another name")
+        for name in names:
+            if name not in MODULES:
+                yield Refusal(part.lineno, f"the import of {name}: what it runs is not looked at")
+            head = name.partition(".")[0]
+            if (file.parent / f"{head}.py").exists() or (file.parent / head).exists():
+                yield Refusal(part.lineno, f"a file beside this one is called {head}, as the module is")
+
+
+def _everywhere(tree: ast.Module) -> Iterator[Refusal]:
+    """What no part of the file may have, whether a step comes there or not."""
+    for part in ast.walk(tree):
+        line = getattr(part, "lineno", 1)
+        match part:
+            case ast.Name(id=name) if name in _TREACHEROUS:
+                yield Refusal(line, f"{name} can change or read what the text does not show")
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) if name in BUILTINS:
+                yield Refusal(line, f"{name} is bound anew")
+            case ast.arg(arg=name) if name in BUILTINS:
+                yield Refusal(line, f"{name} is bound anew")
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) if name in BUILTINS:
+                yield Refusal(line, f"{name} is bound anew")
+            case ast.alias(name=name, asname=other) if (other or name).partition(".")[0] in BUILTINS:
+                yield Refusal(line, f"{other or name} is bound anew")
+            case ast.ExceptHandler(name=str(name)) if name in BUILTINS:
+                yield Refusal(line, f"{name} is bound anew")
+            case ast.MatchAs(name=str(name)) | ast.MatchStar(name=str(name)) if name in BUILTINS:
+                yield Refusal(line, f"{name} is bound anew")
+            case ast.Attribute(attr=name) if name.startswith("__") and name.endswith("__"):
+                yield Refusal(line, f"the attribute {name} reaches behind the text")
+            case ast.Attribute(attr=name) if name in _MUTATING:
+                yield Refusal(line, f".{name} changes a mapping or list")
+            case ast.Subscript(ctx=ast.Store()):
+                yield Refusal(line, "an element of a mapping or list is changed")
+            case ast.Global() | ast.Nonlocal():
+                yield Refusal(line, "a name of another scope is bound")
+            case ast.Delete():
+                yield Refusal(line, "del")
+            case ast.FunctionDef(decorator_list=[_, *_]) | ast.AsyncFunctionDef(decorator_list=[_, *_]):
+                yield Refusal(line, f"the function {part.name} is decorated")
+            case ast.AsyncFunctionDef() | ast.Await() | ast.Yield() | ast.YieldFrom():
+                yield Refusal(line, "a generator or coroutine")
+            case ast.Constant(value=str(text)) if "__setattr__" in text or "__getattribute__" in text:
+                yield Refusal(line, "a text that names what reaches behind the text")
+
+
+def _written_elsewhere(tree: ast.Module, parts: Parts) -> Iterator[Refusal]:
+    """What the class holds or is called by, written where it does not stand: outside its methods, or in one that is
+    neither `__init__` nor reached by `step`."""
+    reached = reachable(parts, "step") | reachable(parts, "__init__")
+    allowed: dict[int, str] = {}
+    for name in reached:
+        method = parts.methods[name]
+        first = method.args.args[0].arg if method.args.args else ""
+        allowed |= {id(inner): first for inner in ast.walk(method)}
+    used = {n.attr for name in reached for n in ast.walk(parts.methods[name]) if isinstance(n, ast.Attribute)}
+    used |= {*parts.methods, *parts.of_class}
+    for part in ast.walk(tree):
+        if not isinstance(part, ast.Attribute) or isinstance(part.ctx, ast.Load):
+            continue
+        own = isinstance(part.value, ast.Name) and part.value.id == allowed.get(id(part))
+        if not own and part.attr in used:
+            yield Refusal(part.lineno, f"{part.attr} is written here too, outside what a step does")
+        elif own and (part.attr in parts.methods or part.attr in parts.of_class):
+            yield Refusal(part.lineno, f"{part.attr} of the class is hidden by an attribute")
+
+
+def reachable(parts: Parts, start: str) -> set[str]:
+    """The methods that a method comes to, itself among them."""
+    found: set[str] = set()
+    stack = [start]
+    while stack:
+        name = stack.pop()
+        if name in found or name not in parts.methods:
+            continue
+        found.add(name)
+        stack += [n.attr for n in ast.walk(parts.methods[name]) if isinstance(n, ast.Attribute)]
+    return found

@@ -1,0 +1,86 @@
+"""Real nodes: the right ones are proved from their source, every mutant is refuted by what CPython answers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from source_nodes import LIMITER, LIMITER_RCL, NODES, TRICKS, WATCHDOG_RCL, Example, mutants
+
+from avow.base.verdict import Object, Verdict
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_right_nodes_are_proved_from_their_source(name: str, tmp_path: Path) -> None:
+    example = NODES[name]
+    for clause, found in example.settled(tmp_path).items():
+        wanted = Verdict.REFUTED if clause in example.false else Verdict.PROVED
+        assert found.verdict is wanted, found.summary
+        assert (found.of, found.numbers) == (Object.SOURCE, "float64")
+
+
+@pytest.mark.parametrize(("name", "mutant"), list(mutants()), ids=[name for name, _ in mutants()])
+def test_every_mutant_is_refuted(name: str, mutant: Example, tmp_path: Path) -> None:
+    found = mutant.settled(tmp_path)
+    refuted = {clause for clause, o in found.items() if o.verdict is Verdict.REFUTED}
+    assert refuted, {c: (o.verdict, o.summary) for c, o in found.items()}
+    assert name != "scanmin-2" or "below" in refuted
+    assert all(found[clause].counterexample is not None for clause in refuted)
+
+
+@pytest.mark.parametrize("name", TRICKS)
+def test_no_trick_is_proved(name: str, tmp_path: Path) -> None:
+    """Not even what holds of any number."""
+    for clause, found in TRICKS[name].settled(tmp_path).items():
+        assert found.verdict in (Verdict.UNKNOWN, Verdict.REFUTED, Verdict.ERROR), (clause, found.summary)
+        assert not found.verdict.supports
+
+
+@pytest.mark.parametrize(
+    ("timeout", "numbers", "late", "calm"),
+    [
+        ("0.5", "float64", Verdict.REFUTED, Verdict.PROVED),
+        ("0.5", "exact", Verdict.PROVED, Verdict.PROVED),
+        ("0.3", "float64", Verdict.REFUTED, Verdict.PROVED),
+        ("0.3", "exact", Verdict.PROVED, Verdict.REFUTED),
+    ],
+)
+def test_reals_err_both_ways(timeout: str, numbers: str, late: Verdict, calm: Verdict, tmp_path: Path) -> None:
+    """A difference of doubles may round to the threshold; and the double 0.3 is below 3/10."""
+    rcl = WATCHDOG_RCL.replace("Timeout = 0.3", f"Timeout = {timeout}")
+    example = replace(NODES["watchdog"], rcl=rcl, params={"timeout": float(timeout)}, numbers=numbers)
+    found = example.settled(tmp_path)
+    assert (found["late"].verdict, found["calm"].verdict) == (late, calm), found
+    assert found["late"].numbers == numbers
+
+
+@pytest.mark.parametrize("name", ["limiter", "median", "scanmin"])
+def test_finite_inputs_are_a_hypothesis(name: str, tmp_path: Path) -> None:
+    for found in NODES[name].settled(tmp_path).values():
+        assert any(h.startswith("inputs are finite") for h in found.hypotheses)
+
+
+def test_what_init_makes_has_to_meet_what_is_assumed_of_memory(tmp_path: Path) -> None:
+    source = NODES["debouncer"].source.replace("self.count = 0\n    def", "self.count = 5\n    def")
+    for found in replace(NODES["debouncer"], source=source).settled(tmp_path).values():
+        assert found.verdict is Verdict.REFUTED
+        assert "in.count = 5" in found.summary
+
+
+def test_what_a_step_leaves_in_memory_is_a_hypothesis_unless_it_is_kept(tmp_path: Path) -> None:
+    kept = NODES["debouncer"].settled(tmp_path / "kept")["says"]
+    assert not any("memory" in h for h in kept.hypotheses)
+    source = NODES["debouncer"].source.replace("min(self.count + 1, self.need)", "self.count + 1")
+    lost = replace(NODES["debouncer"], source=source).settled(tmp_path / "lost")["reset"]
+    assert lost.verdict is Verdict.PROVED
+    assert any("memory: range" in h for h in lost.hypotheses)
+
+
+def test_a_hidden_state_is_told_with_its_line(tmp_path: Path) -> None:
+    source = LIMITER.replace("        return v\n", "        self.n = self.n + 1\n        return v\n").replace(
+        '["vmax"]\n', '["vmax"]\n        self.n = 0\n'
+    )
+    found = Example(source, LIMITER_RCL, "Limiter", {"vmax": 1.5}).settled(tmp_path)
+    assert {o.verdict for o in found.values()} == {Verdict.UNKNOWN}
+    assert "node.py:11: self.n is changed by a step" in found["same"].summary

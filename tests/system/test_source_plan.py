@@ -1,0 +1,64 @@
+"""`source`, `numbers` and `memory` of a node: what is wrong is told in one round, each with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from avow.base.diagnostics import Rejected
+from avow.system.load import load_system
+from avow.system.plan import Numbers, Source
+
+CONTRACT = """node watchdog { inputs( now : REAL, beat : BOOL, last : REAL, f : REAL --> REAL )
+ outputs( stop : BOOL, last : REAL ) topics() guarantee g ( out.stop or not out.stop ) }"""
+
+
+def load(folder: Path, node: str) -> Source | None:
+    (folder / "src.py").write_text("class Watchdog: pass\n")
+    (folder / "p.yaml").write_text("timeout: 0.5\n")
+    (folder / "system.rcl").write_text(CONTRACT)
+    (folder / "plan.yaml").write_text(f"nodes:\n  watchdog:\n{node}")
+    return load_system(folder).plan.node("watchdog").source
+
+
+def test_a_declaration(tmp_path: Path) -> None:
+    found = load(
+        tmp_path,
+        "    source: {python: src.py, class: Watchdog, parameters: p.yaml}\n    memory: {last: self._last}\n",
+    )
+    assert found == Source("src.py", "Watchdog", "", "p.yaml", Numbers.FLOAT64, {"last": "_last"})
+
+
+def test_every_fault_in_one_round(tmp_path: Path) -> None:
+    with pytest.raises(Rejected) as caught:
+        load(
+            tmp_path,
+            "    source: {python: nothing.py, class: Watchdog, parameters: ../p.yaml}\n"
+            "    memory: {lost: self.a, f: self.b, last: self.b}\n",
+        )
+    told = {(d.code, d.span.line if d.span else 0) for d in caught.value.diagnostics}
+    assert {("PLAN107", 3), ("PLAN108", 3), ("PLAN106", 4), ("PLAN110", 4)} <= told
+    text = " ".join(d.message for d in caught.value.diagnostics)
+    assert "self.b stands there twice" in text
+    assert "'lost' is no input of watchdog" in text
+    assert "f is REAL --> REAL" in text
+
+
+@pytest.mark.parametrize(
+    ("node", "code", "words"),
+    [
+        ("    numbers: float64\n", "PLAN110", "numbers is said of a source"),
+        ("    memory: {last: self.last}\n", "PLAN110", "memory is said of a source"),
+        ("    source: {python: src.py}\n", "PLAN104", "class is missing"),
+        ("    source: {class: Watchdog}\n", "PLAN104", "either python or cpp"),
+        ("    source: {python: src.py, class: 'a b'}\n", "PLAN105", "class"),
+        ("    source: {python: src.py, class: W}\n    numbers: float16\n", "PLAN105", "float16"),
+        ("    source: {python: src.py, class: W}\n    memory: {last: last}\n", "PLAN105", "last"),
+        ("    source: {python: src.py, class: W, parameter: p.yaml}\n", "PLAN103", "parameter"),
+    ],
+)
+def test_faults(node: str, code: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(Rejected) as caught:
+        load(tmp_path, node)
+    assert any(d.code == code and words in d.message for d in caught.value.diagnostics), caught.value.diagnostics
