@@ -197,7 +197,7 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         if view.obligation.kind is Kind.COMPOSITION and _wants_a_reason(view):
             return Suggestion(_reason_wanted(view.obligation.name), cost=5)
         return Suggestion(
-            "narrow the question (a scenario in the plan), raise the time limit, or accept it with a reason", cost=20
+            "narrow the question (a scenario in the plan), allow more `seconds`, or accept it with a reason", cost=20
         )
     new = _new_method(view, demand, used, facts)
     for item in view.counting:

@@ -16,6 +16,10 @@ _IDENTIFIER = re.compile(
 _HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|_+|-+")
 
 
+ALLOWS_MORE = "`seconds:` in the plan, or `--seconds`, allows more"
+"""What a person can do where a limit ended something."""
+
+
 def identifiers(text: str) -> tuple[str, ...]:
     """What in a text looks like a name from a contract, a path or a digest."""
     return tuple(found.group() for found in _IDENTIFIER.finditer(text))

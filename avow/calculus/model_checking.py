@@ -27,7 +27,7 @@ from avow.calculus.variables import Frame, system_term
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value
 from avow.language.terms import Term
-from avow.solving.limits import spent, until
+from avow.solving.limits import spent, tried, until
 from avow.system.temporal import Operator, Property, State, Temporal, states_of
 from avow.tuning.bounds import RUN_LENGTH, RUNS_TRIED, STATES_CHECKED
 from avow.tuning.shown import STEP_VARIABLES
@@ -130,7 +130,7 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
             bound=_bound(explored),
             details={"exhaustive": True},
         )
-    why = "; ".join(machine.short) or "time or steps ran out"
+    why = "; ".join(machine.short) or _ended_by(explored, bounds)
     if demands_progress(formula):
         why += "; that what it demands never comes can only be shown by a run that repeats or stops, and none was found"
     return Answer(
@@ -280,6 +280,16 @@ def _explore(explored: Explored, formula: Property, bounds: Bounds) -> Lasso | t
     except TooLong:
         found, cut = None, True
     return found or _prefix(explored, formula, bounds) or not cut
+
+
+def _ended_by(explored: Explored, bounds: Bounds) -> str:
+    """Which limit ended the search."""
+    deepest = explored.machine.world.scenario.steps
+    if deepest is not None and explored.depth >= deepest:
+        return f"the scenario's `steps` end a run after {deepest}"
+    if len(explored.steps) > STATES_CHECKED:
+        return f"there are more than {STATES_CHECKED:,} kinds of steps"
+    return tried("", bounds.effort)
 
 
 def _violation(explored: Explored, formula: Property, deadline: float) -> Lasso | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from avow.assurance.codec import read_case
@@ -14,6 +14,7 @@ from avow.base.workspace import Workspace, name_of
 from avow.evidence.audit import Discrepancy, Fault
 from avow.evidence.heads import Anchor, Index, index_path, read_index, stated_heads
 from avow.evidence.ledger import Ledger
+from avow.evidence.obligation import Kind
 from avow.evidence.signing import Signed, sign, signature_path, verify_signature
 from avow.pipeline.integrity import confirm, discrepancies
 from avow.pipeline.workload import Survey, survey
@@ -154,8 +155,28 @@ def find_claim(
     if system in without_report:
         hint = f"`avow verify {system}` makes one; it says why, if there is something wrong with the system's files"
         raise Rejected(Diagnostic("REPORT001", f"there is no report of {system} yet", hint=hint))
-    known = list(dict.fromkeys(name for _, view in named for name in (short(view.id), view.id)))
-    raise Rejected(_unknown(f"there is no obligation '{wanted}'", wanted, known))
+    known = [name for _, view in named for name in (short(view.id), view.id)]
+    known += [name for case in cases for name in _others(case)]
+    near = difflib.get_close_matches(wanted, dict.fromkeys(known), n=3)
+    guarantees = [short(view.id) for _, view in named if view.obligation.kind is Kind.GUARANTEE]
+    such = f" (such as {guarantees[0]})" if guarantees else ""
+    kinds = (
+        f"a guarantee{such}, a requirement, node, supposition, gate or file, a diagnostic's code, a word of the report"
+    )
+    hint = f"did you mean {' or '.join(near)}?" if near else f"known: {kinds}"
+    raise Rejected(Diagnostic("LEDGER002", f"nothing in the reports is called '{wanted}'", hint=hint))
+
+
+def _others(case: Case) -> Iterator[str]:
+    """Names in a case that are no obligations'."""
+    yield case.system
+    yield from (node.name for node in case.nodes)
+    yield from (r.id for r in case.requirements)
+    yield from (name for s in case.suppositions for name in (s.number, s.key))
+    yield from (w.key for w in case.weakenings)
+    yield from (gate.id for gate in case.gates)
+    yield from (d.derivation.name for d in case.derivations)
+    yield from (method.name for method in case.methods)
 
 
 def _unknown(message: str, name: str, known: Sequence[str]) -> Diagnostic:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -100,9 +100,12 @@ def of_rest(folder: Path) -> tuple[Diagnostic, ...]:
     for plan in rest.system.plan.nodes:
         for method in plan.methods:
             try:
-                found += _method(rest.system, plan.node, method, asks=rest.is_sound)
+                found += _method(rest.system, plan.node, method, follows=rest.may_follow)
             except Rejected as rejected:
                 found += rejected.diagnostics
+            except Exception:
+                if rest.is_sound:
+                    raise
     return tuple(d for d in found if d.is_error)
 
 
@@ -128,8 +131,11 @@ def _policy(system: System) -> tuple[Diagnostic, ...]:
     return ()
 
 
-def _method(system: System, node: str, method: Method, *, asks: bool = True) -> Iterable[Diagnostic]:
-    """`asks`: whether the backend is asked, too, and not its schema alone."""
+def _method(
+    system: System, node: str, method: Method, *, follows: Callable[[Diagnostic], bool] = lambda _: False
+) -> Iterable[Diagnostic]:
+    """What is wrong with the options, and what the backend says of those that are right, but for what only follows from
+    a fault that is told already."""
     if method.id in ENGINES:
         yield Diagnostic("PLAN090", f"'{method.id}' is the name of an engine of Avow's own", method.options.span)
         return
@@ -140,10 +146,30 @@ def _method(system: System, node: str, method: Method, *, asks: bool = True) -> 
             raise
         yield from (replace(d, severity=Severity.WARNING, span=method.options.span) for d in rejected.diagnostics)
         return
-    wrong = tuple(_schema(tool.options_schema, method.options, f"nodes.{node}: {method.id}"))
+    whole = f"nodes.{node}: {method.id}"
+    wrong = tuple(_schema(tool.options_schema, method.options, whole))
     yield from wrong
-    if asks and node in [n.name for n in system.contract.nodes] and not any(d.is_error for d in wrong):
-        yield from one_step.check(tool, method_job(system, system.contract.node(node), method))
+    if any(d.is_error for d in wrong):
+        method = replace(method, options=_right(tool.options_schema, method.options))
+        if any(_schema(tool.options_schema, method.options, whole)):
+            return  # without what is wrong they say nothing
+    if node in [n.name for n in system.contract.nodes]:
+        said = one_step.check(tool, method_job(system, system.contract.node(node), method))
+        yield from (d for d in said if not follows(d))
+
+
+def _right(schema: Mapping[str, Any], options: Located) -> Located:
+    """The options that are right by themselves."""
+    known = schema.get("properties", {})
+    if not isinstance(options.data, Mapping):
+        return options
+    alone = {key: Located({key: value}, options.span) for key, value in options.data.items()}
+    right = {
+        key: options.data[key]
+        for key, one in alone.items()
+        if key in COMMON_OPTIONS or (key in known and not any(_schema({"properties": known}, one, "")))
+    }
+    return replace(options, data=right)
 
 
 def _schema(schema: Mapping[str, Any], options: Located, whole: str) -> Iterable[Diagnostic]:

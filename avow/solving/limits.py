@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+from avow.base.plain import ALLOWS_MORE
 from avow.tuning.effort import HANGS, HANGS_SECONDS, MOST_STEPS, STEPS, WALL_CLOCK
 
 _NO_ANSWER = "no answer with"
@@ -67,9 +68,11 @@ def told(effort: float) -> dict[str, object]:
 
 
 def tried(reason: str, effort: int) -> str:
-    """Why there is no answer, for people; where effort was used up, how many steps of it the whole question had."""
-    used_up = not reason or reason.startswith(_NO_ANSWER)
-    return f"{_NO_ANSWER} {steps(effort):,} steps of effort" if used_up and effort > 0 else reason or NO_ANSWER
+    """Why there is no answer, for people; where effort was used up, how many steps of it the whole question had, and
+    what allows more."""
+    if effort <= 0 or (reason and not reason.startswith(_NO_ANSWER)):
+        return reason or NO_ANSWER
+    return f"{_NO_ANSWER} {steps(effort):,} steps of effort, which usually take {effort / 1000:g} s; {ALLOWS_MORE}"
 
 
 @contextlib.contextmanager

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import Contract
+from avow.language.lexer import KEYWORDS
 from avow.system.formulas import check_formulas
 from avow.system.graph import dataflow
 from avow.system.launched import started
@@ -26,6 +27,8 @@ from avow.system.subsystems import check_subsystems, resolved
 from avow.system.topics import heard
 
 _WORD = re.compile(r"\w+'*")
+_STRING = re.compile(r'"[^"\n]*"|//[^\n]*')
+_OF_NAMES = re.compile("RCL[23]")
 _QUOTED = re.compile(r"'([^']*)'")
 
 
@@ -39,6 +42,12 @@ class Rest:
     root: Piece
     told: frozenset[str]
     """Words of which a fault is told already, so that others may follow from it."""
+    doubtful: frozenset[str] = frozenset()
+    """Names of the contract that may be missing only for a fault in it."""
+
+    def may_follow(self, found: Diagnostic) -> bool:
+        """Whether what a method's tool says of its files may follow from a fault of the contract."""
+        return not self.doubtful.isdisjoint(_WORD.findall(found.message))
 
 
 def rest_of(folder: Path) -> Rest | None:
@@ -49,11 +58,12 @@ def rest_of(folder: Path) -> Rest | None:
         plan, root, _, dropped = read_rest(folder / "plan.yaml")
     except Rejected:
         return None
-    contract, _ = check_paths(plan.contract_files)
+    contract, found = check_paths(plan.contract_files)
     if contract is not None:
         return Rest(System(plan, contract), True, root, dropped)
     words = frozenset(word for path in plan.contract_files for word in _WORD.findall(_text(path)))
-    return Rest(System(plan, read_in_part(plan.contract_files)), False, root, dropped | words)
+    part = read_in_part(plan.contract_files)
+    return Rest(System(plan, part), False, root, dropped | words, _doubtful(plan, part, found))
 
 
 def every_fault(folder: Path, found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
@@ -78,6 +88,20 @@ def in_order(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     return tuple(
         sorted(once.values(), key=lambda d: (d.span.file, d.span.line, d.span.column) if d.span else ("", 0, 0))
     )
+
+
+def _doubtful(plan: Plan, part: Contract, found: Iterable[Diagnostic]) -> frozenset[str]:
+    """The names in the lines that have a fault; where the syntax is wrong, what it swallows is anyone's guess: all."""
+    nodes = {node.name for node in part.nodes}
+    errors = [d for d in found if d.is_error]
+    names: set[str] = set()
+    for path in plan.contract_files:
+        lines = _STRING.sub("", _text(path)).splitlines()
+        here = [d.span for d in errors if d.span is not None and d.span.file == str(path)]
+        if all(_OF_NAMES.match(d.code) for d in errors):
+            lines = [line for at, line in enumerate(lines, 1) if any(s.line <= at <= s.end_line for s in here)]
+        names |= {word for line in lines for word in _WORD.findall(line)}
+    return frozenset(names - nodes - set(KEYWORDS))
 
 
 def _of_names(rest: Rest) -> Iterator[Diagnostic]:

@@ -13,6 +13,7 @@ from enum import StrEnum
 from hashlib import sha256
 from pathlib import Path
 
+from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing, run
 from avow.base.tools import Tool
 from avow.tuning.running import VERSION_SECONDS
@@ -174,7 +175,7 @@ def judge(done: Completed) -> Answer:
     framework = _FRAMEWORK.search(text)
     named = framework[1].strip() if framework else ""
     if done.timed_out:
-        return Answer(Said.TIMEOUT, f"no answer in {done.seconds:.0f} s", log=log, framework=named)
+        return Answer(Said.TIMEOUT, f"no answer in {done.seconds:.0f} s; {ALLOWS_MORE}", log=log, framework=named)
     parser = _PARSER.search(text)
     if parser:
         return Answer(Said.ERROR, f"AJPF's parser complained: {parser[0].strip()}", log=log, framework=named)

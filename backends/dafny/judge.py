@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from avow.backend_kit.protocol import Limits
+from avow.base.plain import ALLOWS_MORE
 from avow.base.verdict import Verdict
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.language.contract import Node
@@ -121,7 +122,7 @@ def _verdict(
 def _broken(run: Run, scanned: Scan, generated: Generated, shown_name: str) -> Settled | None:
     """A run without an answer."""
     if run.timed_out:
-        return Settled(Verdict.UNKNOWN, "dafny was stopped at its time limit")
+        return Settled(Verdict.UNKNOWN, f"dafny did not end within its time limit; {ALLOWS_MORE}")
     printed = _FINISHED.search(run.output)
     if run.members is not None and printed is not None and run.code in (0, 4):
         return None

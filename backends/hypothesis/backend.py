@@ -17,6 +17,7 @@ from typing import Any
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
 from avow.base.verdict import Counterexample, Outcome, Verdict
 from avow.evidence.obligation import Obligation
@@ -113,7 +114,7 @@ def _silence(done: Completed | None, limits: Limits) -> str:
     if done is None:
         return "Python could not be started"
     if done.timed_out:
-        return f"the test did not end within {limits.seconds:g} s"
+        return f"the test did not end within {limits.seconds:g} s; {ALLOWS_MORE}"
     last = done.stderr.strip().splitlines()[-1:] or ["no message"]
     return f"the test ended without a result (code {done.code}): {last[0][:300]}"
 

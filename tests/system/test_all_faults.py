@@ -22,7 +22,7 @@ context { Mode : {heat, idle}; Low = 18; }
 node thermometer {
   inputs( raw : REAL )
   outputs( temperature : REAL )
-  topics( a/B raw matches(in.raw), a/B temperature matches(out.temperature) )
+  topics( std_msgs/Float64 raw matches(in.raw), a/B temperature matches(out.temperature) )
   assume plausible ( -40 <= in.raw <= 85 )
   guarantee calibrated ( out.temperature == in.raw )
 }
@@ -48,10 +48,26 @@ environment:
 compose:
   D: {select: [thermometer, thermostat], rule: R1}
 nodes:
-  thermometer: {criticality: low}
-  thermostat: {criticality: high}
+  thermometer:
+    criticality: low
+    methods:
+      - hypothesis: {subject: "read.py:read", cases: 50}
+      - rosmonitoring: {traces: [run.jsonl], mapping: {in.raw: data, out.temperature: data}}
+  thermostat:
+    criticality: high
+    methods:
+      - hoare: {program: control.imp}
+      - review: {record: review.yaml}
 policy: default
 """
+INPUTS = {
+    "read.py": "def read(raw):\n    return {'temperature': raw}\n",
+    "control.imp": "IF (temperature < 18) THEN\n   mode := heat\nELSE\n   mode := idle\n",
+    "review.yaml": "format: 1\nnode: thermostat\nreviewer: A. Person\nrole: engineer\ndate: 2026-11-20\n"
+    "read:\n  - {file: control.imp}\nchecklist:\n  - {question: Is it short, answer: yes}\nconclusion: accepted\n",
+    "run.jsonl": '{"topic": "raw", "msg": {"data": 1.0}, "time": 1.0}\n',
+}
+"""What the methods read."""
 
 FAULTS: dict[str, tuple[str, str, str, str]] = {
     # what is told → (file, text, text with the fault, code)
@@ -64,12 +80,17 @@ FAULTS: dict[str, tuple[str, str, str, str]] = {
     "no such node": ("plan.yaml", "[thermometer, thermostat]", "[thermometer, boiler]", "PLAN106"),
     "no such level": ("plan.yaml", "criticality: high", "criticality: huge", "PLAN105"),
     "no such policy": ("plan.yaml", "policy: default", "policy: defalt", "POLICY001"),
+    "no Python": ("read.py", "def read(raw):", "def read(raw:", "HYPO103"),
+    "no program": ("control.imp", "THEN", "THAN", "HOARE100"),
+    "no verdict of a review": ("review.yaml", "conclusion: accepted", "conclusion: maybe", "REV"),
+    "wrong option": ("plan.yaml", "cases: 50", "cases: many", "PLAN105"),
+    "wrong mapping": ("plan.yaml", "in.raw: data", "in.row: data", "MON101"),
     "no formula": ("plan.yaml", '"-40 <= in.raw <= 85"', '"-40 <= in.raw <="', "RCL120"),
 }
 
 
 def place(folder: Path, faults: list[str]) -> Path:
-    texts = {"system.rcl": CONTRACT, "plan.yaml": PLAN}
+    texts = {"system.rcl": CONTRACT, "plan.yaml": PLAN, **INPUTS}
     for name in faults:
         file, good, bad, _ = FAULTS[name]
         assert good in texts[file]
