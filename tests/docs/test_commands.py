@@ -77,8 +77,8 @@ INSTEAD = {
     "avow audit --sign release.key": f"{KEYED} && avow audit --sign my.key",
     "avow audit --key release.key.pub": f"{KEYED} && avow audit --sign my.key && avow audit --key my.key.pub",
     "avow check --explain": "avow check thermostat --explain",
-    "avow compose PATH --latex | --json | --graph | --rcl": " && ".join(
-        f"{COMPOSED} {flag}" for flag in ("--latex", "--json", "--graph", "--rcl")
+    "avow compose PATH --latex | --json | --rcl": " && ".join(
+        f"{COMPOSED} {flag}" for flag in ("--latex", "--json", "--rcl")
     ),
     "avow diff OLD NEW --html FILE": "avow diff reports/thermostat reports/thermostat --html changes.html",
     "avow diff OLD [NEW]": "avow diff reports/thermostat reports/thermostat",
