@@ -67,14 +67,7 @@ class Checker:
     reduced: Kripke = field(init=False)
 
     def __post_init__(self) -> None:
-        found = {
-            atom: None
-            for p in self.properties
-            for f in (p.formula, p.trigger, p.goal, p.forbidden)
-            if f
-            for atom in atoms(f)
-        }
-        self.atoms = tuple(found)
+        self.atoms = asked(self.properties)
         self.places = {atom: at for at, atom in enumerate(self.atoms)}
         self.labels = label_states(self.graph.system, self.graph.states, self.atoms)
         self.reduced = reduce(self.whole(self.labels))
@@ -167,7 +160,7 @@ def label_states(system: System, states: Iterable[Any], wanted: Sequence[Atom]) 
     numbered = [(1 << at, atom) for at, atom in enumerate(wanted)]
     names = {agent.program.name: place for place, agent in enumerate(system.agents)}
     labels = [
-        _Labels(agent, [(bit, atom) for bit, atom in numbered if atom.agent == name])
+        Labels(agent, [(bit, atom) for bit, atom in numbered if atom.agent == name])
         for name, agent in zip(names, system.agents, strict=True)
     ]
     done = [(bit, names[a.agent], _own(a.term)) for bit, a in numbered if a.modality is Modality.DID]
@@ -201,8 +194,8 @@ def _of_draw(offered: Sequence[Struct], fair: Sequence[tuple[int, Struct]]) -> i
     return sum(bit | (bit << 1 if percept in offered else 0) for bit, percept in fair)
 
 
-class _Labels:
-    """What one agent believes and wants."""
+class Labels:
+    """What one agent believes, wants and intends of what is asked, as bits."""
 
     def __init__(self, agent: Agent, numbered: Sequence[tuple[int, Atom]]) -> None:
         self.agent = agent
@@ -266,6 +259,12 @@ def _own(term: Term, names: list[int] | None = None) -> Term:
         names.append(0)
         return Var(f"?{len(names)}")
     return Struct(term.functor, tuple(_own(arg, names) for arg in term.args))
+
+
+def asked(properties: Iterable[Property]) -> tuple[Atom, ...]:
+    """The atoms that decide the properties, and what is told of them."""
+    parts = (f for p in properties for f in (p.formula, p.trigger, p.goal, p.forbidden) if f is not None)
+    return tuple(dict.fromkeys(atom for f in parts for atom in atoms(f)))
 
 
 def asks_for_percepts(wanted: Property) -> bool:

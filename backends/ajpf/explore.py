@@ -5,7 +5,7 @@ from __future__ import annotations
 import resource
 import time
 from array import array
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -70,8 +70,23 @@ def _backlog(system: System, newest: Sequence[Any]) -> str:
     )
 
 
-def explore(system: System, *, states: int = STATES, seconds: float = 60.0, megabytes: int = 4096) -> Graph:
-    """Every reachable state, breadth first, as far as the bounds let it (`Graph.unfinished`)."""
+class Reduced(Protocol):
+    """A part of the runs that says what all say (`partial.Reduction`)."""
+
+    def start(self) -> tuple[Any, ...]: ...
+    def successors(self, state: Any, known: Container[Any], /) -> tuple[Any, ...]: ...
+
+
+def explore(
+    system: System,
+    *,
+    states: int = STATES,
+    seconds: float = 60.0,
+    megabytes: int = 4096,
+    reduced: Reduced | None = None,
+) -> Graph:
+    """Every reachable state, breadth first, as far as the bounds let it (`Graph.unfinished`); with `reduced`, those on
+    the runs that it leaves."""
     deadline = time.monotonic() + seconds
     memory = _memory() + megabytes
     numbers: dict[Any, int] = {}
@@ -85,10 +100,10 @@ def explore(system: System, *, states: int = STATES, seconds: float = 60.0, mega
             found.append(state)
         return known
 
-    initial = tuple(dict.fromkeys(number(state) for state in system.start()))
+    initial = tuple(dict.fromkeys(number(state) for state in (reduced or system).start()))
     at = 0
     unfinished = None
-    successors = system.successors
+    successors = system.successors if reduced is None else lambda state: reduced.successors(state, numbers)
     while at < len(found):
         if len(found) > states:
             unfinished = f"more than {states} states"

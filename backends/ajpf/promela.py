@@ -25,7 +25,7 @@ from .syntax import (
     is_ground,
     variables,
 )
-from .tuning import RULE_DEPTH
+from .tuning import PLAN_VARIABLES, RULE_DEPTH
 
 RUNNER = tuple(
     Path(__file__).with_name(name)
@@ -65,8 +65,6 @@ _NAMES = {
     "TOSTRING": "toString",
 }
 _QUIESCENCE = {"never": 0, "once": 1, "repeatedly": 2}
-_VARIABLES = 64
-"""Of one plan: which of them are still needed is a number of so many bits."""
 
 
 class NotTranslated(Exception):  # noqa: N818 - it names a state, not a fault
@@ -91,8 +89,8 @@ class _Tables:
         if isinstance(term, Var):
             number = scope.setdefault(term.name, len(scope))
             self.variables = max(self.variables, len(scope))
-            if number >= _VARIABLES:
-                raise NotTranslated(f"more than {_VARIABLES} variables in one plan")
+            if number >= PLAN_VARIABLES:
+                raise NotTranslated(f"more than {PLAN_VARIABLES} variables in one plan")
             key = (-1, 0, False, (number,))
         else:
             args = tuple(self.pattern(arg, scope) for arg in term.args)

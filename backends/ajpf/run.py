@@ -20,10 +20,11 @@ from .asking import ask
 from .automaton import TooLarge
 from .beliefs import TooDeep
 from .checker import Checker, OutOfTime, Property, asks_for_percepts
-from .explore import System, explore
+from .explore import Graph, System, explore
 from .instances import Instantiation, instances
 from .lazy import open_part
 from .options import Setup, read
+from .partial import Reduction, reduction, unfolded
 from .replay import Unable, replay
 from .settle import Frame, Settled, outcome
 from .society import system
@@ -71,6 +72,8 @@ class _Run:
         self.bound: dict[str, Any] = {}
         self.checkers: dict[str, Checker] = {}
         """Property's key → what knows the state space that it was checked on."""
+        self.reductions: dict[str, Reduction] = {}
+        """Property's key → by what the state space of its checker was made smaller, if it was."""
         self.engine = ENGINE
         self.logs: dict[str, str] = {}
         self.command: tuple[str, ...] = ()
@@ -110,15 +113,21 @@ class _Run:
     def explored(self, properties: Sequence[Property], probed: bool) -> Checker | None:
         setup = self.setup
         agents = system(setup.programs, setup.environment, setup.semantics, probed=probed)
-        graph = explore(
-            agents, states=min(LAZY_STATES, setup.states), seconds=self.left(), megabytes=self.limits.megabytes
-        )
+        reduced = reduction(agents, properties)
+        if reduced is not None:
+            self.bound["partial_order"] = "independent turns of agents in one order"
+
+        def reached(states: int) -> Graph:
+            megabytes = self.limits.megabytes
+            return explore(agents, states=states, seconds=self.left(), megabytes=megabytes, reduced=reduced)
+
+        graph = reached(min(LAZY_STATES, setup.states))
         if graph.unfinished is not None:
             properties = [p for p in properties if not self.settled_early(agents, p)]
             if not properties:
                 return None
             if len(graph) > LAZY_STATES:
-                graph = explore(agents, states=setup.states, seconds=self.left(), megabytes=self.limits.megabytes)
+                graph = reached(setup.states)
         self.bound["states"] += len(graph)
         self.bound["transitions"] += graph.transitions
         if graph.unfinished is not None:
@@ -133,6 +142,8 @@ class _Run:
         for p in properties:
             self.results[p.key] = self.one(checker, p)
             self.checkers[p.key] = checker
+            if reduced is not None:
+                self.reductions[p.key] = reduced
         return checker
 
     def settled_early(self, agents: System, p: Property) -> bool:
@@ -192,21 +203,22 @@ class _Run:
             if lasso is None:  # the reduced and the whole graph disagree: never to happen, never to be passed over
                 self.results[refuted.key] = Settled(Verdict.ERROR, "the checker contradicts itself")
                 continue
-            found = explain(checker.graph, lasso, refuted, self.wording)
+            graph = checker.graph
+            if refuted.key in self.reductions:
+                graph, lasso = unfolded(self.reductions[refuted.key], graph, lasso)
+            found = explain(graph, lasso, refuted, self.wording)
             self.counterexamples[refuted.key] = found
             self.logs[f"{refuted.key}.trace.txt"] = _trace(found)
             if self.setup.engine in ("auto", "ajpf") and self.ajpf is not None and not self.setup.environment_class:
-                self.replay(self.ajpf, checker, lasso, refuted, ail)
+                self.replay(self.ajpf, graph, lasso, refuted, ail)
 
-    def replay(
-        self, installation: Installation, checker: Checker, lasso: Lasso, refuted: Property, folder: Path
-    ) -> None:
+    def replay(self, installation: Installation, graph: Graph, lasso: Lasso, refuted: Property, folder: Path) -> None:
         """The run that refutes, done again by the real AIL: if that goes another way, our interpreter is not AIL's for
         this program, and there is no verdict on anything."""
         name = f"AIL ({installation.version})"
         result = self.results[refuted.key]
         try:
-            difference, log = replay(installation, self.setup, checker.graph, lasso, folder)
+            difference, log = replay(installation, self.setup, graph, lasso, folder)
         except Unable as error:
             self.bound["replay"] = f"not replayed by {name}: {error}"
             return

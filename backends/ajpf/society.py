@@ -15,7 +15,7 @@ from .environment import Environment
 from .intentions import of_event
 from .interpreter import PRINT, Agent, Semantics, State
 from .mind import NONE, Table
-from .syntax import RECEIVED, DeedKind, Event, Program, Sign, Struct, name_of, plain
+from .syntax import RECEIVED, DeedKind, Event, Program, Sign, Struct, Term, name_of, plain
 from .world import World
 
 T = TypeVar("T")
@@ -108,9 +108,19 @@ class Society:
             return looks
         if not any(state.awake):
             return tuple(dict.fromkeys(self._idle(state._replace(drawn=False))))
-        turns = [place for place, up in enumerate(state.awake) if up] if state.changed else [state.turn]
-        now = state._replace(changed=False, drawn=False)
-        return tuple(dict.fromkeys(after for turn in turns for after in self._job(now._replace(turn=turn))))
+        return tuple(dict.fromkeys(after for turn in self.turns(state) for after in self.moves(state, turn)))
+
+    def turns(self, state: Common) -> tuple[int, ...]:
+        """Whose job may be the next: any agent's that is awake, once something has changed for anybody."""
+        return tuple(place for place, up in enumerate(state.awake) if up) if state.changed else (state.turn,)
+
+    def moves(self, state: Common, turn: int) -> Iterator[Common]:
+        """What the next job of this agent makes of the state."""
+        return self._job(state._replace(changed=False, drawn=False, turn=turn))
+
+    def place(self, to: Term) -> int | None:
+        """Which of `agents` a message is for, if any."""
+        return self._places.get(plain(name_of(to)))
 
     # Jobs of the agent whose turn it is
 
@@ -207,7 +217,7 @@ class Society:
         assert isinstance(message, Struct)
         to, force, content = message.args
         state = state._replace(changed=True)
-        place = self._places.get(plain(name_of(to)))
+        place = self.place(to)
         if place is None:
             return state
         agent = self.agents[place]

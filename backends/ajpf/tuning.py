@@ -77,3 +77,9 @@ TAUTOLOGY_CASES = 4_000
 
 INDICES_TRIED = 400
 """Combinations of index values that a row is tried with in each step."""
+
+TURN = 1_000
+"""Jobs of one agent after which its turn is taken for endless: the orders of turns are then not reduced."""
+
+PLAN_VARIABLES = 64
+"""Variables of one plan that Spin's runner takes: which of them are still needed is a number of so many bits."""

@@ -1,0 +1,92 @@
+"""How an agent's state space grows on a machine: a million states, and what one order of independent turns saves.
+
+    python benchmarks/agents.py
+
+Processor seconds and megabytes of this process. The exit code is 1 where a million states take a minute or a gigabyte,
+with the check of a property, or where the turns of independent agents are not reduced.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT)]
+
+from avow.backends.ajpf.checker import Checker, Property  # noqa: E402
+from avow.backends.ajpf.environment import read_environment  # noqa: E402
+from avow.backends.ajpf.explore import explore  # noqa: E402
+from avow.backends.ajpf.interpreter import Semantics  # noqa: E402
+from avow.backends.ajpf.parser import parse_system  # noqa: E402
+from avow.backends.ajpf.partial import reduction  # noqa: E402
+from avow.backends.ajpf.psl_parser import instantiate, parse_psl  # noqa: E402
+from avow.backends.ajpf.society import system  # noqa: E402
+
+HEAD = "GWENDOLEN\n"
+AGENT = ":name: {0}\n:Initial Beliefs:\n:Initial Goals:\n{1}\n:Plans:\n{2}\n"
+
+
+def made(folder: Path, agents: str, draws: str):
+    (folder / "e.yaml").write_text(draws)
+    return system(parse_system(HEAD + agents, "agents.gwen"), read_environment(folder / "e.yaml"), Semantics.MCAPL)
+
+
+def wanted(text: str) -> Property:
+    return Property("f", instantiate(parse_psl(text), {}))
+
+
+def million(folder: Path) -> bool:
+    """An agent with percepts always on offer, which falls behind them."""
+    plans = "".join(
+        f"+p({i}) : {{ True }} <- +k({i}), -k({(i + 1) % 4}), *k({(i + 2) % 4}), go({i});\n" for i in range(4)
+    )
+    percepts = ", ".join(f'"p({i})"' for i in range(4))
+    draws = f"draws: {{at_start: true, at_quiescence: repeatedly}}\npercepts: {{x: [{percepts}, nothing]}}\n"
+    agent = made(folder, AGENT.format("ag", "", plans), draws)
+    before = time.process_time()
+    graph = explore(agent, states=1_000_000, seconds=600)
+    explored = time.process_time() - before
+    p = wanted("[] (B(ag, k(0)) -> (<> D(ag, go(0))))")
+    holds = Checker(graph, [p]).check(p).holds
+    taken = time.process_time() - before
+    megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+    print(f"{len(graph)} states: {explored:.1f} s; with a property ({holds}): {taken:.1f} s, {megabytes} MB")
+    return taken < 60 and megabytes < 1024
+
+
+def turns(folder: Path) -> bool:
+    """Pairs of agents that have nothing to do with each other."""
+    ratios = []
+    for pairs in (1, 2, 3):
+        agents = ""
+        for i in range(pairs):
+            tells = f"+!g [perform] : {{ True }} <- +a, .send(b{i}, :tell, x), +b, .send(b{i}, :tell, y), +c;"
+            hears = f"+.received(:tell, X) : {{ True }} <- +X, .send(a{i}, :tell, X);"
+            agents += AGENT.format(f"a{i}", "g [perform]", tells + "+.received(:tell, X) : { True } <- +X;")
+            agents += AGENT.format(f"b{i}", "", hears)
+        draws = "draws: {at_start: false, at_quiescence: never, quiet: [send]}\npercepts: {x: [nothing]}\n"
+        several, p = made(folder, agents, draws), wanted("<> (B(b0, x) & B(b0, y))")
+        found = []
+        for reduced in (None, reduction(several, [p])):
+            before = time.process_time()
+            graph = explore(several, states=2_000_000, seconds=600, reduced=reduced)
+            found.append((len(graph), time.process_time() - before, Checker(graph, [p]).check(p).holds))
+        (whole, slow, one), (part, fast, other) = found
+        print(f"{2 * pairs} agents: {whole} states in {slow:.1f} s; reduced: {part} in {fast:.1f} s")
+        ratios.append(whole / part)
+        if one is not other:
+            return False
+    return ratios[-1] > 10
+
+
+def main() -> int:
+    with tempfile.TemporaryDirectory() as folder:
+        return 0 if million(Path(folder)) & turns(Path(folder)) else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
