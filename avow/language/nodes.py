@@ -19,6 +19,7 @@ from avow.language.scope import Scope
 from avow.language.source import Reports
 from avow.language.syntax import RosType, UnspecifiedType
 from avow.language.terms import Role, Term
+from avow.ros.calls import part_topic
 from avow.ros.names import is_name
 from avow.tuning.sizes import CONTRACT_PARTS, NESTING
 
@@ -146,7 +147,7 @@ def _topics(node: NodeSyntax, scope: Scope, reports: Reports) -> Iterable[Topic]
         if tree.port is not None and port is None:
             continue
         topic = Topic(flat(tree.type), name.text, port, reports.source.span(tree.start, tree.end))
-        earlier = seen.setdefault(name.text, [])
+        earlier = seen.setdefault(part_topic(name.text, topic.ros_type), [])  # a service has two types: its parts
         if _goes_with(topic, earlier, name, reports):
             earlier.append(topic)
             yield topic

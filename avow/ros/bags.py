@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from avow.ros.calls import Calls, as_message, parts_of, with_parts
 from avow.ros.definitions import Message, canonical
 from avow.ros.sources import DISTRIBUTIONS, from_store, message_files
 
@@ -66,7 +68,10 @@ def carried(path: Path, origin: Origin = NOWHERE) -> Carried:
             counts[topic] = counts.get(topic, 0) + connection.msgcount
             caller = getattr(connection.ext, "callerid", None)
             publishers.setdefault(topic, {}).update({caller: None} if caller else {})
-        known = from_store(reader.typestore.fielddefs, str(path))
+        for topic, kind in [*types.items()]:
+            for part, own in parts_of(topic, kind).items():
+                types[part], publishers[part], counts[part] = own, publishers[topic], counts[topic]
+        known = with_parts(from_store(reader.typestore.fielddefs, str(path)))
         told = {topic: tuple(found) for topic, found in publishers.items()}
         return Carried(types, known, told, counts, bool(getattr(reader, "is2", False)))
 
@@ -75,14 +80,25 @@ def messages(
     path: Path, origin: Origin = NOWHERE, wanted: Callable[[str], bool] = lambda topic: True
 ) -> Iterator[Event]:
     """The messages as events, in the order in which they were recorded; of topics that are not wanted, only that there
-    was one. Raises NoBag."""
+    was one. Of a topic whose parts are wanted (a call's request and response), the part. Raises NoBag."""
+    calls = Calls()
     with _opened(path, origin) as reader:
+        parted = {
+            c.topic
+            for c in reader.connections
+            if not wanted(c.topic) and any(map(wanted, parts_of(c.topic, canonical(c.msgtype))))
+        }
         plain = _plainer(reader.typestore.fielddefs)
+        kind = functools.cache(lambda said: as_message(said, "")[0])
         for connection, time, raw in reader.messages():
             event: dict[str, Any] = {}
-            if wanted(connection.topic):
-                event = plain(reader.deserialize(raw, connection.msgtype))
-            event["topic"] = connection.topic
+            topic = connection.topic
+            if topic in parted:
+                topic, found = calls.part(topic, plain(reader.deserialize(raw, kind(connection.msgtype))))
+                event = dict(found)
+            elif wanted(topic):
+                event = plain(reader.deserialize(raw, kind(connection.msgtype)))
+            event["topic"] = topic
             event["time"] = time / 1e9
             yield event
 
@@ -97,7 +113,7 @@ def _opened(path: Path, origin: Origin) -> Iterator[Any]:
         text = "reading bags needs the package rosbags"
         raise NoBag(text, "pip install 'avow[bags]'", missing=True) from None
     try:
-        with AnyReader([path], default_typestore=_types(origin)) as reader:
+        with _reader(AnyReader, path, origin) as reader:
             yield reader
     except (AnyReaderError, SerdeError) as error:
         hint = None
@@ -106,6 +122,28 @@ def _opened(path: Path, origin: Origin) -> Iterator[Any]:
         raise NoBag(f"{path} is no bag that can be read: {error}", hint) from None
     except (OSError, ValueError, KeyError, RuntimeError, TypesysError) as error:
         raise NoBag(f"{path} cannot be read as a bag: {error}") from None
+
+
+def _reader(kind: Any, path: Path, origin: Origin) -> Any:
+    """A reader of the bag that also knows the types of services and actions."""
+    from rosbags.rosbag2 import Reader
+
+    class Calling(Reader):  # type: ignore[misc]
+        @property
+        def connections(self) -> list[Any]:
+            return [_plain(c) for c in super().connections]
+
+    found = kind([path], default_typestore=_types(origin))
+    if found.is2:
+        found.readers = [Calling(path)]
+    return found
+
+
+def _plain(connection: Any) -> Any:
+    if "/msg/" in connection.msgtype:
+        return connection
+    kind, text = as_message(connection.msgtype, connection.msgdef.data)
+    return connection._replace(msgtype=kind, msgdef=connection.msgdef._replace(data=text), digest="")
 
 
 def _types(origin: Origin) -> Any:

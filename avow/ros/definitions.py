@@ -176,13 +176,13 @@ _STANDARD_NAMES = {
     **{name: name.capitalize().replace("Uint", "UInt") for name in INTEGERS},
 }
 
-STANDARD: Mapping[str, Message] = {
+STANDARD: dict[str, Message] = {
     f"std_msgs/{name}": Message(
         f"std_msgs/{name}", (Field("data", Scalar(OTHER_NAMES.get(base, base))),), source="std_msgs"
     )
     for base, name in _STANDARD_NAMES.items()
 }
-"""What carries one built-in value: the same in every ROS there has been."""
+"""What carries one built-in value, and the calls of std_srvs: the same in every ROS there has been."""
 
 _FIELD = re.compile(
     r"(?P<type>[A-Za-z][A-Za-z0-9_/]*)(?:<=(?P<bound>\d+))?(?P<array>\[(?P<size>(?:<=)?\d*)\])?\s+"
@@ -258,3 +258,11 @@ def parse_parts(text: str, name: str, kind: str, source: str = "") -> tuple[Mess
             raise WrongDefinition(str(wrong), wrong.line + before) from None
         before += len(part) + 1
     return tuple(found)
+
+
+for _name, _text in (
+    ("Empty", "---"),
+    ("SetBool", "bool data\n---\nbool success\nstring message"),
+    ("Trigger", "---\nbool success\nstring message"),
+):
+    STANDARD |= {message.name: message for message in parse_parts(_text, f"std_srvs/{_name}", "srv", "std_srvs")}

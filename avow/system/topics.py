@@ -13,9 +13,10 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
-from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
+from avow.language.contract import Clause, ClauseKind, Contract, Node, Port, Topic
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.terms import Apply, Compare, Iff, Or, Quantified, Quantifier, Role, Term, Variable
+from avow.ros.calls import part_topic
 from avow.ros.definitions import canonical
 from avow.ros.names import Resolver
 from avow.system.plan import Connection, Endpoint, Plan
@@ -50,6 +51,11 @@ class Ends:
         return tuple(dict.fromkeys(found))
 
 
+def whole_name(names: Resolver, node: Node, topic: Topic) -> str:
+    """The topic's name when the robot runs; a part of a call has one of its own."""
+    return part_topic(names.topic(node.name, topic.name), topic.ros_type)
+
+
 def ends(nodes: Sequence[Node], names: Resolver) -> Ends:
     """The topics of the nodes' ports."""
     outputs: dict[Endpoint, tuple[Carrier, ...]] = {}
@@ -60,7 +66,7 @@ def ends(nodes: Sequence[Node], names: Resolver) -> Ends:
             if topic.port is None:
                 continue
             at = Endpoint(node.name, topic.port.name)
-            carrier = Carrier(names.topic(node.name, topic.name), canonical(topic.ros_type), topic.span)
+            carrier = Carrier(whole_name(names, node, topic), canonical(topic.ros_type), topic.span)
             if topic.port.role is Role.INPUT:
                 inputs[at] = (*inputs.get(at, ()), carrier)
             else:

@@ -11,7 +11,7 @@ from typing import Any
 
 from avow.system.graph import Edge, Graph
 from avow.system.plan import Endpoint, System
-from avow.system.topics import ends
+from avow.system.topics import ends, whole_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ def wiring(system: System, graph: Graph) -> Wiring:
     names = system.plan.ros.names
     found = ends(nodes, names)
     late = {edge.target: edge for edge in graph.edges}
-    called = {(n.name, t.port.name, names.topic(n.name, t.name)): t.name for n in nodes for t in n.topics if t.port}
+    called = {(n.name, t.port.name, whole_name(names, n, t)): t.name for n in nodes for t in n.topics if t.port}
     whole: dict[str, str] = {}
     publishers: dict[str, list[Ended]] = {}
     listeners: dict[str, list[Ended]] = {}

@@ -67,6 +67,12 @@ CODES = register(
         "Correct the topic's type in the contract, or the definition that the plan names.",
     ),
     declare(
+        "MON206",
+        "calls not recorded",
+        "A clause speaks of a service's calls, and a ROS 1 bag holds topics alone.",
+        "Judge a ROS 2 bag with service events, or a JSON trace; or let the node publish its calls.",
+    ),
+    declare(
         "MON301",
         "serving not installed",
         "Serving an oracle needs a package that is not installed.",

@@ -9,6 +9,8 @@ from typing import Any
 
 import yaml
 
+from avow.ros.calls import is_part
+
 from .options import Setup, same_topic
 from .rules import Choice, Fields
 
@@ -37,7 +39,7 @@ def topic_types(setup: Setup) -> dict[str, str]:
     seen: set[str] = set()
     rules = (rule for rule in setup.rules.values() if isinstance(rule, Fields | Choice) and rule.kind)
     for name, kind in [*setup.named, *((rule.topic, rule.kind) for rule in rules)]:
-        if same_topic(name) not in seen:
+        if same_topic(name) not in seen and not is_part(name):  # ROSMonitoring listens to topics
             seen.add(same_topic(name))
             found[name] = dotted_type(kind)
     return found

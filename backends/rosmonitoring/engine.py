@@ -260,6 +260,7 @@ class Monitor:
         found: list[Violation] = []
         if self._pairing is not None:
             self._settle(self._pairing.ready(None), found)
+            self.backwards = self.backwards or self._pairing.uneven()
         for watched in {id(w): w for all_ in self._clauses.values() for w in all_}.values():
             if watched.fresh:
                 values = {n: v for part in watched.fresh.values() for n, v in part.items()}

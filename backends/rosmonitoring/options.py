@@ -12,10 +12,11 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.formulas.formula import free_variables
 from avow.formulas.values import FunctionValue, Value
-from avow.language.contract import Node, Port
+from avow.language.contract import Node, Port, Topic
 from avow.language.load import parse_term
 from avow.language.sorts import BOOL, BoolSort, FunctionSort, RealSort
 from avow.language.terms import Apply, Not, Quantified, Quantifier, Role, Term, Variable
+from avow.ros.calls import CALL, is_service_part, part_topic
 from avow.ros.definitions import Definitions, Message, Wire
 from avow.ros.sources import definitions
 from avow.system.graph import Edge, dataflow
@@ -84,7 +85,7 @@ def setup(
         work.port(port)
     work.shared_fields()
     data = options.data if options is not None and isinstance(options.data, Mapping) else {}
-    named = tuple((resolved(system, node, topic.name), topic.ros_type) for topic in node.topics)
+    named = tuple((_called(system, node, topic), topic.ros_type) for topic in node.topics)
     made = Setup(
         node,
         work.rules,
@@ -142,6 +143,10 @@ def readable(setup: Setup, path: File, where: Origin) -> tuple[Diagnostic, ...]:
         return ()
     found = carried(path, where)
     kinds = setup.kinds
+    calls = [topic for topic in setup.topics if is_service_part(topic)]
+    if calls and not found.ros2:
+        text = f"{path.name} is a ROS 1 bag, which cannot hold calls of services: {', '.join(calls)}"
+        return (Diagnostic("MON206", text, hint="publish what is called and answered, or write a JSON trace"),)
     types = {topic: kinds[same_topic(topic)] for topic in found.types if same_topic(topic) in kinds}
     return tuple(conflicts(path, found, setup.known, types))
 
@@ -150,6 +155,11 @@ def resolved(system: System, node: Node, topic: str) -> str:
     """The topic's whole name when the robot runs; as it is written where only the first slash is missing."""
     whole = system.plan.ros.names.topic(node.name, topic)
     return topic if whole == f"/{topic}" else whole
+
+
+def _called(system: System, node: Node, topic: Topic) -> str:
+    """As `resolved`; a part of a call has a topic of its own."""
+    return part_topic(resolved(system, node, topic.name), topic.ros_type)
 
 
 def same_topic(name: str) -> str:
@@ -189,12 +199,12 @@ class _Work:
         if not isinstance(entry, Mapping):
             return None
         by = str(entry.get("by", "latency"))
-        stamp = ("header", "stamp")
+        usual = {"stamp": ("header", "stamp"), "call": (CALL,)}.get(by, ())
         return Answers(
             by,
             str(entry.get("because", "")),
-            observing.path(str(entry["input"])) if "input" in entry else stamp if by == "stamp" else (),
-            observing.path(str(entry["output"])) if "output" in entry else stamp if by == "stamp" else (),
+            observing.path(str(entry["input"])) if "input" in entry else usual,
+            observing.path(str(entry["output"])) if "output" in entry else usual,
             self.duration("answers.latency", entry.get("latency", "0 s")),
             self.duration("answers.jitter", entry.get("jitter", "0 s")),
         )
@@ -284,7 +294,7 @@ class _Work:
     def topic(self, node: Node, port: Port) -> tuple[str | None, str | None]:
         """The name and the type of the topic that carries a port."""
         found = next((t for t in node.topics if t.port == port), None)
-        return (None, None) if found is None else (resolved(self.system, node, found.name), found.ros_type)
+        return (None, None) if found is None else (_called(self.system, node, found), found.ros_type)
 
     def message(self, kind: str | None, entry: Mapping[str, Any]) -> Message | str:
         """The definition of the messages of a topic; else the type's name, of which nothing is known."""

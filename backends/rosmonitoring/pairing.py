@@ -3,7 +3,8 @@
 By `arrival`, an answer is held against the values that came before it: for traces that one process wrote in order. By
 `key` or `stamp`, against those of the message that bears the same key. By `latency`, each input may have had any value
 that was current from `latency + jitter` before the answer to `jitter` after it, independently: what holds for all
-combinations holds, what is broken for all is broken, and anything else is undecided. Independence takes in more
+combinations holds, what is broken for all is broken, and anything else is undecided. By `call`, against the request of
+the same call; by `order`, the k-th against the k-th, where there are as many of both. Independence takes in more
 combinations than there were, so that both verdicts are right as long as the two bounds are.
 """
 
@@ -27,7 +28,7 @@ from .wires import MappingError, seconds
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """The plan's `answers`. `by`: arrival, key, stamp or latency."""
+    """The plan's `answers`. `by`: arrival, key, stamp, call, order or latency."""
 
     by: str
     because: str = ""
@@ -60,10 +61,16 @@ class Pairing:
     seen: dict[str, deque[tuple[Fraction, object, Value | None]]] = field(default_factory=dict)
     """Input → (when, key, value; None: it could not be read), in the order of time."""
     waiting: deque[Asked] = field(default_factory=deque)
+    counts: dict[str, int] = field(default_factory=dict)
+    """Input → how many messages."""
+    asked: dict[int, tuple[int, Asked]] = field(default_factory=dict)
+    """By what is judged: how many answers, and the last of them."""
 
     def saw(self, name: str, event: Mapping[str, Any], value: Value | None) -> None:
         known = self.seen.setdefault(name, deque())
-        known.append((time_of(event), self._key(event, self.answers.input), value))
+        self.counts[name] = self.counts.get(name, 0) + 1
+        key = self.counts[name] if self.answers.by == "order" else self._key(event, self.answers.input)
+        known.append((time_of(event), key, value))
         if self.answers.by == "latency":
             # what is older than any window that is still open, but for the last of it, can no longer be asked for
             first = self.waiting[0].time if self.waiting else known[-1][0]
@@ -76,8 +83,25 @@ class Pairing:
     def ask(
         self, about: Any, event: Mapping[str, Any], index: int, values: dict[str, Value], inputs: tuple[str, ...]
     ) -> None:
-        key = self._key(event, self.answers.output)
-        self.waiting.append(Asked(about, event, index, values, inputs, time_of(event), key))
+        count = self.asked[id(about)][0] + 1 if id(about) in self.asked else 1
+        key = count if self.answers.by == "order" else self._key(event, self.answers.output)
+        asked = Asked(about, event, index, values, inputs, time_of(event), key)
+        self.asked[id(about)] = count, asked
+        self.waiting.append(asked)
+
+    def uneven(self) -> str:
+        """By order: why the k-th answer need not be that to the k-th message of an input; empty where it is. What
+        came after the last answer need not have been answered yet."""
+        for count, asked in self.asked.values() if self.answers.by == "order" else ():
+            for name in asked.inputs:
+                whole = self.counts.get(name, 0)
+                late = sum(when > asked.time for when, _, _ in self.seen.get(name, ()))
+                if count not in (whole, whole - late):
+                    return (
+                        f"{whole} messages of {name} and {count} answers: which answer was to which is not told by "
+                        "their order (`answers: {by: order}`)"
+                    )
+        return ""
 
     def ready(self, now: Fraction | None) -> Iterator[tuple[Asked, list[dict[str, Value]] | str]]:
         """The answers whose inputs are known by a time (None: the run is over), each with the combinations of values

@@ -19,6 +19,7 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause
 from avow.language.sorts import BoolSort, DataSort, EnumSort, FunctionSort, NaturalSort, Sort, StringSort
 from avow.language.terms import Role
+from avow.ros.calls import is_part
 
 from .options import Setup, same_topic
 from .quantifiers import Eliminator
@@ -142,6 +143,10 @@ class _Machine:
 
     def build(self) -> None:
         names = sorted(free_names(self.clause.formula))
+        for name in names:
+            topic = getattr(self.setup.rules.get(name), "topic", "")
+            if is_part(topic):
+                raise NotRml(f"{name} is a part of a call ({topic}), and ROSMonitoring listens to topics")
         self._choose(names)
         guard = Eliminator(self.symbols).condition(self.clause.formula)
         complete = every([compare("==", Name(self.flags[n]), Number(Fraction(1))) for n in names if n in self.flags])

@@ -55,6 +55,18 @@ SCHEMA: dict[str, Any] = {
                 {
                     "type": "object",
                     "additionalProperties": False,
+                    "required": ["by", "because"],
+                    "properties": {"by": {"const": "order"}, "because": {"type": "string", "minLength": 1}},
+                },
+                {
+                    "type": "object",
+                    "additionalProperties": False,
+                    "required": ["by"],
+                    "properties": {"by": {"const": "call"}},
+                },
+                {
+                    "type": "object",
+                    "additionalProperties": False,
                     "required": ["by"],
                     "properties": {"by": {"const": "stamp"}, "input": _PATH, "output": _PATH},
                 },

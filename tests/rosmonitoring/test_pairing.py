@@ -218,3 +218,51 @@ def test_the_command_says_what_was_not_monitored(make_system: Callable[..., Syst
         assert list(running.step(event)) == []
     assert list(running.finish()) == []
     assert running.unmonitored() == ["n.low", "n.high"]
+
+
+# -- by order ----------------------------------------------------------------------------------------------------------
+
+ORDER = {"by": "order", "because": "every link stood before the first message"}
+
+
+def shuffled(rng: random.Random, wrong: frozenset[int]) -> list[Event]:
+    """As `run`, with a recorder that may write an answer long before its input: each topic stays in its own order."""
+    events = run(rng, wrong)
+    queues = {topic: [e for e in events if e["topic"] == topic] for topic in ("r", "s")}
+    found: list[Event] = []
+    while any(queues.values()):
+        topic = rng.choice([name for name, left in queues.items() if left])
+        found.append({**queues[topic].pop(0), "time": len(found) / 10})
+    return found
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_kth_answer_is_held_against_the_kth_input(seed: int, make_system: Callable[..., System]) -> None:
+    rng = random.Random(seed)
+    wrong = frozenset(rng.sample(range(60), 3))
+    events = shuffled(rng, wrong)
+    violations, tallies = judge(make_system(RCL, MAPPING, answers=ORDER), events)
+    answers = [index for index, event in enumerate(events, start=1) if event["topic"] == "s"]
+    assert sorted({v.index for v in violations}) == [answers[k] for k in sorted(wrong)]
+    assert all(v.fault is Fault.GUARANTEE for v in violations)
+    assert all(tally.decided == 60 for name, tally in tallies.items() if name != "positive")
+
+
+@pytest.mark.parametrize(
+    ("lost", "topic", "fine"),
+    [(20, "r", False), (20, "s", False), (0, "r", False), (59, "r", False), (59, "s", True)],
+)
+def test_after_a_loss_order_tells_nothing(
+    lost: int, topic: str, fine: bool, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    """But for the last answer, which the recording may have ended before."""
+    events = [e for e in run(random.Random(1)) if (e["topic"], e["id"]) != (topic, lost)]
+    trace = tmp_path / "run.jsonl"
+    trace.write_text("".join(json.dumps(e) + "\n" for e in events), encoding="utf-8")
+    running = session(make_system(RCL, MAPPING, answers=ORDER), (), trace)
+    found = list(running.run(trace))
+    assert (running.unmonitored() == []) is fine
+    if fine:
+        assert found == []
+    else:
+        assert "is not told by their order" in running.monitors[0].backwards

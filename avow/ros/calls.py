@@ -1,0 +1,163 @@
+"""Services and actions: a call's request and response, a goal, its result and its feedback, as topics of their own.
+
+In a contract the part is named by its type: ``std_srvs/SetBool_Request /go matches(in.data)``. What carries it is known
+here as ``/go/_request``, ``/go/_response``, ``/spin/_goal``, ``/spin/_result`` and ``/spin/_feedback``. A ROS 2 bag
+holds calls as service events, where introspection is on (REP 2012), and actions' feedback; a ROS 1 bag holds actions,
+and no service.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from avow.ros.definitions import Message
+
+_PARTS = {part: f"_{part.lower()}" for part in ("Request", "Response", "Goal", "Result", "Feedback")}
+CALL = "_call"
+"""The field that says to which call a part belongs, in every part of it."""
+_SERVICE_EVENT = "/_service_event"
+_KINDS = ("_request_sent", "_request", "_response", "_response_received")
+"""What an event tells of, by service_msgs/ServiceEventInfo's `event_type`: the server's view has the short names."""
+_ACTION1 = re.compile(r"(?P<name>.*)Action(?P<part>Goal|Result|Feedback)\Z")
+
+
+def part_topic(name: str, kind: str) -> str:
+    """The topic that carries messages of a type under a name: a part of a call has one of its own."""
+    part = kind.rpartition("_")[2] if "_" in kind.rpartition("/")[2] else ""
+    return f"{name}/{_PARTS[part]}" if part in _PARTS else name
+
+
+def is_part(topic: str) -> bool:
+    """Whether a topic is a part of calls: no publisher of ROS publishes it."""
+    return topic.rpartition("/")[2] in (*_PARTS.values(), *_KINDS)
+
+
+def is_service_part(topic: str) -> bool:
+    return topic.rpartition("/")[2] in _KINDS
+
+
+def parts_of(topic: str, kind: str) -> dict[str, str]:
+    """The parts that a recorded topic's messages hold: topic → type (``package/Type``)."""
+    package, _, name = kind.partition("/")
+    if topic.endswith(_SERVICE_EVENT) and name.endswith("_Event"):
+        called, own = topic.removesuffix(_SERVICE_EVENT), name.removesuffix("_Event")
+        if called.endswith("/_action/send_goal"):
+            action = called.removesuffix("/_action/send_goal")
+            return {f"{action}/_goal": f"{package}/{own.removesuffix('_SendGoal')}_Goal"}
+        if called.endswith("/_action/get_result"):
+            action = called.removesuffix("/_action/get_result")
+            return {f"{action}/_result": f"{package}/{own.removesuffix('_GetResult')}_Result"}
+        sides = ("Request", "Request", "Response", "Response")
+        return {f"{called}/{k}": f"{package}/{own}_{side}" for k, side in zip(_KINDS, sides, strict=True)}
+    if topic.endswith("/_action/feedback"):
+        action = topic.removesuffix("/_action/feedback")
+        return {f"{action}/_feedback": f"{package}/{name.removesuffix('_FeedbackMessage')}_Feedback"}
+    found = _ACTION1.match(name)
+    if found and topic.endswith(f"/{found['part'].lower()}"):
+        action = topic.rpartition("/")[0]
+        return {f"{action}/_{found['part'].lower()}": f"{package}/{found['name']}_{found['part']}"}
+    return {}
+
+
+def with_parts(known: Mapping[str, Message]) -> dict[str, Message]:
+    """Definitions, with ROS 1's parts of actions (``SpinGoal``) under the names that they have here (``Spin_Goal``)."""
+    found = dict(known)
+    for name in known:
+        wrapped = _ACTION1.match(name)
+        inner = known.get(f"{wrapped['name']}{wrapped['part']}") if wrapped else None
+        if wrapped and inner is not None:
+            part = f"{wrapped['name']}_{wrapped['part']}"
+            found.setdefault(part, replace(inner, name=part))
+    return found
+
+
+@dataclass(slots=True)
+class Calls:
+    """Takes recorded messages apart, in their order."""
+
+    goals: dict[str, str] = field(default_factory=dict)
+    """A call for a result → the goal whose result it wants."""
+
+    def part(self, topic: str, message: Mapping[str, Any]) -> tuple[str, Mapping[str, Any]]:
+        """The part of a call that a recorded message is, with its topic; the message itself where it is none."""
+        if topic.endswith(_SERVICE_EVENT):
+            return self._event(topic.removesuffix(_SERVICE_EVENT), message) or (topic, message)
+        if topic.endswith("/_action/feedback"):
+            call = _uuid(message.get("goal_id"))
+            return f"{topic.removesuffix('/_action/feedback')}/_feedback", _content(message.get("feedback"), call)
+        action, _, part = topic.rpartition("/")  # ROS 1
+        goal = message.get("goal_id") or (message.get("status") or {}).get("goal_id") or {}
+        return f"{action}/_{part}", _content(message.get(part), str(goal.get("id", "")))
+
+    def _event(self, called: str, message: Mapping[str, Any]) -> tuple[str, Mapping[str, Any]] | None:
+        info = message.get("info") or {}
+        kind = info.get("event_type")
+        if kind not in (0, 1, 2, 3):
+            return None
+        told = message.get("request" if kind < 2 else "response") or [{}]
+        call = f"{bytes(info.get('client_gid') or ()).hex()}:{info.get('sequence_number')}"
+        for service, part, wanted in (("send_goal", "goal", 1), ("get_result", "result", 2)):
+            if called.endswith(f"/_action/{service}"):
+                if part == "result" and kind == 1:
+                    self.goals[call] = _uuid(told[0].get("goal_id"))
+                if kind != wanted:
+                    return None
+                goal = _uuid(told[0].get("goal_id")) if part == "goal" else self.goals.pop(call, "")
+                return f"{called.removesuffix(f'/_action/{service}')}/_{part}", _content(told[0].get(part), goal)
+        return f"{called}/{_KINDS[kind]}", _content(told[0], call)
+
+
+def _uuid(raw: Any) -> str:
+    return bytes((raw or {}).get("uuid") or ()).hex() if isinstance(raw, Mapping) else ""
+
+
+def _content(raw: Any, call: str) -> Mapping[str, Any]:
+    """A part's own fields, and its call; of one that was recorded without content, the call alone."""
+    return {**(raw if isinstance(raw, Mapping) else {}), **({CALL: call} if call else {})}
+
+
+# -- definitions in bags -----------------------------------------------------------------------------------------------
+
+_OTHER = re.compile(r"\b([A-Za-z]\w*)/(?:srv|action)/([A-Za-z]\w*)")
+_RULE = "=" * 80
+_EVENT = """\
+service_msgs/ServiceEventInfo info
+{0}_Request[<=1] request
+{0}_Response[<=1] response
+{rule}
+MSG: service_msgs/ServiceEventInfo
+uint8 event_type
+builtin_interfaces/Time stamp
+uint8[16] client_gid
+int64 sequence_number
+{rule}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+{rule}
+MSG: {0}_Request
+{request}
+{rule}
+MSG: {0}_Response
+{response}
+"""
+
+
+def as_message(kind: str, text: str) -> tuple[str, str]:
+    """A type of a service or an action as a bag names it (``package/srv/Go_Event``), and its definition, as those of a
+    message: what reads bags knows no other. A service's own text (with ``---``) becomes that of its event."""
+    plain = _OTHER.sub(r"\1/msg/\2", kind)
+    first, *others = re.split(rf"^{_RULE}\n", text, flags=re.M)
+    if not first.strip() and others:
+        first, others = others[0].partition("\n")[2], others[1:]  # it begins with its own name
+    halves = re.split(r"^---[ \t]*$", first, flags=re.M)
+    if len(halves) == 2 and plain.endswith("_Event"):
+        own = plain.removesuffix("_Event").replace("/msg/", "/")
+        made = _EVENT.format(own, rule=_RULE, request=halves[0], response=halves[1])
+        known = re.findall(r"^MSG: (\S+)", made, flags=re.M)
+        more = [part for part in others if part.split("\n")[0].removeprefix("MSG: ").strip() not in known]
+        return plain, _OTHER.sub(r"\1/msg/\2", "".join([made, *(f"{_RULE}\n{part}" for part in more)]))
+    return plain, _OTHER.sub(r"\1/msg/\2", text)
