@@ -188,7 +188,7 @@ class Certificates:
             goal.name,
             order,
             partial(_behind, into),
-            any(e.delayed for e in edges),
+            any(e.delayed for e in edges) or any(name in composition.frame.cells for name in nodes),
             frozenset() if everything else frozenset(innermost(str(name)) for name in goal.root.assumed),
             hints,
             frozenset(hopeless - hints.keys()),
@@ -270,7 +270,7 @@ def labels(needed: Iterable[str]) -> tuple[tuple[str, int], ...]:
             continue
         name = label.removesuffix(" one step before")
         back = int(name != label)
-        found.append((name if name.startswith("environment ") else innermost(name), back))
+        found.append((name if name.startswith(("environment ", "memory ")) else innermost(name), back))
     return tuple(dict.fromkeys(found))
 
 

@@ -178,6 +178,8 @@ def _taken_together(flat: Frame, nodes: frozenset[str]) -> bool:
     read, or a requirement of the whole system speaks of several nodes."""
     if any(e.delayed and {e.source.node, e.target.node} <= nodes for e in flat.graph.edges):
         return True
+    if len(nodes) > 1 and any(name in flat.cells for name in nodes):
+        return True  # what was remembered is of one step
     contract = flat.system.contract
     if nodes != frozenset(flat.graph.nodes):
         return False
@@ -191,7 +193,8 @@ def _left_open(composition: Composition, goal: Goal) -> bool:
     frame = composition.frame
     for name in goal.root.assumed:
         node, clause = innermost(str(name)).split(".")
-        ports = (v.name for v in ports_of(frame.node(node).clause(clause).formula) if v.role is Role.INPUT)
+        spoken = frame.behind(node, frame.node(node).clause(clause).formula)
+        ports = (v.name for v, _ in spoken if v.role is Role.INPUT)
         if any(Endpoint(node, port) in frame.graph.by_target for port in ports):
             return True
     return False

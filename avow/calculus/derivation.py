@@ -14,6 +14,7 @@ from enum import StrEnum
 from avow.base.diagnostics import Diagnostic
 from avow.base.verdict import Counterexample, Verdict
 from avow.system.graph import Edge
+from avow.temporal.cells import CELL
 
 
 class Rule(StrEnum):
@@ -155,6 +156,11 @@ class Goal:
         return tuple(found.values())
 
 
+def about_memory(label: str) -> bool:
+    """Whether a hypothesis is only the definition of what is remembered, or its beginning."""
+    return label.startswith("memory ") or (label.startswith("initial ") and CELL in label)
+
+
 @dataclass(frozen=True, slots=True)
 class Case:
     """One question put to the solver, and its answer. `needed`: labels of the hypotheses that a proof rests on."""
@@ -185,7 +191,7 @@ class Settled:
 
     @property
     def needed(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(label for case in self.cases for label in case.needed))
+        return tuple(dict.fromkeys(label for case in self.cases for label in case.needed if not about_memory(label)))
 
     @property
     def trivial(self) -> bool:

@@ -124,7 +124,7 @@ class _Solver:
             return close
         asked: list[tuple[tuple[Phase, ...], list[tuple[Hypotheses, Term]]]] = []
         for number, (same, before) in enumerate(attempts):
-            phases = _phases(condition, before)
+            phases = self.phases(condition, before)
             for wide in (False, True) if len(attempts) == 1 else (number > 0,):
                 found = (phases, [self.question(condition, phase, same, before, wide) for phase in phases])
                 asked += [found] if found not in asked else []
@@ -141,11 +141,16 @@ class _Solver:
         assert last is not None
         return self.by_itself(condition, *attempts[-1]) or self.deeper(condition, last, *attempts[-1])
 
+    def phases(self, condition: SideCondition, before: tuple[str, ...]) -> tuple[Phase, ...]:
+        """One question, or one about the first step and one about every later."""
+        remembering = any(name in self.frame.cells for name in self.selected)
+        return (Phase.INITIAL, Phase.LATER) if before or condition.delayed or remembering else (Phase.SAME_STEP,)
+
     def close(self, condition: SideCondition, same: tuple[str, ...], before: tuple[str, ...]) -> Settled | None:
         """A proof from what speaks of the goal's variables alone, if there is one. A provider of a thousand consumers
         guarantees a thousand things, of which each consumer needs a few."""
         cases: list[Case] = []
-        for phase in _phases(condition, before):
+        for phase in self.phases(condition, before):
             goal, parts = (
                 self.frame.clause(condition.consumer, condition.clause),
                 self.parts(condition, phase, same, before),
@@ -181,7 +186,7 @@ class _Solver:
         guaranteed = {
             f"{consumer}.{g.name}": self.frame.clause(consumer, g.name) for g in self.frame.node(consumer).guarantees
         }
-        phases = _phases(condition, before)
+        phases = self.phases(condition, before)
         cases = tuple(self.case(condition, phase, same, before, True, NARROW_EFFORT, guaranteed) for phase in phases)
         answer = _settled(condition, cases)
         if answer.verdict is not Verdict.PROVED:
@@ -202,9 +207,11 @@ class _Solver:
             frame = self.frame
             asked = steps(
                 frame,
-                self.contracts(tuple(dict.fromkeys((*before, *self.selected_in_order))), 0) | frame.environment(),
-                self.contracts(same, 0) | frame.environment() | self.own(condition.consumer),
-                frame.initials(self.selected),
+                self.contracts(tuple(dict.fromkeys((*before, *self.selected_in_order))), 0)
+                | frame.environment()
+                | frame.memory(),
+                self.contracts(same, 0) | frame.environment() | frame.memory() | self.own(condition.consumer),
+                frame.initials(self.selected) | frame.blank(),
                 frame.clause(condition.consumer, condition.clause),
             )
             patience = min(DEEPER_EFFORT, self.bounds.effort)
@@ -239,7 +246,8 @@ class _Solver:
                 if edge.delayed and edge.source.node in self.selected
             )
         )
-        everything = tuple(dict.fromkeys((*earlier, *ancestors, consumer))) if earlier else ()
+        remembering = any(name in self.frame.cells for name in self.selected)
+        everything = tuple(dict.fromkeys((*earlier, *ancestors, consumer))) if earlier or remembering else ()
         first = before if condition.delayed else ()
         for attempt in ((near, first), (ancestors, first), (ancestors, earlier), (ancestors, everything)):
             if attempt not in tried:
@@ -290,12 +298,12 @@ class _Solver:
     ) -> tuple[Hypotheses, Term]:
         goal = self.frame.clause(condition.consumer, condition.clause)
         hypotheses = self.contracts(same, 0)
-        around = self.frame.environment(0) | self.own(condition.consumer)
+        around = self.frame.environment(0) | self.frame.memory(0) | self.own(condition.consumer)
         if phase is Phase.LATER:
             hypotheses |= self.contracts(before, 1)
-            around |= self.frame.environment(1)
+            around |= self.frame.environment(1) | self.frame.memory(1)
         elif phase is Phase.INITIAL:
-            around |= self.frame.initials(self.selected)
+            around |= self.frame.initials(self.selected) | self.frame.blank()
         hypotheses |= _about(around, [goal, *hypotheses.values()], direct=not wide)
         return hypotheses, goal
 
@@ -312,10 +320,6 @@ class _Solver:
             for node in nodes
             for clause in self.frame.node(node).clauses
         }
-
-
-def _phases(condition: SideCondition, before: tuple[str, ...]) -> tuple[Phase, ...]:
-    return (Phase.INITIAL, Phase.LATER) if before or condition.delayed else (Phase.SAME_STEP,)
 
 
 def _about(facts: Hypotheses, terms: Iterable[Term], *, direct: bool) -> Hypotheses:
@@ -348,7 +352,7 @@ def _settled(condition: SideCondition, cases: tuple[Case, ...]) -> Settled:
     for case in cases:
         for label in case.needed:
             owner = label.split(".")[0]
-            if label.startswith(("environment ", "initial ")):
+            if label.startswith(("environment ", "initial ", "memory ")):
                 continue
             if owner == condition.consumer and not label.endswith(" one step before"):
                 continue  # its own, and still assumed in the conclusion

@@ -52,6 +52,8 @@ class Item:
         """What the engine calls it."""
         if self.claim.kind is Kind.ENVIRONMENT:
             return f"environment {self.claim.name}"
+        if self.claim.kind is Kind.DEFINITION:
+            return f"memory {self.claim.node}.{self.claim.name}"
         return f"{self.claim.node}.{self.claim.name}" if self.claim.node else self.claim.name
 
 
@@ -116,6 +118,8 @@ class Finder:
         own = set(self.nodes)
         found += [Item(How.ENVIRONMENT, s) for s in self.known.every if s.kind is Kind.ENVIRONMENT]
         for s in self.known.every:
+            if s.kind is Kind.DEFINITION and s.node in own:
+                found.append(Item(How.DEFINED, s))
             if s.node not in own or s.node not in self.known.assumptions:
                 continue
             if s.kind is Kind.ASSUMPTION:
@@ -138,7 +142,7 @@ class Finder:
                 done[item] = None
                 self._now[item.label] = item
 
-        add(item for item in ever if item.how in (How.ENVIRONMENT, How.OPEN))
+        add(item for item in ever if item.how in (How.ENVIRONMENT, How.OPEN, How.DEFINED))
         of_node: dict[str, list[Item]] = {name: [] for name in self.nodes}
         for item in ever:
             if item.claim.node in of_node and item.claim.kind is not Kind.ENVIRONMENT:
@@ -198,7 +202,9 @@ class Finder:
     def near(self, item: Item, done: Mapping[Item, None]) -> list[Item]:
         behind = self.ancestors(item.claim.node) if item.claim.node else frozenset(self.nodes)
         return [
-            i for i in done if i.how is How.ENVIRONMENT or i.claim.node in behind or i.claim.node == item.claim.node
+            i
+            for i in done
+            if i.how in (How.ENVIRONMENT, How.DEFINED) or i.claim.node in behind or i.claim.node == item.claim.node
         ]
 
     def hinted(self, item: Item, hint: Hint, done: Mapping[Item, None]) -> _Proof | None:

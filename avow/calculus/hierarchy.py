@@ -48,6 +48,12 @@ class Level(Frame):
     def environment(self, earlier: int = 0) -> dict[str, Term]:
         return self.flat.environment(earlier)
 
+    def memory(self, earlier: int = 0) -> dict[str, Term]:
+        return self.flat.memory(earlier)
+
+    def blank(self) -> dict[str, Term]:
+        return self.flat.blank()
+
     def initials(self, nodes: Iterable[str]) -> dict[str, Term]:
         return self.flat.initials(self.leaves(nodes))
 
@@ -74,6 +80,7 @@ def level(flat: Frame, folded: Folded, composed: Mapping[str, Node]) -> Frame:
         flat.assumed,
         flat.own_inputs,
         flat.constants,
+        flat.cells,
         nodes,
         flat=flat,
         faces=folded.faces,

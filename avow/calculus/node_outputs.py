@@ -200,14 +200,15 @@ class Answerer:
             found = self._broken[place] = tuple(f"{self.node.name}.{clause}" for clause in failed)
         return found
 
-    def answers(self, inputs: Values) -> tuple[tuple[Values, ...], tuple[str, ...]]:
+    def answers(self, inputs: Values, *, free: bool = False) -> tuple[tuple[Values, ...], tuple[str, ...]]:
         """Every output (by port) that meets the guarantees, given the inputs: all of them, where an assumption is
-        broken. And the assumptions that are. Raises Undecided."""
+        broken, or the node is `free`. And the assumptions that are. Raises Undecided."""
         broken = self.broken(inputs)
-        index = (bool(broken), *[key(inputs[name]) for name in self.read])
+        free = free or bool(broken)
+        index = (free, *[key(inputs[name]) for name in self.read])
         found = self._answers.get(index)
         if found is None:
-            found = self._answers[index] = self._solve(inputs, bool(broken))
+            found = self._answers[index] = self._solve(inputs, free)
             self.asked[index] = inputs
         return found, broken
 

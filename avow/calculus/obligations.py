@@ -32,7 +32,6 @@ from avow.kernel.statements import Kind as Claimed
 from avow.language.printer import show_term
 from avow.sanity.claims import triggers
 from avow.solving.limits import from_seconds, told
-from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint, Requirement, System
 
 
@@ -248,7 +247,7 @@ def _environment_tasks(composition: Composition) -> Iterator[Task]:
     for name in dict.fromkeys(ClauseName(*innermost(str(n)).split(".")) for n in composition.whole.root.assumed):
         node = frame.node(name.node)
         clause = node.clause(name.clause)
-        ports = [v.name for v in ports_of(clause.formula)]
+        ports = [v.name for v, _ in frame.behind(name.node, clause.formula)]
         if not ports or any(Endpoint(name.node, port) in frame.graph.by_target for port in ports):
             continue
         given = [reasons.get(frame.entry(name.node, port)) or "" for port in ports]

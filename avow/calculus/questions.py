@@ -343,7 +343,7 @@ class JointQuestion:
             for name in self.members
             for clause in frame.node(name).clauses
         }
-        hypotheses |= frame.environment()
+        hypotheses |= frame.environment() | frame.memory()
         about = f"{self.node}.{self.clause}"
         shown: list[str] = []
         for situation in triggers(frame.clause(self.node, self.clause)):

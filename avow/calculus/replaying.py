@@ -15,6 +15,7 @@ from avow.calculus.open_values import Undecided, closed, is_open
 from avow.calculus.scenario import CannotRun, key
 from avow.calculus.transition import Machine, Step
 from avow.calculus.variables import system_term
+from avow.evaluation.evaluate import NotEvaluable
 from avow.formulas.formula import free_variables, negation
 from avow.formulas.values import Value
 from avow.language.terms import Role, Term
@@ -71,6 +72,16 @@ def _moves(steps: Sequence[Step], back: int | None) -> Iterator[tuple[Step, Step
 
 def _wires(machine: Machine, before: Mapping[str, Value], after: Mapping[str, Value]) -> Iterator[str]:
     """Values that delayed edges, and constants of the environment, do not carry from one step to the next."""
+    for name, cell in machine.cells.items():
+        try:
+            left = cell.now(before)
+        except (NotEvaluable, Undecided):
+            left = None
+        if left is None or key(after[f"{name}@before"]) != key(left):
+            yield f"what {name} remembers"
+    for name in machine.freed.values():
+        if after[f"{name}@before"] and not before[name]:
+            yield f"an earlier {name}"
     for endpoint in machine.memory:
         if key(after[f"{endpoint}@before"]) != key(before[str(endpoint)]):
             yield f"the delayed {endpoint}"
@@ -80,6 +91,12 @@ def _wires(machine: Machine, before: Mapping[str, Value], after: Mapping[str, Va
 
 
 def _start(machine: Machine, values: Mapping[str, Value]) -> Iterator[str]:
+    for name in machine.freed.values():
+        if values[f"{name}@before"]:
+            yield f"an earlier {name}"
+    for name, cell in machine.cells.items():
+        if key(values[f"{name}@before"]) != key(cell.initial):
+            yield f"what {name} begins with"
     for edge in machine.graph.edges:
         condition = initial_condition(machine.frame.system, edge) if edge.delayed else None
         if condition is None:
@@ -98,7 +115,13 @@ def _node(machine: Machine, name: str, values: Mapping[str, Value]) -> Iterator[
     found = {own: values[meant] for own, meant in machine.reads[name]}
     found |= {f"out.{port.name}": values[f"{name}.{port.name}"] for port in node.outputs}
     doubtful = [c for c in node.guarantees if _truth(machine, c.formula, found) is not True]
-    if doubtful and not any(_truth(machine, c.formula, found) is False for c in node.assumptions):
+    freed = machine.freed.get(name)
+    broken = any(_truth(machine, c.formula, found) is False for c in node.assumptions) if doubtful or freed else False
+    if freed:
+        if values[freed] and not (broken or values[f"{freed}@before"]):
+            yield f"a broken assumption of {name}"
+        broken = bool(values[freed])
+    if doubtful and not broken:
         yield from (f"{name}.{clause.name}" for clause in doubtful)
 
 

@@ -14,7 +14,7 @@ from avow.base.files import digest as sha256
 from avow.base.verdict import Counterexample, Verdict
 from avow.calculus.certificates import hint_of, labels
 from avow.calculus.composition import Composition
-from avow.calculus.derivation import Case, Phase
+from avow.calculus.derivation import Case, Phase, about_memory
 from avow.calculus.discharge import Bounds
 from avow.calculus.entailment import implied
 from avow.calculus.finder import Hint
@@ -78,12 +78,12 @@ class FormulaQuestion:
         frame = composition.frame
         everything = tuple(f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees)
         goal = system_term(frame, self.formula)
-        delayed = any(edge.delayed for edge in frame.graph.edges)
+        delayed = bool(frame.cells) or any(edge.delayed for edge in frame.graph.edges)
         last: Entailment | None = None
         for clauses in dict.fromkeys((everything,) if patient else (self.support, everything)):
             if not clauses or (patient and delayed):
                 continue
-            last = self.ask(contracts(frame, clauses) | frame.environment(), goal, bounds)
+            last = self.ask(contracts(frame, clauses) | frame.environment() | frame.memory(), goal, bounds)
             if last.verdict is Verdict.PROVED:
                 return self.proved(composition, (last,), Phase.SAME_STEP, bounds)
         if delayed:
@@ -99,7 +99,7 @@ class FormulaQuestion:
             return answer
         nodes = frame.graph.nodes
         everything = tuple(f"{n.name}.{g.name}" for n in frame.system.contract.nodes for g in n.guarantees)
-        hypotheses = contracts(frame, everything) | frame.environment() | dict(further or {})
+        hypotheses = contracts(frame, everything) | frame.environment() | frame.memory() | dict(further or {})
         spoken = free_variables(goal)
         places = [place for place in providers(frame, nodes) if not spoken.isdisjoint(place.ports)]
         places += environment(frame, nodes)
@@ -117,8 +117,8 @@ class FormulaQuestion:
         self, composition: Composition, everything: tuple[str, ...], goal: Term, bounds: Bounds, patient: bool
     ) -> Answer:
         frame = composition.frame
-        now = contracts(frame, everything) | frame.environment()
-        initial = frame.initials(frame.graph.nodes)
+        now = contracts(frame, everything) | frame.environment() | frame.memory()
+        initial = frame.initials(frame.graph.nodes) | frame.blank()
         quick = replace(bounds, effort=min(QUICK_EFFORT, bounds.effort))
         first = self.ask(now | initial, goal, quick)
         if patient and first.verdict is Verdict.UNKNOWN:
@@ -126,7 +126,7 @@ class FormulaQuestion:
         if first.verdict is not Verdict.PROVED:
             return self.repaired(frame, goal, self.not_proved(first, "at the first step"), initial, Phase.INITIAL.value)
         itself = {f"{self.name} one step before": system_term(frame, self.formula, 1)}
-        before = contracts(frame, everything, 1) | frame.environment(1)
+        before = contracts(frame, everything, 1) | frame.environment(1) | frame.memory(1)
         later = first
         # Mostly it keeps itself; and the contracts of a step less make it quick.
         for earlier in (itself | before,) if patient else (itself, itself | before):
@@ -178,13 +178,14 @@ class FormulaQuestion:
         how = "at the first step, and from one step to the next" if phase is Phase.LATER else "at every step"
         if before > 1:
             how = f"at the first {before} steps, and from each {before} steps to the next"
-        summary = f"follows {how} from {', '.join(needed) or 'the types alone'}"
+        named = [label for label in needed if not about_memory(label)]
+        summary = f"follows {how} from {', '.join(named) or 'the types alone'}"
         if beyond:
             summary += f" (not named as its support: {', '.join(beyond)})"
         answer = Answer(
             Verdict.PROVED,
             summary,
-            details={"needed": list(needed), "phase": phase.value} | ({"k": before} if before > 1 else {}),
+            details={"needed": named, "phase": phase.value} | ({"k": before} if before > 1 else {}),
             vacuous=any(answer.vacuous for answer in answers),
         )
         cases = [Case(phase, one.verdict, one.needed) for one in answers]

@@ -59,7 +59,7 @@ class Resting:
                 return (self.discharging(*name.split(".")),)
             case How.TOGETHER:
                 return self.together(need.conds, goal)
-            case How.OPEN | How.SHOWN | How.POSSIBLE:
+            case How.OPEN | How.SHOWN | How.POSSIBLE | How.DEFINED:
                 return ()
 
     def named(self, kind: Claimed, digest: str, node: str) -> str:
@@ -69,7 +69,7 @@ class Resting:
 
     def guarantee(self, node: str, clause: str) -> tuple[Hypothesis, ...]:
         """What has to be shown of it: nothing of what stands for a topic's wiring, as of any link."""
-        owner = self.composition.frame.node(node)
+        owner = self.composition.frame.system.contract.node(node)
         if owner.relay:
             return ()
         mark = node_digest(owner, owner.clause(clause))

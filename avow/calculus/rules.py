@@ -16,7 +16,6 @@ from avow.calculus.derivation import ClauseName, Derivation, Goal, Rule, SideCon
 from avow.calculus.variables import Frame
 from avow.language.contract import Clause
 from avow.language.terms import Role
-from avow.system.formulas import ports_of
 from avow.system.graph import Edge
 from avow.system.plan import ComposeGoal, Endpoint
 
@@ -80,7 +79,9 @@ class _Builder:
         """Inputs of a node that the providers do not give, each with where it comes from."""
         given = frozenset(providers)
         found: list[str] = []
-        for port in self.frame.node(node).inputs:
+        for port in (
+            self.frame.system.contract.node(node).inputs if node in self.frame.cells else self.frame.node(node).inputs
+        ):
             edge = self.frame.graph.by_target.get(Endpoint(node, port.name))
             if edge is None:
                 found.append(f"{node}.{port.name} (environment)")
@@ -97,13 +98,13 @@ class _Builder:
         kept: list[ClauseName] = []
         for clause in self.frame.node(node).assumptions:
             sources = self.sources(node, clause)
-            edges = [edge for edge in sources.values() if edge is not None and edge.source.node in given]
-            environment = self.environment(node, [port for port, edge in sources.items() if edge is None])
-            beyond = [edge for edge in sources.values() if edge is not None and edge.source.node not in self.selected]
+            edges = [edge for _, edge in sources if edge is not None and edge.source.node in given]
+            environment = self.environment(node, [port for port, edge in sources if edge is None])
+            beyond = [edge for _, edge in sources if edge is not None and edge.source.node not in self.selected]
             if self.carry and beyond:
                 kept.append(ClauseName(node, clause.name))
                 continue
-            if sources and not edges and not (environment and all(edge is None for edge in sources.values())):
+            if sources and not edges and not (environment and all(edge is None for _, edge in sources)):
                 kept.append(ClauseName(node, clause.name))
                 continue
             direct = tuple(dict.fromkeys(edge.source.node for edge in edges))
@@ -111,10 +112,18 @@ class _Builder:
             conditions.append(SideCondition(node, clause.name, direct, delayed, environment))
         return tuple(conditions), tuple(kept)
 
-    def sources(self, node: str, clause: Clause) -> dict[str, Edge | None]:
-        """The inputs that a clause speaks of, and the edge that feeds each (None: the environment)."""
-        inputs = (v.name for v in ports_of(clause.formula) if v.role is Role.INPUT)
-        return {name: self.frame.graph.by_target.get(Endpoint(node, name)) for name in inputs}
+    def sources(self, node: str, clause: Clause) -> list[tuple[str, Edge | None]]:
+        """The inputs that a clause speaks of, and the edge that feeds each (None: the environment). What it remembers
+        of one comes over an edge with a delay, also what it remembers of the node's own outputs."""
+        found: list[tuple[str, Edge | None]] = []
+        for port, remembered in self.frame.behind(node, clause.formula):
+            at = Endpoint(node, port.name)
+            if port.role is Role.INPUT:
+                edge = self.frame.graph.by_target.get(at)
+                found.append((port.name, replace(edge, delayed=True) if edge is not None and remembered else edge))
+            elif remembered:
+                found.append((port.name, Edge(at, at, delayed=True)))
+        return found
 
     def environment(self, node: str, ports: Sequence[str]) -> tuple[str, ...]:
         """The plan's assumptions on some environment inputs of a node."""
@@ -298,7 +307,7 @@ class _Builder:
         return any(
             edge is not None and edge.source.node == node
             for clause in self.frame.node(node).assumptions
-            for edge in self.sources(node, clause).values()
+            for _, edge in self.sources(node, clause)
         )
 
 

@@ -7,9 +7,9 @@ A function's values are decided where they are looked at first: by its node, or 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
+from itertools import chain, product
 from random import Random
 
 from avow.base.graphs import components, cycles_in
@@ -19,6 +19,8 @@ from avow.calculus.narrowing import Narrowing, Unknown, forcings
 from avow.calculus.node_outputs import Answerer, Doubts, Stuck, is_restricted, judge, possible
 from avow.calculus.open_values import Holds, Undecided, decided
 from avow.calculus.scenario import CannotRun, World, key
+from avow.evaluation.evaluate import NotEvaluable, compile_term
+from avow.formulas.formula import substitute
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.sorts import BOOL, FunctionSort, OpaqueSort
@@ -26,6 +28,7 @@ from avow.language.terms import TRUE, Role, Term
 from avow.solving.limits import spend
 from avow.system.formulas import initial_condition, ports_of
 from avow.system.plan import Endpoint
+from avow.temporal.cells import CELL, Cell
 from avow.tuning.bounds import NODE_ANSWERS
 from avow.tuning.effort import SEARCH_STEPS
 
@@ -53,6 +56,14 @@ class Walk:
     back: int | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """What a clause remembers: before the first step, and what a step leaves."""
+
+    initial: Value
+    now: Callable[[Mapping[str, Value]], Value]
+
+
 class Machine:
     """The transition system of a composed system over its scenario. Raises CannotRun where it has none."""
 
@@ -75,7 +86,14 @@ class Machine:
         self.constants: list[str] = []
         self.environment = self._environment()
         self.memory = tuple(dict.fromkeys(edge.source for edge in self.graph.edges if edge.delayed))
-        self.remembered = (*self.constants, *map(str, self.memory))
+        self.cells = {
+            label.removeprefix("memory "): self._kept(label, cell)
+            for label, cell in zip(self.frame.memory(), chain(*self.frame.cells.values()), strict=True)
+        }
+        """What each step leaves to the next of what clauses remember."""
+        self.freed = {node: f"{node}.broken{CELL}" for node in self.frame.cells}
+        """Whether an assumption of a node that remembers has been broken: it promises nothing from then on."""
+        self.remembered = (*self.constants, *map(str, self.memory), *self.cells, *self.freed.values())
         self.memories: dict[tuple[object, ...], Values] = {}
         self.stuck: dict[tuple[object, ...], Stuck] = {}
         self._begun: list[tuple[Endpoint, Term | None, Values, tuple[Value, ...]]] = []
@@ -162,6 +180,7 @@ class Machine:
 
     def _initial(self) -> Iterator[tuple[object, ...]]:
         names = [str(endpoint) for endpoint in self.memory]
+        blank = {name: cell.initial for name, cell in self.cells.items()} | dict.fromkeys(self.freed.values(), False)
         conditions = {endpoint: self._initially(endpoint) for endpoint in self.memory}
         changing = [n for _, read in conditions.values() for n in read.values() if n not in self.constants]
         for choices in self.environment.values():
@@ -175,7 +194,7 @@ class Machine:
                     ranges.append(self._initial_values(endpoint, condition, known))
                 constants = {name: some[0][name] for name in self.constants}
                 for values in product(*ranges):
-                    memory = self._remember({**constants, **dict(zip(names, values, strict=True))})
+                    memory = self._noted({**constants, **blank, **dict(zip(names, values, strict=True))})
                     yield self._before_the_first(memory, place, some) if changing else memory
 
     def _before_the_first(
@@ -221,7 +240,21 @@ class Machine:
         self._begun.append((endpoint, condition, given, found))
         return found
 
+    def _kept(self, label: str, cell: Cell) -> _Kept:
+        """Raises CannotRun for what cannot be computed step by step."""
+        node = label.removeprefix("memory ").partition(".")[0]
+        if cell.parameters or cell.initial is None:
+            raise CannotRun(f"{node} remembers something for each of many values, or of an unspecified type")
+        now = compile_term(substitute(cell.now, self.frame.mapping(node)))
+        return _Kept(compile_term(cell.initial)({}), now)
+
     def _remember(self, values: Values) -> tuple[object, ...]:
+        try:
+            return self._noted(values | {name: cell.now(values) for name, cell in self.cells.items()})
+        except (NotEvaluable, Undecided) as reason:
+            raise CannotRun(f"what a clause remembers has no value: {reason}") from None
+
+    def _noted(self, values: Values) -> tuple[object, ...]:
         names = self.remembered
         found = tuple([key(values[name]) for name in names])
         if found not in self.memories:
@@ -231,7 +264,7 @@ class Machine:
     def _before(self, memory: tuple[object, ...]) -> Values:
         """What a memory gives to the next step."""
         values = self.memories[memory]
-        return {f"{endpoint}@before": values[str(endpoint)] for endpoint in self.memory}
+        return {f"{name}@before": values[name] for name in (*map(str, self.memory), *self.cells, *self.freed.values())}
 
     def _given(self, memory: tuple[object, ...]) -> tuple[Values, ...]:
         """What the environment may give after a memory."""
@@ -312,13 +345,13 @@ class Machine:
     ) -> list[tuple[Values, tuple[str, ...]]]:
         """The values with each answer of a node, and the assumptions of it that do not hold; what it has to know
         of open values is decided first (in each way, or at random)."""
-        node = self.nodes[name]
+        node, freed = self.nodes[name], self.freed.get(name)
         waiting, found = [values], []
         while waiting:
             values = waiting.pop()
             inputs = self._inputs(name, values)
             try:
-                answers, broken = node.answers(inputs)
+                answers, broken = node.answers(inputs, free=bool(freed and values[f"{freed}@before"]))
             except Undecided as undecided:
                 at, point = undecided.wanted[0]
                 waiting += self._decided(values, self.frame.input(name, at[3:]).qualified, point, random)
@@ -328,6 +361,8 @@ class Machine:
                 more = values.copy()
                 for port, value in answer.items():
                     more[f"{name}.{port}"] = value
+                if freed:
+                    more[freed] = bool(broken) or values[f"{freed}@before"]
                 found.append((more, broken))
         return found
 

@@ -7,17 +7,19 @@ earlier (what a delayed edge delivers); an input that no node provides is ``in.m
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from avow.base.files import digest as sha256
 from avow.formulas.formula import digest, free_variables, substitute
-from avow.language.contract import Node
+from avow.language.contract import Node, Port
+from avow.language.printer import show_sort
 from avow.language.sorts import Sort
 from avow.language.terms import Role, Term, Variable
-from avow.system.folding import own_inputs
-from avow.system.formulas import Assumed, environment_assumptions, initial_condition
+from avow.system.folding import leaves, own_inputs
+from avow.system.formulas import Assumed, environment_assumptions, initial_condition, ports_of
 from avow.system.graph import Edge, Graph, dataflow
 from avow.system.plan import Endpoint, System
+from avow.temporal.cells import Cell, compile_node, remembers
 
 SUFFIXES = ("", "@before", "@before@before")
 """Now, one step earlier, two steps earlier."""
@@ -84,6 +86,9 @@ class Frame:
     constants: frozenset[str]
     """Environment inputs (``in.map``, ``planner.map``) that keep their value."""
 
+    cells: Mapping[str, tuple[Cell, ...]] = field(default_factory=dict)
+    """Node → what its clauses remember; each is an input of the node, by the cell's name."""
+
     _nodes: dict[str, Node] = field(default_factory=dict)
     _mappings: dict[tuple[str, int], Mapping[Variable, Term]] = field(default_factory=dict)
     _terms: dict[tuple[str, str, int], Term] = field(default_factory=dict)
@@ -121,7 +126,7 @@ class Frame:
         """As `environment`."""
         key = (frozenset[str](), earlier)
         if key not in self._facts:
-            self._facts[key] = indexed(self.environment(earlier))
+            self._facts[key] = indexed(self.environment(earlier) | self.memory(earlier))
         return self._facts[key]
 
     def beginnings(self, nodes: frozenset[str]) -> Facts:
@@ -130,7 +135,7 @@ class Frame:
         if not nodes:
             return indexed({})
         if key not in self._facts:
-            self._facts[key] = indexed(self.initials(nodes))
+            self._facts[key] = indexed(self.initials(nodes) | self.blank())
         return self._facts[key]
 
     def mapping(self, node: str, earlier: int = 0) -> Mapping[Variable, Term]:
@@ -150,6 +155,9 @@ class Frame:
     def input(self, node: str, port: str, earlier: int = 0) -> Variable:
         """The variable that an input reads: its provider's, now or one step earlier, or the environment's."""
         edge = self.graph.by_target.get(Endpoint(node, port))
+        cell = next((cell for cell in self.cells.get(node, ()) if cell.name == port), None)
+        if cell is not None:
+            return system_variable(f"{node}.{port}", cell.sort, earlier + 1)
         if edge is None:
             sort = self.node(node).input(port).sort
             entry = self.entry(node, port)
@@ -176,6 +184,42 @@ class Frame:
                 for assumed in self.assumed
             }
         return dict(self._environment[earlier])
+
+    def memory(self, earlier: int = 0) -> dict[str, Term]:
+        """What each step leaves to the next, as functions of its values, labelled ``memory navigation.once#…``."""
+        suffix = " one step before" if earlier else ""
+        return {
+            f"memory {node}.{cell.name}{suffix}": substitute(
+                cell.leaves(after := Variable(Role.BOUND, f"{node}.{cell.name} now", cell.sort)),
+                {**self.mapping(node, earlier), after: system_variable(f"{node}.{cell.name}", cell.sort, earlier)},
+            )
+            for node, cells in self.cells.items()
+            for cell in cells
+        }
+
+    def blank(self) -> dict[str, Term]:
+        """What is remembered before the first step."""
+        return {
+            f"initial {node}.{cell.name}": substitute(cell.begins(), self.mapping(node))
+            for node, cells in self.cells.items()
+            for cell in cells
+            if cell.initial is not None
+        }
+
+    def behind(self, node: str, formula: Term) -> tuple[tuple[Variable, bool], ...]:
+        """The ports of a node that a formula speaks of, and whether of their values at earlier steps, by a cell."""
+        known = {cell.name: cell for cell in self.cells.get(node, ())}
+        found: dict[tuple[Variable, bool], None] = {}
+        seen: set[str] = set()
+        stack = [(variable, False) for variable in reversed(ports_of(formula))]
+        while stack:
+            variable, remembered = stack.pop()
+            if variable.role is not Role.INPUT or variable.name not in known:
+                found[variable, remembered] = None
+            elif variable.name not in seen:
+                seen.add(variable.name)
+                stack += [(inner, True) for inner in reversed(ports_of(known[variable.name].now))]
+        return tuple(found)
 
     def initials(self, nodes: Iterable[str]) -> dict[str, Term]:
         """What holds before the first step of the outputs of `nodes` that feed delayed edges."""
@@ -204,9 +248,19 @@ def frame(system: System) -> Frame:
     """Raises Rejected where the plan's formulas are wrong."""
     graph = dataflow(system)
     own = own_inputs(system, graph)
-    nodes = {node.name: node for node in system.contract.nodes}
+    inside = {name for held in leaves(system.plan).values() for name in held}
+    nodes: dict[str, Node] = {}
+    cells: dict[str, tuple[Cell, ...]] = {}
+    for node in system.contract.nodes:
+        nodes[node.name] = node
+        # a subsystem's derived contract has no memory of its own: what speaks of other steps stays so, and open
+        if remembers(node) and node.name not in inside:
+            made = compile_node(node)
+            ports = tuple(Port(Role.INPUT, c.name, c.sort, show_sort(c.sort)) for c in made.cells)
+            nodes[node.name] = replace(made.node, inputs=(*node.inputs, *ports))
+            cells[node.name] = made.cells
     constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
-    return Frame(system, graph, environment_assumptions(system, graph), own, constants, nodes)
+    return Frame(system, graph, environment_assumptions(system, graph), own, constants, cells, nodes)
 
 
 def system_variable(name: str, sort: Sort, earlier: int = 0) -> Variable:

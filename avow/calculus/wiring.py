@@ -7,7 +7,7 @@ from dataclasses import replace
 from avow.calculus.existence import beginning, circles, loops, situations, start_name
 from avow.calculus.variables import Frame
 from avow.kernel.statements import Kind, Place, Wiring
-from avow.language.terms import Role, Term
+from avow.language.terms import Role, Term, Variable
 from avow.system.formulas import initial_condition
 from avow.system.temporal import parse_state
 
@@ -24,6 +24,12 @@ def wiring(frame: Frame) -> Wiring:
                 initials[edge.source.node, edge.source.port] = condition
     plan += [(Kind.ENVIRONMENT, a.node, a.port, a.formula) for a in frame.assumed]
     plan += [(Kind.INITIAL, node, port, term) for (node, port), term in initials.items()]
+    for name, cells in frame.cells.items():
+        for cell in cells:
+            own = Variable(Role.OUTPUT, cell.name, cell.sort)
+            plan.append((Kind.DEFINITION, name, cell.name, cell.leaves(own)))
+            if cell.initial is not None:
+                plan.append((Kind.INITIAL, name, cell.name, cell.begins(own)))
     for r in system.plan.requirements:
         if r.formula is not None:
             plan.append((Kind.REQUIREMENT, "", r.id, parse_state(r.formula, system.contract, r.formula_span)))
@@ -33,7 +39,7 @@ def wiring(frame: Frame) -> Wiring:
             for found in situations(frame, group, node, clause):
                 plan.append((Kind.POSSIBLE, "", found.name, found.possible))
                 plan.append((Kind.IMPOSSIBLE, "", found.name, found.excluded))
-    return Wiring(system.contract.nodes, _ports(frame), tuple(plan))
+    return Wiring(tuple(frame.node(n.name) for n in system.contract.nodes), _ports(frame), tuple(plan))
 
 
 def _ports(frame: Frame) -> dict[tuple[Role, str, str], Place]:
@@ -50,4 +56,10 @@ def _ports(frame: Frame) -> dict[tuple[Role, str, str], Place]:
     for at in frame.graph.environment:
         name, sort = frame.entry(at.node, at.port), frame.node(at.node).input(at.port).sort
         found[Role.INPUT, at.node, at.port] = Place(name, None, 0, sort, name in frame.constants)
+    for node, cells in frame.cells.items():
+        for cell in cells:
+            read = (found[v.role, node, v.name] for v, _ in frame.behind(node, cell.now))
+            owner = node if any(place.node for place in read) else ""
+            found[Role.OUTPUT, node, cell.name] = Place(f"{node}.{cell.name}", owner, 0, cell.sort)
+            found[Role.INPUT, node, cell.name] = Place(f"{node}.{cell.name}", owner, 1, cell.sort)
     return found

@@ -16,16 +16,17 @@ FORMAT = "avow/certificate/2"
 
 
 class How(StrEnum):
-    """How an entry is known: by its questions `base` and `step`; by a node's own evidence, as long as all of its
-    assumptions (`conds`) have held; by a person, of values that no node provides; not at all (open: assumed by the
-    contract that is derived, never under a requirement); by an example (that some values are so: never a premise).
-    Together is no entry, but a hypothesis that the kernel adds (`avow.kernel.check.Needed`)."""
+    """How an entry is known: by its questions; by a node's own evidence, while all its assumptions (`conds`) have held;
+    by a person, of values that no node provides; not at all (open: assumed by the derived contract, never under a
+    requirement); by an example (possible: never a premise); by definition (a memory: whatever the ports are, there is
+    one such). Together is no entry, but a hypothesis that the kernel adds (`avow.kernel.check.Needed`)."""
 
     SHOWN = "shown"
     GUARANTEE = "guarantee"
     ENVIRONMENT = "environment"
     OPEN = "open"
     POSSIBLE = "possible"
+    DEFINED = "defined"
     TOGETHER = "together"
 
 
@@ -49,7 +50,7 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One claim, by its digest, and how it is known. `base`: a question for each of the first steps; `step`: later."""
+    """A claim by its digest, and how it is known: `base` asks of each of the first steps, `step` of every later one."""
 
     how: How
     node: str

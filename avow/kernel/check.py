@@ -61,7 +61,7 @@ class Answered(NamedTuple):
 
 KINDS = {How.SHOWN: (Kind.ASSUMPTION, Kind.REQUIREMENT, Kind.IMPOSSIBLE), How.GUARANTEE: (Kind.GUARANTEE,)}
 KINDS |= {How.ENVIRONMENT: (Kind.ENVIRONMENT, Kind.ASSUMPTION), How.OPEN: (Kind.ASSUMPTION,)}
-KINDS |= {How.POSSIBLE: (Kind.POSSIBLE, Kind.START)}
+KINDS |= {How.POSSIBLE: (Kind.POSSIBLE, Kind.START), How.DEFINED: (Kind.DEFINITION,)}
 
 
 @dataclass
@@ -82,7 +82,7 @@ class Kernel:
             new = set(entries[stack.pop()].named()) - part
             part |= new
             stack += () if alone else new
-        given = [entries[i] for i in part if entries[i].how not in (How.SHOWN, How.POSSIBLE)]
+        given = [entries[i] for i in part if entries[i].how not in (How.SHOWN, How.POSSIBLE, How.DEFINED)]
         conds = [tuple(sorted(entries[c].digest for c in each.conds)) for each in given]
         needed = {Needed(e.how, e.node, e.digest, c) for e, c in zip(given, conds, strict=True)}
         if self._claim(entries[goal]).kind is Kind.REQUIREMENT and any(need.kind is How.OPEN for need in needed):
@@ -169,8 +169,7 @@ class Kernel:
         """`Base_valid` and `Step_valid`: no window of states meets the premises and not the claim. Raises Refused."""
         text, claim = Text(), self._claim(entry)
         premises, goal = self._question(text, claim, question, step)
-        asked = text.script([*premises, f"(not {goal})"])
-        found = self._asked(asked, Said.UNSAT, f"{claim.called} does not follow from what is named")
+        found = self._asked(text.script([*premises, f"(not {goal})"]), Said.UNSAT, f"{claim.called} does not follow")
         vacuous = self.solvers.first(text.script(premises), LOOK) is Said.UNSAT
         return Answered(found.digest, found.solvers, self._together(claim, question), vacuous)
 

@@ -22,7 +22,7 @@ from avow.language.terms import Role, Term, Variable
 class Kind(StrEnum):
     """What a claim is: a clause of a node; what the plan assumes of the environment; what an output is before the first
     step, where delayed edges deliver it; of every step of the whole system (requirement); that some values are so, or
-    none (a situation that a guarantee is about); that a loop has first values."""
+    none (a situation that a guarantee is about); that a loop has first values; what a step leaves in a memory."""
 
     ASSUMPTION = "assumption"
     GUARANTEE = "guarantee"
@@ -32,12 +32,13 @@ class Kind(StrEnum):
     POSSIBLE = "possible"
     IMPOSSIBLE = "impossible"
     START = "start"
+    DEFINITION = "definition"
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
     """A value: of an output of a node (`name` is ``node.port``), or of the environment (`node` is None, and of one name
-    there is one value; a rigid one never changes); `back` steps ago."""
+    there is one value; a rigid one never changes; empty: remembered of the environment); `back` steps ago."""
 
     name: str
     node: str | None
@@ -86,7 +87,7 @@ class Statement:
 
     @property
     def nodes(self) -> frozenset[str]:
-        return frozenset(place.node for place in self.places.values() if place.node is not None)
+        return frozenset(place.node for place in self.places.values() if place.node)
 
     @property
     def unary(self) -> bool:
@@ -129,8 +130,7 @@ def statements(wiring: Wiring) -> Statements:
         found.append(claim)
         if kind is Kind.ASSUMPTION and (marks := assumptions[node]) is not None:
             marks.add(claim.digest)
-    complete = {node: frozenset(marks) for node, marks in assumptions.items() if marks is not None}
-    return Statements(tuple(found), complete)
+    return Statements(tuple(found), {n: frozenset(marks) for n, marks in assumptions.items() if marks is not None})
 
 
 def _stated(wiring: Wiring, kind: Kind, node: str, name: str, term: Term) -> Statement:

@@ -13,7 +13,7 @@ from fractions import Fraction
 from typing import assert_never
 
 from avow.base.diagnostics import Span
-from avow.formulas.formula import conjunction, disjunction, free_variables, negation
+from avow.formulas.formula import conjunction, digest, disjunction, free_variables, negation
 from avow.language.contract import Clause, Node
 from avow.language.sorts import (
     BOOL,
@@ -60,6 +60,9 @@ from avow.language.terms import (
     histories,
 )
 
+CELL = "#"
+"""In the name of every cell, and in that of no port."""
+
 
 class Unsaid(Exception):  # noqa: N818 - it names what happened
     """A clause that has no formula of one step; `reason` is for people."""
@@ -75,7 +78,8 @@ class Cell:
     """What one step leaves to the next."""
 
     before: Variable
-    """What the step before has left: a function of the `parameters`, where there are some."""
+    """What the step before has left: a function of the `parameters`, where there are some. Its name says which record
+    it is of, so that a formula that reads it has another digest where the record is another."""
     parameters: tuple[Variable, ...]
     initial: Term | None
     """What it is before the first step, at every argument; None: any value, which nothing looks at."""
@@ -117,7 +121,7 @@ class Remembering:
     node: Node
     cells: tuple[Cell, ...]
     unsaid: Mapping[str, Unsaid] = field(default_factory=dict)
-    """The clauses that are left out, each with the reason."""
+    """The clauses that speak of other steps all the same, each with the reason."""
 
     @property
     def before(self) -> tuple[Variable, ...]:
@@ -130,7 +134,7 @@ def remembers(node: Node) -> bool:
 
 
 def compile_node(node: Node) -> Remembering:
-    """The node's clauses as formulas of one step. What has none is left out, and told of."""
+    """The node's clauses as formulas of one step. What has none is left as it is, and told of."""
     records = Records()
     unsaid: dict[str, Unsaid] = {}
 
@@ -140,6 +144,7 @@ def compile_node(node: Node) -> Remembering:
                 yield replace(clause, formula=records.clause(clause.formula)) if histories(clause.formula) else clause
             except Unsaid as reason:
                 unsaid[clause.name] = reason
+                yield clause
 
     assumptions, guarantees = tuple(said(node.assumptions)), tuple(said(node.guarantees))
     compiled = replace(node, assumptions=assumptions, guarantees=guarantees)
@@ -264,7 +269,7 @@ class Records:
     def _is_first(self) -> Term:
         """Whether this is the first step."""
         if self._first is None:
-            self._first = Cell(Variable(Role.INPUT, "first step", BOOL), (), TRUE, FALSE)
+            self._first = Cell(Variable(Role.INPUT, f"first step{CELL}", BOOL), (), TRUE, FALSE)
             self.cells.append(self._first)
         return self._first.read
 
@@ -278,7 +283,7 @@ class Records:
             assert not callable(now)
             sort = now.sort
         kept = FunctionSort(tuple(v.sort for v in parameters), sort) if parameters else sort
-        before = Variable(Role.INPUT, f"{term.operator}#{len(self.cells) + 1}", kept)
+        before = Variable(Role.INPUT, f"{term.operator}{CELL}{digest(term)[:12]}", kept)
         read = _at(before, parameters)
         cell = Cell(before, parameters, initial, now(read) if callable(now) else now)
         self.cells.append(cell)

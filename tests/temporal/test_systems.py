@@ -1,0 +1,158 @@
+"""Random systems whose clauses have memory against an enumeration of every run: nothing proved is broken by a run,
+and nothing refuted is kept by all."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Mapping
+from itertools import product
+from pathlib import Path
+
+import pytest
+from helpers import some
+
+from avow.base.verdict import Verdict
+from avow.calculus.composition import compose
+from avow.calculus.obligations import all_obligations, settle_all
+from avow.evaluation.evaluate import compile_term
+from avow.evaluation.running import Keeper
+from avow.formulas.formula import substitute
+from avow.formulas.values import Value
+from avow.language.load import check_text
+from avow.language.printer import show_term
+from avow.language.sorts import NATURAL
+from avow.language.terms import Implies, Literal, Term
+from avow.system.load import load_system
+from avow.temporal.cells import Records
+from temporal.test_cells import N, formula, response
+
+Step = Mapping[str, Value]
+STATES = 400
+PLAN = """requirements:
+  R: {{text: "R", formula: "{}", supported_by: [a, b]}}
+"""
+
+
+def clause(rng: random.Random) -> Term:
+    """A random clause with few states."""
+    if rng.random() < 0.5:
+        trigger, wanted = response(rng)
+        found: Term = Implies(trigger, wanted)
+    else:
+        found = formula(rng, rng.randrange(1, 3))
+    return substitute(found, {N: Literal(1, NATURAL)})
+
+
+class Enumeration:
+    """Every run of two nodes over truth values: `a` reads `e` and says `w`, `b` reads `w` and says `v`."""
+
+    def __init__(self, said: Term, assumed: Term, promised: Term, required: str) -> None:
+        self.parts = []
+        for term, names in ((said, "ew"), (assumed, "ww"), (promised, "wv")):
+            records = Records()
+            self.parts.append((compile_term(records.clause(term)), Keeper(records.cells), names))
+        self.required = required
+
+    def reach(self) -> Iterator[tuple[bool, bool, Step]]:
+        """Of every step that a run can come to: whether b's assumption holds, whether it and all before did, and the
+        step's values. Raises OverflowError where there are too many states."""
+        first = (*(tuple(keeper.memory.items()) for _, keeper, _ in self.parts), True)
+        seen, waiting = {first}, [first]
+        while waiting:
+            *memories, kept = waiting.pop()
+            for e, w, v in product((False, True), repeat=3):
+                values = {"e": e, "w": w, "v": v}
+                holds, after = [], []
+                for (judge, keeper, (one, other)), memory in zip(self.parts, memories, strict=True):
+                    keeper.memory = dict(memory)
+                    ports: dict[str, Value] = {"in.a": values[one], "out.b": values[other]}
+                    holds.append(bool(judge(keeper.at(ports))))
+                    keeper.advance(ports)
+                    after.append(tuple(keeper.memory.items()))
+                said, assumed, promised = holds
+                still = kept and assumed
+                if not said or (still and not promised):
+                    continue
+                yield assumed, still, values
+                state = (*after, still)
+                if state not in seen:
+                    seen.add(state)
+                    waiting.append(state)
+                    if len(seen) > STATES:
+                        raise OverflowError
+
+
+def system(folder: Path, said: Term, assumed: Term, promised: Term, required: str) -> Path:
+    def text(term: Term, one: str, other: str) -> str:
+        return show_term(term, "rcl").replace("in.a", f"in.{one}").replace("out.b", other)
+
+    (folder / "system.rcl").write_text(
+        f"node a {{ inputs( e : BOOL ) outputs( w : BOOL ) topics() guarantee g ( {text(said, 'e', 'out.w')} ) }}\n"
+        f"node b {{ inputs( w : BOOL ) outputs( v : BOOL ) topics() assume m ( {text(assumed, 'w', 'in.w')} )"
+        f" guarantee h ( {text(promised, 'w', 'out.v')} ) }}\n"
+    )
+    (folder / "plan.yaml").write_text(PLAN.format(required))
+    return folder
+
+
+def drawn(seed: int) -> tuple[Term, Term, Term, str]:
+    rng = random.Random(seed)
+    required = rng.choice(("a.w or b.v", "not (a.w and b.v)", "a.w -> b.v", "b.v -> a.w", "not b.v", "a.w"))
+    return clause(rng), clause(rng), clause(rng), required
+
+
+def verdicts(folder: Path) -> dict[str, Verdict]:
+    composition = compose(load_system(folder))
+    obligations = all_obligations(composition)
+
+    class Limits:
+        seconds, seed = 5.0, 0
+
+    found = settle_all(composition, obligations, Limits())
+    return {o.name: outcome.verdict for o, outcome in zip(obligations, found, strict=True)}
+
+
+@pytest.mark.parametrize("seed", some(range(300), 8))
+def test_no_run_says_otherwise(seed: int, tmp_path: Path) -> None:
+    said, assumed, promised, required = drawn(seed)
+    folder = system(tmp_path, said, assumed, promised, required)
+    try:
+        steps = list(Enumeration(said, assumed, promised, required).reach())
+    except OverflowError:
+        pytest.skip("too many states")
+    found = verdicts(folder)
+    judge = {
+        "a.w or b.v": lambda w, v: w or v,
+        "not (a.w and b.v)": lambda w, v: not (w and v),
+        "a.w -> b.v": lambda w, v: not w or v,
+        "b.v -> a.w": lambda w, v: not v or w,
+        "not b.v": lambda w, v: not v,
+        "a.w": lambda w, v: w,
+    }[required]
+    met = all(assumed_now for assumed_now, _, _ in steps)
+    kept = all(judge(step["w"], step["v"]) for _, still, step in steps if still)
+    said_of = found["whole.b.m"]
+    assert said_of in (Verdict.PROVED, Verdict.REFUTED, Verdict.UNKNOWN)
+    assert said_of is not Verdict.PROVED or met
+    assert said_of is not Verdict.REFUTED or not met
+    assert found["R"] is not Verdict.PROVED or kept
+    assert found["R"] is not Verdict.REFUTED or not kept
+
+
+def test_the_draws_are_of_every_kind() -> None:
+    """Some assumptions are met by every run, and some are not."""
+    known = []
+    for seed in range(60):
+        said, assumed, promised, required = drawn(seed)
+        try:
+            known.append(all(now for now, _, _ in Enumeration(said, assumed, promised, required).reach()))
+        except OverflowError:
+            continue
+    assert known.count(True) > 5
+    assert known.count(False) > 5
+
+
+def test_what_is_drawn_is_a_contract(tmp_path: Path) -> None:
+    folder = system(tmp_path, *drawn(0))
+    contract, found = check_text((folder / "system.rcl").read_text(), "system.rcl")
+    assert contract is not None, found
