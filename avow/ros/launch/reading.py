@@ -16,7 +16,6 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Span
 from avow.ros.launch.elements import Element, Parsed, Text, Unread, WrongLaunch, place, unread
-from avow.ros.launch.markup import from_xml, from_yaml
 from avow.ros.launch.python import from_python
 from avow.ros.names import is_name
 from avow.tuning.sizes import LAUNCH_BYTES, LAUNCH_DEPTH, LAUNCH_ELEMENTS, PACKAGES_SEARCHED
@@ -410,6 +409,8 @@ def _parsed(path: Path) -> Parsed:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise WrongLaunch(f"it cannot be read: {error}", 1) from None
+    from avow.ros.launch.markup import from_xml, from_yaml  # PyYAML is not light
+
     match path.suffix:
         case ".py":
             return from_python(text, str(path))
