@@ -16,7 +16,7 @@ from avow.ros.sources import message_files
 from avow.system.paths import inside
 
 from .codes import CODES
-from .coverage import coverage
+from .coverage import coverage, old
 from .schema import SCHEMA
 from .tuning import VIOLATIONS_KEPT
 
@@ -35,7 +35,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "3"
+    version = "4"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     uses_steps = False
@@ -244,6 +244,17 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
         "published": published,
         "traces": {run.name: run.digest for run in runs},
     }
+    ages: dict[str, float] = {}
+    for tally in tallies:
+        for of, age in tally.ages.items():
+            ages[of] = max(age, ages.get(of, 0.0))
+    if ages:
+        bound["oldest"] = {of: round(age, 6) for of, age in ages.items()}
+    passages = [(topic, p) for run in runs for topic, p in run.monitor.passages(names)]
+    lost, disordered = sum(p.lost for _, p in passages), sum(p.disordered for _, p in passages)
+    uncounted = sorted({topic for topic, p in passages if not p.counted})
+    bound |= {"lost": lost} if not uncounted else {}
+    bound |= {"out_of_order": disordered} if disordered else {}
     unpaired = any(t.unpaired for t in tallies)
     backwards = next((f"{run.name}: {run.monitor.backwards}" for run in runs if run.monitor.backwards), "")
     for run in runs:
@@ -276,10 +287,18 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
         text = late or (f"undecided at {undecided} of {judged} judgements: {reason}" if undecided else reason)
         return answer(Verdict.UNKNOWN, f"not monitorable: {text}" if not undecided and not late else text)
     silent = next(
-        (v for run in runs for v in run.first.values() if v.fault is Fault.SILENT and v.clause in names), None
+        (v for run in runs for v in run.first.values() if v.fault in (Fault.SILENT, Fault.RATE) and v.clause in names),
+        None,
     )
     if silent is not None:
         return answer(Verdict.UNKNOWN, f"event {silent.index}: {silent.explanation}")
+    setup = runs[0].monitor.setup
+    if setup.losses is not None and (uncounted or lost > setup.losses):
+        where = f"the messages of {', '.join(uncounted)} have no numbers (header.seq)" if uncounted else ""
+        return answer(Verdict.UNKNOWN, where or f"{lost} messages were lost, and {setup.losses} may be")
+    aged = next((of for of, age in ages.items() if setup.max_age is not None and age > setup.max_age), None)
+    if aged is not None:
+        return answer(Verdict.UNKNOWN, f"{aged} was {ages[aged]:.6g} s old when an answer came: too old (`max_age`)")
     if not judged:
         open_ = "; ".join(dict.fromkeys(t.reason for t in tallies if t.reason))
         text = f"the traces never gave all the values that it speaks of{_topics(runs)}"
@@ -299,6 +318,10 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
     summary = f"held at all {judged} judgements over {events} events"
     if excused:
         summary = f"held at {judged - excused} of {judged} judgements; at the others an assumption was broken"
+    if ages:
+        summary += f"; {old(ages)}"
+    if lost or disordered:
+        summary += f"; {lost} messages lost, {disordered} out of order"
     if decided < published:
         summary += f" ({lacking})"
     vacuous = not any(t.triggered for t in tallies)

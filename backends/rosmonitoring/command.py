@@ -118,6 +118,11 @@ def _print_summary(running: Session) -> None:
         if tally.unpaired:
             words.append("no evidence: the plan does not say which input an answer answered (`answers`)")
         click.echo(f"  {monitor.setup.node.name}.{name} ({kind}): {'; '.join(words)}")
+    passages = {topic: passage for monitor in running.monitors for topic, passage in monitor.passages()}
+    if gone := [f"{topic} lost {p.lost}" for topic, p in passages.items() if p.lost]:
+        click.echo(f"messages lost, by their numbers: {', '.join(gone)}")
+    if mixed := [f"{topic} {p.disordered}" for topic, p in passages.items() if p.disordered]:
+        click.echo(f"messages out of order: {', '.join(mixed)}")
     if unmonitored := running.unmonitored():
         click.echo(f"unmonitored, since too little was decided: {', '.join(unmonitored)}")
     if running.unheard:

@@ -26,9 +26,11 @@ from .coverage import Tally
 from .engine import Monitor
 from .numbers import Decimal
 from .options import same_topic
+from .pace import SEQUENCE
 from .regions import regions
 from .rules import Choice, Fields, Hold, Lookup, Path, Previous
 from .shapes import Shape, scanner, shape
+from .timed import Timed
 from .traces import event_of, not_text
 from .tuning import CHUNK, EVENT_CHARACTERS, REMEMBERED, SHAPES_KEPT
 from .watched import Fault, Violation, Watched, time_text
@@ -57,6 +59,8 @@ class _Plan:
     """Where all of them held."""
     loud: dict[tuple[Token | None, ...], tuple[Violation, ...]] = field(default_factory=dict)
     """Where some were broken: what is told then."""
+    ages: dict[str, float] = field(default_factory=dict)
+    """The greatest age of each input when an answer came."""
 
 
 @dataclass(slots=True)
@@ -163,8 +167,8 @@ class Compiled:
             if plan is not None:
                 _remember(watch, plan, old, tally, found)
         self._last[0] = b""
-        self._clock[0] = max((watch.monitor.not_before for watch in self._watches), default=-math.inf)
-        self._clock[1] = min((watch.monitor.deadline for watch in self._watches), default=math.inf)
+        self._clock[0] = max((watch.monitor.timing.newest for watch in self._watches), default=-math.inf)
+        self._clock[1] = min((watch.monitor.timing.deadline for watch in self._watches), default=math.inf)
         return list(self._told(found)) if found else []
 
     def _again(self, known: list[tuple[Violation, ...]]) -> list[Violation]:
@@ -198,6 +202,9 @@ class Compiled:
                 for watched in plan.due:
                     watched.tally.published += count
                     watched.tally.judged += count
+                    for name in watched.inputs:
+                        if plan.ages.get(name, 0.0) > watched.tally.ages.get(name, -1.0):
+                            watched.tally.ages[name] = plan.ages[name]
             self._heard(topic.name, count)
 
     def _flush(self) -> None:
@@ -272,7 +279,7 @@ class Compiled:
         if len(self._shapes) >= SHAPES_KEPT or any(self._refused(watch, topic) for watch in self._watches):
             return -1, None
         leads = [leads for watch in self._watches for leads in self._leads(watch, topic)]
-        new = shape(text, topic, lambda path: any(lead(path) for lead in leads))
+        new = shape(text, topic, lambda path: path == SEQUENCE or any(lead(path) for lead in leads))
         if new is None:
             return -1, None
         self._shapes.append(new)
@@ -300,8 +307,8 @@ class Compiled:
         """The code for one shape of line."""
         topic = self._topics.setdefault(made.topic, _Topic(made.topic))
         scope: dict[str, Any] = {"bisect": bisect, "clock": self._clock, "topic": topic, "last": self._last}
-        checks: list[str] = []
-        acts: list[str] = []
+        timed = Timed()
+        checks, acts = timed.checks, timed.acts
         loud: list[str] = []
         used: set[int] = set()
         for number, watch in enumerate(self._watches):
@@ -344,14 +351,12 @@ class Compiled:
                 ]
                 loud.append(f"v{number}")
             acts += [f"tok{number}[{at}] = {variable}" for at, variable in fresh.items()]
-            for name in plan.names:
-                if name in watch.monitor.setup.fresh:  # its next deadline, rounded down
-                    scope[f"f{number}_{watch.slots[name]}"] = float(watch.monitor.setup.fresh[name])
-                    acts.append(f"clock[1] = min(clock[1], (t + f{number}_{watch.slots[name]}) * {1 - 2**-50!r})")
+            inputs = tuple(dict.fromkeys(name for watched in plan.due for name in watched.inputs))
+            timed.add(watch.monitor.timing, plan.names, (inputs, plan.ages), made, str(number), scope)
             for name, rule in watch.monitor.setup.rules.items():
                 if isinstance(rule, Previous) and rule.source in plan.names:
                     acts.append(f"tok{number}[{watch.slots[name]}] = tok{number}[{watch.slots[rule.source]}]")
-        used.add(made.time)
+        used |= {made.time, *timed.used}
         groups = sorted(used)
         names = ", ".join(f"a{k}" for k in groups)
         time = f"a{made.time}"

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from .pairing import time_of
 
 
 @dataclass(slots=True)
@@ -29,6 +33,9 @@ class Tally:
     triggered: bool = False
     """Its antecedent held at least once (or it has none)."""
 
+    ages: dict[str, float] = field(default_factory=dict)
+    """The greatest age of each input when an answer came, in seconds."""
+
     hidden: bool = False
     """It speaks of something that no message shows."""
     unpaired: bool = False
@@ -48,6 +55,12 @@ class Tally:
         """Answers that were to be decided."""
         return self.published - self.supposed
 
+    def aged(self, heard: Mapping[str, float], event: Mapping[str, Any]) -> None:
+        """An answer has come; `heard`: when its inputs had."""
+        now = float(time_of(event))
+        for name, then in heard.items():
+            self.ages[name] = max(self.ages.get(name, 0.0), now - then)
+
     reason: str = ""
     """Why it is not judged at all, or the first reason why it was once undecided."""
 
@@ -66,4 +79,11 @@ def coverage(tally: Tally) -> str:
         (tally.supposed, "held by the plan's initial value, before any message {}"),
     ]
     told = ", ".join(words.format(count) for count, words in parts if count)
+    told += f"; {old(tally.ages)}" if tally.ages else ""
     return f"published {tally.published} times" + (f": {told}" if told else "")
+
+
+def old(ages: Mapping[str, float]) -> str:
+    """``inputs at most 0.12 s old (in.r), 3.1 s (in.at)``."""
+    shown = [f"{age:.3g} s{' old' if k == 0 else ''} ({name})" for k, (name, age) in enumerate(ages.items())]
+    return f"inputs at most {', '.join(shown)}" if shown else ""

@@ -8,8 +8,7 @@ environment's door, not the node's.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -25,11 +24,12 @@ from avow.tuning.effort import JUDGE_EFFORT
 
 from .coverage import Tally
 from .options import Setup, same_topic
+from .pace import Passage, Timing
 from .pairing import EARLY, Asked, Pairing, time_of
 from .reading import Reader, reader
-from .rules import Choice, Constant, Fields, Hold, Previous
+from .rules import Choice, Constant, Fields, Hold, Previous, heard_through
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
-from .watched import Fault, Violation, Watched, shorten, time_text, trigger_of
+from .watched import Fault, Violation, Watched, shown, time_text, trigger_of
 from .wires import MappingError
 
 
@@ -53,8 +53,7 @@ class Monitor:
     _previous: list[tuple[str, str]] = field(default_factory=list)
     _clauses: dict[str, list[Watched]] = field(default_factory=dict)
     _assumptions: list[Watched] = field(default_factory=list)
-    _heard: dict[str, tuple[Fraction, bool]] = field(default_factory=dict)
-    """When each variable with a deadline was last heard of, and whether its silence has been told."""
+    timing: Timing = field(init=False)
     _pairing: Pairing | None = None
     _paired: frozenset[str] = frozenset()
     """The observed inputs."""
@@ -70,6 +69,7 @@ class Monitor:
     """Clauses that no message changes: judged once, at the first event."""
 
     def __post_init__(self) -> None:
+        self.timing = Timing(self.setup.fresh, self.setup.rates)
         self._observe()
         answers, rules = self.setup.answers, self.setup.rules.items()
         observed = (n for n, rule in rules if isinstance(rule, Fields | Choice))
@@ -119,11 +119,13 @@ class Monitor:
         if isinstance(topic, str) and len(self.heard) < TOPICS_KEPT:
             self.heard.add(same_topic(topic))
         found: list[Violation] = []
-        if self.setup.fresh:
-            self._watch_silence(event, {name for name, _ in readers or ()}, found)
-        if readers is None:
+        names = [name for name, _ in readers or ()]
+        for name, wrong, silent in self.timing.passes(event, set(names)):
+            found.append(self._violation(Fault.SILENT if silent else Fault.RATE, name, event, wrong))
+        if readers is None or not isinstance(topic, str):
             return found
         self.relevant += 1
+        self.timing.hear(event, same_topic(topic), names)
         self._watch_order(event)
         pairing = self._pairing
         if pairing is not None and pairing.waiting:
@@ -157,6 +159,8 @@ class Monitor:
             watched.tally.published += 1
             watched.tally.unreadable += 1
         for watched in self._due(updated, event, found):
+            if watched.inputs:
+                watched.tally.aged({n: self.timing.heard[n] for n in watched.inputs if n in self.timing.heard}, event)
             if watched.paired:
                 self._ask(watched, event)
             else:
@@ -178,6 +182,14 @@ class Monitor:
             elif self.values.get(name) is not value:
                 self.values[name] = value
                 self._versions[name] += 1
+
+    def passages(self, names: Set[str] | None = None) -> list[tuple[str, Passage]]:
+        """What got lost on the topics that carry some variables (by default any)."""
+        return [
+            (topic, passage)
+            for topic, passage in self.timing.passages.items()
+            if names is None or names & set(self.carried(topic))
+        ]
 
     # -- for `compiled`, which passes over events that change only values ----------------------------------------------
 
@@ -202,32 +214,15 @@ class Monitor:
     def caught_up(self, event: Mapping[str, Any]) -> None:
         """Take over the latest of some events of one topic that could all be read."""
         topic = same_topic(str(event["topic"]))
+        self.timing.caught_up(event, topic, self.carried(topic))
         for name, read in self._readers[topic]:
             old = self.values.get(name)
             new = read(event, old)
             if old is None or new != old:
                 self.values[name] = new
                 self._versions[name] += 1
-            if name in self._heard:
-                self._heard[name] = (time_of(event), False)
         if self._latest is not None:
             self._latest = max(self._latest, time_of(event))
-
-    @property
-    def not_before(self) -> float:
-        """An event that is later tells nothing of the order of the events."""
-        answers = self.setup.answers
-        if self._latest is None or self.backwards or answers is None or answers.by != "arrival":
-            return -math.inf
-        return math.nextafter(float(self._latest), math.inf)
-
-    @property
-    def deadline(self) -> float:
-        """No deadline passes before this time."""
-        if not self.setup.fresh:
-            return math.inf
-        left = [since + self.setup.fresh[name] for name, (since, told) in self._heard.items() if not told]
-        return math.nextafter(float(min(left)), 0.0) if left else math.inf
 
     def _watch_order(self, event: Mapping[str, Any]) -> None:
         """By arrival, the order of the events is that of cause: times that run backwards say otherwise."""
@@ -242,19 +237,6 @@ class Monitor:
             )
         self._latest = now
 
-    def _watch_silence(self, event: Mapping[str, Any], heard: set[str], found: list[Violation]) -> None:
-        """Deadlines pass with time, and not with the next message: each silence is told once, at the first event of the
-        run that comes later than it may last."""
-        now = time_of(event)
-        for name, limit in self.setup.fresh.items():
-            since, told = self._heard.setdefault(name, (now, False))
-            if not told and now > since + limit:
-                explanation = f"{name} was silent for {show(now - since)} s, and at most {show(limit)} s are allowed"
-                found.append(self._violation(Fault.SILENT, name, event, explanation))
-                self._heard[name] = (since, True)
-            if name in heard:
-                self._heard[name] = (now, False)
-
     def finish(self) -> list[Violation]:
         """Judge what still waits, once the run is over."""
         found: list[Violation] = []
@@ -266,7 +248,7 @@ class Monitor:
                 values = {n: v for part in watched.fresh.values() for n, v in part.items()}
                 watched.fresh.clear()
                 self._judge_part(watched, values, {}, found)
-            if any(self._source(name) not in self._seen for name in watched.names if self._source(name)):
+            if any(of not in self._seen for name in watched.names if (of := heard_through(self.setup.rules[name]))):
                 watched.only_supposed()
         return found
 
@@ -275,7 +257,7 @@ class Monitor:
         assert self._pairing is not None
         values = {**self.values, **watched.memory} if watched.held else self.values
         own = [n for n in (*watched.names, *self._assumed) if n not in self._paired]
-        if any(n not in values or self._unheard(n) for n in watched.names if n not in self._paired):
+        if any(n not in values or n in self._supposed for n in watched.names if n not in self._paired):
             watched.tally.early += 1
             return
         known = {n: values[n] for n in own if n in values}
@@ -300,8 +282,7 @@ class Monitor:
                 tally.reason = tally.reason or "it depends on which of its inputs the answer answered"
                 continue
             tally.judged += 1
-            if watched.trigger is not None and not tally.triggered:
-                tally.triggered = all(self._triggered(watched, values) for values in cases)
+            tally.triggered = tally.triggered or all(watched.triggered(values) for values in cases)
             (verdict,) = verdicts
             if verdict is None:
                 tally.undecided += 1
@@ -324,13 +305,6 @@ class Monitor:
             if all(n in values for n in assumed.names) and self._truth(assumed, values) is False:
                 return Fault.EXCUSED
         return Fault.GUARANTEE
-
-    def _triggered(self, watched: Watched, values: Mapping[str, Value]) -> bool:
-        assert watched.trigger is not None
-        try:
-            return bool(watched.trigger(values))
-        except NotEvaluable:
-            return False
 
     def _due(self, updated: Iterable[str], event: Mapping[str, Any], found: list[Violation]) -> list[Watched]:
         """The clauses to be judged now that these variables have new values. A part of an answer that is published
@@ -369,20 +343,8 @@ class Monitor:
             and (n == name or n not in watched.outputs)
             and (n not in held or n in watched.memory)
             and n not in paired
-            and not self._unheard(n)
+            and n not in self._supposed
         }
-
-    def _source(self, name: str) -> str:
-        """The variable whose messages give a value; empty for what the scenario gives."""
-        match self.setup.rules[name]:
-            case Previous(source=source):
-                return source
-            case rule:
-                return "" if isinstance(rule, Constant) else name
-
-    def _unheard(self, name: str) -> bool:
-        """Whether the value is the plan's, and not a message's."""
-        return name in self._supposed
 
     def _judge_part(
         self, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any], found: list[Violation]
@@ -452,6 +414,7 @@ class Monitor:
             paired = tuple(n for n in names if n in self._paired)
             tally.unpaired = bool(paired) and self.setup.answers is None
             watched.paired = paired if self._pairing is not None else ()
+            watched.inputs = tuple(n for n in names if n in self._paired)
         for name in triggers:
             self._clauses.setdefault(name, []).append(watched)
         if not triggers:
@@ -480,13 +443,13 @@ class Monitor:
         if any(name not in values for name in watched.names):
             tally.early += 1
             return
-        supposed = any(self._unheard(name) for name in watched.names)
+        supposed = any(name in self._supposed for name in watched.names)
         key = (*[versions[n] for n in watched.names], supposed)
         if key != watched.key or watched.held:
             watched.key = key
             watched.truth = self._truth(watched, values)
             if not supposed:
-                self._note_trigger(watched, values)
+                watched.note_trigger(values)
         if supposed and watched.truth is not False:
             tally.supposed += 1
             return
@@ -511,14 +474,6 @@ class Monitor:
                 watched.tally.reason = error.reason
             return answer
 
-    def _note_trigger(self, watched: Watched, values: Mapping[str, Value]) -> None:
-        if watched.tally.triggered or watched.trigger is None:
-            return
-        try:
-            watched.tally.triggered = bool(watched.trigger(values))
-        except NotEvaluable:
-            watched.tally.triggered = True
-
     def _blame(self, clause: Clause) -> tuple[Fault, str]:
         said = clause.sentence or clause.text or show_term(clause.formula, "unicode")
         if clause.kind is ClauseKind.ASSUMPTION:
@@ -538,19 +493,9 @@ class Monitor:
         snapshot: Mapping[str, Value] | None = None,
         index: int | None = None,
     ) -> Violation:
-        bindings: dict[str, Value] = {}
-        values: list[tuple[str, str]] = []
-        if watched is not None and snapshot is not None:
-            try:
-                bindings = (watched.witness(snapshot) or {}) if snapshot.keys() >= set(watched.names) else {}
-            except NotEvaluable:
-                bindings = {}
-            values = [(n, shorten(show(snapshot[n]))) for n in watched.names if n in snapshot]
-        pairs = tuple((n, show(v)) for n, v in bindings.items())
+        values, pairs = shown(watched, snapshot) if watched is not None and snapshot is not None else ((), ())
         time = time_text(event.get("time"))
-        return Violation(
-            fault, self.setup.node.name, clause, index or self.events, time, tuple(values), pairs, explanation
-        )
+        return Violation(fault, self.setup.node.name, clause, index or self.events, time, values, pairs, explanation)
 
 
 _HELD = "held"

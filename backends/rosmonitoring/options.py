@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -29,6 +30,7 @@ from .bags import Origin, carried, conflicts, is_bag
 from .fitting import Undecided
 from .numbers import whole
 from .observing import Observed, Wrong, check_keys, literal, observe, table_of
+from .pace import Rate
 from .pairing import Answers
 from .reading import from_text, shown
 from .rules import NOTHING_KNOWN, Choice, Constant, Fields, Path, Previous, Rule
@@ -57,6 +59,12 @@ class Setup:
     """The contract's topics, by their whole names, and their types."""
     fresh: Mapping[str, Fraction] = field(default_factory=dict)
     """How long each of these variables may be silent, in seconds."""
+    rates: Mapping[str, Rate] = field(default_factory=dict)
+    """How often each of these variables has to come."""
+    max_age: Fraction | None = None
+    """How old the inputs of an answer may be, for it to be evidence."""
+    losses: int | None = None
+    """How many messages may have been lost; None: however many."""
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -96,9 +104,14 @@ def setup(
         float(data.get("decided", DECIDED_SHARE)),
         named,
         work.fresh(data.get("fresh")),
+        work.rates(data.get("rate")),
+        work.duration("max_age", data["max_age"]) if "max_age" in data else None,
+        data.get("losses"),
     )
     return made, tuple(work.faults)
 
+
+_RATE = re.compile(r"([0-9]+(?:[.][0-9]+)?) ?Hz ?(?:±|[+]/?-) ?([0-9]+(?:[.][0-9]+)?) ?%")
 
 NO_TIME = "a time with a unit is wanted, such as 50 ms"
 
@@ -211,16 +224,30 @@ class _Work:
 
     def fresh(self, entry: Any) -> dict[str, Fraction]:
         """The deadlines, of variables that messages carry."""
-        found: dict[str, Fraction] = {}
-        for name, limit in (entry or {}).items():
-            if isinstance(self.rules.get(name), Fields | Choice):
-                found[name] = self.duration(f"fresh.{name}", limit)
+        return {name: self.duration(f"fresh.{name}", entry[name]) for name in self.heard("fresh", entry)}
+
+    def rates(self, entry: Any) -> dict[str, Rate]:
+        """How often variables have to come."""
+        found: dict[str, Rate] = {}
+        for name in self.heard("rate", entry):
+            written = _RATE.fullmatch(str(entry[name]))
+            hertz, share = (Fraction(part) for part in written.groups()) if written else (Fraction(0), Fraction(0))
+            if hertz and share < 100:
+                found[name] = Rate.of(hertz, share / 100, str(entry[name]))
             elif self.options is not None:
-                observed = sorted(n for n, rule in self.rules.items() if isinstance(rule, Fields | Choice))
-                text = f"fresh.{name}: no message that is observed carries it"
-                span = self.options.at("fresh", name)
-                self.faults.append(Diagnostic("MON101", text, span, hint=suggest(name, observed)))
+                text = f"rate.{name}: a frequency and a share below 100 % are wanted: 10 Hz ± 20 %"
+                self.faults.append(Diagnostic("MON101", text, self.options.at("rate", name)))
         return found
+
+    def heard(self, key: str, entry: Any) -> list[str]:
+        """The variables of an option that messages carry; the others are faults."""
+        observed = sorted(n for n, rule in self.rules.items() if isinstance(rule, Fields | Choice))
+        for name in entry or ():
+            if name not in observed and self.options is not None:
+                text = f"{key}.{name}: no message that is observed carries it"
+                span = self.options.at(key, name)
+                self.faults.append(Diagnostic("MON101", text, span, hint=suggest(name, observed)))
+        return [name for name in entry or () if name in observed]
 
     def fault(self, message: str, *path: str | int, hint: str | None = None) -> None:
         span = self.options.at("mapping", *path) if self.options is not None else None

@@ -125,3 +125,14 @@ class Previous:
 
 
 Rule = Fields | Choice | Constant | Previous
+
+
+def heard_through(rule: Rule) -> str:
+    """The variable whose messages give a rule's value; empty for what the scenario gives."""
+    match rule:
+        case Previous(source=name):
+            return name
+        case Constant():
+            return ""
+        case Fields(variable=variable) | Choice(variable=variable):
+            return variable.qualified

@@ -94,6 +94,22 @@ SCHEMA: dict[str, Any] = {
             "additionalProperties": _DURATION,
             "description": "how long a variable may be silent: {in.r: 200 ms}",
         },
+        "rate": {
+            "type": "object",
+            "additionalProperties": {
+                "type": "string",
+                "pattern": "^[0-9]+([.][0-9]+)? ?Hz ?(±|[+]/?-) ?[0-9]+([.][0-9]+)? ?%$",
+                "description": "a frequency and how far it may be off",
+            },
+            "description": "how often a variable has to come: {in.r: 10 Hz ± 20 %}",
+        },
+        "max_age": {**_DURATION, "description": "how old an answer's inputs may be, for a run to be evidence"},
+        "losses": {
+            "type": "integer",
+            "minimum": 0,
+            "description": "how many messages may have been lost, by their numbers (header.seq), for a run to be "
+            "evidence; messages without numbers are then no evidence",
+        },
         "decided": {
             "type": "number",
             "exclusiveMinimum": 0,

@@ -122,6 +122,7 @@ class Session:
                     "unreadable": tally.unreadable,
                     "incomplete": tally.partial,
                     "by_initial_value": tally.supposed,
+                    "oldest": {of: round(age, 6) for of, age in tally.ages.items()},
                     "paired": not tally.unpaired,
                     "antecedent_met": tally.triggered,
                     "reason": tally.reason or monitor.backwards,
@@ -129,7 +130,12 @@ class Session:
                 for clause in monitor.setup.node.clauses
                 if (tally := monitor.tallies.get(clause.name)) is not None
             ]
-            nodes.append({"node": monitor.setup.node.name, "relevant": monitor.relevant, "clauses": clauses})
+            topics = {
+                topic: {"lost": p.lost if p.counted else None, "out_of_order": p.disordered}
+                for topic, p in monitor.passages()
+            }
+            name = monitor.setup.node.name
+            nodes.append({"node": name, "relevant": monitor.relevant, "clauses": clauses, "topics": topics})
         counts = {fault.name.lower(): count for fault, count in self.counts.items()}
         return {
             "system": self.system.name,

@@ -51,3 +51,10 @@ REMEMBERED = 65_536
 
 CHUNK = 1 << 20
 """Bytes of a trace that are read at a time."""
+
+RATE_MESSAGES = 10
+"""Messages over which a rate is taken: one that comes a little late says nothing of the rate, and of ten it shows in a
+second at 10 Hz."""
+
+TIMES_APART = 1e-6
+"""Seconds, more than a difference of two times in binary may be off; what is nearer to a bound is calculated exactly."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from avow.evaluation.evaluate import NotEvaluable
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause
 from avow.language.terms import Implies, Quantified, Quantifier, Term, Variable
@@ -23,6 +24,7 @@ class Fault(StrEnum):
     ASSUMPTION = "assumption broken: environment"
     PROVIDER = "assumption broken: by a node that provides it"
     SILENT = "silent for longer than the plan allows"
+    RATE = "messages outside the rate that the plan allows"
     MAPPING = "message outside its mapping"
 
 
@@ -64,8 +66,26 @@ class Watched:
     """The held values."""
     key: tuple[int, ...] | None = None
     truth: bool | None = None
+    inputs: tuple[str, ...] = ()
+    """The observed inputs that its answers are held against."""
     paired: tuple[str, ...] = ()
     """The observed inputs that an answer has to be paired with."""
+
+    def triggered(self, values: Mapping[str, Value]) -> bool:
+        """Whether the antecedent is known to be met."""
+        try:
+            return self.trigger is None or bool(self.trigger(values))
+        except NotEvaluable:
+            return False
+
+    def note_trigger(self, values: Mapping[str, Value]) -> None:
+        """Where nobody can tell, the antecedent counts as met."""
+        if self.tally.triggered or self.trigger is None:
+            return
+        try:
+            self.tally.triggered = bool(self.trigger(values))
+        except NotEvaluable:
+            self.tally.triggered = True
 
     def only_supposed(self) -> None:
         """Nothing was ever heard of what the step before is to have given: its initial value is no observation."""
@@ -94,6 +114,22 @@ def time_text(raw: Any) -> str:
         except NotANumber:
             return ""
     return ""
+
+
+Shown = tuple[tuple[str, str], ...]
+"""Names and values, as text."""
+
+
+def shown(watched: Watched, snapshot: Mapping[str, Value]) -> tuple[Shown, Shown]:
+    """What a broken clause speaks of, and the bindings of its quantifiers that break it."""
+    bindings: dict[str, Value] = {}
+    try:
+        if snapshot.keys() >= set(watched.names):
+            bindings = watched.witness(snapshot) or {}
+    except NotEvaluable:
+        pass
+    values = tuple((n, shorten(show(snapshot[n]))) for n in watched.names if n in snapshot)
+    return values, tuple((n, show(v)) for n, v in bindings.items())
 
 
 def shorten(text: str) -> str:

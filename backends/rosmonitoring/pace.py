@@ -1,0 +1,179 @@
+"""Rates and losses of the messages that a monitor hears: judged by their own times, whatever they say."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Set
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from avow.formulas.values import show
+
+from .pairing import time_of
+from .tuning import RATE_MESSAGES
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """``10 Hz ± 20 %``: of any so many messages (`RATE_MESSAGES`), the time that they take lies within these bounds."""
+
+    text: str
+    least: Fraction
+    most: Fraction
+
+    @classmethod
+    def of(cls, hertz: Fraction, share: Fraction, text: str) -> Rate:
+        """Raises ZeroDivisionError for a rate that allows none."""
+        return cls(text, RATE_MESSAGES / (hertz * (1 + share)), RATE_MESSAGES / (hertz * (1 - share)))
+
+
+@dataclass(slots=True)
+class Pace:
+    """How fast the messages of one variable come. Told once, until it is right again."""
+
+    rate: Rate
+    start: Fraction
+    times: deque[tuple[float, bytes | Fraction]] = field(default_factory=lambda: deque(maxlen=RATE_MESSAGES))
+    """Of the latest messages, in binary and exact."""
+    slow: bool = False
+    fast: bool = False
+
+    def late(self, now: Fraction) -> str:
+        """What is wrong at a time, with or without a message then; empty where nothing new is."""
+        since = self._first if len(self.times) == RATE_MESSAGES else self.start
+        if self.slow or now - since <= self.rate.most:
+            return ""
+        self.slow = True
+        return self._said(now - since, len(self.times))
+
+    def beat(self, now: Fraction) -> str:
+        """A message has come."""
+        found = ""
+        if len(self.times) == RATE_MESSAGES:
+            self.slow = self.slow and now - self._first > self.rate.most
+            fast = now - self._first < self.rate.least
+            found = self._said(now - self._first, RATE_MESSAGES) if fast and not self.fast else ""
+            self.fast = fast
+        self.times.append((float(now), now))
+        return found
+
+    @property
+    def _first(self) -> Fraction:
+        raw = self.times[0][1]
+        return raw if isinstance(raw, Fraction) else Fraction(raw.decode())
+
+    @property
+    def deadline(self) -> Fraction | None:
+        """When it is too slow unless a message comes; None where that has been told."""
+        if self.slow:
+            return None
+        return (self._first if len(self.times) == RATE_MESSAGES else self.start) + self.rate.most
+
+    def _said(self, time: Fraction, count: int) -> str:
+        return f"{count} messages in {show(time)} s, and {self.rate.text} is allowed"
+
+
+@dataclass(slots=True)
+class Passage:
+    """What of one topic's messages got lost or came out of order, as far as they say."""
+
+    last: list[int] = field(default_factory=list)
+    """The latest `header.seq`, where there is one."""
+    lost: int = 0
+    disordered: int = 0
+    counted: bool = False
+    """The messages have numbers, so that a loss would show."""
+    latest: Fraction | None = None
+
+    def heard(self, event: Mapping[str, Any], now: Fraction) -> None:
+        if self.latest is not None and now < self.latest:
+            self.disordered += 1
+        self.latest = now
+        number = sequence(event)
+        if number is None:
+            return
+        self.counted = True
+        if self.last:
+            gap = number - self.last[0]
+            self.lost += max(0, gap - 1)
+            self.disordered += gap <= 0
+        self.last[:] = [number]
+
+
+SEQUENCE = ("header", "seq")
+"""Where a message of ROS 1 has its number."""
+
+
+def sequence(event: Mapping[str, Any]) -> int | None:
+    """A message's number among its publisher's."""
+    header = event.get("header")
+    number = header.get("seq") if isinstance(header, Mapping) else None
+    return number if number.__class__ is int else None
+
+
+@dataclass(slots=True)
+class Timing:
+    """When the messages of a monitor come: deadlines, rates, losses, and how long ago each variable was heard of."""
+
+    fresh: Mapping[str, Fraction]
+    """How long each of these variables may be silent."""
+    rates: Mapping[str, Rate]
+    heard: dict[str, float] = field(default_factory=dict)
+    """When each variable was heard of last, in binary."""
+    paces: dict[str, Pace] = field(default_factory=dict)
+    passages: dict[str, Passage] = field(default_factory=dict)
+    """By topic."""
+    newest: float = -math.inf
+    """The latest time of a message that was heard."""
+    _since: dict[str, tuple[Fraction, bool]] = field(default_factory=dict)
+    """When each variable with a deadline was last heard of, and whether its silence has been told."""
+
+    def passes(self, event: Mapping[str, Any], names: Set[str]) -> Iterator[tuple[str, str, bool]]:
+        """An event of whatever topic: time has passed. Deadlines do not wait for the next message: what is late is told
+        once, at the first event of the run that comes later (variable, what is wrong, whether it is silent)."""
+        if not self.fresh and not self.rates:
+            return
+        now = time_of(event)
+        for name, limit in self.fresh.items():
+            since, told = self._since.setdefault(name, (now, False))
+            if not told and now > since + limit:
+                yield (
+                    name,
+                    f"{name} was silent for {show(now - since)} s, and at most {show(limit)} s are allowed",
+                    True,
+                )
+                self._since[name] = (since, True)
+            if name in names:
+                self._since[name] = (now, False)
+        for name, rate in self.rates.items():
+            pace = self.paces.setdefault(name, Pace(rate, now))
+            if wrong := pace.late(now):
+                yield name, f"{name} is too slow: {wrong}", False
+            if name in names and (wrong := pace.beat(now)):
+                yield name, f"{name} is too fast: {wrong}", False
+
+    def hear(self, event: Mapping[str, Any], topic: str, names: Iterable[str]) -> None:
+        """A message of one of the monitor's topics."""
+        now = time_of(event)
+        self.passages.setdefault(topic, Passage()).heard(event, now)
+        self.heard.update(dict.fromkeys(names, float(now)))
+        self.newest = max(self.newest, math.nextafter(float(now), math.inf))
+
+    def caught_up(self, event: Mapping[str, Any], topic: str, names: Iterable[str]) -> None:
+        """Take over the latest of some messages whose times were looked at elsewhere."""
+        now = time_of(event)
+        passage = self.passages[topic]
+        passage.latest = now
+        self.newest = max(self.newest, math.nextafter(float(now), math.inf))
+        for name in names:
+            if name in self._since:
+                self._since[name] = (now, False)
+
+    @property
+    def deadline(self) -> float:
+        """No deadline passes before this time."""
+        left = [since + self.fresh[name] for name, (since, told) in self._since.items() if not told]
+        left += [at for pace in self.paces.values() if (at := pace.deadline) is not None]
+        return math.nextafter(float(min(left)), 0.0) if left else math.inf

@@ -1,0 +1,166 @@
+"""Deadlines, rates, losses, ages: judged by time, and shown; too old, lost or silent is no evidence."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from avow.backend_kit.protocol import Limits
+from avow.backends.rosmonitoring.backend import RosMonitoringBackend
+from avow.backends.rosmonitoring.options import setup
+from avow.backends.rosmonitoring.session import session
+from avow.backends.rosmonitoring.watched import Fault, Violation
+from avow.base.verdict import Outcome, Verdict
+from avow.system.plan import System
+from rosmonitoring.conftest import job_for
+
+RCL = """
+node n {
+  inputs( r : REAL )
+  outputs( s : REAL )
+  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 s matches(out.s) )
+  guarantee copies ( out.s == in.r )
+}
+"""
+MAPPING = {"in.r": "data", "out.s": "data"}
+Event = dict[str, Any]
+
+
+def ticks(topic: str, start: float, stop: float, period: float) -> Iterator[Event]:
+    count = round((stop - start) / period)
+    for k in range(count):
+        yield {"topic": topic, "time": round(start + k * period, 4), "data": 1.0, "header": {"seq": k + 1}}
+
+
+def merged(*streams: Iterator[Event]) -> list[Event]:
+    return sorted((event for stream in streams for event in stream), key=lambda event: (event["time"], event["topic"]))
+
+
+def judged(make: Callable[..., System], events: list[Event], tmp_path: Path, **options: Any) -> list[Violation]:
+    path = tmp_path / "t.jsonl"
+    path.write_text("".join(json.dumps(event) + "\n" for event in events), encoding="utf-8")
+    return [violation for _, violation in session(make(RCL, MAPPING, **options)).run(path)]
+
+
+def evidence(make: Callable[..., System], events: list[Event], **options: Any) -> Outcome:
+    system = make(RCL, MAPPING, traces=["t.jsonl"], **options)
+    text = "".join(json.dumps(event) + "\n" for event in events)
+    (system.plan.root / "t.jsonl").write_text(text, encoding="utf-8")
+    report = RosMonitoringBackend().discharge(job_for(system, "n"), system.plan.root, Limits(30))
+    return report.outcomes[0]
+
+
+RATE = {"rate": {"in.r": "10 Hz ± 20 %"}}
+
+
+def test_a_right_rate_is_not_complained_of(make_system: Callable[..., System], tmp_path: Path) -> None:
+    for period in (0.1, 0.085, 0.124):
+        events = merged(ticks("r", 0, 20, period), ticks("s", 0.01, 20, 0.5))
+        assert judged(make_system, events, tmp_path, **RATE) == []
+
+
+def test_one_late_message_is_no_other_rate(make_system: Callable[..., System], tmp_path: Path) -> None:
+    events = [e for e in ticks("r", 0, 10, 0.1) if e["time"] != 5.0]
+    assert judged(make_system, events, tmp_path, **RATE) == []
+
+
+@pytest.mark.parametrize(("period", "words"), [(0.2, "too slow"), (0.05, "too fast"), (0.127, "too slow")])
+def test_a_wrong_rate_is_told_once(
+    period: float, words: str, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    events = merged(ticks("r", 0, 20, period), ticks("s", 0.01, 20, 0.5))
+    (found,) = judged(make_system, events, tmp_path, **RATE)
+    assert found.fault is Fault.RATE
+    assert words in found.explanation
+    assert "10 Hz ± 20 % is allowed" in found.explanation
+
+
+def test_a_sensor_that_stops_is_told_when_its_deadline_passes(
+    make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    """By the other topics' events; the last message came at 4.9, and ten take at most 1.25 s."""
+    events = merged(ticks("r", 0, 5, 0.1), ticks("s", 0.01, 20, 0.05))
+    (slow,) = judged(make_system, events, tmp_path, **RATE)
+    assert float(slow.time) == pytest.approx(4.0 + 1.25, abs=0.06)
+    (silent,) = judged(make_system, events, tmp_path, fresh={"in.r": "300 ms"})
+    assert silent.fault is Fault.SILENT
+    assert float(silent.time) == pytest.approx(5.2, abs=0.06)
+
+
+def test_a_sensor_that_never_speaks_is_told(make_system: Callable[..., System], tmp_path: Path) -> None:
+    events = list(ticks("s", 7, 20, 0.05))
+    for options, at in ((RATE, 8.25), ({"fresh": {"in.r": "300 ms"}}, 7.3)):
+        (found,) = judged(make_system, events, tmp_path, **options)
+        assert float(found.time) == pytest.approx(at, abs=0.06)
+
+
+def test_a_sensor_that_stops_before_the_end_is_told_by_the_last_event(
+    make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    events = [*ticks("r", 0, 5, 0.1), {"topic": "s", "time": 6.0, "data": 1.0}]
+    (found,) = judged(make_system, events, tmp_path, fresh={"in.r": "300 ms"})
+    assert found.index == len(events)
+
+
+def test_losses_and_disorder_are_counted(make_system: Callable[..., System], tmp_path: Path) -> None:
+    events = merged(ticks("r", 0, 10, 0.1), ticks("s", 0.01, 10, 0.1))
+    kept = [e for e in events if not (e["topic"] == "r" and 3 <= e["time"] < 3.65)]
+    swapped = [*kept[:120], kept[121], kept[120], *kept[122:]]
+    path = tmp_path / "t.jsonl"
+    path.write_text("".join(json.dumps(event) + "\n" for event in swapped), encoding="utf-8")
+    running = session(make_system(RCL, MAPPING))
+    list(running.run(path))
+    assert running.summary()["nodes"][0]["topics"] == {
+        "r": {"lost": 7, "out_of_order": 0},
+        "s": {"lost": 0, "out_of_order": 0},
+    }
+
+
+def test_how_old_the_inputs_were_is_in_the_evidence(make_system: Callable[..., System]) -> None:
+    events = [
+        e for e in merged(ticks("r", 0, 10, 0.1), ticks("s", 0.01, 10, 0.1)) if e["topic"] == "s" or e["time"] < 9
+    ]
+    found = evidence(make_system, events)
+    assert found.verdict is Verdict.MONITORED
+    assert found.bound["oldest"] == {"in.r": 1.01}
+    assert found.bound["lost"] == 0
+    assert "inputs at most 1.01 s old (in.r)" in found.summary
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"max_age": "500 ms"}, "in.r was 1.01 s old when an answer came: too old"),
+        ({"fresh": {"in.r": "500 ms"}}, "in.r was silent for"),
+        (RATE, "in.r is too slow"),
+        ({"losses": 0}, ""),
+    ],
+)
+def test_what_is_too_old_or_silent_is_no_evidence(
+    options: dict[str, Any], words: str, make_system: Callable[..., System]
+) -> None:
+    events = merged(ticks("r", 0, 9, 0.1), ticks("s", 0.01, 12 if options == RATE else 10, 0.1))
+    found = evidence(make_system, events, **options)
+    assert found.verdict is (Verdict.UNKNOWN if words else Verdict.MONITORED), found.summary
+    assert words in found.summary
+
+
+def test_losses_beyond_what_is_allowed_are_no_evidence(make_system: Callable[..., System]) -> None:
+    events = [e for e in merged(ticks("r", 0, 9, 0.1), ticks("s", 0.01, 9, 0.1)) if e["time"] not in (3.0, 4.0)]
+    assert evidence(make_system, events, losses=2).verdict is Verdict.MONITORED
+    assert "2 messages were lost, and 1 may be" in evidence(make_system, events, losses=1).summary
+    for event in events:
+        event.pop("header")
+    assert "have no numbers" in evidence(make_system, events, losses=1).summary
+
+
+@pytest.mark.parametrize("rate", ["0 Hz ± 20 %", "10 Hz ± 100 %"])
+def test_a_rate_that_allows_everything_is_a_fault_of_the_plan(rate: str, make_system: Callable[..., System]) -> None:
+    system = make_system(RCL, MAPPING, rate={"in.r": rate, "in.q": "1 Hz ± 1 %"})
+    _, faults = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    assert [fault.code for fault in faults] == ["MON101", "MON101"]
+    assert {fault.message.split(":")[0] for fault in faults} == {"rate.in.r", "rate.in.q"}
