@@ -57,4 +57,4 @@ RATE_MESSAGES = 10
 second at 10 Hz."""
 
 TIMES_APART = 1e-6
-"""Seconds, more than a difference of two times in binary may be off; what is nearer to a bound is calculated exactly."""
+"""Seconds, more than a difference of two times in binary may be off; what is nearer to a bound the engine judges."""
