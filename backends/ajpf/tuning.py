@@ -83,3 +83,6 @@ TURN = 1_000
 
 PLAN_VARIABLES = 64
 """Variables of one plan that Spin's runner takes: which of them are still needed is a number of so many bits."""
+
+LIVE_JOBS = 1_000
+"""Steps of a running program without an action: after so many it is taken for endless; a plan has some tens."""

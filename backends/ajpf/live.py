@@ -1,0 +1,72 @@
+"""A Gwendolen program that runs: what is perceived comes from outside, and so does what becomes of its actions.
+
+The reasoning cycle is that of `interpreter`, which the properties are checked with; here the world is not drawn from
+alternatives but told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from .environment import Environment
+from .interpreter import PRINT, Agent, Semantics
+from .mind import NONE
+from .parser import parse_fact, read_system
+from .syntax import Struct, plain
+from .tuning import LIVE_JOBS
+from .world import World
+
+
+class Endless(RuntimeError):  # noqa: N818 - it says what the program is
+    """The program neither acts nor comes to rest."""
+
+
+class _Told(World):
+    """What there is to perceive, as it was told."""
+
+    def __init__(self) -> None:
+        self.shown: list[tuple[Struct, ...]] = [()]
+        super().__init__(Environment((), {}, {}, frozenset(), False, "repeatedly", ()))
+
+    def _offers(self, choice: int) -> tuple[Struct, ...]:
+        return self.shown[choice]
+
+
+class Running:
+    """The first agent of a file, at work."""
+
+    def __init__(self, path: Path | str) -> None:
+        """Raises Rejected where the file is no program."""
+        self._world = _Told()
+        self._agent = Agent(read_system(Path(path))[0], self._world, Semantics.MCAPL)
+        self._state = self._agent.first()
+
+    def perceive(self, percepts: Iterable[str]) -> tuple[str, tuple[str, ...]] | None:
+        """All that there is to perceive now; the program goes on until it acts (the action's name and arguments) or has
+        nothing to do (None). Raises Endless, and ValueError for what is no percept."""
+        found = []
+        for text in percepts:
+            fact = parse_fact(text)
+            if fact is None:
+                raise ValueError(f"{text!r} is no percept")
+            found.append(fact)
+        shown = tuple(sorted(set(found), key=plain))
+        if shown != self._world.shown[self._state.choice]:
+            self._world.shown.append(shown)
+            self._state = self._state._replace(choice=len(self._world.shown) - 1, new=True, asleep=False)
+        for _ in range(LIVE_JOBS):
+            if not self._state.planned:
+                if self._state.asleep and not self._state.new:
+                    return None
+                self._state = self._agent.cycle(self._state)
+                continue
+            self._state, action = self._agent.act(self._state)
+            if action != NONE and (done := self._agent.actions.items[action]).functor != PRINT:
+                self._state = self._state._replace(last=action)
+                return done.functor, tuple(plain(argument) for argument in done.args)
+        raise Endless(f"{LIVE_JOBS} steps without an action")
+
+    def believes(self, fact: str) -> bool:
+        """Whether it believes a ground literal itself."""
+        return parse_fact(fact) in self._agent.believed(self._state)

@@ -1,0 +1,107 @@
+"""Start the rover.
+
+    python contracts/remote_inspection/robot/drive.py [--fault NAME] [--record FILE] [--seconds N] [--unmonitored]
+
+All nodes on a bus of this process, in simulated time, under the monitors of their contracts. Code 1 where something was
+broken. No ROS is needed; `ros1.py` starts the same nodes on ROS 1.
+"""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+import faults  # noqa: E402
+from bus import TICK, Bus  # noqa: E402
+from wiring import FIELDS, NODES, PARAMETERS, Simulation  # noqa: E402
+
+
+class Faulty(Bus):
+    """A bus on which what one node says may be changed or lost."""
+
+    def __init__(self, change=None):
+        super().__init__()
+        self.change = change
+
+    def say(self, topic, message):
+        changed = self.change(topic, message, self.now) if self.change else message
+        if changed is not None:
+            super().say(topic, changed)
+
+
+def parameters(fault=None, sources=None):
+    found = {name: dict(values) for name, values in PARAMETERS.items()}
+    if sources is not None:
+        found["world"]["sources"] = sources
+    for node, values in faults.PARAMETERS.get(fault, {}).items():
+        found[node] |= values
+    return found
+
+
+def drive(fault=None, seconds=400.0, tap=None, sources=None):
+    """Run until the rover is back at the door, or time is up; the bus, as it then is."""
+    bus = Faulty(faults.SAID.get(fault))
+    if tap is not None:
+        bus.tap(tap)
+    chosen = parameters(fault, sources)
+    for start in NODES.values():
+        start(bus, chosen)
+    world = Simulation(bus, TICK, chosen)
+    done = []
+    bus.hear("at", lambda message: done.append(message["posX"]))
+    phase = []
+    bus.hear("phase", lambda message: phase.append(message["phase"]))
+
+    def tick():
+        world.tick()
+        return not (phase and phase[-1] == "leaving" and done and done[-1] == chosen["world"]["start"][0])
+
+    bus.run(tick, seconds)
+    return bus
+
+
+def event(topic, at, message):
+    return {"topic": topic, "time": at, **{field: message[field] for field in FIELDS[topic]}}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--fault", choices=faults.NAMES)
+    parser.add_argument("--record", type=Path, help="write every message, as JSON lines")
+    parser.add_argument("--seconds", type=float, default=400.0)
+    parser.add_argument("--unmonitored", action="store_true")
+    given = parser.parse_args()
+    from avow.backends.rosmonitoring.session import session
+    from avow.backends.rosmonitoring.traces import parse_event
+    from avow.system.load import load_system
+
+    running = None if given.unmonitored else session(load_system(HERE))
+    lines = []
+    found = []
+
+    def tap(topic, at, message):
+        line = json.dumps(event(topic, at, message))
+        lines.append(line)
+        if running is not None:
+            for violation in running.step(parse_event(line)):
+                found.append(violation)
+                if len(found) <= 10:
+                    print(violation.text())
+
+    started = time.process_time()
+    bus = drive(given.fault, given.seconds, tap)
+    if running is not None:
+        found += running.finish()
+    if given.record is not None:
+        given.record.write_text("".join(line + "\n" for line in lines), encoding="utf-8")
+    spent = time.process_time() - started
+    print(f"{len(lines)} messages, {bus.now:.1f} s simulated in {spent:.2f} s: {len(found)} violations")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

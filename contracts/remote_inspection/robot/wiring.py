@@ -1,0 +1,134 @@
+"""Which topics each node hears and says, and how messages become the inputs of its `step`."""
+
+import csv
+import math
+from pathlib import Path
+
+from nodes.agent import Agent
+from nodes.localisation import Localisation
+from nodes.navigation import Navigation
+from nodes.radiation_sensor import RadiationSensor
+from world import World
+
+HERE = Path(__file__).parent
+TYPE = "rover/Snapshot"
+"""What every topic carries, as in the paper: a topic uses the fields that it needs."""
+
+FIELDS = {
+    "sensors": ("posX", "posY"),
+    "position": ("posX", "posY"),
+    "velocity": ("posX", "posY"),
+    "at": ("posX", "posY"),
+    "r": ("radiation",),
+    "radiationStatus": ("level",),
+    "inspected": ("id",),
+    "command": ("command", "posX", "posY", "id"),
+    "phase": ("phase",),
+}
+LATCHED = ("command", "radiationStatus", "at", "inspected")
+
+
+def waypoints():
+    with (HERE / "models/waypoints.csv").open(newline="", encoding="utf-8") as file:
+        return {int(row["id"]): (float(row["x"]), float(row["y"])) for row in csv.DictReader(file)}
+
+
+PLACES = waypoints()
+DOOR = PLACES[0]
+PARAMETERS = {
+    "world": {
+        "start": DOOR,
+        "sources": [(*PLACES[7], 400.0)],
+        "estimate_noise": 0.01,
+        "seed": 7,
+    },
+    "localisation": {"noise": 0.05},
+    "navigation": {"aim": 0.1, "speed": 1.0},
+    "radiationSensor": {"orange": 120, "red": 250, "dwell": 5},
+    "agent": {"program": str(HERE.parent / "models/agent.gwen")},
+}
+
+
+def decoded(topic, message):
+    """A message as the value of a port."""
+    values = tuple(message[field] for field in FIELDS[topic])
+    if topic == "command":
+        word, x, y, number = values
+        return ("inspect", number) if word == "inspect" else ("move", x, y)
+    return values[0] if len(values) == 1 else values
+
+
+def encoded(topic, value):
+    """A port's value as a message."""
+    if topic == "command":
+        if value[0] == "inspect":
+            return {"command": "inspect", "posX": 0.0, "posY": 0.0, "id": value[1]}
+        near = min(PLACES, key=lambda number: math.dist(PLACES[number], value[1:]))
+        return {"command": "move", "posX": value[1], "posY": value[2], "id": near}
+    values = value if isinstance(value, tuple) else (value,)
+    return dict(zip(FIELDS[topic], values, strict=True))
+
+
+class Wired:
+    """A node on a bus: it steps at messages of `wakes`, with the latest of all that it hears, once it has heard all
+    that it `needs`; what its step gives is said, unless it is None."""
+
+    def __init__(self, bus, node, hears, wakes, says, needs=(), first=()):
+        self.bus, self.node, self.says, self.needs = bus, node, says, needs
+        self.latest = dict.fromkeys(hears) | dict(first)
+        for topic in hears:
+            bus.hear(topic, lambda message, topic=topic: self.heard(topic, message, topic in wakes))
+
+    def heard(self, topic, message, wakes):
+        self.latest[topic] = decoded(topic, message)
+        if wakes and all(self.latest[need] is not None for need in self.needs):
+            outputs = self.node.step(**self.latest)
+            for port in self.says:
+                if outputs.get(port) is not None:
+                    self.bus.say(port, encoded(port, outputs[port]))
+
+
+def localisation(bus, params=PARAMETERS):
+    return Wired(bus, Localisation(params["localisation"]), ["sensors"], ["sensors"], ["position"])
+
+
+def navigation(bus, params=PARAMETERS):
+    node = Navigation(params["navigation"])
+    return Wired(bus, node, ["position", "command"], ["position"], ["at", "velocity"], ["command"])
+
+
+def radiation_sensor(bus, params=PARAMETERS):
+    node = RadiationSensor(params["radiationSensor"])
+    first = {"command": ("move", *DOOR)}  # as the plan says: what stands before the agent's first command
+    return Wired(bus, node, ["r", "command"], ["r"], ["inspected", "radiationStatus"], ["r"], first)
+
+
+def agent(bus, params=PARAMETERS):
+    node = Agent(params["agent"])
+    wakes = ["at", "radiationStatus", "inspected"]
+    return Wired(bus, node, wakes, wakes, ["command", "phase"])
+
+
+NODES = {
+    "localisation": localisation,
+    "navigation": navigation,
+    "radiationSensor": radiation_sensor,
+    "agent": agent,
+}
+
+
+class Simulation:
+    """The world on a bus: moves by the velocity that it hears, and says what the sensors would."""
+
+    def __init__(self, bus, dt, params=PARAMETERS):
+        self.bus, self.dt = bus, dt
+        self.world = World(params["world"])
+        self.velocity = (0.0, 0.0)
+        bus.hear("velocity", self.heard)
+
+    def heard(self, message):
+        self.velocity = decoded("velocity", message)
+
+    def tick(self):
+        for port, value in self.world.step(self.velocity, self.dt).items():
+            self.bus.say(port, encoded(port, value))

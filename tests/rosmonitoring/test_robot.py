@@ -1,0 +1,69 @@
+"""The robot that runs: nothing is broken where nothing is wrong, and each fault is found where it begins."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+CASE = ROOT / "contracts/remote_inspection"
+ROBOT = CASE / "robot"
+
+
+def drive(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(ROBOT / "drive.py"), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_a_mission_without_faults_is_the_recorded_one(tmp_path: Path) -> None:
+    done = drive("--record", str(tmp_path / "run.jsonl"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.endswith(": 0 violations\n")
+    assert (tmp_path / "run.jsonl").read_bytes() == (ROBOT / "traces/mission.jsonl").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        ("mislabel", ["guarantee broken: this node: radiationSensor.medium"]),
+        ("ignore_orange", ["guarantee broken: this node: agent.exit_on_danger", "this node: agent.abandon"]),
+        ("early", ["guarantee broken: this node: navigation.there"]),
+        ("jump", ["guarantee broken: this node: localisation.steady"]),
+        ("silent", ["silent for longer than the plan allows: radiationSensor.out.radiationStatus"]),
+    ],
+)
+def test_a_fault_is_found_and_laid_at_the_right_door(fault: str, told: list[str], tmp_path: Path) -> None:
+    done = drive("--fault", fault, "--seconds", "60", "--record", str(tmp_path / "run.jsonl"))
+    assert done.returncode == 1, done.stdout + done.stderr
+    lines = done.stdout.splitlines()
+    for words, line in zip(told, lines, strict=False):
+        assert words in line
+    good = (ROBOT / "traces/mission.jsonl").read_text(encoding="utf-8").splitlines()
+    bad = (tmp_path / "run.jsonl").read_text(encoding="utf-8").splitlines()
+    at = int(lines[0].split("event ")[1].split(" ")[0].rstrip(":"))
+    if fault in ("mislabel", "jump"):  # the first message that is other than it should be
+        assert next(k for k, (a, b) in enumerate(zip(good, bad, strict=False), start=1) if a != b) == at
+
+
+def test_what_the_robot_shares_with_the_case_study_is_the_same() -> None:
+    assert (ROBOT / "models/waypoints.csv").read_bytes() == (CASE / "models/waypoints.csv").read_bytes()
+    mine = ROBOT / "msg/rover/msg/Snapshot.msg"
+    theirs = CASE / "models/msg/gazebo_radiation_plugins/msg/Snapshot.msg"
+    assert mine.read_bytes() == theirs.read_bytes()
+
+
+def test_the_nodes_know_nothing_of_a_bus() -> None:
+    for path in (ROBOT / "nodes").glob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        assert not any(word in text for word in ("rospy", "import bus", "wiring", "publish")), path
+
+
+def test_what_monitors_cost_is_measured() -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROBOT / "overhead.py"), "1"], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "the mission the monitors need" in done.stdout
