@@ -75,7 +75,7 @@ from avow.assurance.support import (
 from avow.assurance.suppositions import Statements, suppositions
 from avow.assurance.weakenings import weakenings
 from avow.base.plain import count
-from avow.base.verdict import Link, Verdict
+from avow.base.verdict import Link, Verdict, in_words
 from avow.evidence.audit import Discrepancy
 from avow.evidence.claims import Standing, judge
 from avow.evidence.ledger import GENESIS, Entry
@@ -395,7 +395,8 @@ def _derivation(
 def _assumed(views: Sequence[ObligationView], derived: Sequence[DerivationView]) -> tuple[HypothesisView, ...]:
     found: dict[str, list[str]] = {}
     for view in views:
-        for text in dict.fromkeys(h for v in view.counting for h in v.entry.evidence.hypotheses):
+        counted = [v.entry.evidence for v in view.counting]
+        for text in dict.fromkeys(h for e in counted for h in in_words(e.rests_on, e.hypotheses)):
             found.setdefault(text, []).append(view.id)
     for d in derived:
         for text in d.conditional:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from avow.assurance.model import ObligationView
 from avow.base.plain import count
+from avow.base.verdict import HypothesisKind, in_words
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 
@@ -46,6 +47,8 @@ class Relied:
     record: Evidence
     status: Status
     suppositions: tuple[str, ...]
+    scenario: frozenset[str] = frozenset()
+    """Those of them that are limits of the plan's scenario."""
 
 
 Opinion = Callable[[str, str], Judged]
@@ -62,7 +65,8 @@ def relied_upon(view: ObligationView, opinion: Opinion) -> Relied | None:
         status = weigh(record).support
         if status is None:
             continue
-        open_ones = tuple(dict.fromkeys(record.hypotheses))
+        open_ones = in_words(record.rests_on, record.hypotheses)
+        limits = (h for h in record.rests_on if h.kind is HypothesisKind.BOUND and h.name.startswith("scenario."))
         thought = [opinion(record.method, text) for text in open_ones]
         badness = (
             any(t.expired for t in thought),
@@ -72,7 +76,7 @@ def relied_upon(view: ObligationView, opinion: Opinion) -> Relied | None:
             len(open_ones),
             record.method,
         )
-        ways.append((badness, Relied(record, status, open_ones)))
+        ways.append((badness, Relied(record, status, open_ones, frozenset(h.text for h in limits))))
     return min(ways, key=lambda way: way[0], default=(None, None))[1]
 
 

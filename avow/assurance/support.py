@@ -8,7 +8,7 @@ from avow.assurance.facts import Facts
 from avow.assurance.findings import takes
 from avow.assurance.model import Derivation, Handled
 from avow.assurance.naming import derivation_claim, is_advice, is_foundation, requirement_claim, sanity_property
-from avow.base.verdict import Hypothesis, HypothesisKind, Link
+from avow.base.verdict import Hypothesis, HypothesisKind, Link, in_words
 from avow.evidence.claims import Claim
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.status import Status, weakest
@@ -120,21 +120,25 @@ def obligation_claim(
     names: Names,
 ) -> Claim:
     """An obligation stands on its evidence; a guarantee also on its node's contract being worth verifying; and either
-    on what its evidence rests on. A hypothesis that no claim of the case discharges is an error; a remark in words is
-    one, also where its words are a claim's id."""
+    on what its evidence rests on. Within limits it is `checked` at most. A hypothesis that no claim of the case
+    discharges is an error; a remark in words is one, also where its words are a claim's id."""
     rests: list[str] = []
     if obligation.kind is Kind.GUARANTEE:
         rests += names.foundation.get(obligation.node, [])
         rests += names.vacuity.get(f"{obligation.node}.{obligation.name}", [])
     elif obligation.kind is Kind.REQUIREMENT:
         rests += [names.clause[clause] for clause in obligation.clauses if clause in names.clause]
+    if status.supports and any(h.kind is HypothesisKind.BOUND for h in rests_on):
+        status = weakest((status, Status.CHECKED)) or status
     for hypothesis in rests_on:
+        if hypothesis.kind is HypothesisKind.BOUND:
+            continue
         found = names.discharging(hypothesis)
         if found is None:
             status = weakest((status, Status.ERROR)) or Status.ERROR
         else:
             rests.append(found)
-    return Claim(obligation.id, status, tuple(dict.fromkeys(rests)), tuple(hypotheses), link)
+    return Claim(obligation.id, status, tuple(dict.fromkeys(rests)), in_words(rests_on, hypotheses), link)
 
 
 def requirement_support(requirement: Requirement, names: Names) -> tuple[tuple[str, ...], tuple[str, ...]]:

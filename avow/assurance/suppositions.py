@@ -176,7 +176,7 @@ def _of_methods(
         sampled = found.status in (Status.TESTED, Status.MONITORED)
         for text in found.suppositions:
             statement = statements.of_method(found.record.method, text)
-            if not statement.place and text.startswith("scenario"):
+            if not statement.place and text in found.scenario:
                 statement = _SCENARIO
             place = statement.place or f"suppositions.{found.record.method}: {text}"
             sort = Sort.SAMPLING if sampled else Sort.MODELS

@@ -5,8 +5,11 @@ A verdict says what one tool run showed about one claim. Unknown, time-out, cras
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
+
+from avow.base.files import digest
 
 
 class Verdict(StrEnum):
@@ -118,6 +121,9 @@ class HypothesisKind(StrEnum):
     """Another obligation of the case: `name` is its id without the system, `digest` that of what it says."""
     SUPPOSITION = "supposition"
     """What no tool shows and a person has to accept, by name: ``agent/supposition/termination``."""
+    BOUND = "bound"
+    """What limits a bounded answer, by name: ``scenario.steps``, ``scenario.domains.in.r``, ``type.Place``. What rests
+    on one is at most `checked`, whatever it says of itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +139,16 @@ class Hypothesis:
     digest: str
     text: str = field(default="", compare=False)
     """For people."""
+
+
+def bound(name: str, text: str) -> Hypothesis:
+    """A limit of a bounded answer, in words that say what lies within."""
+    return Hypothesis(HypothesisKind.BOUND, name, digest(f"{name}\n{text}"), text)
+
+
+def in_words(rests_on: Iterable[Hypothesis], hypotheses: Iterable[str]) -> tuple[str, ...]:
+    """All that an answer supposes beside other claims and what a person accepts by name: its limits, and remarks."""
+    return tuple(dict.fromkeys((*(h.text for h in rests_on if h.kind is HypothesisKind.BOUND), *hypotheses)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from random import Random
 
 from avow.base.verdict import Counterexample, Verdict
+from avow.base.verdict import bound as named
 from avow.calculus.discharge import Bounds
 from avow.calculus.ltl import Lasso, TooLong, demands_progress, refuted_at, refuted_prefix, violation
 from avow.calculus.node_outputs import Doubts, Stuck
@@ -126,7 +127,7 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
         return Answer(
             Verdict.CHECKED,
             f"every run within the scenario has it: {len(explored.steps)} kinds of steps, all looked at",
-            hypotheses=within,
+            within=within,
             bound=_bound(explored),
             details={"exhaustive": True},
         )
@@ -136,7 +137,10 @@ def judge(frame: Frame, name: str, formula: Property, bounds: Bounds, machine: M
     return Answer(
         Verdict.TESTED,
         f"no run of the first {explored.depth} steps was found to break it; not exhaustive: {why}",
-        hypotheses=(*within, f"scenario.steps: no run breaks it after its first {explored.depth} steps"),
+        within=(
+            *within,
+            named("scenario.steps", f"scenario.steps: no run breaks it after its first {explored.depth} steps"),
+        ),
         bound=_bound(explored) | {"n": len(explored.steps)},
         details={"exhaustive": False},
     )

@@ -31,7 +31,8 @@ class Answer:
     verdict: Verdict
     summary: str
     counterexample: Counterexample | None = None
-    hypotheses: tuple[str, ...] = ()
+    within: tuple[Hypothesis, ...] = ()
+    """Limits of a bounded answer."""
     bound: dict[str, object] = field(default_factory=dict)
     details: dict[str, object] = field(default_factory=dict)
     vacuous: bool = False
@@ -47,12 +48,12 @@ class Answer:
             self.verdict,
             self.summary,
             self.counterexample,
-            self.hypotheses,
+            (),
             self.bound,
             self.details,
             self.link,
             self.vacuous or (self.established is not None and self.established.vacuous),
-            rests_on,
+            (*rests_on, *self.within),
         )
 
 

@@ -12,6 +12,7 @@ from fractions import Fraction
 from itertools import product
 
 from avow.base.diagnostics import Rejected
+from avow.base.verdict import Hypothesis, bound
 from avow.calculus.variables import Frame
 from avow.evaluation.evaluate import NotEvaluable, evaluate, finite_values
 from avow.formulas.values import Data, FunctionValue, Opaque, Value
@@ -222,10 +223,10 @@ def world(frame: Frame) -> World:
     return found
 
 
-def restrictions(world: World) -> tuple[str, ...]:
+def restrictions(world: World) -> tuple[Hypothesis, ...]:
     """What a bounded check supposes of the values that the contracts leave open, by its name in the plan: a range that
     leaves out values of its sort, a relation or function that is a table's, and the sorts of which it tries some."""
-    scenario, found = world.scenario, list[str]()
+    scenario, found = world.scenario, list[Hypothesis]()
     named = {**_SORTS, **dict(world.frame.system.contract.types)}
     for name, texts in scenario.domains.items():
         ports = ports_named(name, world.frame.system.contract.nodes)
@@ -234,15 +235,18 @@ def restrictions(world: World) -> tuple[str, ...]:
         if everything is None or sort is None or not set(everything) <= {world.parse(text, sort) for text in texts}:
             more = len(texts) - DOMAIN_VALUES
             shown = ", ".join(texts[:DOMAIN_VALUES]) + (f" and {more} more" if more > 0 else "")
-            found.append(f"scenario.domains.{name}: it is one of {shown}")
+            place = f"scenario.domains.{name}"
+            found.append(bound(place, f"{place}: it is one of {shown}"))
     for name, (table, columns) in scenario.interpret.items():
-        found.append(f"scenario.interpret.{name}: it is as {table}({', '.join(columns)}) has it")
+        place = f"scenario.interpret.{name}"
+        found.append(bound(place, f"{place}: it is as {table}({', '.join(columns)}) has it"))
     for node in world.frame.system.contract.nodes:
         for port in (*node.inputs, *node.outputs):
             role = "in" if port in node.inputs else "out"
             said = {f"{role}.{port.name}", f"{node.name}.{port.name}"} & {*scenario.domains, *scenario.interpret}
             if not said and port.sort not in world.domains and _is_sampled(world, port.sort):
-                found.append(f"scenario: {node.name}.{port.name} has one of the values that are tried")
+                text = f"scenario: {node.name}.{port.name} has one of the values that are tried"
+                found.append(bound(f"scenario.values.{node.name}.{port.name}", text))
     return tuple(dict.fromkeys(found))
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from avow.base.verdict import in_words
 from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
 from avow.solving.limits import from_seconds
 
@@ -147,7 +148,7 @@ def to_json(
                 "verdict": str(outcome.verdict),
                 "summary": outcome.summary,
                 "vacuous": outcome.vacuous,
-                "hypotheses": list(outcome.hypotheses),
+                "hypotheses": list(in_words(outcome.rests_on, outcome.hypotheses)),
                 "counterexample": dict(outcome.counterexample.values) if outcome.counterexample else None,
                 "details": outcome.details,
             }

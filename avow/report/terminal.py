@@ -8,7 +8,7 @@ from rich.table import Table
 
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.naming import short
-from avow.base.verdict import Counterexample
+from avow.base.verdict import Counterexample, in_words
 from avow.evidence.status import Status
 from avow.report.wording import (
     MARKS,
@@ -55,7 +55,7 @@ def show_obligation(case: Case, view: ObligationView, console: Console | None = 
             out.print(f"  {escape(mutation(e))}")
         if e.bound:
             out.print(f"  [dim]within: {escape(bound_text(e.bound))}[/]")
-        for hypothesis in e.hypotheses:
+        for hypothesis in in_words(e.rests_on, e.hypotheses):
             out.print(f"  on the hypothesis: {escape(hypothesis)}")
         if e.counterexample:
             _show_counterexample(e.counterexample, out)

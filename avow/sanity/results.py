@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from avow.base.diagnostics import Severity, Span
-from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.base.verdict import Counterexample, Outcome, Verdict, bound
 from avow.sanity.claims import Property
 
 
@@ -70,7 +70,10 @@ class Patience:
 
 
 CUT_SHORT = "; the search for conflicts was cut short: there may be others"
-WITHIN = "scenario: inputs and quantified variables have the values that the plan's scenario gives them, and no others"
+WITHIN = bound(
+    "scenario.values",
+    "scenario: inputs and quantified variables have the values that the plan's scenario gives them, and no others",
+)
 
 
 def as_outcome(identity: str, node: str, name: str, result: SanityResult | None) -> Outcome:
@@ -90,9 +93,9 @@ def as_outcome(identity: str, node: str, name: str, result: SanityResult | None)
         result.verdict,
         result.explanation or _SUMMARY[result.verdict],
         result.counterexample,
-        (WITHIN,) if result.bounded else (),
         bound={"scenario": True} if result.bounded else {},
         details=details,
+        rests_on=(WITHIN,) if result.bounded else (),
     )
 
 

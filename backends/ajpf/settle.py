@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from avow.base.verdict import Counterexample, Link, Outcome, Verdict
+from avow.base.verdict import Counterexample, Link, Outcome, Verdict, bound
 from avow.evidence.obligation import Obligation
 
 from . import psl
@@ -54,10 +54,9 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
     hypotheses = (
         *_left_to_a_person(claim, attached),
         "the plan's table says truly which agent formulas stand for which contract formulas",
-        *frame.setup.environment.describe(),
-        *_no_messages(frame.setup.programs),
         f"percepts become events as in '{frame.setup.semantics}' percept semantics, in the order of their groups",
     )
+    limits = (*frame.setup.environment.describe(), *_no_messages(frame.setup.programs))
     details: dict[str, object] = {"engine": frame.engine, "percept_semantics": str(frame.setup.semantics)}
     if claim.not_covered is not None:
         summary = f"not covered: {claim.not_covered}"
@@ -94,6 +93,7 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
         details,
         Link.MAPPED,
         vacuous=verdict is Verdict.CHECKED and len(hollow) == len(own),
+        rests_on=tuple(bound(f"environment.{at}", text) for at, text in enumerate(limits, start=1)),
     )
 
 

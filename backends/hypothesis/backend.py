@@ -19,7 +19,7 @@ from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
-from avow.base.verdict import Counterexample, Outcome, Verdict
+from avow.base.verdict import Counterexample, Outcome, Verdict, bound
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE
 from avow.isolation import judge
@@ -183,7 +183,8 @@ def _counted(outcome: Outcome, clause: Clause, node: Node) -> Outcome:
         return outcome
     names = " and ".join(sorted(sort.name for sort in sorts))
     told = f"{names}: an unspecified type has the elements that the cases and the subject's answers name, and no fewer"
-    return replace(outcome, hypotheses=(*outcome.hypotheses, told))
+    made = bound(f"type.{'-'.join(sorted(sort.name for sort in sorts))}", told)
+    return replace(outcome, rests_on=(*outcome.rests_on, made))
 
 
 def _doubt(answer: Mapping[str, Any], own: Mapping[str, Any], valid: int, rejected: int, wanted: int) -> str:

@@ -114,4 +114,4 @@ def test_a_loop_starts_whatever_the_constants_are(tmp_path: Path, initial: str, 
     plan += f"environment: {{n.k: {{constant: true, because: a setting{assumed}}}}}\n"
     found = outcomes(make(tmp_path, text, plan))["start.n"]
     assert found.verdict is verdict
-    assert bool(found.hypotheses) is bool(assume)
+    assert bool(found.rests_on) is bool(assume)

@@ -32,7 +32,7 @@ def test_another_agent_with_other_names(lift, tmp_path):
     assert {name: o.verdict for name, o in outcomes.items()} == {"answers": Verdict.CHECKED, "halts": Verdict.CHECKED}
     assert outcomes["answers"].link is Link.MAPPED
     assert outcomes["answers"].bound["states"] > 0
-    assert any("percepts are drawn" in h for h in outcomes["answers"].hypotheses)
+    assert any("percepts are drawn" in h.text for h in outcomes["answers"].rests_on)
 
 
 def test_the_percept_semantics_change_the_verdict_and_are_named(lift, tmp_path):
@@ -158,7 +158,7 @@ def test_fairness_must_be_stated_and_then_helps(lift, tmp_path):
     )
     outcome = settle(lift({"properties": extra}, {"cabin.yaml": environment}), tmp_path)["answers"]
     assert outcome.verdict is Verdict.CHECKED
-    assert any("somebody always calls" in h for h in outcome.hypotheses)
+    assert any("somebody always calls" in h.text for h in outcome.rests_on)
     unfair = environment.split("fair:")[0]
     assert settle(lift({"properties": extra}, {"cabin.yaml": unfair}), tmp_path)["answers"].verdict is Verdict.REFUTED
 

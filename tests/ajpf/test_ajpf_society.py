@@ -180,7 +180,7 @@ def test_a_system_is_checked_as_a_nodes_method(lift, tmp_path, monkeypatch):
     assert not [d for d in BACKEND.check(job) if d.is_error]
     report = BACKEND.discharge(job, tmp_path, Limits(seconds=120))
     assert {o.verdict for o in report.outcomes} <= {Verdict.CHECKED, Verdict.REFUTED, Verdict.UNKNOWN}
-    assert all(any("take turns" in h for h in o.hypotheses) for o in report.outcomes if o.hypotheses)
+    assert all(any("take turns" in h.text for h in o.rests_on) for o in report.outcomes if o.rests_on)
     exported = BACKEND.export(job)
     assert "SingleAgentScheduler()" not in exported["AvowEnvironment.java"]
     wrong = lift({"properties": {"never": "[] (~B(nobody, told))"}}, {path.name: text})

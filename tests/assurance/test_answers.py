@@ -19,7 +19,7 @@ from avow.assurance.first_screen import WARNED, _lines, _owners
 from avow.assurance.model import Case
 from avow.assurance.weakenings import _WORDS, _weakening
 from avow.base.plain import identifiers, words_of
-from avow.base.verdict import Hypothesis, HypothesisKind, Link, Verdict
+from avow.base.verdict import Hypothesis, HypothesisKind, Link, Verdict, bound
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.evidence.record import Evidence
 from avow.system.plan import EnvironmentInput, Requirement, Statement, System
@@ -222,7 +222,8 @@ def test_a_key_is_about_a_whole_word() -> None:
 
 def test_bounds_of_a_scenario_are_one_supposition() -> None:
     bounds = ("scenario.domains.N: it is one of 0, 1", "scenario: a.x has one of the values that are tried")
-    listed = [evidence(g, Verdict.CHECKED, "ajpf", hypotheses=bounds) for g in GUARANTEES]
+    limits = (bound("scenario.domains.N", bounds[0]), bound("scenario.values.a.x", bounds[1]))
+    listed = [evidence(g, Verdict.CHECKED, "ajpf", rests_on=limits) for g in GUARANTEES]
     (one,) = build(listed, formal=True).suppositions
     assert one.key == "suppositions.compose.scenario"
     assert one.text.splitlines() == list(bounds)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from assurance.sample import rover_case
 from avow.assurance.case import conclude
 from avow.assurance.facts import Facts, facts_of_case
-from avow.base.verdict import Hypothesis, HypothesisKind, Verdict
+from avow.base.verdict import Hypothesis, HypothesisKind, Verdict, bound
 from avow.evidence.ledger import Entry
 from avow.evidence.status import Status
 from avow.system.plan import Finding
@@ -60,3 +60,15 @@ def test_a_supposition_wants_a_person() -> None:
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.UNSUPPORTED
     taken = replace(taken, matched=(ends.name,))
     assert conclude(replace(facts, accepted=(taken,))).obligation(at).standing is Status.JUSTIFIED
+
+
+def test_what_rests_on_a_limit_is_checked_at_most() -> None:
+    """Whatever its evidence says of itself; and the limit is among what the case supposes."""
+    facts = facts_of_case(rover_case())
+    at = proved(facts)
+    assert conclude(facts).obligation(at).standing is Status.PROVED
+    limit = bound("scenario.domains.in.r", "scenario.domains.in.r: it is one of 0, 1")
+    found = conclude(resting(facts, at, limit))
+    assert found.obligation(at).standing is Status.CHECKED
+    assert limit.text in found.obligation(at).hypotheses
+    assert limit.text in [h.text for h in found.hypotheses]

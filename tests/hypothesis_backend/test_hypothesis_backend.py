@@ -226,7 +226,7 @@ def test_made_up_elements_are_a_hypothesis(tmp_path: Path, guarantee: str, suppo
     subject = "def step(**inputs):\n    return {'y': 'U#0', 'z': 'U#1'}\n"
     found = free(tmp_path, guarantee, subject, outputs="y : U, z : U")
     assert found.verdict is Verdict.TESTED, found.summary
-    assert len(found.hypotheses) == supposed
+    assert len(found.rests_on) == supposed
     assert all(text.startswith("U: ") for text in found.hypotheses)
 
 
