@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,7 +31,7 @@ from avow.pipeline.engine_code import trusted_parts
 from avow.pipeline.work import COMPOSE, texts_digest
 from avow.solving.apart import Apart, Both, versions
 from avow.system.plan import System
-from avow.tuning.running import RECHECK_SECOND
+from avow.tuning.effort import KERNEL_SECOND_ALL
 
 FILE = "certificates.json"
 
@@ -71,28 +70,24 @@ _known: dict[Path, _Checked] = {}
 
 def kernel_run(entries: Sequence[Entry], root: Path, system: System, run: str) -> KernelRun:
     """What the kernel establishes, in this run, of what the calculus told that it proved; with cvc5 as well where it is
-    installed, for no longer than the proofs took. Asked once in a process for the same entries."""
+    installed, for so many steps of its own. Asked once in a process for the same entries."""
     records = [e.evidence for e in entries if e.evidence.method == COMPOSE and e.evidence.verdict is Verdict.PROVED]
     records = [r for r in records if isinstance(r.details.get("certificate"), dict)]
     texts = {path: _kept_text(r, root) for r in records if (path := _kept(r)) is not None}
     asked = digest(json.dumps([run, [[r.obligation, r.key, r.details["certificate"]] for r in records], texts]))
     checked = _checked(system)
     if asked not in checked.runs:
-        start = time.monotonic()
         # Z3's answers first: what cvc5 is asked is only what holds already
         good = [r for r in records if _holds(r, root, system) is not None]
-        allowance = max(RECHECK_SECOND, sum(r.seconds for r in good) - (time.monotonic() - start))
-        checked.runs[asked] = _twice(good, texts, system, run, allowance, checked.solvers)
+        checked.runs[asked] = _twice(good, texts, system, run, checked.solvers)
     return checked.runs[asked]
 
 
-def _twice(
-    records: Sequence[Evidence], texts: dict[str, str], system: System, run: str, allowance: float, asked: Solvers
-) -> KernelRun:
+def _twice(records: Sequence[Evidence], texts: dict[str, str], system: System, run: str, asked: Solvers) -> KernelRun:
     found: dict[str, Told] = {}
     used: dict[str, object] = {}
     composition = compose(system)
-    with Both(allowance, asked.known) as solvers:
+    with Both(KERNEL_SECOND_ALL, asked.known) as solvers:
         each = {text: Certificates(composition, _read(text), solvers=solvers) for text in texts.values()}
         for record in records:
             certificates = each[texts[_kept(record) or ""]]

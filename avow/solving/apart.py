@@ -13,7 +13,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 from dataclasses import dataclass, field
 from importlib import metadata, util
 
@@ -21,32 +20,30 @@ from avow.base.files import digest
 from avow.base.process import die_with
 from avow.kernel.solvers import NET_MS, Said, Solvers, ask_z3
 from avow.solving.cvc5_process import answer
-from avow.tuning.effort import CVC5_START_SECONDS, KERNEL_SECOND_MS
+from avow.tuning.effort import KERNEL_SECOND_STEPS
 
 
 @dataclass(slots=True)
 class Apart:
-    """A solver (`z3` or `cvc5`). `seconds`: for all questions together; what is asked later is `unknown`."""
+    """A solver (`z3` or `cvc5`). `steps`: its own, for all questions together; what is asked later is `unknown`."""
 
     solver: str
-    seconds: float = math.inf
+    steps: float = math.inf
     _owner: int = 0
     _process: subprocess.Popen[str] | None = None
     _known: dict[tuple[str, int], Said] = field(default_factory=dict)
 
-    def __call__(self, script: str, limit: int = KERNEL_SECOND_MS) -> Said:
-        """`limit`: steps of Z3, milliseconds of cvc5."""
+    def __call__(self, script: str, limit: int = KERNEL_SECOND_STEPS) -> Said:
+        """`limit`: of its own steps."""
         question = (script, limit)
         if question not in self._known:
-            if self.seconds <= 0:
+            if self.steps <= 0:
                 return Said.UNKNOWN
-            start = time.monotonic()
-            within = limit if self.solver == "z3" else int(min(limit, 1 + self.seconds * 1000))
-            self._known[question] = self._ask(script, within)
-            self.seconds -= time.monotonic() - start
+            self._known[question], used = self._ask(script, int(min(limit, self.steps)))
+            self.steps -= used
         return self._known[question]
 
-    def _ask(self, script: str, limit: int) -> Said:
+    def _ask(self, script: str, limit: int) -> tuple[Said, int]:
         if self._owner != os.getpid():
             self._process = None  # of the process that this one is a fork of
         if self._process is None or self._process.poll() is not None:
@@ -57,15 +54,15 @@ class Apart:
         process = self._process
         assert process.stdin is not None
         assert process.stdout is not None
-        net = threading.Timer(CVC5_START_SECONDS + (NET_MS if self.solver == "z3" else limit) / 1000, process.kill)
+        net = threading.Timer(NET_MS / 1000, process.kill)
         net.start()
         try:
             process.stdin.write((line := json.dumps([self.solver, script, limit])) + "\n")
             process.stdin.flush()
-            said, about = process.stdout.readline().split()
-            return Said(said) if about == digest(line) else Said.UNKNOWN
+            said, used, about = process.stdout.readline().split()
+            return (Said(said), int(used)) if about == digest(line) else (Said.UNKNOWN, limit)
         except (OSError, ValueError):
-            return Said.UNKNOWN
+            return Said.UNKNOWN, limit
         finally:
             net.cancel()
 
@@ -82,15 +79,15 @@ class Apart:
 
 @dataclass(slots=True)
 class Both:
-    """Z3 and, where it is installed, cvc5, each in a process of its own, for as long as a ``with`` lasts. `seconds`: of
+    """Z3 and, where it is installed, cvc5, each in a process of its own, for as long as a ``with`` lasts. `steps`: of
     cvc5, for all questions together. `known`: answers of Z3 to be used and added to."""
 
-    seconds: float = math.inf
+    steps: float = math.inf
     known: dict[tuple[str, int], Said] = field(default_factory=dict)
     _started: tuple[Apart, ...] = ()
 
     def __enter__(self) -> Solvers:
-        first, second = self._started = (Apart("z3"), Apart("cvc5", self.seconds))
+        first, second = self._started = (Apart("z3"), Apart("cvc5", self.steps))
         return Solvers(z3=first, second=second if "cvc5" in versions() else None, known=self.known)
 
     def __exit__(self, *_: object) -> None:
@@ -110,5 +107,8 @@ if __name__ == "__main__":
     die_with(int(sys.argv[1]))
     for line in map(str.strip, sys.stdin):
         solver, script, limit = json.loads(line)
-        said = ask_z3(script, limit) if solver == "z3" else Said(answer(f"{script}(check-sat)\n", limit) or "unknown")
-        print(said, digest(line), flush=True)
+        if solver == "z3":
+            print(ask_z3(script, limit), 0, digest(line), flush=True)
+        else:
+            said, used = answer(f"{script}(check-sat)\n", limit)
+            print(said or Said.UNKNOWN, used, digest(line), flush=True)

@@ -36,9 +36,6 @@ FORK_LOOK = 0.5
 FORK_STOP = 15.0
 """Seconds that it gets to kill a fork."""
 
-RECHECK_SECOND = 1.0
-"""Seconds that the second solver has at least: its process has to begin."""
-
 VERSION_SECONDS = 20.0
 """For a tool to say its version: one that runs on Java or .NET takes seconds on a loaded machine."""
 
