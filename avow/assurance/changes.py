@@ -8,8 +8,8 @@ from dataclasses import replace
 from avow.assurance.answers import Baseline, ChangeLine, Changes, How, Supposition, Weakening
 from avow.assurance.model import Case, ObligationView, RequirementView
 from avow.assurance.relied import word
+from avow.assurance.weakenings import words_of
 from avow.base.files import digest
-from avow.base.plain import count
 from avow.evidence.obligation import Kind
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status
@@ -70,12 +70,11 @@ def changes(
     now = {item[0]: item for item in map(_guarantee, guarantees)}
     then = {item[0]: item for item in old.guarantees}
     titles = {view.id: view.obligation.claim for view in guarantees}
-    entries = [
-        *_requirements(old, requirements),
-        *_guarantees(then, now, titles),
-        *_suppositions(old, suppositions),
-        *_weakenings(old, weakenings),
-    ]
+    shown = [*_requirements(old, requirements), *_guarantees(then, now, titles)]
+    lost = any(entry.kind in ("open", "gone", "weaker") for entry in shown)
+    entries = [*shown, *_suppositions(old, suppositions), *_weakenings(old, weakenings)]
+    if lost:  # what less is claimed also supposes less, and has less to be weakened: that is no gain
+        entries = [e for e in entries if e.kind != "better" or e in shown]
     again = sum(
         1 for name in now if name in then and now[name][1:3] == then[name][1:3] and now[name][4] != then[name][4]
     )
@@ -167,7 +166,7 @@ def _weakenings(old: Baseline, weakenings: Sequence[Weakening]) -> Iterator[Chan
             yield ChangeLine(
                 "better",
                 key,
-                f"{count(was - now.get(key, 0), 'weakening')} fewer of one kind",
+                f"{words_of(key, was)}: {was} → {now.get(key, 0) or 'none'}",
                 str(was),
                 str(now.get(key, 0)),
             )

@@ -168,7 +168,8 @@ def compare(old: Snapshot, new: Snapshot) -> tuple[Change, ...]:
                 changes.append(Change("better" if is_.rank > was.rank else "worse", name, was, is_, title, why))
             elif any(_asked_again(before, after)):
                 changes.append(Change("rerun", name, was, is_, title, why))
-    changes += _suppositions(old, new)
+    lost = any(change.kind in ("worse", "removed") for change in changes)  # what less is shown also supposes less
+    changes += (c for c in _suppositions(old, new) if not lost or c.kind != "better")
     word = {True: "passes", False: "fails"}
     for gate, passed in new.gates.items():
         if gate in old.gates and old.gates[gate] != passed:

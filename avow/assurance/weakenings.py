@@ -68,8 +68,12 @@ def weakenings(
 
 
 def _weakening(key: str, claims: tuple[str, ...]) -> Weakening:
-    words, why = _WORDS[key]
-    return Weakening(key, len(claims), claims, words.format(s="" if len(claims) == 1 else "s"), why)
+    return Weakening(key, len(claims), claims, words_of(key, len(claims)), _WORDS[key][1])
+
+
+def words_of(key: str, number: int) -> str:
+    """What so many weakenings of a kind are called, without the number; of a kind that there is no more, its key."""
+    return _WORDS[key][0].format(s="" if number == 1 else "s") if key in _WORDS else key
 
 
 def _status(view: ObligationView, relied: Mapping[str, Relied]) -> Status | None:

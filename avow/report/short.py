@@ -35,6 +35,10 @@ def terminal_lines(case: Case, command: str = "") -> list[str]:
     head = f" {a.changed_against[:1].lower()}{a.changed_against[1:]}"
     lines += [_cut(f"5 Changed{head.removesuffix(':')}")]
     lines += [_cut(f"  {mark} {words}".rstrip()) for mark, words in a.changed]
+    known = _cut_lines(f"weakened by: {a.weakened_by}", 3) if a.weakened_by else []
+    if len(lines) + len(known) < LINES:
+        at = next(n for n, line in enumerate(lines) if line.startswith("4 Supposed"))
+        lines = [*lines[:at], *known, *lines[at:]]
     over = len(lines) - (LINES - 1)
     if over > 0:  # a sort of suppositions, or two, whose number stands in the verdict
         at = next(n for n, line in enumerate(lines) if line.startswith("5 Changed"))

@@ -249,6 +249,20 @@ def test_changes_since_the_signed_report_worst_first() -> None:
     assert now.changes.against == same.changes.against
 
 
+def test_what_is_lost_with_a_claim_is_no_gain() -> None:
+    """A guarantee that is refuted is no longer sampled, and supposes nothing: the case is not better for it."""
+    tested = evidence(GUARANTEES[0], Verdict.TESTED, "hypothesis", hypotheses=("the runs are drawn",))
+    rest = [evidence(g) for g in GUARANTEES[1:]]
+    signed = baseline_of(build([tested, *rest], formal=False), "f", "A", "2026-11-20")
+    refuted = evidence(GUARANTEES[0], Verdict.REFUTED, "hypothesis")
+    kinds = {e.kind for e in case(subject(PROSE), GUARANTEES, [refuted, *rest], baseline=signed).changes.entries}
+    assert "open" in kinds
+    assert "better" not in kinds
+    proved = case(subject(PROSE), GUARANTEES, [evidence(g) for g in GUARANTEES], baseline=signed).changes.entries
+    assert {e.kind for e in proved} == {"better"}
+    assert "guarantee sampled, not proved: 1 → none" in {e.words for e in proved}
+
+
 def test_what_means_something_else_shows_both_formulas() -> None:
     first = build([evidence(g) for g in GUARANTEES], formal=False)
     moved = replace(GUARANTEES[0], digest="0" * 64, formula="x > 2")

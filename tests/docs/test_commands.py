@@ -125,6 +125,7 @@ CODES = {"avow sanity docs/examples/ventilator/conflict.rcl": 1}
 """Other exit codes than 0."""
 
 ELSEWHERE = {
+    "avow init robot --from-": "tests/ros/test_drafts.py",
     "avow monitor SYSTEM --serve": "tests/rosmonitoring/test_monitor_command.py talks with it",
     "avow verify --on": "tests/scale/test_executors.py",
     "avow verify --sandbox": "it needs a tool: tests/isolation",

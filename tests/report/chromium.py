@@ -73,6 +73,7 @@ function told(doc) {
   }
   for (const s of doc.querySelectorAll(".five>section"))
     out.bottom = Math.max(out.bottom, s.getBoundingClientRect().bottom);
+  out.sheet = first ? first.getBoundingClientRect().bottom : 0;
   out.heads = [...doc.querySelectorAll(".five h2")].map((h) => h.textContent);
   return out;
 }

@@ -14,6 +14,8 @@ from report.chromium import dark, frames_of, measure
 
 OWN_WORDS, ALL_WORDS, BOXES_WITHIN, CONTRAST = 280, 3000, 900, 4.5
 """Own words above the signature, visible words in all, pixels within which the five boxes end, least contrast."""
+SHEET = 1010
+"""Pixels of a sheet of A4 between its margins: 269 mm, less the rounding of lines."""
 WIDTHS = (320, 390, 420, 1366, 1400)
 
 
@@ -28,6 +30,8 @@ def _layout(measured: dict[str, Any]) -> list[str]:
     for width, said in measured.items():
         told += [f"{width}, folds closed: {text}" for text in said["closed"]]
         told += [f"{width}, folds open: {text}" for text in said["open"]]
+        if width == "print" and said["sheet"] > SHEET:
+            told.append(f"print: the first screen ends at {said['sheet']:.0f}, a sheet at {SHEET}")
         if said["scroll"] or said["openScroll"]:
             told.append(f"{width}: scrolls sideways")
         worst = min(said["contrast"], said["openContrast"])
