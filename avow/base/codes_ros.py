@@ -24,6 +24,15 @@ ROS_CODES = register(
         "`pip install 'avow[bags]'`, or name the .msg files under `messages`.",
     ),
     declare(
+        "ROS104",
+        "unknown message type",
+        "Nothing defines the type of a topic's messages, though its package is known; or it is a service or an action, "
+        "and the part of a call is not said.",
+        "Correct the type; of a service write `package/Type_Request` or `_Response`, of an action `_Goal`, `_Result` "
+        "or `_Feedback`.",
+        warning=True,
+    ),
+    declare(
         "ROS111",
         "topic of two types",
         "A topic is published or heard as messages of different types: in ROS the two never meet.",

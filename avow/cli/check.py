@@ -135,7 +135,7 @@ def _of_plan(folder: Path) -> Iterator[Diagnostic]:
     except Rejected as rejected:
         # what is wrong in contract files is told already; a formula of the plan has faults of the same codes
         every = (*rejected.diagnostics, *of_rest(folder))
-        found = tuple(d for d in every if not d.span or not d.span.file.endswith(".rcl"))
+        found = tuple(d for d in every if not (d.code.startswith("RCL") and d.span and d.span.file.endswith(".rcl")))
     yield from (_as_told(d, folder) for d in found)
 
 

@@ -68,10 +68,12 @@ def of_plan(system: System, clean: set[tuple[str, str]] | None = None) -> tuple[
     from avow.system.launched import told as launched
     from avow.system.sentences import requirement_sentences
     from avow.system.statements import unconfirmed, without_words
+    from avow.system.topics import unknown_types
 
     found = [
         *(d for d in dataflow(system).findings if d.code.startswith("ROS")),
         *launched(system),
+        *unknown_types(system.plan, system.contract),
         *_model(system),
         *_policy(system),
         *requirement_sentences(system),
@@ -96,7 +98,9 @@ def of_rest(folder: Path) -> tuple[Diagnostic, ...]:
     rest = rest_of(folder)
     if rest is None:
         return ()
-    found = [*_policy(rest.system)]
+    from avow.system.topics import unknown_types
+
+    found = [*_policy(rest.system), *unknown_types(rest.system.plan, rest.system.contract)]
     for plan in rest.system.plan.nodes:
         for method in plan.methods:
             try:

@@ -15,7 +15,8 @@ from typing import Any
 
 from avow.ros.definitions import Message
 
-_PARTS = {part: f"_{part.lower()}" for part in ("Request", "Response", "Goal", "Result", "Feedback")}
+CALL_PARTS = ("Request", "Response", "Goal", "Result", "Feedback")
+_PARTS = {part: f"_{part.lower()}" for part in CALL_PARTS}
 CALL = "_call"
 """The field that says to which call a part belongs, in every part of it."""
 _SERVICE_EVENT = "/_service_event"

@@ -16,10 +16,12 @@ from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port, Topic
 from avow.language.sorts import BOOL, FunctionSort
 from avow.language.terms import Apply, Compare, Iff, Or, Quantified, Quantifier, Role, Term, Variable
-from avow.ros.calls import part_topic
+from avow.ros.calls import CALL_PARTS, part_topic
 from avow.ros.definitions import canonical
 from avow.ros.names import Resolver
+from avow.ros.sources import definitions
 from avow.system.plan import Connection, Endpoint, Plan
+from avow.system.schema import suggest
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +88,29 @@ def wrong_types(found: Ends) -> Iterator[Diagnostic]:
             notes = ((f"{known[0]} is here", known[1].span),)
             hint = "a topic has one type: correct one of them, or remap one end under `ros: {nodes: …}`"
             yield Diagnostic("ROS111", message, carrier.span, hint=hint, notes=notes)
+
+
+def unknown_types(plan: Plan, contract: Contract) -> Iterator[Diagnostic]:
+    """Topics whose messages' type nothing defines, though the plan says where types are defined: a slip in the name, or
+    a service or an action without the part of a call that is meant. What is wrong with the definitions, too."""
+    if plan.ros.distro is None and not plan.messages:
+        return
+    known, wrong = definitions(plan.messages, plan.ros.distro)
+    if any(d.code == "ROS103" for d in wrong):  # what reads them is not installed: nothing can be said
+        return
+    yield from wrong
+    packages = {name.partition("/")[0] for name in known.messages}
+    for topic in (topic for node in contract.nodes for topic in node.topics):
+        kind = canonical(topic.ros_type)
+        if kind in known.messages:
+            continue
+        parts = [part for part in (f"{kind}_{end}" for end in CALL_PARTS) if part in known.messages]
+        if parts:
+            message = f"{kind} is a service or an action: which part of a call {topic.name} carries is not said"
+            yield Diagnostic("ROS104", message, topic.span, Severity.WARNING, f"write {' or '.join(parts)}")
+        elif kind.partition("/")[0] in packages:
+            hint = suggest(kind, [name for name in known.messages if name.startswith(kind.partition("/")[0])])
+            yield Diagnostic("ROS104", f"nothing defines {kind}", topic.span, Severity.WARNING, hint)
 
 
 def contradicted(connections: Sequence[Connection], found: Ends, relays: Collection[str]) -> Iterator[Diagnostic]:

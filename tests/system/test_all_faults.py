@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from avow.base.diagnostics import Rejected
-from avow.cli import command
+from avow.cli import command, main
 from avow.pipeline.workload import survey
 from avow.system.load import load_system
 
@@ -184,3 +184,52 @@ def test_a_keyword_as_a_name_is_called_so(tmp_path: Path) -> None:
     done = CliRunner().invoke(command("check"), [str(folder)], standalone_mode=False)
     assert "`exists` is a keyword and cannot be a name" in done.output
     assert "`or` is a keyword and cannot be a name" in done.output
+
+
+WIRED = """
+node a { inputs( ) outputs( x : REAL ) topics( float64 t matches(out.x) ) guarantee g ( out.x >= 0 ) }
+node b { inputs( y : REAL ) outputs( o : REAL ) topics( float32 t matches(in.y), float64 cmd matches(out.o) )
+  guarantee g ( out.o >= in.y ) }
+node c { inputs( ) outputs( p : REAL, q : REAL ) topics( float64 cmd matches(out.p), float64 cmd matches(out.q) )
+  guarantee g ( out.p >= 0 and out.q >= 0 ) }
+node d { inputs( v : REAL, u : REAL ) outputs( e : REAL )
+  topics( float64 cmd matches(in.v), my/Speed /u matches(in.u) )
+  guarantee g ( out.e >= in.v + in.u ) }
+"""
+WIRED_PLAN = """\
+ros: {nodes: {e: {name: /e}, d: {remap: {cmd: "bad name"}}}}
+connections: [{from: a.x, to: d.u}]
+messages: [my]
+"""
+
+
+def test_wrong_types_remaps_and_publishers_are_told_by_check_in_one_round(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "my").mkdir()
+    (tmp_path / "my/Sped.msg").write_text("float64 v\nfloat64\n", encoding="utf-8")
+    (tmp_path / "system.rcl").write_text(WIRED, encoding="utf-8")
+    (tmp_path / "plan.yaml").write_text(WIRED_PLAN, encoding="utf-8")
+    with pytest.raises(SystemExit, match="2"):
+        main(["check", str(tmp_path)])
+    output = capsys.readouterr().out
+    told = {
+        code for code in ("PLAN105", "PLAN106", "ROS101", "ROS111", "ROS112", "ROS115") if f"error[{code}]" in output
+    }
+    assert told == {"PLAN105", "PLAN106", "ROS101", "ROS111", "ROS112", "ROS115"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [("my/Sped", ""), ("my/Speed", "nothing defines my/Speed"), ("std_srvs/SetBool", "which part of a call")],
+)
+def test_types_that_nothing_defines(tmp_path: Path, kind: str, message: str) -> None:
+    from avow.pipeline.check import of_plan
+
+    (tmp_path / "my").mkdir()
+    (tmp_path / "my/Sped.msg").write_text("float64 v\n", encoding="utf-8")
+    text = f"node a {{ inputs( ) outputs( x : REAL ) topics( {kind} t matches(out.x) ) guarantee g ( out.x >= 0 ) }}"
+    (tmp_path / "system.rcl").write_text(text, encoding="utf-8")
+    (tmp_path / "plan.yaml").write_text("messages: [my]", encoding="utf-8")
+    found = [d.message for d in of_plan(load_system(tmp_path)) if d.code == "ROS104"]
+    assert [message in text for text in found] == ([True] if message else [])
