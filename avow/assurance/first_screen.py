@@ -22,7 +22,7 @@ from avow.assurance.answers import (
 )
 from avow.assurance.changes import MARKS, baseline_of
 from avow.assurance.model import Case, Gate, NodeView, ObligationView, RequirementView
-from avow.assurance.relied import EVIDENCE, EXHAUSTIVE, LETTERS, Relied, seen, weakness, word
+from avow.assurance.relied import EVIDENCE, EXHAUSTIVE, LETTERS, Relied, examined, seen, weakness, word
 from avow.base.plain import count
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
@@ -179,12 +179,18 @@ def _basis(
     """A node's line, and how weak it is: its worst colour, then how much of it has that colour."""
     own = [v for v in views if v.obligation.kind is Kind.GUARANTEE and v.obligation.node == node.name]
     marks = [(_mark(view, relied), view) for view in own]
-    number = Counter(said for (said, _), _ in marks)
+    number = Counter(" ".join((said, *_examined(view, relied))) for (said, _), view in marks)
     words = ", ".join(f"{many} {said}" for said, many in number.items()) or "no guarantees"
     squares = tuple((LETTERS.get(said, "✘"), tone) for (said, tone), _ in marks)
     worst = min((tone.rank for _, tone in squares), default=Tone.GREEN.rank)
     share = sum(tone.rank == worst for _, tone in squares) / max(1, len(squares))
     return NodeBasis(node.name, node.title, squares if len(squares) <= SQUARES else (), words), (worst, -share)
+
+
+def _examined(view: ObligationView, relied: Mapping[str, Relied]) -> tuple[str, ...]:
+    """What was looked at, where the claim is relied upon."""
+    found = examined(relied[view.id]) if view.id in relied and view.standing.supports else ""
+    return (found,) if found else ()
 
 
 def basis_of(node: NodeView, case: Case) -> NodeBasis:

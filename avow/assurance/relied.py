@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 from avow.assurance.model import ObligationView
 from avow.base.plain import count
-from avow.base.verdict import HypothesisKind, in_words
+from avow.base.verdict import HypothesisKind, Object, in_words
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
+from avow.isolation.observed import ISOLATION
 
 WORDS = {
     Status.PROVED: "proved",
@@ -82,6 +83,23 @@ def relied_upon(view: ObligationView, opinion: Opinion) -> Relied | None:
 
 def word(status: Status) -> str:
     return WORDS.get(status, "open")
+
+
+def examined(relied: Relied) -> str:
+    """What was looked at: ``of the source in float64 (isolation sealed)``; empty of a person's word."""
+    if relied.status not in (*EXHAUSTIVE, Status.TESTED, Status.MONITORED):
+        return ""
+    record = relied.record
+    apart = f" (isolation {record.details[ISOLATION]})" if record.details.get(ISOLATION) else ""
+    match record.of:
+        case Object.MODEL:
+            return f"of a model{apart}"
+        case Object.SOURCE:
+            return f"of the source in {record.numbers}{apart}"
+        case Object.BINARY:
+            return f"of the binary in {record.numbers}{apart}"
+        case Object.RECORDING:
+            return f"of recordings{apart}"
 
 
 def upper_bound(record: Evidence) -> float | None:

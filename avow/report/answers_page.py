@@ -127,7 +127,7 @@ def _boxes(cells: Sequence[dict[str, Any]], basis: NodeBasis) -> list[tuple[Tone
     if len(cells) <= NODE_BOXES:
         return [(cell["tone"], (cell["word"], cell["view"].obligation.claim)) for cell in cells]
     tones = {cell["word"]: cell["tone"] for cell in cells}
-    return [(tones.get(part.split(" ", 1)[1], Tone.RED), (part, "")) for part in basis.words.split(", ")]
+    return [(tones.get(part.split(" ")[1], Tone.RED), (part, "")) for part in basis.words.split(", ")]
 
 
 def _word(record: Evidence) -> str:

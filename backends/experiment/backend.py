@@ -9,7 +9,7 @@ from pathlib import Path
 from avow.backend_kit.given import file_path, told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.base.verdict import Link, Outcome, Verdict
+from avow.base.verdict import Link, Object, Outcome, Verdict
 
 from .codes import CODES
 from .figures import Figures, read_figures
@@ -29,6 +29,7 @@ class ExperimentBackend(Backend):
     uses_scenario = False
     uses_wiring = False
     link = Link.GUIDED
+    of = Object.RECORDING
     options_schema = SCHEMA
     codes = CODES
     green_means = (

@@ -24,7 +24,16 @@ class PythonBackend(Backend):
     uses_scenario = False
     uses_wiring = False
     uses_source = True
-    options_schema = {"type": "object", "properties": {}, "additionalProperties": False}
+    options_schema = {
+        "type": "object",
+        "properties": {
+            "nan": {
+                "const": "possible",
+                "description": "a REAL input may be NaN or an infinity: it is tried, and what goes wrong refutes",
+            }
+        },
+        "additionalProperties": False,
+    }
     codes = CODES
     green_means = (
         "Every call of this file's `step`, from any state that its assumptions allow and on any finite inputs, gives "

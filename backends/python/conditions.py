@@ -13,7 +13,7 @@ from avow.formulas.formula import conjunction, free_variables, negation, substit
 from avow.formulas.values import Value
 from avow.language.contract import Clause
 from avow.language.sorts import INTEGER, NATURAL, REAL, EnumSort, SequenceSort
-from avow.language.terms import Compare, Literal, Term, Variable, Widen
+from avow.language.terms import FALSE, Compare, Literal, Term, Variable, Widen
 from avow.solving.limits import from_seconds, spent
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, contradicted
@@ -83,6 +83,8 @@ class Conditions:
                 found[name] = Found(Verdict.UNKNOWN, why, models=(*models, *one.models))
             else:
                 found[name] = self.guarantee(clause, goal, run, hypotheses, known)
+        if run.ends and all(self.never(run, end) for end in run.ends):
+            return self.alike(claims, "no path of the step is possible: the conditions contradict each other")
         details: dict[str, object] = {
             "invariants": [c.text for c in kept],
             "rounded_at_lines": sorted(set(run.rounds)),
@@ -145,12 +147,12 @@ class Conditions:
             else:
                 inputs[f"in.{port.name}"] = port.variable
         run.whole(inputs)
+        ports = [f"out.{p.name}" for p in node.outputs if p.sort == NATURAL]
+        ports += [f"memory.{p.name}" for p in node.inputs if p.sort == NATURAL and p.name in self.step.memory]
         for end in run.ends:
-            for port in node.outputs:
-                if port.sort == NATURAL:
-                    term = end.outputs[f"out.{port.name}"]
-                    goal = Compare(">=", term, Literal(0, INTEGER))
-                    run.checks.append(Check(end.facts, end.guard, goal, f"out.{port.name} is NATURAL", end.line))
+            for name in ports:
+                goal = Compare(">=", end.outputs[name], Literal(0, INTEGER))
+                run.checks.append(Check(end.facts, end.guard, goal, f"{name} is NATURAL", end.line))
         return run
 
     # -- questions ---------------------------------------------------------------------------------------
@@ -169,6 +171,11 @@ class Conditions:
             self.proved.append(conjunction((*facts, negation(goal))))
             return True
         return False
+
+    def never(self, run: Run, end: End) -> bool:
+        """Whether the facts exclude a way out; what is assumed is not among them."""
+        effort = min(self.left(), from_seconds(CANDIDATE_SECONDS))
+        return self.settler.settles((*run.facts[: end.facts], end.guard), FALSE, effort=effort) == "unsat"
 
     def safe(self, run: Run, assumed: Sequence[Term]) -> tuple[bool, str, tuple[Mapping[Variable, Value], ...]]:
         """Whether every run has an output: no division by zero, no index outside, nothing that overflows."""

@@ -189,7 +189,7 @@ class Expressions:
     def is_module(self, name: str) -> bool:
         """Whether a name is an imported module here."""
         taken = name in self.scope.own or name in self.scope.bound or name in self.scope.sequences
-        return not taken and name not in self.scope.aliases and name not in self.parts.constants
+        return not taken and name not in self.scope.aliases and name in self.parts.modules
 
     # -- numbers -----------------------------------------------------------------------------------------
 

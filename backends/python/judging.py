@@ -41,6 +41,16 @@ class Formula:
                 pass
         return judge(self.term, values, effort=JUDGE_EFFORT)
 
+    def compared(self, values: Mapping[str, Value], name: str, special: float) -> bool | None:
+        """As `holds`, where a value (of a sequence the first item) is NaN or an infinity: compared as IEEE 754 does.
+        None where that cannot be told."""
+        held = values[name]
+        put: Any = Sequence((special, *held.items[1:])) if isinstance(held, Sequence) else special  # type: ignore[arg-type]
+        try:
+            return bool(self.evaluator({**values, name: put})) if self.evaluator is not None else None
+        except (NotEvaluable, ValueError, ArithmeticError, TypeError):
+            return None
+
 
 class NoValue(ValueError):  # noqa: N818 - it says what it is
     """What came back is no value of the port's type."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import io
 import math
+import tokenize
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,11 +79,13 @@ def load(job: Job) -> Reading:
         message = "Python's floats are float64: numbers: float32 is not what this source computes with"
         faults.append(Diagnostic("PYTHON100", message, source.place.at("numbers")))
     path = inside(job.root, source.python)
-    text, tree = "", None
+    text, encoding, tree = "", "", None
     try:
         assert path is not None
-        text = path.read_text(encoding="utf-8")
-        tree = ast.parse(text, filename=path.name)
+        data = path.read_bytes()
+        tree = ast.parse(data, filename=path.name)  # of the bytes, as CPython reads them
+        encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
+        text = data.decode(encoding)
     except SyntaxError as error:
         at = error.lineno or 1
         faults.append(Diagnostic("PYTHON100", f"this is no Python: {error.msg}", Span(str(path), at, 1, at, 2)))
@@ -92,14 +96,16 @@ def load(job: Job) -> Reading:
     faults += wrong
     if faults or tree is None or path is None:
         raise Rejected(*faults)
-    step, refused = _step(job, source, tree, path, text, params)
+    step, refused = _step(job, source, tree, path, text, encoding, params)
     return Reading(job, source, path, text, params, step, refused)
 
 
 def _step(
-    job: Job, source: Source, tree: ast.Module, path: Path, text: str, params: Mapping[str, Any]
+    job: Job, source: Source, tree: ast.Module, path: Path, text: str, encoding: str, params: Mapping[str, Any]
 ) -> tuple[Step | None, tuple[Refusal, ...]]:
     try:
+        if encoding not in ("utf-8", "utf-8-sig"):
+            return None, (Refusal(1, f"the file is written in {encoding}: its text hides what it says"),)
         parts, refused = read(tree, source.class_name, path)
         if parts is None or refused:
             return None, refused

@@ -32,12 +32,12 @@ from avow.tuning.bounds import CASES_KEPT
 
 from .conditions import Conditions, Found
 from .cpython import Told, ask, case_of
-from .judging import Formula, Seen, exact, meets, seen
+from .judging import Formula, NoValue, Seen, meets, returned, seen
 from .machine import fraction, run
 from .reading import Reading, load
 from .samples import Drawing, beside, numbers_of, pool
 from .translate import kind_of
-from .tuning import RUN_SECONDS, VALIDATED
+from .tuning import APART, RUN_SECONDS, VALIDATED
 
 TOOL = "python conditions"
 NOT_FINITE = "inputs are finite"
@@ -104,6 +104,8 @@ class Work:
         begun = self.begins(assumed)
         if begun is not None:
             return tuple(self.refuted(o) or replace(begun, obligation=o.id) for o in job.obligations)
+        if job.options.get("nan") == "possible" and self.reals():
+            return self.apart(cases, formulas, assumed)
         still = [o for o in job.obligations if o.id not in self.broken]
         found: dict[str, Found] = {}
         if still:
@@ -251,7 +253,12 @@ class Work:
         """Whether what `__init__` makes meets what is assumed of memory alone."""
         step = self.reading.step
         assert step is not None
-        values = {f"in.{port}": exact(step.start[attribute]) for port, attribute in step.memory.items()}
+        try:
+            sorts = {port: self.job.node.input(port).sort for port in step.memory}
+            values = {f"in.{p}": returned(p, step.start[a], sorts[p]) for p, a in step.memory.items()}
+        except NoValue as wrong:
+            shown = Counterexample((), f"this is what __init__ makes of memory: {wrong}")
+            return Outcome("", Verdict.REFUTED, shown.text(), shown)
         for formula in assumed:
             names = {v.qualified for v in free_variables(formula.term)}
             if names and names <= values.keys() and formula.holds(values) is False:
@@ -294,14 +301,53 @@ class Work:
         details = {**found.details, OUTPUT_FOR_EVERY_INPUT: True}
         return Outcome(obligation.id, Verdict.PROVED, summary, hypotheses=self.hypotheses(), details=details)
 
-    def hypotheses(self) -> tuple[str, ...]:
+    def reals(self) -> list[str]:
+        """The inputs that are REAL, or sequences of such."""
+
         def real(sort: object) -> bool:
             return isinstance(sort.item if isinstance(sort, SequenceSort) else sort, RealSort)
 
-        names = [f"in.{p.name}" for p in self.job.node.inputs if real(p.sort)]
+        return [p.name for p in self.job.node.inputs if real(p.sort)]
+
+    def hypotheses(self) -> tuple[str, ...]:
+        names = [f"in.{name}" for name in self.reals()]
         if not names or self.reading.exact:
             return self.unkept
         return (f"{NOT_FINITE}: {', '.join(names)}: no NaN, no infinity", *self.unkept)
+
+    def apart(
+        self, cases: Sequence[dict[str, Any]], formulas: Mapping[str, Formula], assumed: tuple[Formula, ...]
+    ) -> tuple[Outcome, ...]:
+        """Where NaN and the infinities are possible: each REAL input in its turn is one, beside a few cases' others. An
+        output that is no REAL breaks every guarantee."""
+        memory, allowed = self.reading.source.memory, meets(assumed)
+        asked: list[tuple[dict[str, Any], str, str]] = []
+        for case in [c for c in cases if allowed(c)][:APART]:
+            for name in self.reals():
+                for special in (math.nan, math.inf, -math.inf):
+                    held: Any = [special, *case[name][1:]] if isinstance(case[name], list) else special
+                    asked.append(({**case, name: held}, name, str(special)))
+        texts = [
+            case_of({n: v for n, v in c.items() if n not in memory}, {n: v for n, v in c.items() if n in memory})
+            for c, _, _ in asked
+        ]
+        found = ask(self.reading.subject, texts, seconds=RUN_SECONDS, megabytes=self.limits.megabytes)
+        self.keep(found)
+        if found.fault or len(found.replies) != len(asked):
+            return self.alike(Verdict.ERROR, found.fault or "the class did not answer every case")
+        for (case, name, word), reply in zip(asked, found.replies, strict=True):
+            zero = {**case, name: [0.0, *case[name][1:]] if isinstance(case[name], list) else 0.0}
+            answer = seen(self.job.node, memory, zero, reply)
+            pairs = tuple((n, word if n == f"in.{name}" else v) for n, v in answer.pairs())
+            for o in self.job.obligations:
+                formula = formulas[o.id]
+                if o.id in self.broken:
+                    continue
+                if answer.wrong or formula.compared(answer.values, f"in.{name}", float(word)) is False:
+                    why = answer.wrong or f"as IEEE 754 compares, {formula.name} does not hold of it"
+                    self.broken[o.id] = Counterexample(pairs, why)
+        why = "NaN and the infinities are possible: none that was tried does harm, and nothing is proved of them"
+        return tuple(self.refuted(o) or Outcome(o.id, Verdict.UNKNOWN, why) for o in self.job.obligations)
 
 
 def _plain(value: Any) -> Any:

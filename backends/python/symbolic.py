@@ -14,6 +14,7 @@ from fractions import Fraction
 from avow.formulas.formula import conjunction, disjunction, negation
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, EnumSort, FunctionSort, Sort
 from avow.language.terms import (
+    FALSE,
     TRUE,
     Apply,
     Arithmetic,
@@ -234,12 +235,13 @@ class Run:
         names = set(assigned(loop.body))
         carried = tuple(sorted(name for name in names if name in state.values))
         entry = dict(state.values)
-        own = [c for c in self.candidates if c.loop == loop.counter]
         first = Turn(entry, ZERO, entry, loop, carried)
         self.loops.append((loop, first))
-        for candidate in own:
+        own: list[Candidate] = []
+        for candidate in (c for c in self.candidates if c.loop == loop.counter):
             goal = candidate.build(first)
             if goal is not None:
+                own.append(candidate)
                 self.check(state, goal, f"at first {candidate.text}", loop.line, candidate)
         head = dict(state.values)
         for name in carried:
@@ -266,9 +268,8 @@ class Run:
             if word == "continue":
                 after = Turn(gone.values, plus_one(done), entry, loop, carried)
                 for candidate in own:
-                    goal = candidate.build(after)
-                    if goal is not None:
-                        self.check(gone, goal, f"each turn keeps {candidate.text}", loop.line, candidate)
+                    goal = candidate.build(after) or FALSE
+                    self.check(gone, goal, f"each turn keeps {candidate.text}", loop.line, candidate)
         result: State | None = over
         for gone, word in leaving:
             if word == "break":

@@ -12,6 +12,9 @@ LENGTHS = (0, 1, 2, 3, 4, 5, 8, 12)
 BATCH = 100
 """Cases in one message to the class' process: each message wakes another process."""
 
+APART = 20
+"""Cases beside which each REAL input is NaN and infinite, where that is possible."""
+
 INLINED_DEPTH = 8
 """Calls within calls beyond which a step is refused; recursion is told at once."""
 

@@ -50,6 +50,8 @@ class Parts:
     """Names of the module."""
     of_class: dict[str, ast.expr]
     """Names of the class."""
+    modules: frozenset[str] = frozenset()
+    """Modules that it imports by their own name."""
 
 
 def read(tree: ast.Module, class_name: str, file: Path) -> tuple[Parts | None, tuple[Refusal, ...]]:
@@ -64,7 +66,9 @@ def read(tree: ast.Module, class_name: str, file: Path) -> tuple[Parts | None, t
     refused += _class(node)
     functions = {s.name: s for s in tree.body if isinstance(s, ast.FunctionDef)}
     methods = {s.name: s for s in node.body if isinstance(s, ast.FunctionDef)}
-    parts = Parts(node, methods, functions, dict(_constants(tree.body)), dict(_constants(node.body)))
+    modules = frozenset(a.name for s in tree.body if isinstance(s, ast.Import) for a in s.names)
+    parts = Parts(node, methods, functions, dict(_constants(tree.body)), dict(_constants(node.body)), modules)
+    refused += _bound_when_run(tree)
     refused += _twice(tree.body, "this file")
     refused += _twice(node.body, class_name)
     refused += _written_elsewhere(tree, parts)
@@ -95,7 +99,34 @@ def _statements(tree: ast.Module, class_name: str) -> Iterator[Refusal]:
 
 
 def _is_main(test: ast.expr) -> bool:
-    return isinstance(test, ast.Compare) and isinstance(test.left, ast.Name) and test.left.id == "__name__"
+    return ast.unparse(test) in ("__name__ == '__main__'", "'__main__' == __name__")
+
+
+def _bound_when_run(tree: ast.Module) -> Iterator[Refusal]:
+    """What a main block binds that the file has already, or the block binds where the file is only imported."""
+    known = {name for statement in tree.body for name in _names(statement)}
+    for statement in tree.body:
+        if isinstance(statement, ast.If):
+            if statement.orelse:
+                yield Refusal(statement.orelse[0].lineno, "a statement that runs when the file is loaded")
+            for inner in ast.walk(statement):
+                names = _names(inner) if isinstance(inner, ast.stmt) else []
+                if isinstance(inner, ast.Name) and not isinstance(inner.ctx, ast.Load):
+                    names = [inner.id]
+                for name in known & set(names):
+                    at = getattr(inner, "lineno", statement.lineno)
+                    yield Refusal(at, f"{name} is bound again when the file is run")
+
+
+def _names(statement: ast.stmt) -> list[str]:
+    """What a statement defines, imports or names as a constant."""
+    match statement:
+        case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+            return [name]
+        case ast.Import(names=names) | ast.ImportFrom(names=names):
+            return [(alias.asname or alias.name).partition(".")[0] for alias in names]
+        case _:  # nothing else defines at the top of a file
+            return [name for name, _ in _constants([statement])]
 
 
 def _other_class(node: ast.ClassDef) -> Iterator[Refusal]:
@@ -149,12 +180,7 @@ def _is_constant(value: ast.expr) -> bool:
 def _twice(body: list[ast.stmt], where: str) -> Iterator[Refusal]:
     seen: set[str] = set()
     for statement in body:
-        names = [name for name, _ in _constants([statement])]
-        if isinstance(statement, ast.FunctionDef | ast.ClassDef):
-            names = [statement.name]
-        if isinstance(statement, ast.Import | ast.ImportFrom):
-            names = [(alias.asname or alias.name).partition(".")[0] for alias in statement.names]
-        for name in names:
+        for name in _names(statement):
             if name in seen:
                 yield Refusal(statement.lineno, f"{name} is defined twice in {where}")
             seen.add(name)
@@ -211,10 +237,16 @@ def _everywhere(tree: ast.Module) -> Iterator[Refusal]:
                 yield Refusal(line, "del")
             case ast.FunctionDef(decorator_list=[_, *_]) | ast.AsyncFunctionDef(decorator_list=[_, *_]):
                 yield Refusal(line, f"the function {part.name} is decorated")
+            case ast.FunctionDef(args=arguments, returns=returns) if _runs(arguments, returns):
+                yield Refusal(line, "a call in an annotation or default runs when the file is loaded")
             case ast.AsyncFunctionDef() | ast.Await() | ast.Yield() | ast.YieldFrom():
                 yield Refusal(line, "a generator or coroutine")
             case ast.Constant(value=str(text)) if "__setattr__" in text or "__getattribute__" in text:
                 yield Refusal(line, "a text that names what reaches behind the text")
+
+
+def _runs(arguments: ast.arguments, returns: ast.expr | None) -> bool:
+    return any(isinstance(part, ast.Call) for root in (arguments, returns) if root for part in ast.walk(root))
 
 
 def _written_elsewhere(tree: ast.Module, parts: Parts) -> Iterator[Refusal]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Translated
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
-from avow.base.verdict import Counterexample, Link, Outcome, Verdict
+from avow.base.verdict import Counterexample, Link, Object, Outcome, Verdict
 from avow.ros.sources import message_files
 from avow.system.paths import inside
 
@@ -38,6 +38,7 @@ class RosMonitoringBackend(Backend):
     version = "4"
     strength = Verdict.MONITORED
     link = Link.MAPPED
+    of = Object.RECORDING
     uses_steps = False
     options_schema = SCHEMA
     codes = CODES

@@ -18,7 +18,7 @@ from avow.assurance.codec import read_case
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "docs/examples"
 VERDICTS = {
-    "warehouse": "Holds if 4 suppositions hold",
+    "warehouse": "Holds if 5 suppositions hold",
     "ventilator": "Holds",
     "geofence": "Holds if 2 suppositions hold",
 }

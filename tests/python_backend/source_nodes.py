@@ -107,6 +107,7 @@ class Example:
     params: Mapping[str, Any] = field(default_factory=dict)
     memory: Mapping[str, str] = field(default_factory=dict)
     numbers: str = "float64"
+    options: Mapping[str, Any] = field(default_factory=dict)
     mutants: tuple[tuple[str, str], ...] = ()
     false: frozenset[str] = frozenset()
     """Guarantees that the right class does not meet: what it computes with is not exact."""
@@ -122,7 +123,11 @@ class Example:
         (folder / "system.rcl").write_text(self.rcl)
         (folder / "params.yaml").write_text(yaml.safe_dump(dict(self.params)))
         declared = {"python": "node.py", "class": self.class_name, "parameters": "params.yaml"}
-        node: dict[str, Any] = {"source": declared, "numbers": self.numbers, "methods": [{"python": {}}]}
+        node: dict[str, Any] = {
+            "source": declared,
+            "numbers": self.numbers,
+            "methods": [{"python": dict(self.options)}],
+        }
         if self.memory:
             node["memory"] = {port: f"self.{name}" for port, name in self.memory.items()}
         (folder / "plan.yaml").write_text(yaml.safe_dump({"nodes": {self.node: node}}))
@@ -302,6 +307,29 @@ TRICKS: dict[str, Example] = {
         "exec": (LIMITER + "\n    def poke(self): exec('Limiter.step = None')\n", "Limiter"),
         "import that patches": ("import builtins\n" + LIMITER, "Limiter"),
         "star import": ("from math import *\n" + LIMITER, "Limiter"),
+        "a function rebound when imported": (
+            "def clip(x):\n    return 1.0\nif __name__ != '__main__':\n    def clip(x):\n        return x\n"
+            + _with_step("        return clip(v)\n"),
+            "Limiter",
+        ),
+        "a constant rebound when run": (
+            "LIMIT = 1.0\nif __name__ == '__main__':\n    LIMIT = 9.0\n" + _with_step("        return LIMIT\n"),
+            "Limiter",
+        ),
+        "a main block that is none": (
+            "LIMIT = 1.0\nif __name__ == '__main__':\n    pass\nelse:\n    LIMIT = 9.0\n"
+            + _with_step("        return LIMIT\n"),
+            "Limiter",
+        ),
+        "hidden by its encoding": ("# -*- coding: utf-7 -*-\n" + LIMITER + "\n# +AAo-Limiter.step = None\n", "Limiter"),
+        "a call in an annotation": (
+            "def patch(c):\n    return c\n" + LIMITER + "\ndef f(x: patch(Limiter)): pass\n",
+            "Limiter",
+        ),
+        "math that is not imported": (
+            _with_step("        if v == 12345.678 and v < 0.0:\n            return math.pi\n        return v\n"),
+            "Limiter",
+        ),
         "overflow": (_with_step("        return v * 1e308 * 0.0\n"), "Limiter"),
     }.items()
 }

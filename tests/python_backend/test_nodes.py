@@ -61,6 +61,19 @@ def test_finite_inputs_are_a_hypothesis(name: str, tmp_path: Path) -> None:
         assert any(h.startswith("inputs are finite") for h in found.hypotheses)
 
 
+@pytest.mark.parametrize("name", ["limiter", "median", "scanmin"])
+def test_nan_passes_through_where_it_is_possible(name: str, tmp_path: Path) -> None:
+    found = replace(NODES[name], options={"nan": "possible"}).settled(tmp_path)
+    assert {o.verdict for o in found.values()} == {Verdict.REFUTED}
+    assert any("nan" in o.summary for o in found.values())
+
+
+def test_memory_starts_with_a_value_of_its_type(tmp_path: Path) -> None:
+    source = NODES["debouncer"].source.replace("self.count = 0\n    def", "self.count = -1\n    def")
+    for found in replace(NODES["debouncer"], source=source).settled(tmp_path).values():
+        assert found.verdict is Verdict.REFUTED
+
+
 def test_what_init_makes_has_to_meet_what_is_assumed_of_memory(tmp_path: Path) -> None:
     source = NODES["debouncer"].source.replace("self.count = 0\n    def", "self.count = 5\n    def")
     for found in replace(NODES["debouncer"], source=source).settled(tmp_path).values():
