@@ -15,9 +15,10 @@ from .intentions import Frame
 from .interpreter import Agent, State
 from .mind import NONE
 from .psl import Atom, Formula, Modality, Not, atoms, conjunction
+from .standing import standing
 from .structure import Fair, Kripke, Lasso, find_lasso, reduce
-from .syntax import DeedKind, Sign, Struct, Term, Var, unify
-from .tautology import is_valid
+from .syntax import DeedKind, Sign, Struct, Term, named_apart, unify
+from .tautology import Laws, is_valid
 
 
 class OutOfTime(Exception):  # noqa: N818 - it names a state, not a fault
@@ -49,7 +50,8 @@ class Result:
     immediate: bool
     """Wherever the trigger is met, so is the goal, at once: nothing had to happen."""
     valid: bool = False
-    """It holds of every agent: what the table made of the claim is a tautology."""
+    """It holds of every agent with these reasoning rules and lasting beliefs, whatever its plans are: what the table
+    made of the claim is a tautology."""
     answered: bool = False
     """What is forbidden is the agent's answer to the trigger (`Checker._answered`)."""
 
@@ -65,9 +67,13 @@ class Checker:
     """For each state: the bits of `atoms`, above them two bits for each fairness assumption (drawn; granted)."""
     places: dict[Atom, int] = field(default_factory=dict)
     reduced: Kripke = field(init=False)
+    laws: Laws = field(init=False)
 
     def __post_init__(self) -> None:
         self.atoms = asked(self.properties)
+        system = self.graph.system
+        percepts = [p for _, group in system.environment.groups for p in group if p is not None]
+        self.laws = standing([agent.program for agent in system.agents], percepts)
         self.places = {atom: at for at, atom in enumerate(self.atoms)}
         self.labels = label_states(self.graph.system, self.graph.states, self.atoms)
         self.reduced = reduce(self.whole(self.labels))
@@ -86,7 +92,7 @@ class Checker:
         automaton, fair, labels = self._projected(wanted, self.reduced.labels)
         small = reduce(Kripke(self.reduced.initial, self.reduced.successors, labels))
         holds = find_lasso(small, automaton, fair) is None
-        valid = holds and is_valid(wanted.formula)
+        valid = holds and is_valid(wanted.formula, self.laws)
         vacuous = immediate = False
         if wanted.trigger is not None:
             met = self._where(wanted.trigger)
@@ -163,8 +169,8 @@ def label_states(system: System, states: Iterable[Any], wanted: Sequence[Atom]) 
         Labels(agent, [(bit, atom) for bit, atom in numbered if atom.agent == name])
         for name, agent in zip(names, system.agents, strict=True)
     ]
-    done = [(bit, names[a.agent], _own(a.term)) for bit, a in numbered if a.modality is Modality.DID]
-    perceived = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.PERCEPT]
+    done = [(bit, names[a.agent], named_apart(a.term)) for bit, a in numbered if a.modality is Modality.DID]
+    perceived = [(bit, named_apart(a.term)) for bit, a in numbered if a.modality is Modality.PERCEPT]
     fair = [(1 << (len(wanted) + 2 * at), f.percept) for at, f in enumerate(system.environment.fair)]
     by_last: dict[int, int] = {}
     by_draw: dict[int, int] = {}
@@ -200,9 +206,9 @@ class Labels:
     def __init__(self, agent: Agent, numbered: Sequence[tuple[int, Atom]]) -> None:
         self.agent = agent
         mental = (Modality.INTENDS, Modality.INTENDS_TO_DO)
-        self.believed = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.BELIEVES]
-        self.wanted = [(bit, _own(a.term)) for bit, a in numbered if a.modality is Modality.WANTS]
-        self.intended = [(bit, a.modality, _own(a.term)) for bit, a in numbered if a.modality in mental]
+        self.believed = [(bit, named_apart(a.term)) for bit, a in numbered if a.modality is Modality.BELIEVES]
+        self.wanted = [(bit, named_apart(a.term)) for bit, a in numbered if a.modality is Modality.WANTS]
+        self.intended = [(bit, a.modality, named_apart(a.term)) for bit, a in numbered if a.modality in mental]
         self.by_beliefs: dict[int, int] = {}
         self.by_goals: dict[int, int] = {}
         self.by_intention: dict[int, int] = {NONE: 0}
@@ -250,15 +256,6 @@ def _mental(frames: Iterable[Frame], wanted: Sequence[tuple[int, Modality, Term]
             if hits:
                 bits |= bit
     return bits
-
-
-def _own(term: Term, names: list[int] | None = None) -> Term:
-    """Each ``_`` gets a name of its own, as it stands for anything."""
-    names = [] if names is None else names
-    if isinstance(term, Var):
-        names.append(0)
-        return Var(f"?{len(names)}")
-    return Struct(term.functor, tuple(_own(arg, names) for arg in term.args))
 
 
 def asked(properties: Iterable[Property]) -> tuple[Atom, ...]:

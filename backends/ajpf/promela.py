@@ -23,6 +23,7 @@ from .syntax import (
     Term,
     Var,
     is_ground,
+    named_apart,
     variables,
 )
 from .tuning import PLAN_VARIABLES, RULE_DEPTH
@@ -135,7 +136,8 @@ def header(system: System, wanted: Sequence[Atom]) -> str:
     percepts, rows = _environment(tables, environment)
     places = {agent.program.name: at for at, agent in enumerate(system.agents)}
     said = [
-        f"{{'{_ATOMS[a.modality]}', {places.get(a.agent, 0)}, {tables.pattern(_apart(a.term), {})}}}" for a in wanted
+        f"{{'{_ATOMS[a.modality]}', {places.get(a.agent, 0)}, {tables.pattern(named_apart(a.term), {})}}}"
+        for a in wanted
     ]
     for fair in environment.fair:
         percept = tables.pattern(fair.percept, {})
@@ -262,15 +264,6 @@ def _environment(tables: _Tables, environment: Environment) -> tuple[str, str]:
         f"static const int percepts[NGROUPS][{width}] = {percepts};",
         f"static const int options[][NGROUPS][{longest}] = {cells};",
     )
-
-
-def _apart(term: Term, names: list[int] | None = None) -> Term:
-    """Each ``_`` a variable of its own."""
-    names = [] if names is None else names
-    if isinstance(term, Var):
-        names.append(0)
-        return Var(f"?{len(names)}")
-    return Struct(term.functor, tuple(_apart(arg, names) for arg in term.args))
 
 
 def _kind(kind: GoalKind | None) -> int:

@@ -189,7 +189,7 @@ def _nothing_shown(own: Sequence[Property], results: Mapping[str, Settled]) -> I
     elif unmet:
         yield f"the trigger{_which(unmet)} is never met, so that nothing is shown there"
     if valid and every:
-        yield "but the table makes it a tautology, true of every agent, so that nothing is shown"
+        yield "but the table makes it a tautology, true of every agent with these rules, so that nothing is shown"
     elif valid:
         yield f"the table makes a tautology of the property{_which(valid)}, so that nothing is shown there"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from itertools import count
 
 from avow.base.diagnostics import Span
 
@@ -231,6 +232,18 @@ def deeper(term: Term, most: int) -> bool:
 
 def is_ground(term: Term) -> bool:
     return isinstance(term, Struct) and all(map(is_ground, term.args))
+
+
+def named_apart(term: Struct) -> Struct:
+    """Each ``_`` of a property gets a name of its own, as it stands for anything."""
+    numbers = count(1)
+
+    def walk(part: Term) -> Term:
+        if isinstance(part, Var):
+            return Var(f"?{next(numbers)}")
+        return Struct(part.functor, tuple(map(walk, part.args)))
+
+    return Struct(term.functor, tuple(map(walk, term.args)))
 
 
 def rename(term: Term, names: Mapping[str, Term]) -> Term:

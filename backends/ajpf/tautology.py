@@ -22,13 +22,21 @@ from .tuning import TAUTOLOGY_CASES
 _EXISTENTIAL = (Modality.DID, Modality.WANTS, Modality.INTENDS, Modality.INTENDS_TO_DO, Modality.PERCEPT)
 
 
+Laws = Callable[[tuple[Atom, ...]], Iterable[Formula]]
+"""What is known of the states of one agent, as far as it bears on some atoms (`standing`)."""
+
+
+def _no_laws(atoms: tuple[Atom, ...]) -> Iterable[Formula]:
+    return ()
+
+
 @dataclass(slots=True)
 class Steps:
     left: int = TAUTOLOGY_CASES
 
 
-def is_valid(formula: Formula) -> bool:
-    """Whether a property holds on every run of every agent. Raises automaton.TooLarge."""
+def is_valid(formula: Formula, laws: Laws = _no_laws) -> bool:
+    """Whether a property holds on every run of every agent of which the laws are true. Raises automaton.TooLarge."""
     automaton = build(psl.Not(formula))
     known: dict[int, bool] = {}
     steps = Steps()
@@ -41,7 +49,7 @@ def is_valid(formula: Formula) -> bool:
                     literals.append(leaf)
                 if automaton.negative[node] >> at & 1:
                     literals.append(psl.Not(leaf))
-            known[node] = is_satisfiable(psl.And(tuple(literals)), steps)
+            known[node] = is_satisfiable(psl.And(tuple(literals)), steps, laws)
         return known[node]
 
     def successors(node: int) -> list[int]:
@@ -61,10 +69,10 @@ def constant(formula: Formula) -> bool | None:
     return None if is_satisfiable(psl.Not(formula)) else True
 
 
-def is_satisfiable(formula: Formula, steps: Steps | None = None) -> bool:
+def is_satisfiable(formula: Formula, steps: Steps | None = None, laws: Laws = _no_laws) -> bool:
     """Of a formula without temporal operators; true also where finding out would take too long."""
     atoms = tuple(dict.fromkeys(psl.atoms(formula)))
-    whole = psl.And((formula, *_laws(atoms)))
+    whole = psl.And((formula, *_laws(atoms), *laws(atoms)))
     steps = steps or Steps()
     pending: list[dict[Atom, bool]] = [{}]
     while pending:

@@ -86,3 +86,9 @@ PLAN_VARIABLES = 64
 
 LIVE_JOBS = 1_000
 """Steps of a running program without an action: after so many it is taken for endless; a plan has some tens."""
+
+STANDING_ATOMS = 40
+"""Beliefs to which rules are followed from those of a property, to see whether it follows from the rules alone."""
+
+STANDING_INSTANCES = 64
+"""Instances of one rule that are looked at for that."""

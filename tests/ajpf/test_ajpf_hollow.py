@@ -12,8 +12,17 @@ from test_ajpf_ltl import Kripke as Graph
 from test_ajpf_ltl import Not as Negation
 
 from avow.backend_kit.protocol import Limits
-from avow.backends.ajpf import BACKEND
+from avow.backends.ajpf import BACKEND, psl
+from avow.backends.ajpf.automaton import compiled
+from avow.backends.ajpf.checker import label_states
+from avow.backends.ajpf.environment import read_environment
+from avow.backends.ajpf.explore import explore
+from avow.backends.ajpf.interpreter import Semantics
+from avow.backends.ajpf.parser import parse_system
 from avow.backends.ajpf.psl_parser import parse_psl
+from avow.backends.ajpf.society import system
+from avow.backends.ajpf.standing import standing
+from avow.backends.ajpf.syntax import Struct
 from avow.backends.ajpf.tautology import Steps, constant, is_satisfiable, is_valid
 from avow.backends.ajpf.tuning import TAUTOLOGY_CASES
 from avow.base.verdict import Verdict
@@ -104,6 +113,93 @@ def test_a_goal_that_is_its_own_trigger_shows_nothing(lift, tmp_path):
     assert outcome.vacuous
     assert "the table makes it a tautology" in outcome.summary
     assert all(entry["tautology"] for entry in outcome.details["properties"])
+
+
+RULED = """\
+GWENDOLEN
+:name: ag
+:Initial Beliefs:
+ready, old, near(1), fixed
+:Reasoning Rules:
+barred :- outside;
+barred :- wet, ~dry;
+stopped :- barred;
+close(X) :- near(X), at(X);
+odd(X) :- near(X), [X < 2];
+hidden :- ~(near(X), at(X));
+quiet :- ~noise(X);
+:Initial Goals:
+:Plans:
++p : { True } <- act, -old, -at(2);
++outside : { True } <- +seen, -near(_);
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[] (B(ag, outside) -> (<> B(ag, barred)))", True),
+        ("[] (B(ag, outside) -> (<> B(ag, stopped)))", True),  # by two rules
+        ("[] ((B(ag, wet) & ~B(ag, dry)) -> (<> B(ag, stopped)))", True),
+        ("[] (B(ag, wet) -> (<> B(ag, barred)))", False),
+        ("[] (B(ag, barred) -> (<> B(ag, outside)))", False),
+        ("[] ((B(ag, near(1)) & B(ag, at(1))) -> (<> B(ag, close(1))))", True),
+        ("[] ((B(ag, near(1)) & B(ag, at(1))) -> (<> B(ag, close(_))))", True),
+        ("[] ((B(ag, near(1)) & B(ag, at(2))) -> (<> B(ag, close(_))))", False),
+        ("[] (B(ag, near(1)) -> (<> B(ag, odd(1))))", False),  # what a comparison says is not followed
+        ("[] ((~B(ag, noise(_))) -> (<> B(ag, quiet)))", True),
+        ("[] (B(ag, outside) -> (<> B(ag, ready)))", True),  # nothing ever drops it
+        ("[] (B(ag, outside) -> (<> B(ag, old)))", False),  # a plan drops it
+        ("[] (B(ag, outside) -> (<> B(ag, fixed)))", False),  # it may go with a percept
+        ("[] (B(ag, outside) -> (<> B(ag, seen)))", False),
+        ("[] (B(other, outside) -> (<> B(other, barred)))", False),
+    ],
+)
+def test_what_follows_from_the_agents_own_rules_shows_nothing_of_its_plans(text, expected):
+    laws = standing(parse_system(RULED, "a.gwen"), [Struct("outside"), Struct("fixed")])
+    assert is_valid(parse_psl(text), laws) is expected
+
+
+def test_the_laws_are_true_wherever_an_agent_comes(tmp_path):
+    percepts = "{x: [outside, wet, nothing], y: [dry, fixed, 'at(1)', nothing]}"
+    (tmp_path / "e.yaml").write_text(f"draws: {{at_quiescence: once}}\npercepts: {percepts}\n")
+    programs, draws = parse_system(RULED, "a.gwen"), read_environment(tmp_path / "e.yaml")
+    names = [
+        "barred",
+        "stopped",
+        "close(1)",
+        "close(_)",
+        "hidden",
+        "quiet",
+        "ready",
+        "fixed",
+        "old",
+        "at(1)",
+        "near(_)",
+    ]
+    asked = parse_psl(" & ".join(f"B(ag, {name})" for name in names))
+    offered = [p for _, group in draws.groups for p in group if p is not None]
+    laws = tuple(standing(programs, offered)(tuple(psl.atoms(asked))))
+    assert len(laws) >= 6
+    atoms = tuple(dict.fromkeys(a for law in laws for a in psl.atoms(law)))
+    graph = explore(system(programs, draws, Semantics.MCAPL), states=5_000)
+    labels = set(label_states(graph.system, graph.states, atoms))
+    assert len(labels) > 5
+    for law in laws:
+        true = compiled(law, {atom: at for at, atom in enumerate(atoms)})
+        assert all(map(true, labels)), psl.show(law)
+
+
+def test_a_goal_that_its_rule_derives_of_the_trigger_shows_nothing(lift, tmp_path):
+    rows = {**lift().options["predicates"], "out.motion == go(f)": "B(cabin, wanted(f))"}
+    path = lift().options["program"]
+    text = (lift().root / path).read_text()
+    assert ":Reasoning Rules:\n" in text
+    ruled = text.replace(":Reasoning Rules:\n", ":Reasoning Rules:\nwanted(F) :- call(F);\n")
+    outcome = settle(lift({"predicates": rows}, {path: ruled}), tmp_path)["answers"]
+    assert outcome.verdict is Verdict.CHECKED
+    assert outcome.vacuous
+    assert "true of every agent with these rules" in outcome.summary
 
 
 # What a guarantee forbids
