@@ -22,8 +22,9 @@ from pathlib import Path
 
 from avow.tuning.sizes import OUTPUT_KEPT
 
-_FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -signal.SIGTERM})
-"""How a tool ends that somebody ended: a person, or a system out of memory. A crash of its own is none of them."""
+_FROM_OUTSIDE = frozenset({-signal.SIGHUP, -signal.SIGINT, -signal.SIGKILL, -signal.SIGTERM, -signal.SIGXFSZ})
+"""How a tool ends that somebody ended: a person, or a system out of memory or room. A crash of its own is none of
+them."""
 
 _running: set[int] = set()
 _ended_by_others = threading.Event()
@@ -86,9 +87,15 @@ def run(
             kill_tree(process.pid)
             process.wait()
             unwatch(process.pid)
-        if code in _FROM_OUTSIDE:
-            _ended_by_others.set()
+        ended_with(code)
         return Completed(tuple(command), code, _read(out), _read(err), time.monotonic() - start)
+
+
+def ended_with(code: int | None) -> None:
+    """A program that this process ran ended so; where that was somebody else's doing, `ended_by_others` says so. A
+    program that runs another one tells of that one's signal by a code above 128."""
+    if code is not None and (128 - code if code > 128 else code) in _FROM_OUTSIDE:
+        _ended_by_others.set()
 
 
 def ended_by_others() -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import threading
 from collections.abc import Mapping, Sequence
@@ -47,7 +48,14 @@ def ask(
         reader.join(5.0)
         if not reader.is_alive():
             os.close(ours)
-    return done, _answer(b"".join(parts)) if done.code == 0 and not reader.is_alive() else None
+    answer = _answer(b"".join(parts)) if done.code == 0 and not reader.is_alive() else None
+    if answer is not None and answer.pop(_ENDED, False):
+        process.ended_with(-signal.SIGKILL)
+    return done, answer
+
+
+_ENDED = "ended by others"
+"""In a judge's word: its subject was ended by somebody else."""
 
 
 def _answer(data: bytes) -> dict[str, Any] | None:
@@ -62,7 +70,7 @@ def _answer(data: bytes) -> dict[str, Any] | None:
 
 def say(channel: int, answer: Mapping[str, Any]) -> None:
     """The judge's one word to whoever started it."""
-    data = json.dumps(answer).encode() + b"\n"
+    data = json.dumps({**answer, _ENDED: process.ended_by_others()}).encode() + b"\n"
     while data:
         data = data[os.write(channel, data) :]
     os.close(channel)

@@ -127,6 +127,7 @@ class Subject:
 
     def _stop(self) -> None:
         if self.process is not None:
+            process.ended_with(self.process.poll())
             process.kill_tree(self.process.pid)
             self.process.wait()
             process.unwatch(self.process.pid)
@@ -218,6 +219,9 @@ class Subject:
                 raise self._end(f"the subject does not answer within {self.patience:g} s")
             part = os.read(self._from, 1 << 16)
             if not part:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    assert self.process is not None
+                    self.process.wait(1.0)  # what it ended with says by whom
                 raise self._end("the subject's process has ended")
             self._buffer += part
             if len(self._buffer) > 16_000_000:

@@ -1,24 +1,16 @@
 """Solvers in processes of their own: a crash of one, or one that does not keep its time, is an unknown answer.
 
-``python -m avow.solving.apart`` reads lines ``[solver, script, limit]`` and writes a line for each: the answer, and the
-digest of what it is the answer to, so that no answer is taken for another's.
+Questions are ``[solver, script, limit]``, answers ``[answer, steps]`` (`avow.solving.answering`).
 """
 
 from __future__ import annotations
 
-import contextlib
-import json
 import math
-import os
-import subprocess
-import sys
-import threading
 from dataclasses import dataclass, field
 from importlib import metadata, util
 
-from avow.base.files import digest
-from avow.base.process import die_with
 from avow.kernel.solvers import NET_MS, Said, Solvers, ask_z3
+from avow.solving.answering import Answering, NoAnswer, serve
 from avow.solving.cvc5_process import answer
 from avow.tuning.effort import KERNEL_SECOND_STEPS
 
@@ -29,8 +21,7 @@ class Apart:
 
     solver: str
     steps: float = math.inf
-    _owner: int = 0
-    _process: subprocess.Popen[str] | None = None
+    _process: Answering = field(default_factory=lambda: Answering("avow.solving.apart"))
     _known: dict[tuple[str, int], Said] = field(default_factory=dict)
 
     def __call__(self, script: str, limit: int = KERNEL_SECOND_STEPS) -> Said:
@@ -44,37 +35,14 @@ class Apart:
         return self._known[question]
 
     def _ask(self, script: str, limit: int) -> tuple[Said, int]:
-        if self._owner != os.getpid():
-            self._process = None  # of the process that this one is a fork of
-        if self._process is None or self._process.poll() is not None:
-            self.close()
-            self._owner = os.getpid()
-            command = [sys.executable, "-P", "-m", "avow.solving.apart", str(self._owner)]
-            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        process = self._process
-        assert process.stdin is not None
-        assert process.stdout is not None
-        net = threading.Timer(NET_MS / 1000, process.kill)
-        net.start()
         try:
-            process.stdin.write((line := json.dumps([self.solver, script, limit])) + "\n")
-            process.stdin.flush()
-            said, used, about = process.stdout.readline().split()
-            return (Said(said), int(used)) if about == digest(line) else (Said.UNKNOWN, limit)
-        except (OSError, ValueError):
+            said, used = self._process.ask([self.solver, script, limit], NET_MS / 1000)
+            return Said(said), int(used)
+        except (TimeoutError, NoAnswer, ValueError, TypeError):
             return Said.UNKNOWN, limit
-        finally:
-            net.cancel()
 
     def close(self) -> None:
-        if self._process is None:
-            return
-        self._process.kill()
-        self._process.wait()
-        for stream in (self._process.stdin, self._process.stdout):
-            with contextlib.suppress(OSError):  # what it was to read can no longer be written
-                stream.close() if stream is not None else None
-        self._process = None
+        self._process.close()
 
 
 @dataclass(slots=True)
@@ -103,12 +71,13 @@ def versions() -> dict[str, str]:
     return found
 
 
+def _said(question: tuple[str, str, int]) -> tuple[str, int]:
+    solver, script, limit = question
+    if solver == "z3":
+        return ask_z3(script, limit), 0
+    said, used = answer(f"{script}(check-sat)\n", limit)
+    return said or Said.UNKNOWN, used
+
+
 if __name__ == "__main__":
-    die_with(int(sys.argv[1]))
-    for line in map(str.strip, sys.stdin):
-        solver, script, limit = json.loads(line)
-        if solver == "z3":
-            print(ask_z3(script, limit), 0, digest(line), flush=True)
-        else:
-            said, used = answer(f"{script}(check-sat)\n", limit)
-            print(said or Said.UNKNOWN, used, digest(line), flush=True)
+    serve(_said)

@@ -1,5 +1,4 @@
-"""cvc5 in a process of its own: ``python -m avow.solving.cvc5_process STEPS``, the script on standard input, the
-answer on standard output.
+"""cvc5 in a process of its own (`avow.solving.answering`): questions are ``[script, steps]``.
 
 There are scripts on which cvc5 does not keep its own limits (seen: sequences of tuples), and a call into a library
 cannot be ended from Python.
@@ -8,8 +7,9 @@ cannot be ended from Python.
 from __future__ import annotations
 
 import re
-import sys
 from typing import Any
+
+from avow.solving.answering import serve
 
 _PRODUCT = re.compile(r"\(\* (?!\(?[-/]? ?\d)(?!\S+ \(?[-/]? ?\d)")
 """Of what are not numbers."""
@@ -50,4 +50,4 @@ def _steps(solver: Any) -> int:
 
 
 if __name__ == "__main__":
-    print(answer(sys.stdin.read(), int(sys.argv[1]))[0])
+    serve(lambda question: answer(*question)[0])

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import importlib.util
 import re
-import sys
 from collections.abc import Iterable, Mapping
 from itertools import pairwise
 
-from avow.base import process
 from avow.formulas.formula import free_variables
 from avow.language.terms import Term
+from avow.solving.answering import Answering, NoAnswer
 from avow.solving.limits import net
 from avow.solving.translation import Translator
 from avow.solving.z3_module import z3
@@ -78,8 +77,16 @@ def ask_cvc5(script: str, *, effort: int = QUESTION_EFFORT) -> str | None:
     cannot read the script. Its own steps are counted, as Z3's are; the clock only ends what hangs."""
     if importlib.util.find_spec("cvc5") is None:
         return None
-    command = (sys.executable, "-P", "-m", "avow.solving.cvc5_process", str(max(1, effort * CVC5_STEPS)))
-    done = process.run(command, seconds=net(effort) + CVC5_START_SECONDS, stdin=script)
-    if done.timed_out:
-        return "unknown"
-    return done.stdout.strip() or None
+    steps, seconds = max(1, effort * CVC5_STEPS), net(effort) + CVC5_START_SECONDS
+    for _ in range(2):  # another process may have been ended by somebody else
+        try:
+            found: str | None = _cvc5.ask([script, steps], seconds)
+        except TimeoutError:
+            return "unknown"
+        except NoAnswer:
+            continue
+        return found or None
+    return None
+
+
+_cvc5 = Answering("avow.solving.cvc5_process")

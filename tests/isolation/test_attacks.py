@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import threading
 import time
 from pathlib import Path
 
@@ -12,9 +14,12 @@ from hoare.systems import make_job, sensor
 
 from avow.backend_kit.protocol import Limits, Report
 from avow.backends.hypothesis import BACKEND
+from avow.base import process
 from avow.base.verdict import Verdict
+from avow.isolation import judge
 from avow.isolation.level import SANDBOX, Isolation, seals
 from avow.isolation.observed import Seen
+from avow.isolation.subject import Subject, SubjectFailed
 
 LEVELS = [
     pytest.param("off", id="processes"),
@@ -229,3 +234,41 @@ def test_a_sealed_subject_has_no_network(tmp_path: Path, monkeypatch: pytest.Mon
     )
     report = settle(tmp_path, text)
     assert not any("AssertionError" in o.summary for o in report.outcomes), report.outcomes[0].summary
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_a_subject_that_somebody_else_ends_is_asked_again(
+    tmp_path: Path, level: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kill says nothing of what was given: the next run must not be content with it."""
+    monkeypatch.setenv(SANDBOX, level)
+    monkeypatch.setattr(process, "_ended_by_others", threading.Event())
+    (tmp_path / "s.py").write_text("import time\ndef step():\n    time.sleep(60)\n")
+    subject = Subject(tmp_path / "s.py", "step", 30.0)
+
+    def kill() -> None:
+        time.sleep(1.5)
+        assert subject.process is not None
+        os.kill(process._descendants(subject.process.pid)[-1], signal.SIGKILL)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    with pytest.raises(SubjectFailed):
+        subject.ask({})
+    killer.join()
+    assert process.ended_by_others()
+
+
+@pytest.mark.parametrize("killed", [True, False])
+def test_a_judge_tells_that_its_subject_was_ended(
+    tmp_path: Path, killed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(process, "_ended_by_others", threading.Event())
+    code = -signal.SIGKILL if killed else 0
+    (tmp_path / "j.py").write_text(
+        "import sys\nfrom avow.base import process\nfrom avow.isolation import judge\n"
+        f"process.ended_with({code})\njudge.say(int(sys.argv[1]), {{'a': 1}})\n"
+    )
+    _, said = judge.ask(str(tmp_path / "j.py"), [], cwd=tmp_path, seconds=30, megabytes=4000, env={})
+    assert said == {"a": 1}
+    assert process.ended_by_others() is killed

@@ -25,30 +25,42 @@ def solver() -> Iterator[Apart]:
 def acting(solver: Apart, shell: str) -> None:
     """Another program in the solver's place."""
     solver.close()
-    solver._owner = os.getpid()
-    solver._process = subprocess.Popen(["sh", "-c", shell], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        ["sh", "-c", shell], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+    )
+    solver._process._owner, solver._process._process = os.getpid(), process
 
 
 def test_it_answers_again_after_it_was_killed(solver: Apart) -> None:
     assert solver(NEVER, BUDGET) is Said.UNSAT
-    assert solver._process is not None
-    solver._process.kill()
-    solver._process.wait()
+    process = solver._process._process
+    assert process is not None
+    process.kill()
+    process.wait()
     assert solver(EVER, BUDGET) is Said.SAT
 
 
-@pytest.mark.parametrize("shell", ["read line; kill -SEGV $$", "read line; echo unsat", "read line; echo unsat 0"])
+@pytest.mark.parametrize("shell", ["kill -SEGV $$", "echo unsat", "echo '[\"unsat\"]'", 'echo \'["unsat", "0"]\''])
 def test_a_crash_or_the_answer_to_another_question_is_unknown(solver: Apart, shell: str) -> None:
-    acting(solver, shell)
+    acting(solver, f"read line; {shell}")
     assert solver(NEVER, BUDGET) is Said.UNKNOWN
 
 
 def test_a_fork_does_not_read_the_answers_of_the_process_that_it_is_a_fork_of(solver: Apart) -> None:
     acting(solver, "while read line; do echo unsat; done")
-    theirs = solver._process
-    solver._owner = -1
+    theirs = solver._process._process
+    solver._process._owner = -1
     assert solver(EVER, BUDGET) is Said.SAT
     assert theirs is not None
     assert theirs.poll() is None
     theirs.kill()
     theirs.communicate()
+
+
+def test_one_that_hangs_is_ended(solver: Apart, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avow.solving.apart.NET_MS", 100)
+    acting(solver, "read line; sleep 60")
+    hanging = solver._process._process
+    assert solver(NEVER, BUDGET) is Said.UNKNOWN
+    assert hanging is not None
+    assert hanging.poll() is not None
