@@ -14,6 +14,36 @@ from avow.base.codes_ros import ROS_CODES
 
 WORKSPACE_CODES = register(
     declare(
+        "FRET001",
+        "no FRETish file",
+        "The file cannot be read, or is neither text with a sentence on a line nor JSON as FRET exports it.",
+        "Export the requirements from FRET as JSON, or write the sentences into a text file.",
+    ),
+    declare(
+        "FRET002",
+        "no FRETish sentence",
+        "A sentence is: scope, condition, component, `shall`, timing, `satisfy`, response, in FRET's grammar.",
+        "Correct it at the place that is shown; FRET's own editor colours its fields.",
+    ),
+    declare(
+        "FRET003",
+        "no clause says the sentence",
+        "RCL has no counterpart for something that the sentence says; the message names it. It is left out.",
+        "Say it another way, in FRETish or in RCL.",
+    ),
+    declare(
+        "FRET004",
+        "FRET means something else than many expect",
+        "The clause means what FRET makes of the sentence, which is often not what was meant.",
+        "Read what the message says of it, and change the sentence if that was not meant.",
+    ),
+    declare(
+        "FRET005",
+        "no FRETish sentence says the clause",
+        "FRETish has no counterpart for something that the clause says; the message names it. It is left out.",
+        "Say it another way, or keep it in RCL.",
+    ),
+    declare(
         "PLAN090",
         "name taken",
         "A method of the plan has the name of one of Avow's own engines, whose evidence it would be mistaken for.",

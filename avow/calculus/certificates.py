@@ -122,7 +122,7 @@ class Certificates:
                 for assumed in ((), given) if given else ((),):
                     uses = tuple(Use(k) for k in range(len(assumed)))
                     yield (*assumed, Entry(How.POSSIBLE, "", claim.digest, base=(Question(uses),)))
-            case _:
+            case _:  # a supposition
                 yield (Entry(How.POSSIBLE, "", claim.digest),)
 
     def parts(self, name: str) -> list[list[Statement]]:

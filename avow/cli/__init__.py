@@ -28,6 +28,7 @@ COMMANDS = {
     "doctor": "which tools are here, and the command that installs a missing one",
     "explain": "one obligation: formula, status, evidence, counterexample, how to re-run it",
     "fmt": "the canonical layout of .rcl files",
+    "fretish": "FRETish requirements as nodes of a contract",
     "graph": "how a system is wired: nodes, topics, types, environment",
     "init": "a new workspace with a contract that verifies",
     "lsp": "the language server",

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import click
 
@@ -20,9 +19,11 @@ if TYPE_CHECKING:
 NOTATIONS = {
     **dict.fromkeys(("rcl", "text", "unicode", "latex", "json"), "avow.language.translate"),
     "smtlib": "avow.solving.contract_smtlib",
+    "fretish": "avow.fretish.writing",
 }
-"""Notation → the module with its function ``to_<notation>(contract) -> str``, imported when it is asked for. Further
-notations are those of the backends (`avow.backend_kit.protocol.Backend`)."""
+"""Notation → the module with its function ``to_<notation>(contract)``, imported when it is asked for: it gives a text,
+or (`avow.fretish.writing.Partial`) a text and what is left out. Further notations are those of the backends
+(`avow.backend_kit.protocol.Backend`)."""
 
 
 @click.command()
@@ -45,6 +46,8 @@ def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], outp
     translated.
     """
     from avow.backend_kit.registry import trust_plugins
+    from avow.base.diagnostics import Rejected
+    from avow.base.rendering import render
 
     trust_plugins()
     if notation not in NOTATIONS:
@@ -53,13 +56,18 @@ def command(paths: tuple[Path, ...], notation: str, nodes: tuple[str, ...], outp
 
     contract = _only(load_contract(_files(paths)), nodes)
     module = importlib.import_module(NOTATIONS[notation])
-    translate = cast("Callable[[Contract], str]", getattr(module, f"to_{notation}"))
-    text = translate(contract)
+    translated = getattr(module, f"to_{notation}")(contract)
+    text = translated if isinstance(translated, str) else translated.text
+    missing = [] if isinstance(translated, str) else translated.missing
+    if missing and not text:
+        raise Rejected(*missing)
     if not as_json or output is not None:
-        _put(text, output)
+        put(text, output)
     if as_json:
-        click.echo(_data(notation, {output.name if output else "": text}, [], output))
-    return 0
+        click.echo(_data(notation, {output.name if output else "": text}, [*missing], output))
+    elif missing:
+        click.echo(render(missing), err=True)
+    return 1 if missing else 0
 
 
 def _by_backend(
@@ -149,7 +157,8 @@ def _put_all(files: dict[str, str], output: Path | None, *, told: bool) -> None:
             click.echo(f"wrote {output / name}")
 
 
-def _put(text: str, output: Path | None) -> None:
+def put(text: str, output: Path | None) -> None:
+    """To a file, or to the terminal."""
     from avow.base.files import write
 
     if output is None:

@@ -75,7 +75,7 @@ def _compared(term: Term, variable: Variable) -> Iterator[Fraction | None]:
             yield from map(_number, items)
         case In(item=item, collection=SequenceRange(low=low, high=high)) if _is(item, variable):
             yield from (_number(low), _number(high))
-        case _:
+        case _:  # compares nothing itself
             for child in term.children:
                 yield from _compared(child, variable)
 
@@ -99,5 +99,5 @@ def _number(term: Term) -> Fraction | None:
             if one is None or other is None:
                 return None
             return one + other if operator == "+" else one - other if operator == "-" else one * other
-        case _:
+        case _:  # no number
             return None

@@ -1,0 +1,251 @@
+"""A FRETish sentence as its fields: scope, condition, component, timing, response."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from lark import Lark, Token, Tree
+from lark.exceptions import UnexpectedInput, UnexpectedToken
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    value: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Denied:
+    body: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Minus:
+    body: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Sign:
+    """``=>``, ``<=>``, ``|``, ``xor``, ``&``, a relation, or an operation on numbers."""
+
+    operator: str
+    left: Expression
+    right: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    name: str
+    arguments: tuple[Expression, ...]
+
+
+Expression = Name | Number | Truth | Denied | Minus | Sign | Call
+
+
+class Scope(StrEnum):
+    """When a requirement is in force."""
+
+    ALWAYS = "null"
+    IN = "in"
+    NOT_IN = "notin"
+    BEFORE = "before"
+    AFTER = "after"
+    ONLY_IN = "onlyIn"
+    ONLY_BEFORE = "onlyBefore"
+    ONLY_AFTER = "onlyAfter"
+
+
+class Condition(StrEnum):
+    """What triggers it: the scope's beginning, the condition's becoming true, its being so."""
+
+    NONE = "null"
+    REGULAR = "regular"
+    HOLDING = "holding"
+
+
+class Timing(StrEnum):
+    """When the response has to be there."""
+
+    IMMEDIATELY = "immediately"
+    NEXT = "next"
+    WITHIN = "within"
+    FOR = "for"
+    AFTER = "after"
+    UNTIL = "until"
+    BEFORE = "before"
+    EVENTUALLY = "eventually"
+    ALWAYS = "always"
+    NEVER = "never"
+    FINALLY = "finally"
+
+
+@dataclass(frozen=True, slots=True)
+class Duration:
+    """A number and RCL's unit."""
+
+    number: str
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sentence:
+    """The fields. `trigger` is there with a condition, `stop` with `until` and `before`, `duration` with `within`,
+    `for` and `after`, `mode` with every scope but the whole run."""
+
+    component: str
+    response: Expression
+    timing: Timing = Timing.EVENTUALLY
+    scope: Scope = Scope.ALWAYS
+    mode: Expression | None = None
+    condition: Condition = Condition.NONE
+    trigger: Expression | None = None
+    stop: Expression | None = None
+    duration: Duration | None = None
+
+
+class Unreadable(Exception):  # noqa: N818 - it names what happened
+    """No FRETish: what was found, and the column, counted from 1."""
+
+    def __init__(self, message: str, column: int) -> None:
+        super().__init__(message)
+        self.message = message
+        self.column = column
+
+
+def parse(text: str) -> Sentence:
+    """Raises Unreadable."""
+    return _sentence(_tree(text, "sentence"))
+
+
+def parse_expression(text: str) -> Expression:
+    """Raises Unreadable."""
+    return _expression(_tree(text, "expression"))
+
+
+def _tree(text: str, start: str) -> Any:
+    if len(text) > _LONGEST or text.count("(") > _DEEPEST:
+        raise Unreadable("the sentence is too long to be one requirement", 1)
+    if (found := re.search(r"at\s+the\s+(?:previous|next)\s+occurrence", text, re.IGNORECASE)) is not None:
+        raise Unreadable(f"`{found[0]}` is not read: say it with `since` in RCL", found.start() + 1)
+    try:
+        return _lark().parse(_without_commas(text), start=start)
+    except UnexpectedInput as error:
+        ended = isinstance(error, UnexpectedToken) and error.token.type == "$END"
+        column = len(text) + 1 if ended or error.column < 1 else error.column
+        rest = text[column - 1 :].split(maxsplit=1)
+        what = f"did not expect `{rest[0]}` here" if rest else "the sentence ends too early"
+        raise Unreadable(what, column) from None
+
+
+_LONGEST, _DEEPEST = 4_000, 100
+"""No sentence that a person wrote is longer, or nests deeper."""
+
+
+def _without_commas(text: str) -> str:
+    """Commas outside parentheses mean nothing; places stay."""
+    depth, out = 0, []
+    for sign in text:
+        depth += (sign == "(") - (sign == ")")
+        out.append(" " if sign == "," and depth == 0 else sign)
+    return re.sub(r"\.(\s*)\Z", r" \1", "".join(out))
+
+
+@functools.cache
+def _lark() -> Lark:
+    grammar = (Path(__file__).parent / "fretish.lark").read_text("utf-8")
+    return Lark(grammar, parser="lalr", lexer="basic", start=["sentence", "expression"], maybe_placeholders=False)
+
+
+def _sentence(tree: Any) -> Sentence:
+    fields: dict[str, Any] = {"response": _expression(tree.children[-1])}
+    for part in tree.children[:-1]:
+        if part.data == "component":
+            fields["component"] = str(part.children[0])
+        elif part.data in _SCOPES:
+            fields |= {"scope": _SCOPES[part.data], "mode": _expression(part.children[-1])}
+        elif part.data == "conditions":
+            fields |= _conditions([c for c in part.children if isinstance(c, Tree)])
+        else:
+            fields |= _timing(part)
+    return Sentence(**fields)
+
+
+_SCOPES = {
+    "in_mode": Scope.IN,
+    "not_in": Scope.NOT_IN,
+    "before": Scope.BEFORE,
+    "after": Scope.AFTER,
+    "only_in": Scope.ONLY_IN,
+    "only_before": Scope.ONLY_BEFORE,
+    "only_after": Scope.ONLY_AFTER,
+}
+
+
+def _conditions(parts: list[Any]) -> dict[str, Any]:
+    trigger: Expression | None = None
+    holding = False
+    for part in parts:
+        words = [c for c in part.children if isinstance(c, Token)]
+        (word, expression, *truth) = [c for c in part.children if isinstance(c, Tree)]
+        kind = str(word.children[0]).lower() if word.children else "when"
+        said = _expression(expression)
+        denied = (kind == "unless") != bool(truth and str(truth[0].children[-1]).lower() == "false")
+        said = Denied(said) if denied else said
+        either = any(str(token).lower() == "or" for token in words)
+        trigger = said if trigger is None else Sign("|" if either else "&", trigger, said)
+        holding = holding or kind == "whenever"
+    return {"trigger": trigger, "condition": Condition.HOLDING if holding else Condition.REGULAR}
+
+
+def _timing(tree: Any) -> dict[str, Any]:
+    timing = Timing(tree.data.rstrip("_"))
+    if timing in (Timing.UNTIL, Timing.BEFORE):
+        return {"timing": timing, "stop": _expression(tree.children[0])}
+    if timing in (Timing.WITHIN, Timing.FOR, Timing.AFTER):
+        number, unit = tree.children[0].children
+        return {"timing": timing, "duration": Duration(str(number), _unit(str(unit)))}
+    return {"timing": timing}
+
+
+def _unit(word: str) -> str:
+    starts = {"tick": "steps", "micro": "us", "milli": "ms", "sec": "s", "min": "min", "hour": "h"}
+    return next(unit for start, unit in starts.items() if word.lower().startswith(start))
+
+
+def _expression(tree: Any) -> Expression:
+    parts = tree.children
+    make: dict[str, Callable[[], Expression]] = {
+        "name": lambda: Name(str(parts[0])),
+        "number": lambda: Number(str(parts[0])),
+        "true": lambda: Truth(True),
+        "false": lambda: Truth(False),
+        "denied": lambda: Denied(_expression(parts[0])),
+        "minus": lambda: Minus(_expression(parts[-1])),
+        "implies": lambda: Sign("=>", _expression(parts[0]), _expression(parts[1])),
+        "call": lambda: Call(str(parts[0]), tuple(map(_expression, parts[1:]))),
+    }
+    if tree.data == "sign_implies":
+        left, _, *inner = parts
+        return Sign("=>", _expression(left), Sign("=>", *map(_expression, inner)))
+    if tree.data == "sign":
+        left, operator, right = parts
+        return Sign(_SIGNS.get(str(operator).lower(), str(operator)), _expression(left), _expression(right))
+    return make[tree.data]()
+
+
+_SIGNS = {"->": "=>", "<->": "<=>", "xor": "xor", "mod": "mod"}
