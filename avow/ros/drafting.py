@@ -202,7 +202,7 @@ class _Draft:
                 return "BOOL"
             case Scalar():
                 return "STRING"
-            case _:  # a list, or nothing: no field
+            case _:  # a message within a message: its fields are drafted
                 return None
 
     def free(self, name: str) -> str:

@@ -144,7 +144,7 @@ class RosMonitoringBackend(Backend):
             monitor = Monitor(found, [o.name for o in job.obligations])
             runs.append(_judge(job, name, monitor, deadline))
         logs = {f"trace-{k}.log": run.log() for k, run in enumerate(runs, start=1)}
-        outcomes = tuple(_outcome(o.id, o.name, runs, _spoken(job, o)) for o in job.obligations)
+        outcomes = tuple(_outcome(o.id, o.name, runs, _spoken(job, o), _excuse(job, runs)) for o in job.obligations)
         for obligation, outcome in zip(job.obligations, outcomes, strict=True):
             outcome.details["rml"] = refused.get(obligation.name, "translated")
         return Report(outcomes, "avow monitor", __version__, (), logs)
@@ -231,8 +231,29 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
     return run
 
 
-def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]) -> Outcome:
-    """`names`: what the guarantee speaks of."""
+def _excuse(job: Job, runs: list[_Run]) -> str:
+    """The first assumption that was broken, and who provides what it speaks of: whose evidence says more."""
+    from avow.system.formulas import ports_of
+    from avow.system.graph import dataflow
+
+    from .watched import Fault
+
+    found = ((run.name, v) for run in runs for v in run.first.values() if v.fault is Fault.ASSUMPTION)
+    first = min(found, key=lambda one: (one[0], one[1].index), default=None)
+    if first is None:
+        return "an assumption was broken"
+    trace, broken = first
+    spoken = {v.name for v in ports_of(job.node.clause(broken.clause).formula)}
+    feeding = [e for e in dataflow(job.system).feeding(job.node.name) if e.target.port in spoken]
+    late = " one step before" if any(e.delayed for e in feeding) else ""
+    who = " and ".join(dict.fromkeys(str(e.source) for e in feeding))
+    told = f"by what {who} said{late}" if feeding else "by the environment"
+    about = ", ".join(f"{n} = {v}" for n, v in broken.values)
+    return f"the assumption {broken.clause} was broken {told}, first at event {broken.index} of {trace} ({about})"
+
+
+def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str], excuse: str) -> Outcome:
+    """`names`: what the guarantee speaks of; `excuse`: what was broken before it."""
     from .watched import Fault
 
     tallies = [run.monitor.tallies[name] for run in runs]
@@ -315,10 +336,10 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
         return answer(Verdict.UNKNOWN, f"{_UNPAIRED}: held at all {judged} judgements over {events} events")
     excused = sum(t.excused for t in tallies)
     if excused == judged:
-        return answer(Verdict.UNKNOWN, "every judgement fell while an assumption was broken")
+        return answer(Verdict.UNKNOWN, f"every judgement fell while an assumption was broken: {excuse}")
     summary = f"held at all {judged} judgements over {events} events"
     if excused:
-        summary = f"held at {judged - excused} of {judged} judgements; at the others an assumption was broken"
+        summary = f"held at {judged - excused} of {judged} judgements; at the others {excuse}"
     if ages:
         summary += f"; {old(ages)}"
     if lost or disordered:

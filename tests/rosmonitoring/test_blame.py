@@ -122,3 +122,29 @@ def test_a_deadline_of_nothing_is_a_fault(make_system: Callable[..., System], na
     (fault,) = setup(system, node, system.plan.node("n").methods[0].options)[1]
     assert "no message that is observed" in fault.message
     assert fault.span is not None
+
+
+DELAYED = '[{"from": "guard.t", "to": "motor.t", "delayed": true, "initial": 0}]'
+
+
+@pytest.mark.parametrize(
+    ("connections", "told"),
+    [
+        ("[]", "at the others the assumption nonneg was broken by what guard.t said, first at event 3 of t.jsonl"),
+        (DELAYED, "by what guard.t said one step before"),
+    ],
+)
+def test_recorded_evidence_says_what_was_broken_before_it_and_by_whom(
+    connections: str, told: str, tmp_path: Path
+) -> None:
+    chain(tmp_path, connections)
+    (tmp_path / "plan.yaml").write_text(
+        (tmp_path / "plan.yaml").read_text().replace('"mapping": {}', '"mapping": {}, "traces": ["t.jsonl"]'),
+        encoding="utf-8",
+    )
+    events = [("t", 1), ("u", 1), ("t", -1), ("u", 3)]
+    lines = [json.dumps({"topic": topic, "data": value, "time": k}) for k, (topic, value) in enumerate(events)]
+    (tmp_path / "t.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    job = job_for(load_system(tmp_path), "motor")
+    (outcome,) = BACKEND.discharge(job, tmp_path, Limits()).outcomes
+    assert told in outcome.summary

@@ -129,7 +129,7 @@ class _Python:
                 return [e for part in (self.bound[name], *added) for e in self.actions(part)]
             case ast.Call():
                 return self.action(node)
-            case _:  # told
+            case _:  # told: what it would give is known only when it runs
                 self.tell(node, f"`{_shown(node)}` is not evaluated")
                 return []
 
@@ -158,7 +158,7 @@ class _Python:
                 return [self.plain(call, "let", ("name", "value"))]
             case "IncludeLaunchDescription":
                 return [self.include(call)]
-            case _:  # told
+            case _:  # told, with its name
                 self.tell(call, f"{name}(…) is not read")
                 for inner in ast.walk(call):
                     self.seen.add(id(inner))
@@ -256,7 +256,7 @@ class _Python:
                     return {"if": self.text(value.args[0])}
                 case "UnlessCondition":
                     return {"unless": self.text(value.args[0])}
-                case _:  # starts nothing
+                case _:  # any other condition is not evaluated
                     pass
         return {"if": Unread(f"the condition `{_shown(given)}` is not evaluated")}
 
@@ -290,7 +290,7 @@ class _Python:
                 if known is None or any(isinstance(a, ast.Starred) for a in self.added.get(name, ())):
                     return None
                 return known + self.added.get(name, [])
-            case _:  # no text
+            case _:  # no list that is written out
                 return None
 
     def text(self, node: ast.expr) -> Text:
@@ -311,7 +311,7 @@ class _Python:
                 return joined([self.text(part) for part in parts]) if parts is not None else self.unknown(node)
             case ast.Call():
                 return self.called(node)
-            case _:  # told
+            case _:  # told where it matters
                 return self.unknown(node)
 
     def called(self, call: ast.Call) -> Text:
@@ -338,7 +338,7 @@ class _Python:
                 return self.path(self.items(call.args[0]), call)
             case "join" if isinstance(call.func, ast.Attribute) and ast.unparse(call.func.value).endswith("path"):
                 return self.path(call.args, call)
-            case _:  # told
+            case _:  # told where it matters
                 return self.unknown(call)
 
     def word(self, call: ast.Call, *keywords: str) -> str | None:
@@ -377,7 +377,7 @@ def _called(call: ast.Call) -> str:
     match call.func:
         case ast.Name(id=name) | ast.Attribute(attr=name):
             return name
-        case _:  # its name is computed
+        case _:  # what is called has no name
             return "a call"
 
 
@@ -396,6 +396,6 @@ def _bindings(module: ast.Module) -> Counter[str]:
                 found[name] += 1
             case ast.Import(names=names) | ast.ImportFrom(names=names):
                 found.update(alias.asname or alias.name for alias in names)
-            case _:  # starts nothing
+            case _:  # binds no name
                 pass
     return found

@@ -416,7 +416,7 @@ def _parsed(path: Path) -> Parsed:
             return from_python(text, str(path))
         case ".yaml" | ".yml":
             return from_yaml(text, str(path))
-        case _:  # ROS 1, and XML of ROS 2
+        case _:  # XML: .launch, .xml, or no suffix at all
             return from_xml(text, str(path))
 
 
