@@ -59,10 +59,11 @@ class Shortcut:
         return results if asked - {""} <= names else None
 
     def keep(self, results: Sequence[Result]) -> None:
-        """Note that everything is settled as things stand. Without effect where a link leads out of the workspace, or
-        where something was edited during the run: the results are not of what stands there now."""
+        """Note that everything is settled as things stand. Without effect where a link leads out of the workspace,
+        where a plan reads launch files (which stand anywhere, and say what else is read), or where something was edited
+        during the run: the results are not of what stands there now."""
         try:
-            if self._begun != _sources(self.workspace):
+            if self._begun != _sources(self.workspace) or _reads_elsewhere(self.workspace):
                 return
             observed = _observed(self.workspace)
             kept = {
@@ -73,6 +74,11 @@ class Shortcut:
             write_note(_stamp(self.workspace), kept)
         except OSError:
             return
+
+
+def _reads_elsewhere(workspace: Workspace) -> bool:
+    """Whether a plan may read files outside ``contracts/``. Raises OSError."""
+    return any(b"launch" in path.read_bytes() for path in workspace.contracts.rglob("plan.yaml"))
 
 
 def _stamp(workspace: Workspace) -> Path:

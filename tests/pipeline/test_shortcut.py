@@ -132,3 +132,10 @@ def test_fresh_runs_and_damaged_notes_go_the_long_way(settled: Workspace, monkey
 )
 def test_what_doit_was_asked_for(line: str, names: tuple[str, ...]) -> None:
     assert read_wanted(line.split()) == names
+
+
+def test_where_a_plan_reads_launch_files_nothing_is_noted(settled: Workspace) -> None:
+    """They stand outside contracts/, and say what else is read."""
+    (settled.contracts / "crane/plan.yaml").write_text('"ros": {launch: [../../bringup.launch]}')
+    run(settled)
+    assert Shortcut(settled).nothing_to_do(("verify",)) is None

@@ -153,3 +153,17 @@ def test_what_is_taken_in_may_be_called_otherwise_here(tmp_path: Path) -> None:
     assert load_system(make(tmp_path, whole)).plan.ros.names.topic("l_n", "t") == "/deep/s"
     here = whole + "ros: {nodes: {l_n: {name: /here/n}}}"
     assert load_system(make(tmp_path, here)).plan.ros.names.topic("l_n", "t") == "/here/t"
+
+
+def test_an_edit_of_a_launch_file_is_another_question(tmp_path: Path) -> None:
+    from avow.pipeline.workload import survey
+
+    folder = make(tmp_path, LAUNCH)
+    before = survey(folder)
+    (tmp_path / "launch/robot.launch").write_text(APART.replace("/left/t", "/right/t"), encoding="utf-8")
+    after = survey(folder)
+    assert not isinstance(before, Rejected)
+    assert not isinstance(after, Rejected)
+    assert before.digest != after.digest
+    assert dataflow(before.system).edges
+    assert not dataflow(after.system).edges
