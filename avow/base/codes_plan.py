@@ -110,6 +110,12 @@ PLAN_CODES: dict[str, Code] = {
             remedy="Read both; if they still go together, write your name, the day and the digest under `confirmed`.",
         ),
         Code(
+            "PLAN130",
+            "parameters",
+            "The file under `source: parameters` is no mapping of numbers, truth values and texts.",
+            remedy="Write one YAML mapping; what YAML reads otherwise than it looks (`off`, `1:30`) in quotes.",
+        ),
+        Code(
             "PLAN121",
             "types clash",
             "An output and the input that it would feed have different types.",

@@ -29,16 +29,16 @@ class HypothesisBackend(Backend):
     """See `docs/backends/hypothesis.md`."""
 
     name = "hypothesis"
-    title = "Property-based tests of a Python function, generated from the contract"
-    version = "6"
+    title = "Property-based tests of a Python function, or of the node's own class, generated from the contract"
+    version = "7"
     strength = Verdict.TESTED
     uses_steps = False
     uses_wiring = False
+    uses_source = True
     link = Link.GENERATED
     options_schema = {
         "type": "object",
         "properties": {"subject": _SUBJECT, "cases": _CASES, "numbers": _NUMBERS},
-        "required": ["subject"],
         "additionalProperties": False,
     }
     codes = CODES
@@ -58,10 +58,10 @@ class HypothesisBackend(Backend):
         return problems(job)
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        from .subject import locate, modules
+        from .subject import locate, modules, parameter_files
 
         try:
-            return modules(locate(job).path)
+            return (*modules(locate(job).path), *parameter_files(job))
         except Rejected:
             return ()
 

@@ -19,7 +19,7 @@ from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
-from avow.base.verdict import Counterexample, Outcome, Verdict, bound
+from avow.base.verdict import Counterexample, Object, Outcome, Verdict, bound
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE
 from avow.isolation import judge
@@ -77,14 +77,17 @@ def settle(job: Job, folder: Path, limits: Limits) -> Report:
         return replace(Report.alike(job, verdict, why, "hypothesis", version), command=command, logs=logs)
     try:
         observed, isolation = from_json(answer.pop("observed")), Isolation(answer.pop("isolation"))
-        refuting = job.options.get("numbers") == ANY
-        exact = job.options.get("numbers", "exact") == "exact"
+        refuting = export.numbers(job) == ANY
+        exact = export.numbers(job) == "exact"
         outcomes = tuple(
             _counted(_outcome(o, answer, limits.seed, refuting, exact), job.clause(o), job.node)
             for o in job.obligations
         )
     except (KeyError, ValueError, TypeError) as error:
         return Report.alike(job, Verdict.ERROR, f"the judge's answer is not one: {error!r}", "hypothesis", version)
+    if "crash_trace" in answer:
+        numbers = "exact" if exact else "float64"
+        outcomes = tuple(replace(o, of=Object.SOURCE, numbers=numbers) for o in outcomes)
     logs["result.json"] = json.dumps(answer, indent=1) + "\n"
     return Report(outcomes, "hypothesis", version, command, logs, observed, isolation)
 
@@ -130,13 +133,16 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refut
     if own["failure"] is not None:
         values = tuple((str(name), str(value)) for name, value in own["failure"])
         told = f"guarantee {obligation.name} does not hold of these{_inexact(values) if exact else ''}"
-        shown = Counterexample(values, told)
+        trace = [tuple((str(n), str(v)) for n, v in step) for step in own.get("trace", ())]
+        shown = Counterexample(values, told, tuple(trace))
         details[CASE] = own["case"]
         return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
     if answer["crash"] is not None:
         pairs, why = answer["crash"]
         shown = Counterexample(tuple((str(n), str(v)) for n, v in pairs), str(why))
-        return replace(outcome, verdict=Verdict.ERROR, summary=str(why), counterexample=shown)
+        # a class that raises has no output for inputs that the contract allows; a function may be no subject at all
+        verdict = Verdict.REFUTED if answer.get("crash_trace") else Verdict.ERROR
+        return replace(outcome, verdict=verdict, summary=shown.text(), counterexample=shown)
     if answer["fault"]:
         return replace(outcome, verdict=Verdict.ERROR, summary=str(answer["fault"]))
     apart = [Counterexample(tuple((str(n), str(v)) for n, v in case), str(why)) for case, why in answer["apart"]]

@@ -8,7 +8,7 @@ CODES = register(
     declare(
         "HYPO100",
         "no subject",
-        "The option `subject` is missing, or not of the form file.py:function.",
+        "The option `subject` is missing and the node has no Python source, or it is not of the form file.py:function.",
         "Name the function to be tested.",
     ),
     declare(
@@ -29,6 +29,12 @@ CODES = register(
         "arguments do not fit",
         "The function wants an argument that is no input of the node, or is async.",
         "Name the arguments as the inputs; inputs may be left out.",
+    ),
+    declare(
+        "HYPO106",
+        "not for a class",
+        "A port has a type whose values a step class is not given, or the class computes with float32.",
+        "Give the node a function as `subject`, or another method.",
     ),
     declare(
         "HYPO105",

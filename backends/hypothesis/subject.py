@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import ast
 import difflib
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.drive.steps import coded
+from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
+from avow.system.parameters import parameters
 from avow.system.paths import inside
+from avow.system.plan import Numbers, Source
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +25,9 @@ class SubjectFile:
     name: str
     path: Path
     function: str
+    """The function; of a class that is driven, how, as JSON (`avow.drive.steps`)."""
+    memory: tuple[str, ...] = ()
+    driven: bool = False
 
 
 def subject(job: Job) -> SubjectFile:
@@ -34,6 +43,12 @@ def subject(job: Job) -> SubjectFile:
     except (OSError, ValueError, RecursionError) as error:
         raise Rejected(Diagnostic("HYPO103", f"`{found.name}` cannot be read: {error}", place)) from error
     defined = _top_level(tree)
+    if found.driven:
+        assert job.source is not None
+        if not isinstance(defined.get(job.source.class_name), ast.ClassDef):
+            where = job.source.place.at("source", "class")
+            raise Rejected(Diagnostic("HYPO102", f"`{found.name}` defines no class `{job.source.class_name}`", where))
+        return found
     if found.function not in defined:
         near = difflib.get_close_matches(found.function, [*defined], 1)
         hint = f"did you mean `{near[0]}`?" if near else None
@@ -52,8 +67,10 @@ def locate(job: Job) -> SubjectFile:
     """The file and the function's name, if there is such a file. Raises Rejected."""
     text = job.options.get("subject")
     options = job.method.options
+    if text is None and job.source is not None and job.source.python:
+        return _declared(job, job.source)
     if not isinstance(text, str):
-        message = "the method needs a subject: `subject: models/….py:function`"
+        message = "the method needs a subject: `subject: models/….py:function`, or a node with a Python source"
         raise Rejected(Diagnostic("HYPO100", message, options.span))
     name, colon, function = text.rpartition(":")
     if not colon or not name or not function.isidentifier():
@@ -67,6 +84,42 @@ def locate(job: Job) -> SubjectFile:
             Diagnostic("HYPO101", f"there is no file `{name}` in the system's folder", options.at("subject"))
         )
     return SubjectFile(name, path, function)
+
+
+def _declared(job: Job, source: Source) -> SubjectFile:
+    """The node's own class, driven. Raises Rejected."""
+    place = source.place.at("source")
+    path = inside(job.root, source.python)
+    if path is None or not path.is_file():
+        raise Rejected(Diagnostic("HYPO101", f"there is no file `{source.python}` in the system's folder", place))
+    params, faults = parameters(job.root, source)
+    if source.numbers is Numbers.FLOAT32:
+        faults += (Diagnostic("HYPO106", "a Python class computes with float64, not float32", place),)
+    wrong = unfit({p.name: p.sort for p in (*job.node.inputs, *job.node.outputs)})
+    if wrong:
+        faults += (Diagnostic("HYPO106", f"a step class is not given what {wrong} is", place),)
+    if faults:
+        raise Rejected(*faults)
+    spec = {"class": source.class_name, "params": coded(dict(params)), "memory": dict(source.memory), "attributes": []}
+    return SubjectFile(source.python, path, json.dumps(spec), tuple(sorted(source.memory)), True)
+
+
+def parameter_files(job: Job) -> tuple[Path, ...]:
+    """The parameters of a driven class."""
+    source = job.source if job.options.get("subject") is None else None
+    path = inside(job.root, source.parameters) if source is not None and source.parameters else None
+    return (path,) if path is not None else ()
+
+
+def unfit(ports: Mapping[str, Sort]) -> str:
+    """The first port whose values no step class is given; empty where there is none."""
+    for name, sort in ports.items():
+        if not isinstance(sort.item if isinstance(sort, SequenceSort) else sort, _PLAIN):
+            return name
+    return ""
+
+
+_PLAIN = (BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort)
 
 
 def modules(path: Path) -> tuple[Path, ...]:

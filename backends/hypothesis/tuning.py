@@ -53,6 +53,18 @@ CONSTANTS_READ = 300
 LARGEST_CONSTANT = 10**12
 """Larger constants are no thresholds of a robot: masks, digests, dates in nanoseconds."""
 
+STEPS = 20
+"""Steps of one run of a class: what counts to ten, or waits for a second at ten hertz, comes to its end."""
+
+STEP_TRIES = 12
+"""Draws for one step's inputs; where the assumptions allow none of them, the run ends and another begins."""
+
+HELD_STEPS = 0.8
+"""In runs that hold their inputs, how often a step has those of the step before: what counts has to count on."""
+
+SHRINKING_TRIES = 60
+"""Steps that are left out one by one of a run that breaks a guarantee: more than a run has."""
+
 LONGEST_TEXT = 60
 """Longer texts of a program are messages, not values."""
 

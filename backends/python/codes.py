@@ -12,12 +12,6 @@ CODES = register(
         "Write `source: {python: src/node.py, class: Node}` for the node; `docs/plan.md` has the form.",
     ),
     declare(
-        "PYTHON101",
-        "parameters",
-        "The file under `source: parameters` is no mapping of numbers, truth values and texts.",
-        "Write one YAML mapping; what YAML reads otherwise than it looks (`off`, `1:30`) in quotes.",
-    ),
-    declare(
         "PYTHON200",
         "not in the subset",
         "The file has something that this method does not understand: nothing is proved of it.",

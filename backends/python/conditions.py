@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,7 +25,7 @@ from .program import Step
 from .reading import Reading
 from .rounding import around
 from .symbolic import Candidate, Check, End, Run, TooMuch
-from .tuning import CANDIDATE_SECONDS, ROUNDS, SHOWN_SECONDS
+from .tuning import CANDIDATE_SECONDS, COMBINED, ROUNDS, SHOWN_SECONDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,8 @@ class Conditions:
     step: Step
     numbers: frozenset[Fraction]
     deadline: float
+    combined: bool = False
+    """Rounded results are told apart also at sums and products of two numbers: a second try, which costs more."""
     settler: Settler = field(default_factory=Settler)
     proved: list[Term] = field(default_factory=list)
     """Formulas of which Z3 says that they cannot hold."""
@@ -134,6 +137,10 @@ class Conditions:
                 if members.setdefault(member, sort) != sort:
                     raise KeyError(f"{member}, which is in two enumerations,")
         doubles = {d for n in self.numbers for d in around(n) if math.isfinite(d)} | {0.0}
+        if self.combined:
+            some = sorted(doubles, key=lambda d: (abs(d), d))[:COMBINED]
+            both = itertools.combinations_with_replacement(some, 2)
+            doubles |= {m for a, b in both for m in (a + b, a * b) if math.isfinite(m)}
         doubles |= {-d for d in doubles}
         apart = tuple(n for n in self.numbers if around(n)[0] != around(n)[1])
         run = Run(self.step, members, self.reading.exact, tuple(sorted(doubles)), (*apart, *(-n for n in apart)), kept)

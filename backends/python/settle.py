@@ -28,6 +28,7 @@ from avow.language.sorts import RealSort, SequenceSort
 from avow.language.terms import Variable
 from avow.solving.limits import from_seconds, until
 from avow.solving.questions import z3_version
+from avow.solving.settling import Settler
 from avow.tuning.bounds import CASES_KEPT
 
 from .conditions import Conditions, Found
@@ -113,6 +114,10 @@ class Work:
             conditions = Conditions(reading, reading.step, numbers, until(from_seconds(self.limits.seconds)))
             found = conditions.settle([(o.id, job.clause(o)) for o in still])
             self.unkept = conditions.unkept
+            left = [(o.id, job.clause(o)) for o in still if found[o.id].verdict is Verdict.UNKNOWN]
+            if left and any(found[name].details.get("rounded_at_lines") for name, _ in left) and not reading.exact:
+                again = replace(conditions, combined=True, settler=Settler(), proved=[])
+                found |= {n: f for n, f in again.settle(left).items() if f.verdict is Verdict.PROVED}
             self.logs["conditions.log"] = conditions.log()
             shown = [case for f in found.values() for case in f.models]
             wanted = [c for model in shown for c in self.near(model)]

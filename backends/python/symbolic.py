@@ -56,7 +56,7 @@ from .program import (
     assigned,
 )
 from .rounding import finite, gaps, no_overflow, rounded
-from .tuning import MOST_NAMES
+from .tuning import BESIDE, MOST_NAMES
 
 ZERO = Literal(0, INTEGER)
 
@@ -134,6 +134,8 @@ class Run:
     loops: list[tuple[For, Turn]] = field(default_factory=list)
     rounds: list[int] = field(default_factory=list)
     """Lines where something is rounded."""
+    _doubles: list[Term] = field(default_factory=list)
+    """Inputs, which rounding does not pass."""
     _fresh: int = 0
     _exits: list[list[tuple[State, Term | None]]] = field(default_factory=list)
     _left: list[list[tuple[State, str]]] = field(default_factory=list)
@@ -170,6 +172,7 @@ class Run:
         for term in inputs.values():
             if term.sort == REAL:
                 self.double(term)
+                self._doubles.append(term)
         self._exits.append([])
         self.block(self.step.body, State(TRUE, values), top=True)
         self._exits.pop()
@@ -420,7 +423,7 @@ class Run:
         exact = self.named("exact", exact)
         self.check(state, no_overflow(exact), "the result is no infinity", line)
         result = self.fresh("rounded", REAL)
-        variables = [t for t in doubles if not isinstance(t, Literal)]
+        variables = [t for t in (*doubles, *self._doubles[:BESIDE]) if not isinstance(t, Literal)]
         self.facts.append(rounded(result, exact, products=products, beside=variables, at=self.thresholds))
         self.facts += gaps(result, self.gaps)
         return result

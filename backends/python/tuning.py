@@ -15,6 +15,12 @@ BATCH = 100
 APART = 20
 """Cases beside which each REAL input is NaN and infinite, where that is possible."""
 
+BESIDE = 6
+"""Inputs that are said not to be passed by a rounding, besides its operands: a handful is what a step compares."""
+
+COMBINED = 10
+"""Numbers whose sums and products of two are thresholds on a second try: more would drown the solver."""
+
 INLINED_DEPTH = 8
 """Calls within calls beyond which a step is refused; recursion is told at once."""
 

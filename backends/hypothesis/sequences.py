@@ -1,0 +1,365 @@
+"""Runs of a node's own class: from its start, step after step, with inputs that its memory and the last ones suggest.
+
+Each step is judged as a case of its own, with the memory that the class really had. A run ends where the assumptions
+allow no input that is found, and begins anew; what breaks a guarantee is cut down to as few steps as still break it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import random
+import time
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from avow.formulas.values import Element, Value
+from avow.formulas.values import Sequence as SequenceValue
+from avow.isolation.subject import Subject, SubjectFailed
+from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort
+
+from .bench import Apart, Bench, Case, OutOfTime, _Enough, _pairs, told, valuation
+from .convention import Malformed, outputs, received
+from .export import KEPT
+from .generate import Impossible, Inputs, Source
+from .machine import SPECIAL
+from .tuning import (
+    ASKED_AGAIN,
+    CASE_BYTES,
+    HELD_STEPS,
+    REJECTED_CASES,
+    SHRINKING_SECONDS,
+    SHRINKING_TRIES,
+    STEP_TRIES,
+    STEPS,
+)
+
+Trace = list[tuple[Inputs, dict[str, Value]]]
+
+WHOLE = tuple(s * 2**n + d for n in (7, 8, 15, 16, 31, 32, 63) for s in (1, -1) for d in (-1, 0))
+"""The ends of ROS' own integers: what wraps there wraps nowhere else."""
+
+
+class SequenceBench(Bench):
+    """As `Bench`, of a class that is driven. `memory` are the inputs that the class holds itself."""
+
+    def __init__(self, data: Mapping[str, Any], folder: Path) -> None:
+        super().__init__(data, folder)
+        self.memory: tuple[str, ...] = tuple(data["memory"])
+        self.others = {n: s for n, s in self.output_sorts.items() if n not in self.memory}
+        self.traces: dict[str, Trace] = {}
+        self._first: list[list[Inputs]] = []
+        self._kept_runs = _kept_runs(folder / KEPT)
+        self._edges_left: Iterator[Inputs] = iter(())
+        self._swept = False
+
+    # -- the class ---------------------------------------------------------------------------------------
+
+    def begin(self, subject: Subject) -> dict[str, Value]:
+        """A new object; its memory."""
+        reply = self._asked(subject, {"steps": []})
+        return self._held(reply["held"])
+
+    def advance(self, subject: Subject, inputs: Inputs) -> dict[str, Value]:
+        """One step; the outputs, with memory among them. Raises SubjectFailed."""
+        given = {name: self.coded(value) for name, value in inputs.items() if name not in self.memory}
+        (answer,) = self._asked(subject, {"on": True, "steps": [given]})["steps"]
+        if "error" in answer:
+            raise SubjectFailed(f"the step raises {answer['why']}")
+        try:
+            found = outputs(_as_host(answer["value"]), self.others) if self.others else {}
+            held = {n: v for n, v in answer["memory"].items() if n in self.output_sorts}
+            return found | {n: received(_as_host(v), self.output_sorts[n], f"out.{n}") for n, v in held.items()}
+        except (Malformed, ValueError, TypeError, KeyError) as error:
+            raise SubjectFailed(str(error)) from error
+
+    def memory_of(self, inputs: Inputs) -> dict[str, Value]:
+        return {name: value for name, value in inputs.items() if name in self.memory}
+
+    def _asked(self, subject: Subject, case: Mapping[str, Any]) -> Any:
+        reply = subject.ask({"case": json.dumps(case)})
+        if not isinstance(reply, str):
+            raise SubjectFailed("the class cannot be driven")
+        return json.loads(reply)
+
+    def _held(self, data: Mapping[str, Any]) -> dict[str, Value]:
+        try:
+            return {n: received(_as_host(data[n]), self.inputs_sorts[n], f"in.{n}") for n in self.memory}
+        except Malformed as error:
+            raise SubjectFailed(f"in memory, {error}") from error
+
+    def coded(self, value: Value) -> Any:
+        """An input as the class gets it."""
+        match value:
+            case bool():
+                return value
+            case Fraction() if self.doubles:
+                return {"f": float(value).hex()}
+            case Fraction():
+                return {"q": [str(value.numerator), str(value.denominator)]}
+            case int():
+                return {"i": str(value)}
+            case Element(name=name):
+                return name
+            case SequenceValue(items=items):
+                return {"l": [self.coded(item) for item in items]}
+        raise Impossible(f"a step class is not given {value}")
+
+    # -- runs --------------------------------------------------------------------------------------------
+
+    def _sweep(self) -> str:
+        chance = random.Random(self.seed)
+        try:
+            for steps in self._kept_runs:
+                self._replayed_run(steps)
+            self._edges_left = iter([*map(self._given, self.generator.edges(self._blamed))])
+            while self.valid < self.cases:
+                self._run(chance)
+                if self.rejected > REJECTED_CASES * max(self.valid, 50):
+                    return "assumptions"
+        except OutOfTime:
+            return "time"
+        except _Enough:
+            return "enough"
+        except Impossible as error:
+            return f"no values: {error}"
+        return ""
+
+    def _run(self, chance: random.Random) -> None:
+        trace: Trace = []
+        sticky = chance.random() < 0.4
+        try:
+            memory = self.begin(self.subject)
+        except SubjectFailed as error:
+            self.crash = ({}, str(error))
+            raise _Enough from error
+        for _ in range(STEPS):
+            self._in_time()
+            inputs = self._drawn(chance, memory, trace[-1][0] if trace else None, sticky)
+            if inputs is None or self.valid >= self.cases:
+                break
+            memory = self._one(inputs, trace)
+        if len(self._first) * STEPS < ASKED_AGAIN:
+            self._first.append([inputs for inputs, _ in trace])
+
+    def _one(self, inputs: Inputs, trace: Trace) -> dict[str, Value]:
+        """One step of a run, judged; the memory after it."""
+        try:
+            found = self.advance(self.subject, inputs)
+        except SubjectFailed as error:
+            self.crash = (inputs, str(error))
+            self.traces["crash"] = [*trace, (inputs, {})]
+            raise _Enough from error
+        trace.append((inputs, found))
+        self.valid += 1
+        failed = {name for name, g in self.guarantees.items() if g.failure is not None}
+        self._judge(inputs, found, False)
+        for name, each in self.guarantees.items():
+            if each.failure is not None and name not in failed:
+                self.traces[name] = list(trace)
+        if all(g.failure is not None for g in self.guarantees.values()):
+            raise _Enough
+        unheld = [n for n in self.memory if n not in found]
+        return {n: found[n] for n in self.memory if n in found} | (self._looked(unheld) if unheld else {})
+
+    def _looked(self, names: list[str]) -> dict[str, Value]:
+        held = self._held(self._asked(self.subject, {"on": True, "steps": []})["held"])
+        return {n: held[n] for n in names}
+
+    def _drawn(
+        self, chance: random.Random, memory: dict[str, Value], last: Inputs | None, sticky: bool
+    ) -> Inputs | None:
+        """Inputs that the assumptions allow beside this memory; None where none are found."""
+        for attempt in range(STEP_TRIES):
+            if last is not None and sticky and chance.random() < HELD_STEPS:
+                inputs = {**last, **memory}
+            else:
+                edge = next(self._edges_left, None) if chance.random() < 0.5 else None
+                data = Source(chance.randbytes(CASE_BYTES))
+                inputs = edge or self._given(
+                    self.generator.case(data, lambda drawn: self._blamed({**drawn, **memory}), self._aims)
+                )
+                inputs = {**self._nudged(chance, inputs, memory, last), **memory}
+            if self._assumed(inputs):
+                return inputs
+            self.rejected += attempt == STEP_TRIES - 1
+        return None
+
+    def _nudged(self, chance: random.Random, inputs: Inputs, memory: dict[str, Value], last: Inputs | None) -> Inputs:
+        """Now and then a number lies a threshold away from one that was there before, or at the end of a machine's."""
+        before = [v for v in (*memory.values(), *(last or {}).values()) if isinstance(v, Fraction)]
+        steps = self.generator.pools.edges.get(REAL, ())
+        changed = dict(inputs)
+        for name, sort in self.inputs_sorts.items():
+            if isinstance(sort, RealSort) and before and steps and chance.random() < 0.4:
+                step = chance.choice(steps)
+                assert isinstance(step, Fraction)
+                changed[name] = self._beside(chance, chance.choice(before) + abs(step))
+            elif isinstance(sort, IntegerSort | NaturalSort) and chance.random() < 0.1:
+                number = chance.choice(WHOLE)
+                changed[name] = abs(number) if isinstance(sort, NaturalSort) else number
+        return changed
+
+    def _beside(self, chance: random.Random, number: Fraction) -> Fraction:
+        if not self.doubles:
+            return number
+        try:
+            near = float(number)
+        except OverflowError:
+            return Fraction(0)
+        end = chance.choice((-math.inf, None, None, math.inf))
+        near = near if end is None else math.nextafter(near, end)
+        return Fraction(near) if math.isfinite(near) else Fraction(0)
+
+    def hold(self, name: str) -> None:
+        """For pytest: no run breaks the guarantee. Raises AssertionError, in contract words."""
+        broken = self._broken(name)
+        assert not broken, broken
+
+    def _broken(self, name: str) -> str:
+        if not self._swept:
+            self._swept = True
+            self._sweep()
+        each = self.guarantees[name]
+        if self.crash is not None:
+            return f"{name}: {self.crash[1]}"
+        return f"{name}: {told(*each.failure)}" if each.failure is not None else ""
+
+    # -- what was found ----------------------------------------------------------------------------------
+
+    def _replayed_run(self, steps: list[dict[str, Any]]) -> None:
+        """What refuted a guarantee once, as far as its inputs are still allowed."""
+        trace: Trace = []
+        memory = self.begin(self.subject)
+        for step in steps:
+            try:
+                given = {n: received(_as_host(step[n]), s, n) for n, s in self.inputs_sorts.items() if n in step}
+            except (Malformed, KeyError, ValueError, TypeError):
+                return
+            inputs = {**self._given(given), **memory}
+            if set(inputs) != set(self.inputs_sorts) or not self._assumed(inputs):
+                return
+            memory = self._one(inputs, trace)
+        self.replayed += 1
+
+    def _shrunk(self, name: str) -> Case:
+        each = self.guarantees[name]
+        assert each.failure is not None
+        end = min(self.end or math.inf, time.monotonic() + SHRINKING_SECONDS)
+        best = self.traces[name]
+        tries = 0
+        at = len(best) - 2
+        alone = self._again([best[-1][0]], name)
+        if alone is not None:
+            best, at = alone, -1
+        while at >= 0 and tries < SHRINKING_TRIES and time.monotonic() < end:
+            tries += 1
+            shorter = self._again([i for k, (i, _) in enumerate(best) if k != at], name)
+            best = shorter if shorter is not None else best
+            at -= 1
+        self.traces[name] = best
+        return best[-1]
+
+    def _again(self, steps: list[Inputs], name: str) -> Trace | None:
+        """The run of these steps, if its last breaks the guarantee and all are allowed."""
+        trace: Trace = []
+        try:
+            memory = self.begin(self.subject)
+            for step in steps:
+                inputs = {**step, **memory}
+                if not self._assumed(inputs):
+                    return None
+                found = self.advance(self.subject, inputs)
+                trace.append((inputs, found))
+                memory = self._held(self._asked(self.subject, {"on": True, "steps": []})["held"])
+        except SubjectFailed:
+            return None
+        broken = self.guarantees[name].judged.holds(valuation(*trace[-1])) is False
+        return trace if broken else None
+
+    def _shrunk_crash(self) -> tuple[Inputs, str]:
+        assert self.crash is not None
+        return self.crash
+
+    def _asked_again(self) -> Inputs | None:
+        """The first inputs to which another process answers otherwise."""
+        twin = Subject(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
+        try:
+            for run in self._first:
+                self.begin(self.subject)
+                self.begin(twin)
+                for inputs in run:
+                    if self.end is not None and time.monotonic() > self.end:
+                        return None
+                    if self._said_by(self.subject, inputs) != self._said_by(twin, inputs):
+                        return inputs
+        finally:
+            twin.close()
+        return None
+
+    def _said_by(self, subject: Subject, inputs: Inputs) -> Any:
+        try:
+            return self.advance(subject, inputs)
+        except SubjectFailed as error:
+            return str(error)
+
+    def _asked_apart(self) -> list[Apart]:
+        """Each REAL input in its turn is what no REAL is, in a first step."""
+        found: dict[str, Apart] = {}
+        reals = [n for n, s in self.inputs_sorts.items() if n not in self.memory and isinstance(s, RealSort)]
+        for run in (r for r in self._first[:3] if r):
+            for name, (word, text) in itertools.product(reals, SPECIAL.items()):
+                why = self._wrong_first(run[0], name, text)
+                case = [(n, word if n == f"in.{name}" else v) for n, v in _pairs(run[0], {})]
+                if why:
+                    found.setdefault(why, (case, why))
+        return list(found.values())
+
+    def _wrong_first(self, inputs: Inputs, name: str, text: str) -> str:
+        given = {n: self.coded(v) for n, v in inputs.items() if n not in self.memory} | {name: {"f": text}}
+        try:
+            self.begin(self.subject)
+            (answer,) = self._asked(self.subject, {"on": True, "steps": [given]})["steps"]
+            if "error" in answer:
+                return f"the step raises {answer['why']}"
+            outputs(_as_host(answer["value"]), self.others)
+        except (SubjectFailed, Malformed) as error:
+            return str(error)
+        return ""
+
+    def _report(self, stopped: str, smaller: Mapping[str, Case]) -> dict[str, Any]:
+        report = super()._report(stopped, smaller)
+        for name, own in report["guarantees"].items():
+            if name in smaller:
+                trace = self.traces[name]
+                own["trace"] = [_pairs(*step) for step in trace] if len(trace) > 1 else []
+                own["case"] = [{n: self.coded(v) for n, v in inputs.items()} for inputs, _ in trace]
+        report["crash_trace"] = [_pairs(*step) for step in self.traces.get("crash", [])]
+        return report
+
+
+def _as_host(data: Any) -> Any:
+    """What a class returned, as a subject's process has it (`convention`)."""
+    match data:
+        case {"f": str(text)}:
+            number = float.fromhex(text)
+            if not math.isfinite(number):
+                return {"?": f"the number {number}"}
+            return {"q": [str(part) for part in number.as_integer_ratio()]}
+        case {"i": str(digits)}:
+            return {"q": [digits, "1"], "w": True}
+        case {"l": items}:
+            return {"t": [_as_host(item) for item in items]}
+        case {"d": pairs}:
+            return {"m": [[key, _as_host(value)] for key, value in pairs]}
+        case _:  # its own JSON
+            return data
+
+
+def _kept_runs(path: Path) -> list[list[dict[str, Any]]]:
+    if not path.is_file():
+        return []
+    return [case for case in json.loads(path.read_text(encoding="utf-8")) if isinstance(case, list)]

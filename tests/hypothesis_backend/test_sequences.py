@@ -1,0 +1,121 @@
+"""The node's own class under the driver: what only a sequence of steps, or a machine's number, shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from avow.backend_kit.protocol import Job, Limits
+from avow.backends.hypothesis import BACKEND
+from avow.base.verdict import Object, Outcome, Verdict
+from avow.conformance.seeded import settle
+from avow.pipeline.work import method_job
+from avow.system.load import load_system
+
+HEAD = "class Node:\n    def __init__(self, params):\n        self.n = 0\n        self.limit = params['limit']\n"
+
+
+def job(folder: Path, ports: str, clauses: str, step: str, **memory: str) -> Job:
+    (folder / "node.py").write_text(f"{HEAD}    def step(self, {step}")
+    (folder / "system.rcl").write_text(f"node made {{ {ports} topics() {clauses} }}")
+    (folder / "p.yaml").write_text("limit: 250.0\n")
+    node = {
+        "source": {"python": "node.py", "class": "Node", "parameters": "p.yaml"},
+        "methods": [{"hypothesis": {"cases": 400}}],
+    }
+    if memory:
+        node["memory"] = {port: f"self.{name}" for port, name in memory.items()}
+    (folder / "plan.yaml").write_text(yaml.safe_dump({"nodes": {"made": node}}))
+    system = load_system(folder)
+    (method,) = system.plan.node("made").methods
+    return method_job(system, system.contract.node("made"), method)
+
+
+def outcome(folder: Path, *parts: str, **memory: str) -> Outcome:
+    work = job(folder, *parts, **memory)
+    (found,) = settle(BACKEND, work, folder / "made", Limits()).outcomes
+    return found
+
+
+SAME = "guarantee g ( out.u == in.r )"
+REAL = "inputs( r : REAL ) outputs( u : REAL )"
+
+
+@pytest.mark.parametrize(
+    ("ports", "clauses", "step"),
+    [
+        (REAL, SAME, "r):\n        return 0.0 if r == 777.0 else r\n"),
+        (
+            REAL,
+            "guarantee g ( out.u == in.r )",
+            "r):\n        self.n += 1\n        return 0.0 if self.n == 11 else r\n",
+        ),
+        (
+            "inputs( r : REAL ) outputs( red : BOOL )",
+            "guarantee g ( in.r >= 250 <=> out.red )",
+            "r):\n        return r >= 249.99999999999\n",
+        ),
+        (
+            "inputs( s : <REAL> ) outputs( n : NATURAL )",
+            "guarantee g ( out.n == length(in.s) )",
+            "s):\n        return 9 if len(s) >= 10 else len(s)\n",
+        ),
+        (
+            "inputs( i : INTEGER ) outputs( j : INTEGER )",
+            "guarantee g ( out.j == in.i + 1 )",
+            "i):\n        return (i + 1 + 2**31) % 2**32 - 2**31\n",
+        ),
+        (REAL, SAME, "r):\n        return r / r * r\n"),
+        (REAL, "guarantee g ( out.u + 1/10 == in.r )", "r):\n        return r - 0.1\n"),
+    ],
+    ids=["a number of its own", "the 11th call", "nearly 250", "ten elements", "32 bits", "raises", "rounds"],
+)
+def test_what_a_class_does_wrong_is_found(ports: str, clauses: str, step: str, tmp_path: Path) -> None:
+    found = outcome(tmp_path, ports, clauses, step)
+    assert found.verdict is Verdict.REFUTED, found.summary
+    assert found.counterexample is not None
+    assert (found.of, found.numbers) == (Object.SOURCE, "float64")
+
+
+def test_a_right_class_is_tested(tmp_path: Path) -> None:
+    found = outcome(tmp_path, REAL, "guarantee g ( out.u <= 250 )", "r):\n        return min(r, self.limit)\n")
+    assert found.verdict is Verdict.TESTED, found.summary
+    assert found.bound["cases"] == 400
+
+
+COUNT = "inputs( go : BOOL, n : NATURAL ) outputs( u : BOOL, n : NATURAL )"
+COUNTS = "go):\n        self.n = self.n + 1 if go else 0\n        return self.n > 4\n"
+
+
+def test_memory_is_what_the_class_had(tmp_path: Path) -> None:
+    """A fault that shows only after five steps in a row; the counterexample has these and no more."""
+    clauses = "guarantee g ( in.go -> out.n == in.n + 1 and not out.u )"
+    found = outcome(tmp_path, COUNT, clauses, COUNTS, n="n")
+    assert found.verdict is Verdict.REFUTED
+    assert found.counterexample is not None
+    assert len(found.counterexample.trace) == 5
+    assert dict(found.counterexample.values)["in.n"] == "4"
+
+
+def test_a_case_is_tried_again_first(tmp_path: Path) -> None:
+    clauses = "guarantee g ( in.go -> out.n == in.n + 1 and not out.u )"
+    work = job(tmp_path, COUNT, clauses, COUNTS, n="n")
+    (first,) = settle(BACKEND, work, tmp_path / "made", Limits()).outcomes
+    again = Job(work.system, work.node, work.method, work.obligations, {first.obligation: [first.details["case"]]})
+    (second,) = settle(BACKEND, again, tmp_path / "again", Limits()).outcomes
+    assert second.verdict is Verdict.REFUTED
+
+
+def test_what_another_process_answers_otherwise_is_no_function(tmp_path: Path) -> None:
+    step = "r):\n        return float(id(object()) % 1000)\n"
+    found = outcome(tmp_path, REAL, "guarantee g ( out.u >= 0 )", step)
+    assert not found.verdict.supports
+
+
+def test_no_class_of_that_name(tmp_path: Path) -> None:
+    work = job(tmp_path, REAL, "guarantee g ( out.u == in.r )", "r):\n        return r\n")
+    (tmp_path / "node.py").write_text("class Other: pass\n")
+    assert [d.code for d in BACKEND.check(work)] == ["HYPO102"]
+    assert {tmp_path / "node.py", tmp_path / "p.yaml"} <= set(BACKEND.files(work))
