@@ -9,9 +9,9 @@ from itertools import product
 from avow.base.verdict import Verdict
 from avow.evaluation.evaluate import finite_values
 from avow.formulas.formula import conjunction, disjunction, free_variables, substitute
-from avow.formulas.values import Data, Element, Value
-from avow.language.sorts import BoolSort, DataSort, EnumSort, SetSort, Sort, TupleSort
-from avow.language.terms import Compare, Construct, EnumValue, In, Literal, Not, SetTerm, Term, TupleTerm, Variable
+from avow.formulas.written import value_term
+from avow.language.sorts import SetSort
+from avow.language.terms import Compare, In, Not, SetTerm, Term, Variable
 from avow.solving.questions import entails, solve
 from avow.tuning.bounds import VALUES_TRIED
 
@@ -45,21 +45,6 @@ def enumerated(
     if not possible or entails(together, goal, effort=effort).verdict is not Verdict.PROVED:
         return None
     return found, sure and frozenset(variables) >= spoken & frozenset(ports)
-
-
-def value_term(value: Value, sort: Sort) -> Term:
-    """A value as RCL writes it. Only of sorts with finitely many values."""
-    match sort, value:
-        case EnumSort(), Element(name=name):
-            return EnumValue(name, sort)
-        case DataSort(), Data(constructor=constructor, arguments=arguments):
-            parameters = sort.constructor(constructor).parameters
-            return Construct(constructor, tuple(map(value_term, arguments, parameters)), sort)
-        case TupleSort(items=items), tuple():
-            return TupleTerm(tuple(map(value_term, value, items)), sort)
-        case BoolSort(), bool():
-            return Literal(value, sort)
-    raise AssertionError(f"{value} of {sort}")
 
 
 def _one_of(variables: Sequence[Variable], choices: Sequence[tuple[Term, ...]]) -> Term:

@@ -26,6 +26,7 @@ from avow.solving.questions import solve
 from avow.solving.sizes import in_every_size
 from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint
+from avow.temporal.cells import CELL
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +129,8 @@ def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
     answer = solve(asked.formulas, effort=bounds.effort, seed=bounds.seed, shown=False)
     because = None
     match answer.status:
+        case "sat" if any(CELL in v.name for f in asked.formulas.values() for v in free_variables(f)):
+            verdict, text = Verdict.UNKNOWN, "it can be met of some memory; whether a run comes to it is not asked"
         case "sat":
             what = f"{about} and what its providers guarantee"
             verdict, text = in_every_size({}, asked.formulas, what=what, effort=bounds.effort, seed=bounds.seed)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from avow.base.diagnostics import Severity
@@ -22,11 +22,13 @@ from avow.language.contract import ClauseKind, Contract, Node
 from avow.language.sorts import FunctionSort, IntegerSort, NaturalSort, RealSort
 from avow.language.terms import Compare, Not, Role, Term, Variable
 from avow.sanity.claims import Claim, Property, claims, node_key, triggers
-from avow.sanity.results import CUT_SHORT, Bounds, Patience, SanityResult, as_outcome, listing
+from avow.sanity.results import CUT_SHORT, Bounds, Finding, Patience, SanityResult, as_outcome, listing
 from avow.solving.limits import spent
+from avow.temporal.cells import remembers
 from avow.tuning.effort import CONSISTENT_EFFORT
 
 if TYPE_CHECKING:
+    from avow.sanity.over_runs import OverRuns
     from avow.sanity.realizability import Realizability
 
 __all__ = [
@@ -45,19 +47,6 @@ __all__ = [
 Given = Mapping[Variable, Value]
 
 
-@dataclass(frozen=True, slots=True)
-class _Finding:
-    verdict: Verdict
-    explanation: str = ""
-    clauses: tuple[str, ...] = ()
-    counterexample: Counterexample | None = None
-    conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
-    because: str | None = None
-    engine: str = "z3"
-    bounded: bool = False
-    cut_short: bool = False
-
-
 def analyse(
     node: Node,
     contract: Contract | None = None,
@@ -72,7 +61,7 @@ def analyse(
 
     `contract` is not consulted (formulas are whole); it is accepted so that callers need not know that.
     """
-    analysis = _Analysis(node, scenario or {}, ranges or Ranges(), bounds or Bounds())
+    analysis = _analysis(node, scenario or {}, ranges or Ranges(), bounds or Bounds())
     results = []
     for claim in claims(node):
         if wanted is not None and claim.name not in wanted:
@@ -98,7 +87,7 @@ def outcomes(
     return tuple(as_outcome(identity, node.name, name, results.get(name)) for identity, name in obligations.items())
 
 
-def _result(node: Node, claim: Claim, finding: _Finding, seconds: float) -> SanityResult:
+def _result(node: Node, claim: Claim, finding: Finding, seconds: float) -> SanityResult:
     return SanityResult(
         node.name,
         claim.about,
@@ -120,6 +109,14 @@ def _result(node: Node, claim: Claim, finding: _Finding, seconds: float) -> Sani
     )
 
 
+def _analysis(node: Node, scenario: Given, ranges: Ranges, bounds: Bounds) -> _Analysis | OverRuns:
+    if not remembers(node):
+        return _Analysis(node, scenario, ranges, bounds)
+    from avow.sanity.over_runs import OverRuns
+
+    return OverRuns(node, bounds)
+
+
 class _Analysis:
     """One node under analysis. Each claim is settled once, others ask for it."""
 
@@ -134,11 +131,11 @@ class _Analysis:
         self.outputs = tuple(port.variable for port in node.outputs)
         self.assumptions = {c.name: c.formula for c in node.assumptions}
         self.guarantees = {c.name: c.formula for c in node.guarantees}
-        self.known: dict[str, _Finding] = {}
+        self.known: dict[str, Finding] = {}
         self.claims = {claim.name: claim for claim in claims(node)}
         self.answer: tuple[Realizability, bool] | None = None
 
-    def settle(self, claim: Claim) -> _Finding:
+    def settle(self, claim: Claim) -> Finding:
         if claim.name not in self.known:
             asked, self.serious = self.serious, claim.severity is Severity.ERROR
             start, lost = spent(), self.patience.lost
@@ -155,9 +152,9 @@ class _Analysis:
         """Effort for a question of the claim that is being settled."""
         return self.patience.effort(self.serious)
 
-    def _settle(self, claim: Claim) -> _Finding:
+    def _settle(self, claim: Claim) -> Finding:
         subject = claim.subject or ""
-        methods: dict[Property, Callable[[str], _Finding]] = {
+        methods: dict[Property, Callable[[str], Finding]] = {
             Property.ASSUMPTIONS_SATISFIABLE: lambda _: self._satisfiable(),
             Property.CONSISTENT: lambda _: self._in_every_size(self._consistent()),
             Property.REALIZABLE: lambda _: self._in_every_size(self._realizable(), "consistent"),
@@ -170,16 +167,16 @@ class _Analysis:
         }
         return methods[claim.about](subject)
 
-    def _other(self, name: str) -> _Finding:
+    def _other(self, name: str) -> Finding:
         return self.settle(self.claims[name])
 
     # -- the whole contract --------------------------------------------------------------------------------------------
 
-    def _satisfiable(self) -> _Finding:
+    def _satisfiable(self) -> Finding:
         finding = self._possible(self.assumptions, "no input meets {} together", "no input meets {}")
         return self._with_all_sets(finding, self.assumptions)
 
-    def _in_every_size(self, finding: _Finding, because: str = "") -> _Finding:
+    def _in_every_size(self, finding: Finding, because: str = "") -> Finding:
         """What was not refuted is, if it fails for some number of elements of the unspecified types."""
         from avow.solving.sizes import in_every_size
 
@@ -191,9 +188,9 @@ class _Analysis:
         clauses = tuple(self.guarantees) if verdict is Verdict.REFUTED else ()
         if verdict is Verdict.PROVED:
             return finding
-        return _Finding(verdict, reason, clauses, because=self._if_refuted(because))
+        return Finding(verdict, reason, clauses, because=self._if_refuted(because))
 
-    def _consistent(self) -> _Finding:
+    def _consistent(self) -> Finding:
         together = {**self.assumptions, **self.guarantees}
         texts = ("no inputs and outputs meet {} together", "no inputs and outputs meet {}")
         finding = self._possible(together, *texts, limit=CONSISTENT_EFFORT)
@@ -201,13 +198,13 @@ class _Analysis:
             answer, bounded = self._realizability()
             if answer.verdict is Verdict.PROVED and not bounded:
                 allowed = self._other("assumptions-satisfiable")
-                return _Finding(allowed.verdict, allowed.explanation, engine=answer.engine)
+                return Finding(allowed.verdict, allowed.explanation, engine=answer.engine)
             finding = self._possible(together, *texts)
         if finding.verdict is Verdict.REFUTED and self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
             return replace(finding, because="assumptions-satisfiable")
         return self._with_all_sets(finding, together)
 
-    def _with_all_sets(self, finding: _Finding, formulas: Mapping[str, Term]) -> _Finding:
+    def _with_all_sets(self, finding: Finding, formulas: Mapping[str, Term]) -> Finding:
         """Where formulas contradict each other, every smallest set of them that does."""
         from avow.sanity.conflicts import contradictions
 
@@ -265,17 +262,17 @@ class _Analysis:
             self.patience.lose(spent() - start)
         return self.answer
 
-    def _realizable(self) -> _Finding:
+    def _realizable(self) -> Finding:
         from avow.sanity.conflicts import conflicts
 
         answer, bounded = self._realizability()
         if answer.verdict is Verdict.PROVED:
             if self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
-                return _Finding(Verdict.PROVED, "vacuously: no input is allowed", because="assumptions-satisfiable")
+                return Finding(Verdict.PROVED, "vacuously: no input is allowed", because="assumptions-satisfiable")
             verdict = Verdict.CHECKED if bounded else Verdict.PROVED
-            return _Finding(verdict, _resting(answer.needed), answer.needed, engine=answer.engine, bounded=bounded)
+            return Finding(verdict, _resting(answer.needed), answer.needed, engine=answer.engine, bounded=bounded)
         if answer.verdict is not Verdict.REFUTED:
-            return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+            return Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
         found, complete = conflicts(
             self.inputs,
             self.outputs,
@@ -290,16 +287,16 @@ class _Analysis:
             from avow.solving.counterexample import show_values
 
             shown = Counterexample(show_values(answer.inputs), "no output meets the guarantees here")
-            return _Finding(Verdict.REFUTED, shown.explanation, answer.group, shown, engine=answer.engine)
+            return Finding(Verdict.REFUTED, shown.explanation, answer.group, shown, engine=answer.engine)
         # A conflict between guarantees tells more than one guarantee that cannot be met by itself.
         clauses, shown = next((pair for pair in listed if len(pair[0]) > 1), listed[0])
         because = "consistent" if self._other("consistent").verdict is Verdict.REFUTED else None
         text = f"for some inputs no output meets {listing(clauses)}{'' if complete else CUT_SHORT}"
-        return _Finding(Verdict.REFUTED, text, clauses, shown, listed, because, answer.engine, cut_short=not complete)
+        return Finding(Verdict.REFUTED, text, clauses, shown, listed, because, answer.engine, cut_short=not complete)
 
     # -- one clause ----------------------------------------------------------------------------------------------------
 
-    def _tautology(self, name: str) -> _Finding:
+    def _tautology(self, name: str) -> Finding:
         clause = self.node.clause(name)
         if clause.kind is ClauseKind.ASSUMPTION:
             return self._fails_somewhere({}, clause.formula, "every input meets it: it assumes nothing", "")
@@ -313,9 +310,9 @@ class _Analysis:
             return finding
         return replace(finding, because=self._if_refuted("assumptions-satisfiable"))
 
-    def _vacuous(self, name: str) -> _Finding:
+    def _vacuous(self, name: str) -> Finding:
         impossible = []
-        undecided: _Finding | None = None
+        undecided: Finding | None = None
         for number, trigger in enumerate(triggers(self.guarantees[name]), start=1):
             finding = self._possible(
                 {**self.assumptions, "its trigger": trigger}, "{} cannot hold together", "{} cannot hold"
@@ -330,12 +327,12 @@ class _Analysis:
             because = "assumptions-satisfiable" if empty else self._if_refuted(f"tautology-{name}")
             clauses = tuple(c for c in first.clauses if c in self.assumptions)
             text = "what it demands is never demanded: its condition cannot come about"
-            return _Finding(
+            return Finding(
                 Verdict.REFUTED, text + _given(clauses), (name, *clauses), because=because, engine=first.engine
             )
-        return undecided or _Finding(Verdict.PROVED)
+        return undecided or Finding(Verdict.PROVED)
 
-    def _redundant(self, name: str) -> _Finding:
+    def _redundant(self, name: str) -> Finding:
         kind = self.node.clause(name).kind
         others = self.assumptions if kind is ClauseKind.ASSUMPTION else {**self.assumptions, **self.guarantees}
         others = {other: formula for other, formula in others.items() if other != name}
@@ -346,13 +343,13 @@ class _Analysis:
         whole = "assumptions-satisfiable" if kind is ClauseKind.ASSUMPTION else "consistent"
         return replace(finding, because=self._if_refuted(whole) or self._if_refuted(f"tautology-{name}"))
 
-    def _unneeded(self, name: str) -> _Finding:
+    def _unneeded(self, name: str) -> Finding:
         from avow.sanity.realizability import realizable
 
         if weaker := self._if_refuted(f"tautology-{name}") or self._if_refuted(f"redundant-{name}"):
-            return _Finding(Verdict.REFUTED, "it rules out nothing that the others do not", (name,), because=weaker)
+            return Finding(Verdict.REFUTED, "it rules out nothing that the others do not", (name,), because=weaker)
         because = self._if_refuted("assumptions-satisfiable")
-        unused = _Finding(Verdict.REFUTED, "every guarantee can be met without it", (name,), because=because)
+        unused = Finding(Verdict.REFUTED, "every guarantee can be met without it", (name,), because=because)
         if self._other("realizable").verdict is Verdict.PROVED and name not in self._realizability()[0].needed:
             return unused
         # What it rules out is all that there is to ask about: an output for each of these inputs makes it idle.
@@ -368,19 +365,19 @@ class _Analysis:
         )
         match answer.verdict:
             case Verdict.REFUTED:
-                return _Finding(Verdict.PROVED, engine=answer.engine)
+                return Finding(Verdict.PROVED, engine=answer.engine)
             case Verdict.PROVED:
                 return replace(unused, engine=answer.engine)
             case _:  # no answer
-                return _Finding(Verdict.UNKNOWN, "whether the guarantees could be met without it is open")
+                return Finding(Verdict.UNKNOWN, "whether the guarantees could be met without it is open")
 
     # -- one output ----------------------------------------------------------------------------------------------------
 
-    def _unconstrained(self, name: str) -> _Finding:
+    def _unconstrained(self, name: str) -> Finding:
         output = self.node.output(name).variable
         everything = conjunction(self.guarantees.values())
         if output not in free_variables(everything):
-            return _Finding(Verdict.REFUTED, f"no guarantee mentions out.{name}")
+            return Finding(Verdict.REFUTED, f"no guarantee mentions out.{name}")
         again = Variable(Role.OUTPUT, f"{name} (another)", output.sort)
         changed = [substitute(f, {output: again}) for f in self.guarantees.values() if output in free_variables(f)]
         finding = self._possible(
@@ -393,7 +390,7 @@ class _Analysis:
         because = self._if_refuted("consistent") or next((b for b in blamed if self._if_refuted(b)), None)
         return replace(finding, explanation=text, clauses=(), because=because)
 
-    def _undetermined(self, name: str) -> _Finding:
+    def _undetermined(self, name: str) -> Finding:
         from avow.sanity.realizability import Group, groups
         from avow.solving.counterexample import show_values
         from avow.solving.questions import solve
@@ -412,17 +409,17 @@ class _Analysis:
         for given in self._attempts():
             answer = solve(question, effort=self.limit, seed=self.seed, given=given, shown=False)
             if answer.status == "unsat" and not given:
-                return _Finding(Verdict.PROVED, engine=answer.engine, because=self._if_refuted("consistent"))
+                return Finding(Verdict.PROVED, engine=answer.engine, because=self._if_refuted("consistent"))
             if answer.status == "sat":
                 values = {v: value for v, value in {**answer.values, **given}.items() if v.role is not Role.BOUND}
                 text = f"the guarantees allow both values of out.{name}"
                 shown = Counterexample(show_values(values)) if values else None
                 because = self._if_refuted(f"unconstrained-{name}")
-                return _Finding(Verdict.REFUTED, text, counterexample=shown, because=because, engine=answer.engine)
+                return Finding(Verdict.REFUTED, text, counterexample=shown, because=because, engine=answer.engine)
         if self._by_definitions(question, self.limit // 2):
             because = self._if_refuted(f"unconstrained-{name}")
-            return _Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name}", because=because)
-        return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+            return Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name}", because=because)
+        return Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
 
     # -- asking --------------------------------------------------------------------------------------------------------
 
@@ -439,7 +436,7 @@ class _Analysis:
     def _if_refuted(self, name: str) -> str | None:
         return name if name in self.claims and self._other(name).verdict is Verdict.REFUTED else None
 
-    def _possible(self, formulas: Mapping[str, Term], several: str, one: str, limit: int | None = None) -> _Finding:
+    def _possible(self, formulas: Mapping[str, Term], several: str, one: str, limit: int | None = None) -> Finding:
         """Can they hold together? If not, the texts say so of the smallest set that cannot."""
         from avow.solving.questions import solve
 
@@ -450,15 +447,15 @@ class _Analysis:
             # An example in the scenario is an example; that there is none in it proves nothing.
             answer = within if within.status == "sat" else answer
         if answer.status == "unknown" and self._by_definitions(formulas, limit // 2):
-            return _Finding(Verdict.PROVED)
+            return Finding(Verdict.PROVED)
         match answer.status:
             case "sat":
-                return _Finding(Verdict.PROVED, engine=answer.engine)
+                return Finding(Verdict.PROVED, engine=answer.engine)
             case "unsat":
                 text = several if len(answer.core) > 1 else one
-                return _Finding(Verdict.REFUTED, text.format(listing(answer.core)), answer.core, engine=answer.engine)
+                return Finding(Verdict.REFUTED, text.format(listing(answer.core)), answer.core, engine=answer.engine)
             case _:  # unknown
-                return _Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
+                return Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
 
     def _by_definitions(self, formulas: Mapping[str, Term], limit: int) -> bool:
         """Whether these hold together, for functions that have no finite table."""
@@ -466,7 +463,7 @@ class _Analysis:
 
         return _are_endless(formulas.values()) and possible(formulas, effort=limit, seed=self.seed)
 
-    def _fails_somewhere(self, hypotheses: Mapping[str, Term], formula: Term, alone: str, implied: str) -> _Finding:
+    def _fails_somewhere(self, hypotheses: Mapping[str, Term], formula: Term, alone: str, implied: str) -> Finding:
         """Is there a case where the hypotheses hold and the formula does not? If not, the texts say so."""
         finding = self._possible({**hypotheses, "": negation(formula)}, "", "")
         if finding.verdict is not Verdict.REFUTED:

@@ -20,6 +20,21 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
+class Finding:
+    """What was found of a claim."""
+
+    verdict: Verdict
+    explanation: str = ""
+    clauses: tuple[str, ...] = ()
+    counterexample: Counterexample | None = None
+    conflicts: tuple[tuple[tuple[str, ...], Counterexample], ...] = ()
+    because: str | None = None
+    engine: str = "z3"
+    bounded: bool = False
+    cut_short: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class SanityResult:
     """What became of one claim. `subject` is the clause or output that the claim is about, if it is about one."""
 

@@ -100,6 +100,15 @@ def eliminable(term: Term) -> bool:
     return all(isinstance(v.sort, _ELIMINABLE) for v in free_variables(term))
 
 
+def eliminated(formula: Term) -> Term | None:
+    """A formula without quantifiers that should say the same; None where none is found. It is for the caller to have
+    that confirmed: Z3's tactics have lost parts of a formula before."""
+    try:
+        return _eliminate(formula)
+    except (Unsupported, z3.Z3Exception, RecursionError):
+        return None
+
+
 def _eliminate(formula: Term) -> Term | None:
     translator = Translator()
     goal = z3.Goal(ctx=translator.context)

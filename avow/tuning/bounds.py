@@ -2,6 +2,18 @@
 is `unknown` or "not exhaustive", never a proof.
 """
 
+GAME_MEMORIES = 300
+"""Memories of a contract that are played through one by one; with more, quantifiers are eliminated instead."""
+
+GAME_ANSWERS = 256
+"""Inputs and outputs at one step of such a game: each is evaluated from each memory."""
+
+RUN_TO_AN_EXAMPLE = 6
+"""Steps of a run at whose end an example is looked for: each adds a copy of the contract to the question."""
+
+VIABILITY_ROUNDS = 8
+"""Rounds in which the viable memories are approached: each eliminates quantifiers from a larger formula."""
+
 CHOICES_FOUND = 300
 """Answers that the solver is asked for, where they cannot be enumerated: each costs one question."""
 

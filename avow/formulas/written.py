@@ -1,0 +1,40 @@
+"""Values as terms."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from avow.formulas.values import Data, Element, Value
+from avow.language.sorts import (
+    BoolSort,
+    DataSort,
+    EnumSort,
+    IntegerSort,
+    NaturalSort,
+    RealSort,
+    Sort,
+    StringSort,
+    TupleSort,
+)
+from avow.language.terms import Construct, EnumValue, Literal, Term, TupleTerm
+
+
+def value_term(value: Value, sort: Sort) -> Term:
+    """A value as RCL writes it; of a sort whose values it can write: no function, no sequence, no unspecified type."""
+    match sort, value:
+        case EnumSort(), Element(name=name):
+            return EnumValue(name, sort)
+        case DataSort(), Data(constructor=constructor, arguments=arguments):
+            parameters = sort.constructor(constructor).parameters
+            return Construct(constructor, tuple(map(value_term, arguments, parameters)), sort)
+        case TupleSort(items=items), tuple():
+            return TupleTerm(tuple(map(value_term, value, items)), sort)
+        case BoolSort(), bool():
+            return Literal(value, sort)
+        case ((IntegerSort() | NaturalSort()), int()):
+            return Literal(value, sort)
+        case RealSort(), (Fraction() | int()):
+            return Literal(Fraction(value), sort)
+        case StringSort(), str():
+            return Literal(value, sort)
+    raise AssertionError(f"{value} of {sort}")

@@ -1,0 +1,166 @@
+"""The sanity claims of a node whose clauses have memory: asked of what runs can reach, not of any memory at all.
+
+A run reaches a memory by steps at which all assumptions and guarantees hold. What holds of no memory at all holds of
+none that is reached; what is possible is shown at the end of a run from its first step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import assert_never
+
+from avow.base.verdict import Verdict
+from avow.formulas.formula import conjunction, disjunction, free_variables, negation, rename, substitute
+from avow.language.contract import ClauseKind, Node
+from avow.language.terms import Role, Term, Variable
+from avow.sanity.claims import Claim, Property, triggers
+from avow.sanity.results import Bounds, Finding, listing
+from avow.sanity.viability import Viability, viable
+from avow.solving.questions import solve
+from avow.system.formulas import ports_of
+from avow.temporal.cells import Remembering, compile_node
+from avow.tuning.bounds import RUN_TO_AN_EXAMPLE
+
+_TRIGGER = "trigger"
+
+
+@dataclass(slots=True)
+class OverRuns:
+    """One node; its claims share what was found of its memory."""
+
+    node: Node
+    bounds: Bounds
+    remembering: Remembering = field(init=False)
+    _viable: Viability | None = None
+
+    def __post_init__(self) -> None:
+        asked = tuple(
+            replace(clause, name=f"{clause.name} {_TRIGGER}", formula=trigger)
+            for clause in self.node.guarantees
+            for trigger in triggers(clause.formula)
+        )
+        self.remembering = compile_node(replace(self.node, guarantees=(*self.node.guarantees, *asked)))
+
+    @property
+    def assumptions(self) -> Mapping[str, Term]:
+        return {c.name: c.formula for c in self.remembering.node.assumptions}
+
+    @property
+    def guarantees(self) -> Mapping[str, Term]:
+        return {c.name: c.formula for c in self.remembering.node.guarantees if not c.name.endswith(_TRIGGER)}
+
+    def settle(self, claim: Claim) -> Finding:
+        unsaid = self.remembering.unsaid
+        if unsaid:
+            name, why = next(iter(unsaid.items()))
+            return Finding(Verdict.UNKNOWN, f"{name} speaks of {why.reason}")
+        spoken = {v for a in self.assumptions.values() for v in ports_of(a) if v.role is Role.OUTPUT}
+        if spoken:
+            return Finding(
+                Verdict.UNKNOWN, f"an assumption speaks of {min(v.qualified for v in spoken)} at the same step"
+            )
+        match claim.about:
+            case Property.REALIZABLE:
+                return self._realizable()
+            case Property.ASSUMPTIONS_SATISFIABLE:
+                return self._possible(self.assumptions, "no input meets {} at any step of a run")
+            case Property.CONSISTENT:
+                together = {**self.assumptions, **self.guarantees}
+                return self._possible(together, "no inputs and outputs meet {} at any step of a run")
+            case Property.TAUTOLOGY | Property.REDUNDANT:
+                return self._said_already(claim)
+            case Property.VACUOUS:
+                return self._vacuous(claim.subject or "")
+            case Property.UNCONSTRAINED:
+                return self._unconstrained(claim.subject or "")
+            case Property.UNDETERMINED | Property.UNNEEDED | Property.UNMEETABLE:
+                return Finding(Verdict.UNKNOWN, "not asked of clauses that speak of other steps")
+            case _:
+                assert_never(claim.about)
+
+    @property
+    def viability(self) -> Viability:
+        if self._viable is None:
+            self._viable = viable(compile_node(self.node), effort=2 * self.bounds.effort, seed=self.bounds.seed)
+        return self._viable
+
+    def _realizable(self) -> Finding:
+        found = self.viability
+        if found.verdict is Verdict.REFUTED:
+            steps = f" in {len(found.run.trace)} steps" if found.run is not None and found.run.trace else ""
+            text = found.reason or f"the environment can bring it{steps} to where no output meets the guarantees"
+            return Finding(found.verdict, text, tuple(self.guarantees), found.run)
+        return Finding(found.verdict, found.reason)
+
+    def _said_already(self, claim: Claim) -> Finding:
+        name = claim.subject or ""
+        kind = self.node.clause(name).kind
+        own = self.assumptions if kind is ClauseKind.ASSUMPTION else self.guarantees
+        others: Mapping[str, Term] = {} if kind is ClauseKind.ASSUMPTION else self.assumptions
+        if claim.about is Property.REDUNDANT:
+            others = {**others, **{label: f for label, f in own.items() if label != name}}
+        found = self._possible({**others, "": negation(own[name])}, "it follows from {}")
+        needed = tuple(label for label in found.clauses if label)
+        if found.verdict is not Verdict.REFUTED:
+            return found
+        text = f"it follows from {listing(needed)}" if needed else "it holds at every step of every run"
+        return Finding(found.verdict, text, needed)
+
+    def _vacuous(self, name: str) -> Finding:
+        asked = [c.formula for c in self.remembering.node.guarantees if c.name == f"{name} {_TRIGGER}"]
+        for trigger in asked:
+            found = self._possible({**self.assumptions, "its trigger": trigger}, "{} cannot hold together in any run")
+            if found.verdict is not Verdict.PROVED:
+                return found
+        return Finding(Verdict.PROVED)
+
+    def _unconstrained(self, name: str) -> Finding:
+        output = self.node.output(name).variable
+        spoken = {label: f for label, f in self.guarantees.items() if output in free_variables(f)}
+        if not spoken:
+            mentioned = any(output in ports_of(clause.formula) for clause in self.node.guarantees)
+            text = "it is only remembered" if mentioned else f"no guarantee mentions out.{name}"
+            return Finding(Verdict.UNKNOWN if mentioned else Verdict.REFUTED, text)
+        another = Variable(Role.OUTPUT, f"{name} (another)", output.sort)
+        other = disjunction(negation(substitute(f, {output: another})) for f in spoken.values())
+        together = {**self.assumptions, **self.guarantees, "another value": other}
+        text = f"wherever the guarantees hold, they hold for every other value of out.{name} too"
+        found = self._possible(together, text)
+        return Finding(found.verdict, text) if found.verdict is Verdict.REFUTED else found
+
+    def _possible(self, formulas: Mapping[str, Term], excluded: str) -> Finding:
+        """Can they hold together at some step of a run at whose earlier steps the contract was kept?"""
+        limit, seed = self.bounds.effort, self.bounds.seed
+        anywhere = solve(formulas, effort=limit, seed=seed, shown=False)
+        if anywhere.status == "unsat":
+            return Finding(Verdict.REFUTED, excluded.format(listing(anywhere.core)), anywhere.core)
+        kept = conjunction((*self.assumptions.values(), *self.guarantees.values()))
+        facts: dict[str, Term] = {}
+        for length in range(RUN_TO_AN_EXAMPLE):
+            here = {label: self._at(f, length) for label, f in formulas.items()}
+            begun = {f"first {c.name}": self._at(c.begins(), 0) for c in self.remembering.cells}
+            if solve({**facts, **begun, **here}, effort=limit, seed=seed, shown=False).status == "sat":
+                return Finding(Verdict.PROVED)
+            facts[f"step {length}"] = self._at(kept, length)
+            for cell in self.remembering.cells:
+                after = Variable(Role.INPUT, f"{cell.name} after", cell.sort)
+                moved = rename(self._at(cell.leaves(after), length), {after: self._named(cell.before, length + 1)})
+                facts[f"{cell.name} {length}"] = moved
+        open_still = f"not at the first {RUN_TO_AN_EXAMPLE} steps of a run; whether later is open"
+        if self.viability.reachable is None:
+            return Finding(Verdict.UNKNOWN, open_still)
+        within = {**formulas, "memory": self.viability.reachable}
+        ever = solve(within, effort=limit, seed=seed, shown=False)
+        if ever.status == "unsat":
+            named = tuple(label for label in ever.core if label != "memory")
+            return Finding(Verdict.REFUTED, excluded.format(listing(named)), named)
+        return Finding(Verdict.UNKNOWN, open_still)
+
+    def _at(self, formula: Term, step: int) -> Term:
+        """The formula at a step of a run."""
+        own = {v for v in free_variables(formula) if v.role is not Role.BOUND and not v.name.endswith(" after")}
+        return rename(formula, {v: self._named(v, step) for v in own})
+
+    def _named(self, variable: Variable, step: int) -> Variable:
+        return Variable(variable.role, f"{variable.name} at {step}", variable.sort)

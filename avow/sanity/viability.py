@@ -1,0 +1,301 @@
+"""Realizability of a contract with memory: can the node keep its guarantees for ever, whatever allowed inputs come?
+
+A memory is viable where every allowed input has an output that meets the guarantees and leaves a viable memory: the
+greatest such set. With finitely many inputs, outputs and memories all that a run can reach is played through; else the
+set is approached from above by eliminating quantifiers. Nothing that this finds is taken from it: that a set is closed
+and holds the first memory, that an input leads out of it whatever the answer, are questions of their own to the solver.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+from avow.base.verdict import Counterexample, Verdict
+from avow.evaluation.evaluate import NotEvaluable, compile_term, finite_values
+from avow.evaluation.running import Keeper
+from avow.formulas.formula import conjunction, disjunction, free_variables, negation, substitute
+from avow.formulas.values import Value, show
+from avow.formulas.written import value_term
+from avow.language.sorts import BOOL
+from avow.language.terms import FALSE, TRUE, Compare, Iff, Implies, Quantified, Quantifier, Role, Term, Variable
+from avow.sanity.realizability import realizable
+from avow.solving.quantifier_elimination import eliminable, eliminated
+from avow.solving.questions import entails, solve
+from avow.temporal.cells import Remembering
+from avow.tuning.bounds import GAME_ANSWERS, GAME_MEMORIES, VIABILITY_ROUNDS
+
+_Memory = tuple[Value, ...]
+_Move = tuple[Mapping[str, Value], tuple[tuple[Mapping[str, Value], _Memory], ...]]
+"""An allowed input, and the outputs that meet the guarantees, each with the memory that it leaves."""
+
+
+@dataclass(frozen=True, slots=True)
+class Viability:
+    """Whether the node can go on for ever, and why not: the environment's moves up to where no output is left."""
+
+    verdict: Verdict
+    reason: str = ""
+    run: Counterexample | None = None
+    reachable: Term | None = None
+    """The memories that runs which keep the contract can reach; None where they are not known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contract:
+    """The node's contract of one step, with its memory before and after."""
+
+    remembering: Remembering
+    effort: int = 10_000
+    seed: int = 0
+
+    @property
+    def inputs(self) -> tuple[Variable, ...]:
+        return tuple(port.variable for port in self.remembering.node.inputs)
+
+    @property
+    def outputs(self) -> tuple[Variable, ...]:
+        return tuple(port.variable for port in self.remembering.node.outputs)
+
+    @property
+    def assumed(self) -> Mapping[str, Term]:
+        return {clause.name: clause.formula for clause in self.remembering.node.assumptions}
+
+    @property
+    def promised(self) -> Mapping[str, Term]:
+        return {clause.name: clause.formula for clause in self.remembering.node.guarantees}
+
+    def divided(self) -> tuple[list[Term], Contract]:
+        """The assumptions on inputs that nothing else depends on, and the contract without these: they only matter in
+        that they can be met."""
+        node, cells = self.remembering.node, self.remembering.cells
+        known = {v for g in self.promised.values() for v in free_variables(g)}
+        known = known.union(*(free_variables(cell.now) for cell in cells), (cell.before for cell in cells))
+        growing = True
+        while growing:
+            more = [free_variables(a) for a in self.assumed.values() if free_variables(a) & known]
+            growing = not set().union(*more) <= known
+            known = known.union(*more)
+        apart = [a for a in node.assumptions if not free_variables(a.formula) & known]
+        inputs = tuple(port for port in node.inputs if port.variable in known)
+        rest = replace(node, inputs=inputs, assumptions=tuple(a for a in node.assumptions if a not in apart))
+        return [a.formula for a in apart], replace(self, remembering=replace(self.remembering, node=rest))
+
+    @property
+    def first(self) -> Mapping[Variable, Term]:
+        return {cell.before: cell.initial for cell in self.remembering.cells if cell.initial is not None}
+
+    def after(self, region: Term) -> Term:
+        """That the memory which a step leaves is in a region."""
+        return substitute(region, {cell.before: cell.now for cell in self.remembering.cells})
+
+    def at_first(self, region: Term) -> Term:
+        return substitute(region, self.first)
+
+    def closed(self, region: Term) -> bool:
+        """Whether the solver shows that from each memory of a region every allowed input has an output that stays in
+        it, and that the first memory is in it."""
+        begins = solve([negation(self.at_first(region))], effort=self.effort, seed=self.seed, shown=False)
+        if region != TRUE and begins.status != "unsat":
+            return False
+        wanted = self.promised if region == TRUE else {**self.promised, "memory": self.after(region)}
+        known = self.assumed if region == TRUE else {**self.assumed, "memory": region}
+        inputs = (*self.remembering.before, *self.inputs)
+        values = [finite_values(v.sort) for v in self.outputs]
+        few = [v for v in values if v is not None]
+        if len(few) == len(values) and math.prod(map(len, few)) <= GAME_ANSWERS:
+            whole = conjunction(wanted.values())
+            terms = ([value_term(value, v.sort) for value in some] for v, some in zip(self.outputs, few, strict=True))
+            fails = [
+                negation(substitute(whole, dict(zip(self.outputs, choice, strict=True)))) for choice in product(*terms)
+            ]
+            return solve([*known.values(), *fails], effort=self.effort, seed=self.seed, shown=False).status == "unsat"
+        answer = realizable(inputs, self.outputs, known, wanted, effort=self.effort, seed=self.seed)
+        return answer.verdict is Verdict.PROVED
+
+
+def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> Viability:
+    """Decide it, as far as it can be decided."""
+    if remembering.unsaid:
+        name, why = next(iter(remembering.unsaid.items()))
+        return Viability(Verdict.UNKNOWN, f"{name} speaks of {why.reason}")
+    if any(cell.initial is None for cell in remembering.cells):
+        return Viability(Verdict.UNKNOWN, "a value of an unspecified type is remembered")
+    contract = Contract(remembering, effort, seed)
+    if any(v in free_variables(f) for f in contract.assumed.values() for v in contract.outputs):
+        return Viability(Verdict.UNKNOWN, "an assumption speaks of an output at the same step")
+    apart, about = contract.divided()
+    if apart:
+        found = _decided(about)
+        possible = solve(apart, effort=effort, seed=seed, shown=False).status == "sat"
+        sure = found.verdict is Verdict.PROVED or possible
+        return found if sure else Viability(Verdict.UNKNOWN, "whether its assumptions can be met is open")
+    return _decided(about)
+
+
+def _decided(contract: Contract) -> Viability:
+    game = _Game(contract)
+    if game.explored():
+        return game.answer()
+    if contract.closed(TRUE):
+        return Viability(Verdict.PROVED, "whatever was before")
+    return _approached(contract)
+
+
+def _same(variable: Variable, value: Term) -> Term:
+    return Iff(variable, value) if variable.sort == BOOL else Compare("==", variable, value)
+
+
+@dataclass(slots=True)
+class _Game:
+    """All that a run can reach, where that is finite and small."""
+
+    contract: Contract
+    moves: dict[_Memory, list[_Move]] = field(default_factory=dict)
+    first: _Memory = ()
+    lost: dict[_Memory, tuple[int, _Move]] = field(default_factory=dict)
+    """A memory from which the environment wins → in how many rounds found, and its move."""
+
+    def explored(self) -> bool:
+        remembering = self.contract.remembering
+        ports = (*self.contract.inputs, *self.contract.outputs)
+        found = [finite_values(v.sort) for v in ports]
+        values = [v for v in found if v is not None]
+        if len(values) < len(found) or math.prod(map(len, values)) > GAME_ANSWERS:
+            return False
+        count = len(self.contract.inputs)
+        try:
+            keeper = Keeper(remembering.cells)
+            assumed = [compile_term(f) for f in self.contract.assumed.values()]
+            promised = [compile_term(f) for f in self.contract.promised.values()]
+            names = [v.qualified for v in remembering.before]
+            self.first = tuple(keeper.memory[name] for name in names)
+            waiting = [self.first]
+            while waiting:
+                memory = waiting.pop()
+                if memory in self.moves:
+                    continue
+                if len(self.moves) >= GAME_MEMORIES:
+                    return False
+                self.moves[memory] = []
+                before = dict(zip(names, memory, strict=True))
+                for given in product(*values[:count]):
+                    inputs = {v.qualified: x for v, x in zip(ports, given, strict=False)}
+                    answers: list[tuple[Mapping[str, Value], _Memory]] = []
+                    known = True
+                    for number, answer in enumerate(product(*values[count:])):
+                        outputs = {v.qualified: x for v, x in zip(ports[count:], answer, strict=True)}
+                        at = {**before, **inputs, **outputs}
+                        if not number and not all(holds(at) for holds in assumed):
+                            known = False
+                            break
+                        if all(holds(at) for holds in promised):
+                            keeper.memory = before
+                            keeper.advance({**inputs, **outputs})
+                            answers.append((outputs, tuple(keeper.memory[name] for name in names)))
+                    if known:
+                        self.moves[memory].append((inputs, tuple(answers)))
+                        waiting += [left for _, left in answers]
+        except (NotEvaluable, KeyError):
+            return False
+        return True
+
+    def answer(self) -> Viability:
+        self._lose()
+        reachable = self.region(self.moves)
+        if self.first not in self.lost:
+            won = [memory for memory in self.moves if memory not in self.lost]
+            if self.contract.closed(self.region(won)):
+                return Viability(Verdict.PROVED, reachable=reachable)
+            return Viability(Verdict.UNKNOWN, "a strategy was found, but the solver does not confirm it")
+        if not self._confirmed():
+            return Viability(Verdict.UNKNOWN, "the environment wins, but the solver does not confirm it")
+        return Viability(Verdict.REFUTED, run=self._run(), reachable=reachable)
+
+    def _lose(self) -> None:
+        rounds, growing = 0, True
+        while growing:
+            rounds += 1
+            found = {
+                memory: (rounds, move)
+                for memory, moves in self.moves.items()
+                if memory not in self.lost
+                for move in moves
+                if all(left in self.lost for _, left in move[1])
+            }
+            self.lost |= found
+            growing = bool(found)
+
+    def region(self, memories: Sequence[_Memory] | Mapping[_Memory, object]) -> Term:
+        return disjunction(map(self.at, memories))
+
+    def at(self, memory: _Memory) -> Term:
+        cells = self.contract.remembering.before
+        return conjunction(_same(v, value_term(x, v.sort)) for v, x in zip(cells, memory, strict=True))
+
+    def _confirmed(self) -> bool:
+        """Whether the solver shows of each memory that the environment's moves lead to that no answer leads out."""
+        asked, waiting = set[_Memory](), [self.first]
+        contract = self.contract
+        while waiting:
+            memory = waiting.pop()
+            if memory in asked:
+                continue
+            asked.add(memory)
+            rounds, (inputs, answers) = self.lost[memory]
+            given = [_same(v, value_term(inputs[v.qualified], v.sort)) for v in contract.inputs]
+            place = [self.at(memory), *given]
+            allowed = solve([*place, *contract.assumed.values()], effort=contract.effort, shown=False)
+            lower = self.region([m for m, (at, _) in self.lost.items() if at < rounds])
+            out = [*place, *contract.promised.values(), negation(contract.after(lower))]
+            escapes = solve(out, effort=contract.effort, shown=False)
+            if allowed.status != "sat" or escapes.status != "unsat":
+                return False
+            waiting += [left for _, left in answers]
+        return True
+
+    def _run(self) -> Counterexample:
+        steps: list[tuple[tuple[str, str], ...]] = []
+        memory = self.first
+        while True:
+            _, (inputs, answers) = self.lost[memory]
+            shown = tuple((name, show(value)) for name, value in inputs.items())
+            if not answers:
+                told = f"after these inputs no output meets the guarantees at step {len(steps) + 1}"
+                return Counterexample(shown, told, (*steps, shown))
+            outputs, memory = max(answers, key=lambda answer: self.lost[answer[1]][0])
+            steps.append((*shown, *((name, show(value)) for name, value in outputs.items())))
+
+
+def _approached(contract: Contract) -> Viability:
+    """By eliminating quantifiers, round by round."""
+    unknown = Viability(Verdict.UNKNOWN, "which memories are viable could not be worked out")
+    region: Term = TRUE
+    some = {v: Variable(Role.BOUND, f"some {v.name}", v.sort) for v in contract.outputs}
+    every = {v: Variable(Role.BOUND, f"any {v.name}", v.sort) for v in contract.inputs}
+    for number in range(1, VIABILITY_ROUNDS + 1):
+        met = conjunction((*contract.promised.values(), contract.after(region)))
+        answered = Quantified(Quantifier.EXISTS, tuple(some.values()), substitute(met, some)) if some else met
+        asked = substitute(Implies(conjunction(contract.assumed.values()), answered), every)
+        exact = Quantified(Quantifier.FORALL, tuple(every.values()), asked) if every else asked
+        if not eliminable(exact):
+            return unknown
+        found = eliminated(exact)
+        if found is None:
+            return unknown
+        # the elimination counts only where the solver shows that both say the same
+        for one, other in ((found, exact), (exact, found)):
+            if entails([one], other, effort=contract.effort, seed=contract.seed).verdict is not Verdict.PROVED:
+                return unknown
+        following = conjunction((region, found))
+        if solve([contract.at_first(following)], effort=contract.effort, shown=False).status == "unsat":
+            told = f"the environment can bring it to where no output meets the guarantees, within {number} steps"
+            return Viability(Verdict.REFUTED, told, Counterexample(explanation=told))
+        if entails([region], following, effort=contract.effort, seed=contract.seed).verdict is Verdict.PROVED:
+            return Viability(Verdict.PROVED) if contract.closed(region) else unknown
+        region = following
+        if region == FALSE:
+            return unknown
+    return unknown

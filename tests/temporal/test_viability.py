@@ -1,0 +1,153 @@
+"""Realizability with memory against the game itself, played over whole runs by the definitions of the operators; and
+contracts with known answers."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import pytest
+from helpers import some
+
+from avow.base.verdict import Verdict
+from avow.formulas.formula import substitute
+from avow.language.contract import Clause, ClauseKind, Node
+from avow.language.load import check_text
+from avow.language.sorts import NATURAL
+from avow.language.terms import RESPONSES, History, Implies, Literal, Not, Term, Variable
+from avow.sanity.analysis import analyse
+from avow.sanity.viability import viable
+from avow.system.formulas import ports_of
+from avow.temporal.cells import Records, compile_node
+from temporal.positions import Step, broken, value
+from temporal.test_cells import N, formula
+from temporal.test_systems import clause
+
+BOTH = (False, True)
+DEPTH = 5
+
+
+def holds(term: Term, run: list[Step]) -> bool:
+    """Whether a clause is not broken at the last step of a run (and was not before)."""
+    if isinstance(term, Implies) and isinstance(term.right, History) and term.right.operator in RESPONSES:
+        return broken(term.left, term.right, run) is None
+    return bool(value(term, run, len(run) - 1))
+
+
+def environment_wins(assumed: Term, promised: list[Term], depth: int, run: list[Step] | None = None) -> bool:
+    """Whether inputs can be chosen, step by step, so that within so many steps no output keeps the guarantees."""
+    run = run or []
+    if not depth:
+        return False
+    for a in BOTH:
+        if not holds(assumed, [*run, {"in.a": a, "out.b": False, "in.n": 1}]):
+            continue
+        answers = [[*run, {"in.a": a, "out.b": b, "in.n": 1}] for b in BOTH]
+        kept = [longer for longer in answers if all(holds(g, longer) for g in promised)]
+        if all(environment_wins(assumed, promised, depth - 1, longer) for longer in kept):
+            return True
+    return False
+
+
+def drawn(seed: int) -> tuple[Term, list[Term]]:
+    rng = random.Random(seed)
+    assumed: Term = substitute(formula(rng, rng.randrange(3)), {N: Literal(1, NATURAL)})
+    if any(v.qualified == "out.b" for v in _now(assumed)):
+        assumed = Not(Literal(False, assumed.sort))
+    return assumed, [clause(rng) for _ in range(rng.randrange(1, 4))]
+
+
+def _now(term: Term) -> tuple[Variable, ...]:
+    return ports_of(Records().clause(term))
+
+
+def node_of(assumed: Term, promised: list[Term]) -> Node:
+    contract, _ = check_text("node n { inputs( a : BOOL ) outputs( b : BOOL ) topics() guarantee( TRUE ) }", "n.rcl")
+    assert contract is not None
+    guarantees = tuple(Clause(ClauseKind.GUARANTEE, f"g{k}", k + 1, g) for k, g in enumerate(promised))
+    return replace(
+        contract.nodes[0], assumptions=(Clause(ClauseKind.ASSUMPTION, "a", 1, assumed),), guarantees=guarantees
+    )
+
+
+@pytest.mark.parametrize("seed", some(range(1000), 40))
+def test_the_game_says_the_same(seed: int) -> None:
+    assumed, promised = drawn(seed)
+    found = viable(compile_node(node_of(assumed, promised)), effort=2_000)
+    if found.verdict is Verdict.PROVED:
+        assert not environment_wins(assumed, promised, DEPTH)
+    elif found.verdict is Verdict.REFUTED:
+        assert found.run is not None
+        length = len(found.run.trace)
+        if length <= DEPTH:
+            assert environment_wins(assumed, promised, length)
+
+
+TANK = """inputs( flow : REAL ) outputs( level : REAL, valve : REAL ) topics()
+  assume small ( 0 <= flow <= 1 )
+  guarantee moves ( level == previous(out.level, 5) + flow - valve )
+  guarantee stays ( 0 <= level <= 10 )
+  guarantee valve ( 0 <= valve <= {} )"""
+ARBITER = """inputs( a : BOOL, b : BOOL ) outputs( x : BOOL, y : BOOL ) topics()
+  guarantee one ( not (x and y) )
+  guarantee first ( a -> within[{} steps](out.x) )
+  guarantee second ( b -> within[{} steps](out.y) )"""
+KNOWN = {
+    "a tank whose bad levels no run comes to": (TANK.format(2), Verdict.PROVED),
+    "a tank that a full flow fills": (TANK.format(0), Verdict.REFUTED),
+    "an arbiter with room for both": (ARBITER.format(1, 1), Verdict.PROVED),
+    "an arbiter without": (ARBITER.format(0, 0), Verdict.REFUTED),
+    "an arbiter that answers one at once": (ARBITER.format(0, 1), Verdict.REFUTED),
+    "a response that later requests forbid": (
+        """inputs( a : BOOL ) outputs( b : BOOL ) topics()
+        guarantee g ( rose(a) -> within[1 steps](out.b) )
+        guarantee h ( previous(in.a, FALSE) -> not out.b )
+        guarantee i ( not previous(out.b, FALSE) -> not out.b )""",
+        Verdict.REFUTED,
+    ),
+    "the same, where requests are apart": (
+        """inputs( a : BOOL ) outputs( b : BOOL ) topics()
+        assume apart ( rose(a) -> historically[2 steps](a or not a) )
+        guarantee g ( a -> next(out.b) )""",
+        Verdict.PROVED,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_known_answers(name: str) -> None:
+    text, verdict = KNOWN[name]
+    contract, found = check_text(f"node n {{ {text} }}", "n.rcl")
+    assert contract is not None, found
+    assert viable(compile_node(contract.nodes[0])).verdict is verdict
+
+
+def test_a_refutation_is_a_run_of_the_environment() -> None:
+    contract, _ = check_text(f"node n {{ {ARBITER.format(0, 0)} }}", "n.rcl")
+    assert contract is not None
+    found = viable(compile_node(contract.nodes[0]))
+    assert found.run is not None
+    assert dict(found.run.trace[-1]) == {"in.a": "TRUE", "in.b": "TRUE"}
+
+
+def test_claims_are_about_what_runs_can_reach() -> None:
+    """What no memory that a run comes to allows is refuted, also where some memory would."""
+    text = """node n { inputs( a : BOOL ) outputs( b : BOOL ) topics()
+      guarantee never ( not b )
+      guarantee idle ( a and previous(out.b, FALSE) -> out.b )
+      guarantee late ( held[3 steps](in.a) -> not b ) }"""
+    contract, _ = check_text(text, "n.rcl")
+    assert contract is not None
+    found = {result.name: result.verdict for result in analyse(contract.nodes[0])}
+    assert found["vacuous-idle"] is Verdict.REFUTED
+    assert found["vacuous-late"] is Verdict.PROVED
+    assert found["redundant-late"] is Verdict.REFUTED
+    assert found["realizable"] is Verdict.PROVED
+
+
+def test_what_is_not_a_safety_property_is_not_called_realizable() -> None:
+    text = """node n { inputs( a : BOOL ) outputs( b : BOOL ) topics()
+      guarantee g ( a -> eventually(b) ) guarantee h ( not b ) }"""
+    contract, _ = check_text(text, "n.rcl")
+    assert contract is not None
+    assert {r.verdict for r in analyse(contract.nodes[0])} == {Verdict.UNKNOWN}
