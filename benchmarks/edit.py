@@ -52,7 +52,7 @@ def run(root: Path, kind: str) -> tuple[list[float], list[str]]:
     """Processor seconds (own, formats, tools), and the stages that were run."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
-        [sys.executable, "-c", _CHILD, str(root), kind],
+        [sys.executable, "-P", "-c", _CHILD, str(root), kind],
         capture_output=True,
         text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},

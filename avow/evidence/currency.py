@@ -40,11 +40,11 @@ def outlived(entry: Entry, refutations: Sequence[Entry]) -> bool:
 
 def as_of_now(ledger: Ledger, root: Path) -> tuple[Entry, ...]:
     """The entries; those that do not stand with a key that is nobody's, so that they count as of an earlier state."""
+    with ledger.still():
+        known = [(entry, refutations(ledger, entry)) for entry in ledger.records()]
     return tuple(
-        entry
-        if stands(entry.evidence, root) and not outlived(entry, refutations(ledger, entry))
-        else changed_since(entry)
-        for entry in ledger.records()
+        entry if stands(entry.evidence, root) and not outlived(entry, refuted) else changed_since(entry)
+        for entry, refuted in known
     )
 
 

@@ -14,11 +14,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 import os
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,6 +60,7 @@ class Ledger:
         self.repaired: tuple[str, ...] = ()
         """What was done about torn lines, in sentences."""
         self._lock = threading.RLock()
+        self._held = 0
         self._forget()
 
     # -- reading ------------------------------------------------------------------------------------------------
@@ -107,6 +109,18 @@ class Ledger:
             found = [e for name in (obligation, digest) for e in self._refuted.get((name, backend), ())]
             return tuple({e.number: e for e in sorted(found, key=lambda e: e.number)}.values())
 
+    @contextlib.contextmanager
+    def still(self) -> Iterator[None]:
+        """Many questions about the ledger as it stands now: within the block nothing is read, and nothing written. Not
+        to be left open for long: others wait."""
+        with self._lock:
+            self._refresh()
+            self._held += 1
+            try:
+                yield
+            finally:
+                self._held -= 1
+
     # -- writing ------------------------------------------------------------------------------------------------
 
     def append(self, evidence: Evidence) -> Entry:
@@ -116,6 +130,7 @@ class Ledger:
     def append_all(self, evidences: Sequence[Evidence]) -> tuple[Entry, ...]:
         """Add records under one lock with one sync. Raises OSError: then none of them was added."""
         with self._lock, locked(self.path) as file:
+            assert not self._held, "nothing is written while the ledger is to stand still"
             self._mend(file)
             self._refresh()
             cut = self._lines > 0 and bool(self._cut_off())
@@ -146,6 +161,7 @@ class Ledger:
     def accept_end(self) -> None:
         """The newest record that is there is the newest that there has to be. Raises OSError."""
         with self._lock, locked(self.path) as file:
+            assert not self._held, "nothing is written while the ledger is to stand still"
             self._mend(file)
             self._refresh()
             write(self._head_file, canonical({"hash": self._stated_head, "records": self._lines}) + "\n")
@@ -189,6 +205,8 @@ class Ledger:
 
     def _refresh(self) -> None:
         """Read what was added since the last look (by this or another process)."""
+        if self._held:
+            return
         try:
             if self._seen and _identity(self.path.stat()) == self._seen:
                 return

@@ -6,7 +6,7 @@ import functools
 import json
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
@@ -17,7 +17,7 @@ from avow.base.files import digest, digest_file, is_intact, write
 from avow.base.verdict import Link, Object, Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.currency import outlived
-from avow.evidence.ledger import Ledger, ledger_of
+from avow.evidence.ledger import Entry, ledger_of
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import CASE, RETRY, Evidence
 from avow.isolation.level import Isolation
@@ -38,15 +38,24 @@ def open_obligations(workspace: Workspace, work: Work, run: Run) -> tuple[Obliga
     method of the plan takes on it settles together, so that an answer does not depend on what else was open."""
     ledger = ledger_of(workspace.ledger(work.system.name))
     intact = functools.cache(lambda path, sha: is_intact(workspace.root / path, sha))
-    found = tuple(o for o in work.obligations if not _is_settled(workspace, ledger, work, o, run, intact))
+    with ledger.still():
+        known = [
+            (o, ledger.refutations(o.id, o.digest, work.engine), ledger.current(o.id, work.keys[o.id]))
+            for o in work.obligations
+        ]
+    found = tuple(o for o, refuted, entries in known if not _is_settled(workspace, work, refuted, entries, run, intact))
     return work.obligations if found and not work.is_engine else found
 
 
 def _is_settled(
-    workspace: Workspace, ledger: Ledger, work: Work, obligation: Obligation, run: Run, intact: Intact
+    workspace: Workspace,
+    work: Work,
+    refuted: Sequence[Entry],
+    entries: Sequence[Entry],
+    run: Run,
+    intact: Intact,
 ) -> bool:
-    refuted = ledger.refutations(obligation.id, obligation.digest, work.engine)
-    found = [e for e in ledger.current(obligation.id, work.keys[obligation.id]) if not outlived(e, refuted)]
+    found = [e for e in entries if not outlived(e, refuted)]
     records = [e.evidence for e in found if still_counts(e.evidence, workspace.root, work.system)]
     if not records or (run.fresh and records[-1].run != run.id):
         return False

@@ -242,3 +242,18 @@ def test_ill_typed_records_are_not_read(change: dict[str, object]) -> None:
 def test_encoding_keeps_a_whole_record() -> None:
     record = replace(some(1)[0], hypotheses=("h",), command=("a", "b c"), inputs={"p": "d"})
     assert decode(json.loads(json.dumps(encode(record)))) == record
+
+
+def test_while_it_stands_still_nothing_is_read_and_nothing_written(tmp_path: Path) -> None:
+    ledger, other = Ledger(tmp_path / "l.jsonl"), Ledger(tmp_path / "l.jsonl")
+    first, second, third = some(3)
+    ledger.append(first)
+    with ledger.still():
+        other.append(second)
+        assert len(ledger.records()) == 1
+        with pytest.raises(AssertionError):
+            ledger.append(third)
+    assert len(ledger.records()) == 2
+    ledger.append(third)
+    assert len(other.records()) == 3
+    assert not ledger.damage
