@@ -112,7 +112,7 @@ def _wiring(system: System, node: Node, backend: str) -> list[Any]:
     ros = system.plan.ros
     found: list[Any] = [_topics(node)]
     if ros != Ros():
-        found.append([ros.distro, repr(ros.names)])
+        found.append([ros.distro, repr(ros.names), *ros.shared])
     try:
         edges = dataflow(system).feeding(node.name)
     except Rejected as rejected:  # told elsewhere

@@ -308,6 +308,8 @@ class Ros:
 
     distro: str | None = None
     names: Resolver = field(default_factory=Resolver)
+    shared: tuple[str, ...] = ()
+    """The topics that several nodes publish, by their whole names: a message does not say whose it is."""
 
 
 @dataclass(frozen=True, slots=True)

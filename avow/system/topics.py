@@ -171,6 +171,8 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
     """The system with a node for each input whose topic several nodes publish; and who else publishes a topic without
     its being said what the input hears of it. None is left out: what it says would be heard all the same."""
     found = ends(contract.nodes, plan.ros.names)
+    several = (name for name, outputs in found.published.items() if len({at.node for at, _ in outputs}) > 1)
+    plan = replace(plan, ros=replace(plan.ros, shared=tuple(sorted(several))))
     connections = list(plan.connections)
     nodes: list[Node] = []
     taken = {node.name for node in contract.nodes}

@@ -65,7 +65,7 @@ class Blame:
 
     def _assumption(self, violation: Violation, monitors: Mapping[str, Monitor]) -> Violation:
         node = self.system.contract.node(violation.node)
-        edges = [edge for port in _inputs(node, violation.clause) if (edge := self._edge(node.name, port)) is not None]
+        edges = [edge for port in _inputs(node, violation.clause) for edge in self._edges(node.name, port)]
         if not edges:
             self._assumed[node.name] = f"{node.name}.{violation.clause} at event {violation.index} (environment)"
             return violation
@@ -79,9 +79,14 @@ class Blame:
             why = f"it came from {providers}, of which no guarantee was seen broken"
         return replace(violation, fault=Fault.PROVIDER, explanation=f"{violation.explanation}; {why}")
 
-    def _edge(self, node: str, port: str) -> Edge | None:
-        """What feeds an input; through the node that stands for a topic of several publishers, the topic itself."""
-        return self._feeding.get(node, {}).get(port)
+    def _edges(self, node: str, port: str) -> list[Edge]:
+        """What feeds an input; of a topic of several publishers, all of them."""
+        edge = self._feeding.get(node, {}).get(port)
+        if edge is None:
+            return []
+        if self.system.contract.node(edge.source.node).relay:
+            return list(self._feeding.get(edge.source.node, {}).values())
+        return [edge]
 
     def _cause(self, edge: Edge, monitors: Mapping[str, Monitor]) -> str:
         """Where a breach of the source began that the edge still delivers; empty where there is none."""
@@ -95,9 +100,6 @@ class Blame:
             # a delayed edge still delivers what was said before the latest answer
             if broken and speaks and _held(monitor.tallies[clause.name]) <= broken.held + edge.delayed:
                 return broken.origin
-        if source.name.startswith("topic_"):
-            inner = (e for e in self._feeding.get(source.name, {}).values())
-            return next((cause for e in inner if (cause := self._cause(e, monitors))), "")
         return ""
 
 

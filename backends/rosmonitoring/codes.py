@@ -73,6 +73,12 @@ CODES = register(
         "Judge a ROS 2 bag with service events, or a JSON trace; or let the node publish its calls.",
     ),
     declare(
+        "MON207",
+        "unknown publisher",
+        "A bag has messages of several nodes on a topic that one node of the contract publishes.",
+        "Add the others to the contract, or record without them.",
+    ),
+    declare(
         "MON301",
         "serving not installed",
         "Serving an oracle needs a package that is not installed.",

@@ -156,6 +156,14 @@ def readable(setup: Setup, path: File, where: Origin) -> tuple[Diagnostic, ...]:
         return ()
     found = carried(path, where)
     kinds = setup.kinds
+    rules = (rule for name, rule in setup.rules.items() if name.startswith(f"{Role.OUTPUT}."))
+    said = {same_topic(rule.topic) for rule in rules if isinstance(rule, Fields | Choice)}
+    others = [(t, who) for t, who in found.publishers.items() if same_topic(t) in said and len(who) > 1]
+    if others:
+        topic, who = others[0]
+        text = f"{path.name}: {' and '.join(who)} publish {topic}, and in the contract {setup.node.name} alone does"
+        hint = "model the others too: whose message was wrong could not be told"
+        return (Diagnostic("MON207", text, hint=hint),)
     calls = [topic for topic in setup.topics if is_service_part(topic)]
     if calls and not found.ros2:
         text = f"{path.name} is a ROS 1 bag, which cannot hold calls of services: {', '.join(calls)}"
@@ -307,6 +315,8 @@ class _Work:
             topic = resolved(self.system, self.node, entry["topic"]) if "topic" in entry else topic
         if topic is None:
             return f"no topic of {self.node.name} matches {name}, and the plan does not map it"
+        if port.role is Role.OUTPUT and same_topic(topic) in map(same_topic, self.system.plan.ros.shared):
+            return f"several nodes publish {topic}, and a message does not say whose it is"
         return self.observed(port, topic, kind, entry)
 
     def observed(self, port: Port, topic: str, kind: str | None, entry: Any) -> Rule | str:

@@ -174,7 +174,7 @@ def _asked(kind: ClauseKind, tally: Tally) -> int:
 def session(system: System, nodes: Sequence[str] = (), trace: Path | None = None) -> Session:
     """Monitors for the named nodes, by default all, with the plan's mappings; where `trace` is a bag, also by what it
     says of its messages. Raises Rejected."""
-    known = {node.name: node for node in system.contract.nodes}
+    known = {node.name: node for node in system.contract.nodes if not node.relay}  # wiring says nothing itself
     types, wrong = known_types(system, () if trace is None else (trace,))
     faults: list[Diagnostic] = list(wrong)
     monitors: list[Monitor] = []

@@ -148,3 +148,55 @@ def test_recorded_evidence_says_what_was_broken_before_it_and_by_whom(
     job = job_for(load_system(tmp_path), "motor")
     (outcome,) = BACKEND.discharge(job, tmp_path, Limits()).outcomes
     assert told in outcome.summary
+
+
+TWO = """
+node joy { inputs( ) outputs( v : REAL ) topics( float64 cmd matches(out.v) ) guarantee slow ( out.v <= 1 ) }
+node auto { inputs( ) outputs( w : REAL ) topics( float64 cmd matches(out.w) ) guarantee slow ( out.w <= 0 ) }
+node wheels { inputs( u : REAL ) outputs( t : REAL ) topics( float64 cmd matches(in.u), float64 t matches(out.t) )
+  assume slow ( in.u <= 1 )
+  guarantee follows ( out.t <= 1 ) }
+"""
+
+
+def test_nobody_is_blamed_for_what_several_publish(tmp_path: Path) -> None:
+    """A message does not say whose it is: neither of the two is called broken, nor is anything observed of them."""
+    (tmp_path / "system.rcl").write_text(TWO, encoding="utf-8")
+    methods = {"methods": [{"rosmonitoring": {"traces": ["t.jsonl"]}}]}
+    (tmp_path / "plan.yaml").write_text(json.dumps({"nodes": {"auto": methods}}), encoding="utf-8")
+    (tmp_path / "t.jsonl").write_text('{"topic": "cmd", "data": 0.5, "time": 0}\n', encoding="utf-8")
+    system = load_system(tmp_path)
+    running = session(system)
+    events = [{"topic": "cmd", "data": value, "time": k} for k, value in enumerate((0.5, 7))]
+    found = [(v.node, v.clause, v.fault) for event in events for v in running.step(event)]
+    assert found == [("wheels", "slow", Fault.PROVIDER)]
+    (outcome,) = BACKEND.discharge(job_for(system, "auto"), tmp_path, Limits()).outcomes
+    assert outcome.verdict is Verdict.UNKNOWN
+    assert "several nodes publish cmd" in outcome.summary
+
+
+def test_a_slice_knows_that_others_publish_too(tmp_path: Path) -> None:
+    from avow.pipeline.slices import method_slice
+
+    (tmp_path / "system.rcl").write_text(TWO, encoding="utf-8")
+    methods = {"methods": [{"rosmonitoring": {}}]}
+    (tmp_path / "plan.yaml").write_text(json.dumps({"nodes": {"auto": methods}}), encoding="utf-8")
+    cut = method_slice(BACKEND, job_for(load_system(tmp_path), "auto")).system
+    assert [node.name for node in cut.contract.nodes] == ["auto"]
+    assert cut.plan.ros.shared == ("/cmd",)
+
+
+def test_a_bag_with_a_publisher_that_is_not_modelled_is_refused(tmp_path: Path) -> None:
+    rosbags = pytest.importorskip("rosbags.rosbag1")
+    from rosbags.typesys import Stores, get_typestore
+
+    from avow.base.diagnostics import Rejected
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    message = store.types["std_msgs/msg/Float64"](data=9.0)
+    with rosbags.Writer(tmp_path / "run.bag") as writer:
+        for k, caller in enumerate(("/sensor", "/stranger"), start=1):
+            connection = writer.add_connection("/s", "std_msgs/msg/Float64", typestore=store, callerid=caller)
+            writer.write(connection, k * 10**9, store.serialize_ros1(message, "std_msgs/msg/Float64"))
+    with pytest.raises(Rejected, match="/sensor and /stranger publish /s, and in the contract sensor alone does"):
+        session(chain(tmp_path), (), tmp_path / "run.bag")
