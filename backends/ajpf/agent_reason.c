@@ -18,18 +18,25 @@ static int gw_believes(const Mind *m, int goal, int depth, const Rest *rest);
 static int gw_goes_on(const Mind *m, const Rest *rest) {
     return !rest || gw_solve(m, rest->c, rest->n, rest->env, rest->depth, rest->next);
 }
-/* A rule whose body has cuts: what stands before one is met in one way, and then no other rule is tried */
+/* A rule with a cut derives nothing in AIL; if what stands before its last condition holds, no other rule is tried.
+   What was found before a cut stands, and so does the first way to meet each condition after it. */
+static int gw_cuts(const Mind *m, const Rule *r, int *env, int depth) {
+    int i, cut;
+    for (cut = 0; cut < r->n - 1 && r->body[cut].what != CUT; cut++);
+    if (!gw_solve(m, r->body, cut, env, depth, 0)) return 0;
+    for (i = cut; i < r->n - 1; i++)
+        if (r->body[i].what != CUT && !gw_solve(m, r->body + i, 1, env, depth, 0)) return 0;
+    return 1;
+}
 static int gw_by_rule(const Mind *m, const Rule *r, int goal, int depth, const Rest *rest, int *committed) {
-    int env[MAXVARS], from = 0, i;
+    int env[MAXVARS], i, cuts = 0;
     gw_unbound(env);
     if (!gw_unify(goal, gw_build(r->head, env))) return 0;
-    for (i = 0; i < r->n; i++)
-        if (r->body[i].what == CUT) {
-            if (!gw_solve(m, r->body + from, i - from, env, depth + 1, 0)) return 0;
-            *committed = 1;
-            from = i + 1;
-        }
-    return gw_solve(m, r->body + from, r->n - from, env, depth + 1, rest);
+    for (i = 0; i < r->n; i++) cuts |= r->body[i].what == CUT;
+    if (!cuts) return gw_solve(m, r->body, r->n, env, depth + 1, rest);
+    if (r->n == 1) return gw_goes_on(m, rest);
+    *committed = gw_cuts(m, r, env, depth + 1);
+    return 0;
 }
 static int gw_believes(const Mind *m, int goal, int depth, const Rest *rest) {
     int i, trail = gw_ntrail, committed = 0;
@@ -94,6 +101,7 @@ static int gw_wanted(const Mind *m, int t, int kind, const Rest *rest) {
 }
 static int gw_meets(const Mind *m, const Cond *c, int *env, int depth, const Rest *rest) {
     int t;
+    if (c->what == CUT) return gw_goes_on(m, rest);
     if (c->what == GROUP) return gw_solve(m, c->group, c->n, env, depth, rest);
     t = gw_build(c->pat, env);
     switch (c->what) {

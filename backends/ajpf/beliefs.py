@@ -24,11 +24,11 @@ from .syntax import (
     unify,
     variables,
 )
-from .tuning import RULE_DEPTH
+from .tuning import RULE_DEPTH, RULE_STEPS
 
 
 class TooDeep(Exception):  # noqa: N818 - it names what happened
-    """Reasoning rules call each other without end, or nearly so."""
+    """Reasoning rules call each other without end, or nearly so; or what they ask for takes too many steps to find."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +74,8 @@ class Reasoner:
 
     rules: Mapping[tuple[str, int], Sequence[Rule]]
     fresh: Iterator[int] = field(default_factory=count)
+    steps: int = 0
+    """Beliefs and rules that were tried for the question at hand."""
 
     @staticmethod
     def of(rules: Sequence[Rule]) -> Reasoner:
@@ -81,6 +83,23 @@ class Reasoner:
         for rule in rules:
             index.setdefault((rule.head.functor, len(rule.head.args)), []).append(rule)
         return Reasoner(index)
+
+    def first_way(
+        self, beliefs: Beliefs, conditions: Sequence[Condition], bindings: Bindings, goals: Sequence[Goal]
+    ) -> Bindings | None:
+        """The first way to meet all conditions, if there is any. Raises TooDeep."""
+        self.steps = 0
+        return next(self.holds(beliefs, conditions, bindings, goals), None)
+
+    def derived(self, beliefs: Beliefs, term: Term) -> Bindings | None:
+        """The first way to believe the term, if there is any. Raises TooDeep."""
+        self.steps = 0
+        return next(self.believes(beliefs, term, {}), None)
+
+    def _tried(self) -> None:
+        self.steps += 1
+        if self.steps > RULE_STEPS:
+            raise TooDeep
 
     def believes(self, beliefs: Beliefs, term: Term, bindings: Bindings, depth: int = 0) -> Iterator[Bindings]:
         """Every way to bind the term's variables so that it is believed or derivable. Raises TooDeep."""
@@ -92,29 +111,36 @@ class Reasoner:
             return
         key = (goal.functor, len(goal.args))
         for belief in beliefs.index.get(key, ()):
+            self._tried()
             if belief.args and not is_ground(belief):
                 belief = apart(belief, f"'{next(self.fresh)}")
             found = unify(goal, belief, bindings)
             if found is not None:
                 yield found
         for rule in self.rules.get(key, ()):
+            self._tried()
             if depth >= RULE_DEPTH:
                 raise TooDeep
             renamed = renamed_rule(rule, f"'{next(self.fresh)}")
             found = unify(goal, renamed.head, bindings)
             if found is None:
                 continue
-            body, committed = renamed.body, False
-            while any(c.is_cut for c in body):  # what stands before a cut is met in one way
-                at = next(n for n, c in enumerate(body) if c.is_cut)
-                found = next(self.holds(beliefs, body[:at], found, (), depth + 1), None)
-                if found is None:
-                    break
-                body, committed = body[at + 1 :], True
+            if len(renamed.body) > 1 and any(c.is_cut for c in renamed.body):
+                if self._passes(beliefs, renamed.body[:-1], found, depth + 1):
+                    return
+                continue
+            yield from self.holds(beliefs, renamed.body, found, (), depth + 1)
+
+    def _passes(self, beliefs: Beliefs, conditions: Sequence[Condition], bindings: Bindings, depth: int) -> bool:
+        """Whether a rule with a cut gets as far as its last condition. AIL's iterator then takes it for cut before its
+        first answer: such a rule derives nothing, and none that comes after it is tried. What was found before a cut
+        stands, and so does the first way to meet each condition after it."""
+        at = next((n for n, c in enumerate(conditions) if c.is_cut), len(conditions))
+        found = next(self.holds(beliefs, conditions[:at], bindings, (), depth), None)
+        for condition in conditions[at:]:
             if found is not None:
-                yield from self.holds(beliefs, body, found, (), depth + 1)
-            if committed:
-                return
+                found = next(self._one(beliefs, condition, found, (), depth), None)
+        return found is not None
 
     def holds(
         self,
@@ -124,7 +150,7 @@ class Reasoner:
         goals: Sequence[Goal],
         depth: int = 0,
     ) -> Iterator[Bindings]:
-        """Every way to meet all conditions. They come with the negated ones last."""
+        """Every way to meet all conditions."""
         if not conditions:
             yield bindings
             return

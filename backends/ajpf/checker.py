@@ -225,7 +225,7 @@ class Labels:
     def _of_beliefs(self, number: int) -> int:
         agent = self.agent
         beliefs = agent.beliefs.items[number]
-        holds = ((bit, next(agent.reasoner.believes(beliefs, term, {}), None)) for bit, term in self.believed)
+        holds = ((bit, agent.reasoner.derived(beliefs, term)) for bit, term in self.believed)
         return sum(bit for bit, found in holds if found is not None)
 
     def _of_goals(self, number: int) -> int:

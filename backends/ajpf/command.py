@@ -57,6 +57,6 @@ def run(file: Path, environment: Path | None, semantics: str, seed: int, steps: 
         click.echo(f"the agent ends with an error of its own: {error}", err=True)
         return 1
     except (TooDeep, RecursionError):
-        click.echo("the agent's terms or reasoning rules nest too deeply", err=True)
+        click.echo("the agent's terms or reasoning rules nest too deeply, or ask for too much", err=True)
         return 1
     return 0

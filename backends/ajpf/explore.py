@@ -117,7 +117,7 @@ def explore(
         try:
             reached = successors(found[at])
         except (TooDeep, RecursionError):
-            unfinished = "the agent's terms or reasoning rules nest too deeply"
+            unfinished = "the agent's terms or reasoning rules nest too deeply, or ask for too much"
             break
         except Crash as error:
             unfinished = f"the agent ends with an error of its own: {error}"

@@ -285,7 +285,7 @@ class Agent(Mind):
             number = self.number(perform(intention, goal))
             return done._replace(goals=self.goals.number(wanted | {goal}), intention=number), state.queue
         beliefs = self.beliefs.items[state.beliefs]
-        met = next(self.reasoner.believes(beliefs, goal.term, {}), None)
+        met = self.reasoner.derived(beliefs, goal.term)
         if met is not None:
             left = self.after(state.beliefs, state.goals, intention, met)
             elsewhere = any(
@@ -334,5 +334,5 @@ class Agent(Mind):
         if self.semantics is Semantics.MCAPL:
             return any(unify(intention.waiting, belief, {}) is not None for belief in changed)
         deeds = intention.frames[-1].deeds
-        derivable = next(self.reasoner.believes(self.beliefs.items[base], intention.waiting, {}), None) is not None
+        derivable = self.reasoner.derived(self.beliefs.items[base], intention.waiting) is not None
         return derivable is not (deeds is not None and deeds[0].kind is DeedKind.WAIT_NOT)

@@ -106,7 +106,7 @@ class Mind:
             if bindings is None:
                 continue
             guard = tuple(_own_condition(c, suffix) for c in plan.guard)
-            met = next(self.reasoner.holds(self.beliefs.items[base], guard, bindings, self._wanted(goals)), None)
+            met = self.reasoner.first_way(self.beliefs.items[base], guard, bindings, self._wanted(goals))
             if met is None:
                 continue
             if not plan.deeds:
@@ -149,7 +149,7 @@ class Mind:
             case DeedKind.DROP_BELIEF:
                 return self._drop_belief(goals, intention, beliefs, term)
             case DeedKind.WAIT | DeedKind.WAIT_NOT:
-                met: Bindings | None = next(self.reasoner.believes(beliefs, term, {}), None)
+                met = self.reasoner.derived(beliefs, term)
                 if deed.kind is DeedKind.WAIT_NOT:
                     met = {} if met is None else None
                 if met is not None:
@@ -176,7 +176,7 @@ class Mind:
         return Done(base, self.without(goals, gone), self.number(bind(left, bindings)), posted, changed, action)
 
     def _add_belief(self, goals: int, intention: Intention, beliefs: Beliefs, base: int, belief: Struct) -> Done:
-        known = next(self.reasoner.believes(beliefs, belief, {}), None) is not None
+        known = self.reasoner.derived(beliefs, belief) is not None
         new = base
         if belief not in beliefs:
             if intention.frames[0].event == PERCEPTION:

@@ -136,7 +136,7 @@ class _Run:
         try:
             checker = Checker(graph, properties)
         except (TooDeep, RecursionError):
-            reason = "the agent's terms or reasoning rules nest too deeply"
+            reason = "the agent's terms or reasoning rules nest too deeply, or ask for too much"
             self.results |= {p.key: Settled(Verdict.UNKNOWN, reason) for p in properties}
             return None
         for p in properties:

@@ -64,7 +64,8 @@ def _bodies(program: Program, rule: Rule, suffix: str, atom: Atom, known: Sequen
     """Instances of the rule's body that make the atom true."""
     renamed = renamed_rule(rule, suffix)
     bindings = unify(named_apart(atom.term), renamed.head, {})
-    if bindings is None or not all(_plain(c) for c in renamed.body):
+    cut = any(c.is_cut for other in program.rules for c in other.body if other.head.functor == rule.head.functor)
+    if bindings is None or cut or not all(_plain(c) for c in renamed.body):
         return
     derived = {(other.head.functor, len(other.head.args)) for other in program.rules}
     facts = [a.term for a in known if a.agent == atom.agent and (a.term.functor, len(a.term.args)) not in derived]

@@ -3,6 +3,9 @@
 RULE_DEPTH = 60
 """Belief rules that call each other: one that calls itself never ends, and the search must."""
 
+RULE_STEPS = 300_000
+"""Beliefs and rules tried to answer one question that an agent asks itself: about a second's work."""
+
 DRAWS = 4096
 """Combinations of percepts that an environment may draw in one step: each is a branch of every state."""
 

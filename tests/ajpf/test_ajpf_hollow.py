@@ -128,6 +128,8 @@ close(X) :- near(X), at(X);
 odd(X) :- near(X), [X < 2];
 hidden :- ~(near(X), at(X));
 quiet :- ~noise(X);
+tired :- wet, dry, !, wet;
+tired :- outside;
 :Initial Goals:
 :Plans:
 +p : { True } <- act, -old, -at(2);
@@ -152,6 +154,7 @@ quiet :- ~noise(X);
         ("[] (B(ag, outside) -> (<> B(ag, old)))", False),  # a plan drops it
         ("[] (B(ag, outside) -> (<> B(ag, fixed)))", False),  # it may go with a percept
         ("[] (B(ag, outside) -> (<> B(ag, seen)))", False),
+        ("[] (B(ag, outside) -> (<> B(ag, tired)))", False),  # another rule's cut may keep it from being tried
         ("[] (B(other, outside) -> (<> B(other, barred)))", False),
     ],
 )

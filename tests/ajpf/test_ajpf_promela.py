@@ -109,15 +109,18 @@ GWENDOLEN
 square(1), square(2), square(3), empty(2), lit("on"), near(1, [2, 3])
 :Reasoning Rules:
 full :- ~(square(X), empty(X));
-first(X) :- square(X), [1 < X], !;
-first(9);
+big(X) :- square(X), [1 < X];
+one :- full, !;
+one;
+none :- square(X), !, [X < 9], lit("on");
+none;
 member(X, [X|T]);
 member(X, [H|T]) :- member(X, T);
 twice(X, Y) :- square(X), [Y == X * 2];
 :Initial Goals:
 start [perform]
 :Plans:
-+!start [perform] : { B first(X), ~B full, B twice(X, Y), Y < 5 } <- +got(Y), sum(Y, 0.5, Z), +half(Z),
++!start [perform] : { B big(X), B one, ~B none, ~B full, B twice(X, Y), Y < 5 } <- +got(Y), sum(Y, 0.5, Z), +half(Z),
   toString(f(Z), S), say(S), append("a", "b", T), +text(T), +any(W), +!ask(V) [perform], after(V), -square(U), gone(U),
   div(1, 4, Q), +quarter(Q), +!find(F) [achieve], have(F);
 +!ask(V) [perform] : { B near(1, L), B member(V, L), ~B empty(V) } <- found(V), +asked((V + 1));
