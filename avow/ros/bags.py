@@ -88,7 +88,7 @@ def messages(
             for c in reader.connections
             if not wanted(c.topic) and any(map(wanted, parts_of(c.topic, canonical(c.msgtype))))
         }
-        plain = _plainer(reader.typestore.fielddefs)
+        plain = plainer(reader.typestore.fielddefs)
         kind = functools.cache(lambda said: as_message(said, "")[0])
         for connection, time, raw in reader.messages():
             event: dict[str, Any] = {}
@@ -160,7 +160,7 @@ def _types(origin: Origin) -> Any:
     return store
 
 
-def _plainer(fielddefs: Mapping[str, Any]) -> Callable[[Any], Any]:
+def plainer(fielddefs: Mapping[str, Any]) -> Callable[[Any], Any]:
     """Deserialised messages as the JSON that ROSMonitoring would write of them; floats as they are. Fields have their
     own names, also those that are words of Python's, to which rosbags puts an underscore."""
     names: dict[type, tuple[tuple[str, str], ...]] = {}

@@ -84,5 +84,12 @@ CODES = register(
         "Serving an oracle needs a package that is not installed.",
         "`pip install 'avow[monitor]'`.",
     ),
+    declare(
+        "MON303",
+        "no graph",
+        "No master of ROS 1 answers, or it refuses.",
+        "Start one (`roscore`), or name it: `--live ros1:http://host:11311`.",
+    ),
+    declare("MON304", "no record", "The record of a live run cannot be written.", "Correct the path of `--record`."),
     declare("MON302", "cannot listen", "The port is taken or not allowed.", "Choose another with `--serve`."),
 )

@@ -29,19 +29,43 @@ if TYPE_CHECKING:
 @click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one JSON object.")
 @click.option("--all", "show_all", is_flag=True, help=f"Show every violation, not only the first {VIOLATIONS_SHOWN}.")
+@click.option("--live", metavar="GRAPH", help="Judge a running graph: ros1, or ros1:http://host:11311.")
+@click.option(
+    "--for", "seconds", type=click.FloatRange(min=0), help="With --live: for so many seconds (else until Ctrl-C)."
+)
+@click.option("--host", default="127.0.0.1", help="With --live: where the graph's nodes find this one (127.0.0.1).")
+@click.option("--record", type=click.Path(path_type=Path), help="With --live: write all that is heard, as a trace.")
+@click.option(
+    "--verdicts", metavar="TOPIC", help="With --live: say verdicts there, as diagnostic_msgs/DiagnosticArray."
+)
 @click.option("--serve", "port", type=click.IntRange(0, 65535), help="Answer ROSMonitoring's monitors on this port.")
 def command(
-    system: str, trace: str | None, nodes: tuple[str, ...], as_json: bool, show_all: bool, port: int | None
+    system: str,
+    trace: str | None,
+    nodes: tuple[str, ...],
+    as_json: bool,
+    show_all: bool,
+    live: str | None,
+    seconds: float | None,
+    host: str,
+    record: Path | None,
+    verdicts: str | None,
+    port: int | None,
 ) -> int:
     """Judge TRACE against the contracts of SYSTEM (a folder, or a name under contracts/).
 
-    TRACE is JSON lines in ROSMonitoring's shape, a ROS 1 or ROS 2 bag, or - for standard input. Code 1 where something
+    TRACE is JSON lines in ROSMonitoring's shape, a ROS 1 or ROS 2 bag, or - for standard input; --live judges a graph
+    that runs. Code 1 where something
     was broken or nothing could be judged, 2 where an input cannot be used.
     """
     from avow.base.workspace import system_folder
     from avow.system.load import load_system
 
     loaded = load_system(system_folder(system))
+    if live is not None:
+        if trace is not None or port is not None:
+            raise click.UsageError("give a TRACE, --live or --serve")
+        return _live(loaded, nodes, live, (seconds, host, record, verdicts), as_json, show_all)
     if port is not None:
         if trace is not None:
             raise click.UsageError("give a TRACE or --serve, not both")
@@ -52,14 +76,55 @@ def command(
     return _judge(loaded, nodes, trace, as_json, show_all)
 
 
+def _live(
+    system: System, nodes: tuple[str, ...], graph: str,
+    how: tuple[float | None, str, Path | None, str | None], as_json: bool, show_all: bool,
+) -> int:  # fmt: skip
+    from avow.base.diagnostics import Diagnostic, Rejected
+
+    from .live import follow
+    from .ros1 import Ros1, master_of
+    from .session import session
+
+    if graph.partition(":")[0] != "ros1":
+        text = f"{graph!r} is no graph that can be listened to"
+        raise Rejected(Diagnostic("MON303", text, hint="ros1, or ros1:http://host:11311"))
+    seconds, host, record, verdicts = how
+    running = session(system, nodes)
+    found = follow(running, Ros1(master_of(graph), running.topics, host), seconds, record, verdicts, _warn)
+
+    def until_interrupted() -> Iterator[tuple[int, Violation]]:
+        try:
+            for violation in found:
+                yield 0, violation
+        except KeyboardInterrupt:
+            for violation in running.finish():
+                yield 0, violation
+
+    return _told(running, until_interrupted(), str(record or ""), as_json, show_all)
+
+
+def _warn(text: str) -> None:
+    click.echo(text, err=True)
+
+
 def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, show_all: bool) -> int:
-    from .session import session, violation_json
-    from .traces import digest_trace
+    from .session import session
 
     running = session(system, nodes, None if trace == "-" else Path(trace))
+    return _told(running, _violations(running, trace), trace, as_json, show_all)
+
+
+def _told(
+    running: Session, violations: Iterator[tuple[int, Violation]], trace: str, as_json: bool, show_all: bool
+) -> int:
+    """Show what was found, and what became of each clause; the exit code."""
+    from .session import violation_json
+    from .traces import digest_trace
+
     shown: list[dict[str, Any]] = []
     count = 0
-    for line, violation in _violations(running, trace):
+    for line, violation in violations:
         count += 1
         if not show_all and count > VIOLATIONS_SHOWN:
             continue
@@ -68,7 +133,7 @@ def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, sh
         else:
             click.echo(violation.text())
     if as_json:
-        digest = "" if trace == "-" else digest_trace(Path(trace))
+        digest = "" if trace in ("-", "") else digest_trace(Path(trace))
         whole = {**running.summary(), "trace": trace, "sha256": digest, "violations": shown}
         click.echo(json.dumps(whole, indent=2, ensure_ascii=False))
     else:

@@ -118,10 +118,8 @@ class Monitor:
         readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
         if isinstance(topic, str) and len(self.heard) < TOPICS_KEPT:
             self.heard.add(same_topic(topic))
-        found: list[Violation] = []
         names = [name for name, _ in readers or ()]
-        for name, wrong, silent in self.timing.passes(event, set(names)):
-            found.append(self._violation(Fault.SILENT if silent else Fault.RATE, name, event, wrong))
+        found = self.tick(event, set(names))
         if readers is None or not isinstance(topic, str):
             return found
         self.relevant += 1
@@ -171,6 +169,11 @@ class Monitor:
                     watched.memory[name] = self.values[source]
         self.settle_previous()
         return found
+
+    def tick(self, event: Mapping[str, Any], names: Set[str] = frozenset()) -> list[Violation]:
+        """Time has passed, with or without a message of these variables: deadlines do not wait for one."""
+        late = self.timing.passes(event, names)
+        return [self._violation(Fault.SILENT if silent else Fault.RATE, n, event, wrong) for n, wrong, silent in late]
 
     def settle_previous(self) -> None:
         """An answer is over: what it said is now what the step before said."""
@@ -300,7 +303,7 @@ class Monitor:
         if truth is None:
             return None
         if truth:
-            return _HELD
+            return "held"
         for assumed in self._assumptions:
             if all(n in values for n in assumed.names) and self._truth(assumed, values) is False:
                 return Fault.EXCUSED
@@ -409,7 +412,8 @@ class Monitor:
             watched.outputs = frozenset(triggers)
             if len(triggers) > 1:
                 watched.held = tuple((n, s) for n, s in self._previous if n in names and s in triggers)
-                self._hold(watched)
+                # before the first answer: the initial values
+                watched.memory = {n: self.values[n] for n, _ in watched.held if n in self.values}
         if any(n.startswith(f"{Role.OUTPUT}.") for n in triggers):
             paired = tuple(n for n in names if n in self._paired)
             tally.unpaired = bool(paired) and self.setup.answers is None
@@ -421,10 +425,6 @@ class Monitor:
             self._constant.append(watched)
         if clause.kind is ClauseKind.ASSUMPTION:
             self._assumptions.append(watched)
-
-    def _hold(self, watched: Watched) -> None:
-        """Before the first answer: the initial values."""
-        watched.memory = {n: self.values[n] for n, _ in watched.held if n in self.values}
 
     def _triggers(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """The variables whose publication makes a clause judged."""
@@ -496,6 +496,3 @@ class Monitor:
         values, pairs = shown(watched, snapshot) if watched is not None and snapshot is not None else ((), ())
         time = time_text(event.get("time"))
         return Violation(fault, self.setup.node.name, clause, index or self.events, time, values, pairs, explanation)
-
-
-_HELD = "held"

@@ -44,6 +44,10 @@ class Session:
         self.heard(topic if isinstance(topic, str) else "", 1)
         yield from self.told([v for monitor in self.monitors for v in monitor.step(event)])
 
+    def tick(self, event: Mapping[str, Any]) -> Iterator[Violation]:
+        """Time has passed without a message."""
+        yield from self.told([v for monitor in self.monitors for v in monitor.tick(event)])
+
     def heard(self, topic: str, count: int) -> None:
         """So many events of a topic (without a name: of none) have come."""
         self.events += count

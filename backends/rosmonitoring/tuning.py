@@ -58,3 +58,18 @@ second at 10 Hz."""
 
 TIMES_APART = 1e-6
 """Seconds, more than a difference of two times in binary may be off; what is nearer to a bound the engine judges."""
+
+FRAME_BYTES = 64_000_000
+"""Bytes of one message of a running graph; a longer length is taken for a fault of the other side."""
+
+HEADER_BYTES = 1_000_000
+"""Bytes of a connection's header: it holds a definition, at most some hundred kilobytes."""
+
+QUEUED_MESSAGES = 100_000
+"""Messages of a running graph that wait to be judged; more are lost, counted and told."""
+
+LIVE_PAUSE = 0.1
+"""Seconds without a message after which deadlines are looked at."""
+
+VERDICTS_EVERY = 1.0
+"""Seconds between two messages of verdicts where nothing is broken, as ROS's diagnostics are."""

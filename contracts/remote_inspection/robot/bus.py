@@ -10,14 +10,17 @@ DELIVERY = 0.001
 
 
 class Bus:
-    """`hear(topic, act)` calls `act(message)` for each message; `say(topic, message)` publishes. The same two calls as
-    `ros1.Bus` has, so that no node knows which it is on."""
+    """`announce(topic)` before its first message; `hear(topic, act)` calls `act(message)` for each; `say(topic, message)`
+    publishes. `ros1.Bus` has the same calls, so that no node knows which it is on."""
 
     def __init__(self):
         self.listeners = {}
         self.taps = []
         self.waiting = deque()
         self.now = 0.0
+
+    def announce(self, topic):
+        """Nothing has to be made known in one process."""
 
     def hear(self, topic, act):
         self.listeners.setdefault(topic, []).append(act)

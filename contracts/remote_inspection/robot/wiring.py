@@ -76,6 +76,8 @@ class Wired:
     def __init__(self, bus, node, hears, wakes, says, needs=(), first=()):
         self.bus, self.node, self.says, self.needs = bus, node, says, needs
         self.latest = dict.fromkeys(hears) | dict(first)
+        for topic in says:
+            bus.announce(topic)
         for topic in hears:
             bus.hear(topic, lambda message, topic=topic: self.heard(topic, message, topic in wakes))
 
@@ -124,6 +126,8 @@ class Simulation:
         self.bus, self.dt = bus, dt
         self.world = World(params["world"])
         self.velocity = (0.0, 0.0)
+        for topic in ("sensors", "r"):
+            bus.announce(topic)
         bus.hear("velocity", self.heard)
 
     def heard(self, message):

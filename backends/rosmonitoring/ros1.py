@@ -1,0 +1,292 @@
+"""A participant of a running ROS 1 graph: it hears topics and says verdicts, and needs no ROS package.
+
+ROS's protocols: the master's and the nodes' XML-RPC interfaces, and TCPROS: a header of `name=value` fields, then one
+length and one message after the other. The header of a publisher's answer has the full definition of its messages.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import socket
+import struct
+import threading
+import time
+import xmlrpc.client
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from socketserver import ThreadingMixIn
+from typing import Any
+from urllib.parse import urlparse
+from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.ros.bags import plainer
+
+from .bags import Event
+from .tuning import FRAME_BYTES, HEADER_BYTES, QUEUED_MESSAGES
+
+CALLER = "/avow_monitor"
+HOST = "127.0.0.1"
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """One message, or (`event` None) what is wrong with a publisher."""
+
+    topic: str
+    event: Event | None
+    trouble: str = ""
+
+
+class _Server(ThreadingMixIn, SimpleXMLRPCServer):
+    daemon_threads = True
+
+
+class _Handler(SimpleXMLRPCRequestHandler):
+    rpc_paths = ("/", "/RPC2")
+
+
+class Ros1:
+    """Hears the topics of a graph; use it as a context."""
+
+    def __init__(self, master: str, topics: Iterable[str], host: str = HOST) -> None:
+        """`host`: the name or address at which the graph's nodes find this one."""
+        self.host = host
+        self.topics = tuple(topic if topic.startswith("/") else f"/{topic}" for topic in topics)
+        self.heard: queue.Queue[Heard] = queue.Queue(QUEUED_MESSAGES)
+        self.dropped = 0
+        self._uri = master
+        self._master = xmlrpc.client.ServerProxy(master, allow_none=True)
+        self._known: set[tuple[str, str]] = set()
+        self._lock = threading.Lock()
+        self._over = threading.Event()
+        self._spoken: dict[str, Spoken] = {}
+
+    def __enter__(self) -> Ros1:
+        """Raises Rejected where there is no master."""
+        self._slave = _Server((self.host, 0), requestHandler=_Handler, logRequests=False, allow_none=True)
+        calls: dict[str, Any] = {"publisherUpdate": self._publishers, "requestTopic": self._requested}
+        for name, call in calls.items():
+            self._slave.register_function(call, name)
+        self._slave.register_function(lambda caller: (1, "", os.getpid()), "getPid")
+        self._slave.register_function(lambda caller, reason="": (1, "", 0), "shutdown")
+        threading.Thread(target=self._slave.serve_forever, daemon=True).start()
+        self.uri = f"http://{self.host}:{self._slave.server_address[1]}/"
+        try:
+            for topic in self.topics:
+                _, _, publishers = self._asked("registerSubscriber", CALLER, topic, "*", self.uri)
+                self._publishers("", topic, publishers)
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        for topic in self.topics:
+            with suppress(OSError, xmlrpc.client.Error):
+                self._master.unregisterSubscriber(CALLER, topic, self.uri)
+        for spoken in self._spoken.values():
+            with suppress(OSError, xmlrpc.client.Error):
+                self._master.unregisterPublisher(CALLER, spoken.topic, self.uri)
+            spoken.close()
+        self._slave.shutdown()
+        self._slave.server_close()
+
+    def speak(self, topic: str, kind: str, definition: str, digest: str) -> Spoken:
+        """Advertise a topic."""
+        spoken = Spoken(self.host, topic, {"type": kind, "message_definition": definition, "md5sum": digest})
+        self._spoken[topic] = spoken
+        self._asked("registerPublisher", CALLER, topic, kind, self.uri)
+        return spoken
+
+    def _asked(self, call: str, *arguments: Any) -> tuple[int, str, Any]:
+        try:
+            code, text, value = getattr(self._master, call)(*arguments)
+        except (OSError, xmlrpc.client.Error, ValueError) as error:
+            text = f"no ROS 1 master answers at {self._uri}: {error}"
+            raise Rejected(Diagnostic("MON303", text, hint="--live ros1:http://host:11311")) from None
+        if code != 1:
+            raise Rejected(Diagnostic("MON303", f"the master at {self._uri} refuses {call}: {text}"))
+        return code, text, value
+
+    def _requested(self, caller: str, topic: str, protocols: list[Any]) -> tuple[int, str, Any]:
+        """A subscriber asks for what is spoken."""
+        spoken = self._spoken.get(topic)
+        if spoken is None:
+            return 0, "not published here", []
+        return 1, "", ["TCPROS", self.host, spoken.port]
+
+    def _publishers(self, caller: str, topic: str, publishers: list[str]) -> tuple[int, str, int]:
+        """The master says who publishes a topic now."""
+        with self._lock:
+            for uri in publishers:
+                if (topic, uri) not in self._known and uri != getattr(self, "uri", None):
+                    self._known.add((topic, uri))
+                    threading.Thread(target=self._listen, args=(topic, uri), daemon=True).start()
+            self._known -= {(t, uri) for t, uri in self._known if t == topic and uri not in publishers}
+        return 1, "", 0
+
+    def _listen(self, topic: str, uri: str) -> None:
+        """Hear one publisher of a topic until it is gone."""
+        try:
+            other: Any = xmlrpc.client.ServerProxy(uri)
+            code, text, protocol = other.requestTopic(CALLER, topic, [["TCPROS"]])
+            if code != 1 or not isinstance(protocol, list) or len(protocol) != 3:
+                self._put(Heard(topic, None, f"{uri} does not speak TCPROS: {text}"))
+                return
+            with socket.create_connection((str(protocol[1]), int(protocol[2])), timeout=5) as line:
+                line.settimeout(None)
+                wanted = {"callerid": CALLER, "topic": topic, "type": "*", "md5sum": "*", "tcp_nodelay": "1"}
+                line.sendall(header(wanted))
+                fields = read_header(line)
+                read = reader(topic, fields)
+                while not self._over.is_set():
+                    raw = frame(line, FRAME_BYTES)
+                    now = time.time()
+                    self._put(Heard(topic, {**read(raw), "topic": topic, "time": now}))
+        except (OSError, ValueError, xmlrpc.client.Error) as error:
+            if not self._over.is_set() and not isinstance(error, EOFError):
+                self._put(Heard(topic, None, f"{topic} from {uri}: {error}"))
+        finally:
+            with self._lock:
+                self._known.discard((topic, uri))
+
+    def _put(self, heard: Heard) -> None:
+        try:
+            self.heard.put_nowait(heard)
+        except queue.Full:
+            self.dropped += 1
+
+
+class Spoken:
+    """A topic that is published; the latest message is kept for whoever comes later."""
+
+    def __init__(self, host: str, topic: str, fields: Mapping[str, str]) -> None:
+        self.topic = topic
+        self._header = header({"callerid": CALLER, "topic": topic, "latching": "1", **fields})
+        self._listening = socket.create_server((host, 0))
+        self.port = int(self._listening.getsockname()[1])
+        self._lines: list[socket.socket] = []
+        self._latest = b""
+        self._lock = threading.Lock()
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                line, _ = self._listening.accept()
+                read_header(line)
+                line.sendall(self._header)
+                with self._lock:
+                    if self._latest:
+                        line.sendall(self._latest)
+                    self._lines.append(line)
+            except (OSError, ValueError):
+                if self._listening.fileno() < 0:
+                    return
+
+    def say(self, raw: bytes) -> None:
+        with self._lock:
+            self._latest = struct.pack("<I", len(raw)) + raw
+            for line in [*self._lines]:
+                try:
+                    line.sendall(self._latest)
+                except OSError:
+                    self._lines.remove(line)
+
+    def close(self) -> None:
+        self._listening.close()
+        for line in self._lines:
+            line.close()
+
+
+def header(fields: Mapping[str, str]) -> bytes:
+    """TCPROS's header."""
+    parts = [f"{name}={value}".encode() for name, value in fields.items()]
+    whole = b"".join(struct.pack("<I", len(part)) + part for part in parts)
+    return struct.pack("<I", len(whole)) + whole
+
+
+def read_header(line: socket.socket) -> dict[str, str]:
+    """Raises ValueError for what is none, or says that the other side refuses."""
+    raw, found, at = frame(line, HEADER_BYTES), {}, 0
+    while at < len(raw):
+        if at + 4 > len(raw):
+            raise ValueError("the header is cut")
+        (length,) = struct.unpack_from("<I", raw, at)
+        name, mark, value = raw[at + 4 : at + 4 + length].partition(b"=")
+        if not mark or at + 4 + length > len(raw):
+            raise ValueError("the header is no list of fields")
+        found[name.decode(errors="replace")] = value.decode(errors="replace")
+        at += 4 + length
+    if "error" in found:
+        raise ValueError(found["error"])
+    return found
+
+
+class Gone(EOFError, OSError):  # noqa: N818 - it says what the other side is
+    """The other side has closed the connection."""
+
+
+def frame(line: socket.socket, most: int) -> bytes:
+    """The next length and as many bytes. Raises ValueError for more than there may be, Gone at the end."""
+    (length,) = struct.unpack("<I", _exactly(line, 4))
+    if length > most:
+        raise ValueError(f"{length} bytes are more than {most}")
+    return _exactly(line, length)
+
+
+def _exactly(line: socket.socket, count: int) -> bytes:
+    parts = []
+    while count:
+        part = line.recv(min(count, 1 << 16))
+        if not part:
+            raise Gone("the connection is closed")
+        parts.append(part)
+        count -= len(part)
+    return b"".join(parts)
+
+
+def reader(topic: str, fields: Mapping[str, str]) -> Callable[[bytes], dict[str, Any]]:
+    """What a publisher's messages hold, by the definition that it sent. Raises ValueError where it contradicts itself,
+    Rejected without the package rosbags."""
+    try:
+        from rosbags.serde import SerdeError
+        from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+    except ImportError:
+        hint = "pip install 'avow[bags]'"
+        raise Rejected(Diagnostic("MON202", "reading messages needs the package rosbags", hint=hint)) from None
+    kind = fields.get("type", "")
+    package, _, name = kind.partition("/")
+    full = f"{package}/msg/{name}"
+    try:
+        store = get_typestore(Stores.EMPTY)
+        store.register(get_types_from_msg(fields.get("message_definition", ""), full))
+        _, digest = store.generate_msgdef(full, ros_version=1)
+    except (TypesysError, KeyError) as error:
+        raise ValueError(f"{topic} is {kind or 'of no type'}, whose definition cannot be read: {error}") from None
+    if digest != fields.get("md5sum"):
+        raise ValueError(f"{topic}: the digest of {kind} is not that of the definition that came with it")
+    plain = plainer(store.fielddefs)
+
+    def read(raw: bytes) -> dict[str, Any]:
+        try:
+            found: dict[str, Any] = plain(store.deserialize_ros1(raw, full))
+        except (SerdeError, struct.error, IndexError, UnicodeDecodeError, AssertionError) as error:
+            raise ValueError(f"a message of {topic} is no {kind}: {error}") from None
+        return found
+
+    return read
+
+
+def master_of(text: str) -> str:
+    """``ros1`` or ``ros1:http://host:11311``: the master's address, by default that of ROS_MASTER_URI. Raises
+    Rejected."""
+    uri = text.removeprefix("ros1").removeprefix(":") or os.environ.get("ROS_MASTER_URI", "http://127.0.0.1:11311")
+    parts = urlparse(uri)
+    if parts.scheme != "http" or not parts.hostname:
+        raise Rejected(Diagnostic("MON303", f"{uri!r} is no address of a master", hint="--live ros1:http://host:11311"))
+    return uri

@@ -1,0 +1,226 @@
+"""A running ROS 1 graph: a master and nodes of the test's own, and, where Debian's ROS is installed, the real ones."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from xmlrpc.server import SimpleXMLRPCServer
+
+import pytest
+
+from avow.backends.rosmonitoring.live import follow
+from avow.backends.rosmonitoring.ros1 import Ros1, frame, header, master_of, read_header, reader
+from avow.backends.rosmonitoring.session import session
+from avow.backends.rosmonitoring.watched import Violation
+from avow.base.diagnostics import Rejected
+from avow.system.plan import System
+
+pytest.importorskip("rosbags")
+
+RCL = """
+node n {
+  inputs( r : REAL )
+  outputs( s : REAL )
+  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 s matches(out.s) )
+  guarantee low ( out.s <= 120 )
+}
+"""
+MAPPING = {"in.r": "data", "out.s": "data"}
+
+
+class Master:
+    """What of ROS's master a publisher and a subscriber need."""
+
+    def __init__(self) -> None:
+        self.server = SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False, allow_none=True)
+        self.publishers: dict[str, list[str]] = {}
+        for call in (self.registerSubscriber, self.registerPublisher, self.unregisterSubscriber):
+            self.server.register_function(call)
+        self.server.register_function(self.unregisterSubscriber, "unregisterPublisher")
+        self.uri = f"http://127.0.0.1:{self.server.server_address[1]}"
+        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+
+    def registerSubscriber(self, caller: str, topic: str, kind: str, uri: str) -> Any:  # noqa: N802 - ROS's name
+        return 1, "", self.publishers.get(topic, [])
+
+    def registerPublisher(self, caller: str, topic: str, kind: str, uri: str) -> Any:  # noqa: N802
+        self.publishers.setdefault(topic, []).append(uri)
+        return 1, "", []
+
+    def unregisterSubscriber(self, caller: str, topic: str, uri: str) -> Any:  # noqa: N802
+        return 1, "", 1
+
+
+@pytest.fixture
+def master() -> Iterator[Master]:
+    made = Master()
+    yield made
+    made.server.shutdown()
+    made.server.server_close()
+
+
+def float64(value: float) -> bytes:
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    message = store.types["std_msgs/msg/Float64"](data=value)
+    return bytes(store.serialize_ros1(message, "std_msgs/msg/Float64"))
+
+
+FLOAT64 = ("std_msgs/Float64", "float64 data\n", "fdb28210bfa9d7c91146260178d9a584")
+
+
+def heard(
+    master: Master,
+    system: System,
+    say: Callable[[Any], None],
+    seconds: float,
+    record: Path,
+    verdicts: str | None = None,
+) -> tuple[list[Violation], list[str]]:
+    warned: list[str] = []
+    with Ros1(master.uri, ()) as node:
+        spoken = node.speak("/s", *FLOAT64)
+        graph = Ros1(master.uri, ("s", "r"))
+        threading.Timer(0.6, say, (spoken,)).start()
+        running = session(system)
+        found = list(follow(running, graph, seconds, record, None, warned.append))
+    return found, warned
+
+
+def test_what_a_graph_says_is_judged_and_recorded(
+    master: Master, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    def say(spoken: Any) -> None:
+        for value in (1.5, 119.0, 120.5, 7.0):
+            spoken.say(float64(value))
+
+    record = tmp_path / "run.jsonl"
+    system = make_system(RCL, MAPPING)
+    found, warned = heard(master, system, say, 2.0, record)
+    assert warned == []
+    assert [(v.clause, v.index) for v in found] == [("low", 3)]
+    assert [json.loads(line)["data"] for line in record.read_text("utf-8").splitlines()] == [1.5, 119.0, 120.5, 7.0]
+    again = [(v.clause, v.index) for _, v in session(system).run(record)]
+    assert again == [("low", 3)]
+
+
+def test_a_silent_topic_is_told_while_nothing_comes(
+    master: Master, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    system = make_system(RCL, MAPPING, fresh={"out.s": "300 ms"})
+    found, _ = heard(master, system, lambda spoken: spoken.say(float64(1.0)), 2.0, tmp_path / "r.jsonl")
+    assert [v.clause for v in found][-1] == "out.s"
+    assert "was silent for" in found[-1].explanation
+
+
+def test_a_wrong_digest_is_told(master: Master, make_system: Callable[..., System], tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="digest"):
+        reader("/s", {"type": "std_msgs/Float64", "message_definition": "float64 data\n", "md5sum": "0" * 32})
+    with pytest.raises(ValueError, match="cannot be read"):
+        reader("/s", {"type": "std_msgs/Float64", "message_definition": "float65 data\n", "md5sum": "0" * 32})
+
+
+@pytest.mark.parametrize(
+    "raw", [b"\xff\xff\xff\xff", b"\x05\x00\x00\x00abcde", b"\x08\x00\x00\x00\xff\x00\x00\x00a=bc", b"\x04\x00"]
+)
+def test_hostile_headers_are_refused(raw: bytes) -> None:
+    one, other = socket.socketpair()
+    with one, other:
+        one.sendall(raw)
+        one.close()
+        with pytest.raises((ValueError, EOFError)):
+            read_header(other)
+
+
+def test_a_header_is_read_as_it_is_written() -> None:
+    one, other = socket.socketpair()
+    with one, other:
+        one.sendall(header({"type": "a/B", "message_definition": "int32 x=1\n"}) + b"\x03\x00\x00\x00abc")
+        assert read_header(other) == {"type": "a/B", "message_definition": "int32 x=1\n"}
+        assert frame(other, 10) == b"abc"
+
+
+def test_no_master_is_told() -> None:
+    with pytest.raises(Rejected, match="no ROS 1 master"), Ros1("http://127.0.0.1:1", ("s",)):
+        pass
+    with pytest.raises(Rejected, match="no address"):
+        master_of("ros1:ftp://x")
+
+
+ROS = Path("/usr/lib/python3/dist-packages/rospy")
+NODE = """
+import rospy
+from std_msgs.msg import Float64
+from diagnostic_msgs.msg import DiagnosticArray
+said = []
+rospy.init_node("n")
+def hear(m):
+    said.extend((s.name, ord(s.level) if isinstance(s.level, bytes) else s.level) for s in m.status)
+rospy.Subscriber("/verdicts", DiagnosticArray, hear)
+out = rospy.Publisher("s", Float64, queue_size=1000)
+while out.get_num_connections() < 1 and not rospy.is_shutdown():
+    rospy.sleep(0.05)
+rate = rospy.Rate(200)
+for k in range(400):
+    out.publish(200.0 if k % 100 == 50 else k / 10.0)
+    rate.sleep()
+rospy.sleep(0.5)
+print("ERROR" if ("n.low", 2) in said else said[-3:], flush=True)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not ROS.is_dir() or shutil.which("rosmaster") is None,
+    reason="ROS 1 is not installed (python3-rospy, python3-rosmaster)",
+)
+def test_a_real_master_and_a_rospy_node(make_system: Callable[..., System], tmp_path: Path) -> None:
+    """400 messages at 200 Hz, four of them wrong: these are found, none is lost, and the node hears the verdicts."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    environment = {
+        **os.environ,
+        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+        "ROS_IP": "127.0.0.1",
+        "ROS_HOME": str(tmp_path / "ros"),
+        "PYTHONPATH": "/usr/lib/python3/dist-packages",
+    }
+    system = make_system(RCL, MAPPING)
+    (tmp_path / "node.py").write_text(NODE, encoding="utf-8")
+    core = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], env=environment)
+    node = None
+    try:
+        for _ in range(100):
+            with socket.socket() as probe:
+                if probe.connect_ex(("127.0.0.1", port)) == 0:
+                    break
+            time.sleep(0.1)
+        node = subprocess.Popen(
+            ["/usr/bin/python3", str(tmp_path / "node.py")], env=environment, stdout=subprocess.PIPE, text=True
+        )
+        command = [
+            sys.executable, "-m", "avow", "monitor", str(system.plan.root), "--live", f"ros1:http://127.0.0.1:{port}",
+            "--for", "10", "--record", str(tmp_path / "run.jsonl"), "--verdicts", "/verdicts", "--json",
+        ]  # fmt: skip
+        done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+        said = node.communicate(timeout=30)[0]
+    finally:
+        for process in (node, core):
+            if process is not None:
+                process.terminate()
+                process.wait(timeout=20)
+    assert done.returncode == 1, done.stdout + done.stderr
+    found = json.loads(done.stdout)
+    assert found["events"] == 400
+    assert [v["event"] for v in found["violations"]] == [51, 151, 251, 351]
+    assert said.strip() == "ERROR"
