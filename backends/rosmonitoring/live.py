@@ -44,7 +44,8 @@ def follow(
             try:
                 heard = graph.heard.get(timeout=LIVE_PAUSE)
             except queue.Empty:
-                yield from running.tick({"time": time.time()})
+                if running.events:  # the run begins with its first message
+                    yield from running.tick({"time": time.time()})
             else:
                 if heard.event is None:
                     warn(heard.trouble)

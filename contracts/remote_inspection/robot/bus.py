@@ -10,8 +10,8 @@ DELIVERY = 0.001
 
 
 class Bus:
-    """`announce(topic)` before its first message; `hear(topic, act)` calls `act(message)` for each; `say(topic, message)`
-    publishes. `ros1.Bus` has the same calls, so that no node knows which it is on."""
+    """`announce(topic)` before its first message; `hear(topic, act)` calls `act(message)` for each; `say(topic,
+    message)` publishes. `ros1.Bus` has the same calls, so that no node knows which it is on."""
 
     def __init__(self):
         self.listeners = {}

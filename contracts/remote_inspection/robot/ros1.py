@@ -2,7 +2,7 @@
 
     python contracts/remote_inspection/robot/ros1.py [--port 11311] [--seconds N]
 
-Needs Debian's python3-rospy and python3-rosmaster. `avow monitor contracts/remote_inspection/robot --live ros1` watches.
+Needs Debian's python3-rospy and python3-rosmaster. To watch: avow monitor contracts/remote_inspection/robot --live ros1
 """
 
 import argparse
