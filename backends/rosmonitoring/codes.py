@@ -90,6 +90,11 @@ CODES = register(
         "No master of ROS 1 answers, or it refuses.",
         "Start one (`roscore`), or name it: `--live ros1:http://host:11311`.",
     ),
-    declare("MON304", "no record", "The record of a live run cannot be written.", "Correct the path of `--record`."),
+    declare(
+        "MON304",
+        "cannot be written",
+        "A file that was to be written cannot be.",
+        "Correct the path of `--record` or `--configuration`.",
+    ),
     declare("MON302", "cannot listen", "The port is taken or not allowed.", "Choose another with `--serve`."),
 )

@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 @click.option(
     "--verdicts", metavar="TOPIC", help="With --live: say verdicts there, as diagnostic_msgs/DiagnosticArray."
 )
+@click.option(
+    "--configuration", type=click.Path(path_type=Path), help="Write ROSMonitoring's configuration of all nodes there."
+)
 @click.option("--serve", "port", type=click.IntRange(0, 65535), help="Answer ROSMonitoring's monitors on this port.")
 def command(
     system: str,
@@ -50,6 +53,7 @@ def command(
     host: str,
     record: Path | None,
     verdicts: str | None,
+    configuration: Path | None,
     port: int | None,
 ) -> int:
     """Judge TRACE against the contracts of SYSTEM (a folder, or a name under contracts/).
@@ -62,6 +66,9 @@ def command(
     from avow.system.load import load_system
 
     loaded = load_system(system_folder(system))
+    if configuration is not None:
+        _configure(loaded, nodes, configuration)
+        return 0
     if live is not None:
         if trace is not None or port is not None:
             raise click.UsageError("give a TRACE, --live or --serve")
@@ -74,6 +81,28 @@ def command(
     if trace is None:
         raise click.UsageError("give a TRACE, or --serve PORT")
     return _judge(loaded, nodes, trace, as_json, show_all)
+
+
+def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
+    """Write ROSMonitoring's configuration. Raises Rejected."""
+    from avow.base.diagnostics import Diagnostic, Rejected
+
+    from .configuration import of_system
+    from .options import NAME
+    from .session import session
+
+    parts = []
+    for monitor in session(system, nodes).monitors:
+        node = monitor.setup.node.name
+        methods = [m for m in system.plan.node(node).methods if m.backend == NAME]
+        options: dict[str, Any] = dict(methods[0].options.data) if methods else {}
+        parts.append((monitor.setup, options))
+    text = of_system(parts)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise Rejected(Diagnostic("MON304", f"{path} cannot be written: {error.strerror}")) from None
+    click.echo(f"{path}: {len(parts)} monitors")
 
 
 def _live(

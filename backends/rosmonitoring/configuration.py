@@ -1,17 +1,18 @@
-"""The ROSMonitoring configuration (3.0) of one node: which topics its monitor listens to."""
+"""ROSMonitoring's configuration (3.0) of one node or all: which topics the monitors listen to, filter and order."""
 
 from __future__ import annotations
 
 import keyword
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import yaml
 
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.calls import is_part
 
-from .options import Setup, same_topic
+from .options import Setup, duration, same_topic
 from .rules import Choice, Fields
 
 _ESCAPE = re.compile(r"[^A-Za-z0-9_]|_(?=x[0-9a-f]+_)")
@@ -46,7 +47,43 @@ def topic_types(setup: Setup) -> dict[str, str]:
 
 
 def configuration(setup: Setup, options: Mapping[str, Any]) -> str:
-    """The file's text."""
+    """One node's file."""
+    return _file([_monitor(setup, options)], _nodes(setup, options), options.get("ros_version"))
+
+
+def of_system(parts: Sequence[tuple[Setup, Mapping[str, Any]]]) -> str:
+    """One file for all nodes: the generator makes one package of a file, and each of its packages has the same name.
+    Nodes of which nothing can be observed are left out. Raises Rejected where the methods do not agree."""
+    versions = {str(options["ros_version"]) for _, options in parts if "ros_version" in options}
+    if len(versions) > 1:
+        text = f"the methods say {' and '.join(sorted(versions))} as `ros_version`, and one file is for one"
+        raise Rejected(Diagnostic("MON101", text))
+    monitors = [_monitor(setup, options) for setup, options in parts if topic_types(setup)]
+    nodes = [node for setup, options in parts for node in _nodes(setup, options)]
+    text = _file(monitors, nodes, next(iter(versions), None))
+    if wrong := problems(text):
+        raise Rejected(
+            *(Diagnostic("MON101", f"ROSMonitoring would not take the configuration: {one}") for one in wrong)
+        )
+    return text
+
+
+def _nodes(setup: Setup, options: Mapping[str, Any]) -> list[dict[str, Any]]:
+    if not {"package", "path"} <= options.keys():
+        return []
+    node = {"name": setup.node.name, "package": str(options["package"]), "path": str(options["path"])}
+    return [{"node": node}]
+
+
+def _file(monitors: list[dict[str, Any]], nodes: list[dict[str, Any]], version: object) -> str:
+    whole: dict[str, Any] = {"ros_version": str(version)} if version is not None else {}
+    if nodes:
+        whole["nodes"] = nodes
+    whole["monitors"] = [{"monitor": monitor} for monitor in monitors]
+    return yaml.safe_dump(whole, sort_keys=False, allow_unicode=False, width=1000)
+
+
+def _monitor(setup: Setup, options: Mapping[str, Any]) -> dict[str, Any]:
     monitor_id = identifier("monitor_", setup.node.name)
     monitor: dict[str, Any] = {
         "id": monitor_id,
@@ -62,16 +99,16 @@ def configuration(setup: Setup, options: Mapping[str, Any]) -> str:
             "action": str(oracle.get("action", "nothing")),
             "timeout": float(oracle.get("timeout", 2.0)),
         }
-    types = topic_types(setup)
-    monitor["topics"] = [{"name": name, "type": kind, "action": "log"} for name, kind in types.items()]
-    whole: dict[str, Any] = {}
-    if "ros_version" in options:
-        whole["ros_version"] = str(options["ros_version"])
-    if "package" in options and "path" in options:
-        node = {"name": setup.node.name, "package": str(options["package"]), "path": str(options["path"])}
-        whole["nodes"] = [{"node": node}]
-    whole["monitors"] = [{"monitor": monitor}]
-    return yaml.safe_dump(whole, sort_keys=False, allow_unicode=False, width=1000)
+    filtered = {same_topic(getattr(setup.rules.get(name), "topic", "")) for name in options.get("filter", ())}
+    monitor["topics"] = []
+    for name, kind in topic_types(setup).items():
+        topic: dict[str, Any] = {"name": name, "type": kind, "action": "log"}
+        if same_topic(name) in filtered:
+            topic |= {"action": "filter", "publishers": [setup.node.name]}
+        if "ordered" in options:
+            topic["ordering"] = {"enabled": True, "max_delay_ms": int(1000 * duration(str(options["ordered"])))}
+        monitor["topics"].append(topic)
+    return monitor
 
 
 def problems(text: str) -> list[str]:
@@ -85,6 +122,7 @@ def problems(text: str) -> list[str]:
     if not isinstance(monitors, list) or not monitors:
         return ["`monitors` must be a list of monitors"]
     ids: set[str] = set()
+    filtered: set[str] = set()
     for entry in monitors:
         monitor = entry.get("monitor") if isinstance(entry, dict) else None
         if not isinstance(monitor, dict):
@@ -97,9 +135,26 @@ def problems(text: str) -> list[str]:
             found.append(f"the id {name} occurs twice")
         else:
             ids.add(name)
+        found += [
+            f"the topic {topic['name']} is filtered by several monitors"
+            for topic in _filtered(monitor)
+            if _taken(same_topic(str(topic["name"])), filtered)
+        ]
         if not isinstance(monitor.get("log"), str):
             found.append("`log` must be a path")
         found += _topic_problems(monitor.get("topics"))
+    return found
+
+
+def _filtered(monitor: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    topics = monitor.get("topics")
+    listed = [topic for topic in topics if isinstance(topic, dict)] if isinstance(topics, list) else []
+    return [topic for topic in listed if topic.get("action") == "filter"]
+
+
+def _taken(name: str, taken: set[str]) -> bool:
+    found = name in taken
+    taken.add(name)
     return found
 
 

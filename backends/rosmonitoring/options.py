@@ -92,6 +92,7 @@ def setup(
     for port in (*node.inputs, *node.outputs):
         work.port(port)
     work.shared_fields()
+    work.filtered()
     data = options.data if options is not None and isinstance(options.data, Mapping) else {}
     named = tuple((_called(system, node, topic), topic.ros_type) for topic in node.topics)
     made = Setup(
@@ -246,6 +247,21 @@ class _Work:
                 text = f"rate.{name}: a frequency and a share below 100 % are wanted: 10 Hz ± 20 %"
                 self.faults.append(Diagnostic("MON101", text, self.options.at("rate", name)))
         return found
+
+    def filtered(self) -> None:
+        """What can be filtered: outputs that messages carry, where an oracle is asked."""
+        data = self.options.data if self.options is not None and isinstance(self.options.data, Mapping) else {}
+        names = data.get("filter", ())
+        outputs = [n for n, r in self.rules.items() if n.startswith("out.") and isinstance(r, Fields | Choice)]
+        for at, name in enumerate(names):
+            if self.options is not None and name not in outputs:
+                text = f"filter: {name} is no output that messages carry"
+                span = self.options.at("filter", at)
+                self.faults.append(Diagnostic("MON101", text, span, hint=suggest(str(name), outputs)))
+        if names and "oracle" not in data and self.options is not None:
+            text = "filter: a message is held back by what an oracle says, and the plan names none"
+            span = self.options.at("filter")
+            self.faults.append(Diagnostic("MON101", text, span, hint="oracle: {port: 8080}"))
 
     def heard(self, key: str, entry: Any) -> list[str]:
         """The variables of an option that messages carry; the others are faults."""

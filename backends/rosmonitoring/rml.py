@@ -242,9 +242,18 @@ def condition_text(condition: Condition) -> str:
             return f"({' || '.join(map(condition_text, items))})"
 
 
+TOLERANCE = (
+    "The official monitor compares by CLP(R), in floating point: to it, numbers less than 1e-10 apart are equal.",
+    "A value that near to a number of the contract, or to another value, may be judged otherwise than by Avow.",
+)
+"""Compiled conditions are constraints of SWI-Prolog's library clpr, whose comparisons have this tolerance."""
+
+
 def write(specification: Specification) -> str:
     """The file's text. Raises NotRml."""
     lines = [comment(text) if text else "" for text in specification.comments]
+    if any(isinstance(event, EventType) and event.condition != TRUE for event in specification.events):
+        lines += ["", *map(comment, TOLERANCE)]
     for event in specification.events:
         if event.name in specification.notes:
             lines += ["", comment(specification.notes[event.name])]

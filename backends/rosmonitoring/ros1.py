@@ -188,6 +188,10 @@ class Spoken:
                 if self._listening.fileno() < 0:
                     return
 
+    @property
+    def listeners(self) -> int:
+        return len(self._lines)
+
     def say(self, raw: bytes) -> None:
         with self._lock:
             self._latest = struct.pack("<I", len(raw)) + raw

@@ -131,6 +131,12 @@ SCHEMA: dict[str, Any] = {
             },
             "description": "where the online oracle listens; without it the monitor only writes its log",
         },
+        "filter": {
+            "type": "array",
+            "items": {"type": "string"},
+            "description": "outputs whose messages the ROS monitor passes on only if the oracle finds nothing broken",
+        },
+        "ordered": {**_DURATION, "description": "the ROS monitor sorts by time what comes within so long"},
         "package": {"type": "string", "description": "the ROS package of the node, for instrumentation"},
         "path": {"type": "string", "description": "the launch file of the node, for instrumentation"},
         "mapping": {

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
-from avow.backends.rosmonitoring.configuration import configuration, dotted_type, identifier, problems
+from avow.backends.rosmonitoring.configuration import configuration, dotted_type, identifier, of_system, problems
 from avow.backends.rosmonitoring.options import setup
+from avow.base.diagnostics import Rejected
+from avow.system.load import load_system
 from avow.system.plan import System
 
 
@@ -34,6 +38,76 @@ def test_the_case_study(name: str, case: System) -> None:
     assert len(names) == len(set(names))
     assert {t["type"] for t in monitor["topics"]} == {"gazebo_radiation_plugins.msg.Snapshot"}
     assert "oracle" not in monitor
+
+
+TWO = """
+node a {
+  inputs( r : REAL )
+  outputs( s : REAL )
+  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 /robot/s matches(out.s) )
+  guarantee g ( out.s <= in.r )
+}
+node b {
+  inputs( s : REAL )
+  outputs( t : REAL )
+  topics( std_msgs/Float64 /robot/s matches(in.s), std_msgs/Float64 t matches(out.t) )
+  guarantee g ( out.t <= in.s )
+}
+"""
+
+
+def two(folder: Path, **options: Any) -> System:
+    (folder / "system.rcl").write_text(TWO, encoding="utf-8")
+    mappings = {"a": {"in.r": "data", "out.s": "data"}, "b": {"in.s": "data", "out.t": "data"}}
+    nodes = {
+        name: {"methods": [{"rosmonitoring": {"mapping": mapping, **options.get(name, {})}}]}
+        for name, mapping in mappings.items()
+    }
+    (folder / "plan.yaml").write_text(json.dumps({"contract": "system.rcl", "nodes": nodes}), encoding="utf-8")
+    return load_system(folder)
+
+
+def test_one_file_for_the_system_filters_and_orders(tmp_path: Path) -> None:
+    oracle = {"oracle": {"port": 8080}, "ordered": "200 ms", "ros_version": "ros1"}
+    system = two(tmp_path, a={"filter": ["out.s"], **oracle}, b=oracle)
+    parts = []
+    for node in system.contract.nodes:
+        options = system.plan.node(node.name).methods[0].options
+        found, faults = setup(system, node, options)
+        assert not faults
+        parts.append((found, options.data))
+    whole = yaml.safe_load(of_system(parts))
+    assert whole["ros_version"] == "ros1"
+    monitors = {entry["monitor"]["id"]: entry["monitor"] for entry in whole["monitors"]}
+    assert list(monitors) == ["monitor_a", "monitor_b"]
+    by_name = {topic["name"]: topic for topic in monitors["monitor_a"]["topics"]}
+    assert by_name["/robot/s"] == {
+        "name": "/robot/s",
+        "type": "std_msgs.msg.Float64",
+        "action": "filter",
+        "publishers": ["a"],
+        "ordering": {"enabled": True, "max_delay_ms": 200},
+    }
+    assert by_name["r"]["action"] == "log"
+    assert {topic["action"] for topic in monitors["monitor_b"]["topics"]} == {"log"}
+
+
+def test_what_cannot_be_one_file_is_told(tmp_path: Path) -> None:
+    system = two(tmp_path, a={"ros_version": "ros1"}, b={"ros_version": "ros2"})
+    nodes = system.contract.nodes
+    options = [system.plan.node(node.name).methods[0].options for node in nodes]
+    parts = [(setup(system, node, given)[0], given.data) for node, given in zip(nodes, options, strict=True)]
+    with pytest.raises(Rejected, match="ros1 and ros2"):
+        of_system(parts)
+
+
+def test_a_filter_is_of_outputs_and_needs_an_oracle(tmp_path: Path) -> None:
+    system = two(tmp_path, a={"filter": ["in.r", "out.s"]})
+    _, faults = setup(system, system.contract.node("a"), system.plan.node("a").methods[0].options)
+    assert [fault.message.split(":")[1].strip() for fault in faults] == [
+        "in.r is no output that messages carry",
+        "a message is held back by what an oracle says, and the plan names none",
+    ]
 
 
 def test_one_entry_a_topic_even_if_several_variables_match(make_system: Callable[..., System]) -> None:

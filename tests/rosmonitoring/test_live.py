@@ -91,7 +91,13 @@ def heard(
     with Ros1(master.uri, ()) as node:
         spoken = node.speak("/s", *FLOAT64)
         graph = Ros1(master.uri, ("s", "r"))
-        threading.Timer(0.6, say, (spoken,)).start()
+
+        def once_heard() -> None:
+            while not spoken.listeners:
+                time.sleep(0.02)
+            say(spoken)
+
+        threading.Thread(target=once_heard, daemon=True).start()
         running = session(system)
         found = list(follow(running, graph, seconds, record, None, warned.append))
     return found, warned
@@ -106,7 +112,7 @@ def test_what_a_graph_says_is_judged_and_recorded(
 
     record = tmp_path / "run.jsonl"
     system = make_system(RCL, MAPPING)
-    found, warned = heard(master, system, say, 2.0, record)
+    found, warned = heard(master, system, say, 4.0, record)
     assert warned == []
     assert [(v.clause, v.index) for v in found] == [("low", 3)]
     assert [json.loads(line)["data"] for line in record.read_text("utf-8").splitlines()] == [1.5, 119.0, 120.5, 7.0]
@@ -118,7 +124,7 @@ def test_a_silent_topic_is_told_while_nothing_comes(
     master: Master, make_system: Callable[..., System], tmp_path: Path
 ) -> None:
     system = make_system(RCL, MAPPING, fresh={"out.s": "300 ms"})
-    found, _ = heard(master, system, lambda spoken: spoken.say(float64(1.0)), 2.0, tmp_path / "r.jsonl")
+    found, _ = heard(master, system, lambda spoken: spoken.say(float64(1.0)), 4.0, tmp_path / "r.jsonl")
     assert [v.clause for v in found][-1] == "out.s"
     assert "was silent for" in found[-1].explanation
 
