@@ -87,8 +87,8 @@ CODES = register(
     declare(
         "MON303",
         "no graph",
-        "No master of ROS 1 answers, or it refuses.",
-        "Start one (`roscore`), or name it: `--live ros1:http://host:11311`.",
+        "No master of ROS 1 and no rosbridge answers, or it refuses.",
+        "Start one (`roscore`), or name it: `--live ros1:http://host:11311`, `--live rosbridge:ws://host:9090`.",
     ),
     declare(
         "MON304",

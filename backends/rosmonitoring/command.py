@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 @click.option("--node", "nodes", multiple=True, metavar="NAME", help="Only this node (may be repeated).")
 @click.option("--json", "as_json", is_flag=True, help="For machines: one JSON object.")
 @click.option("--all", "show_all", is_flag=True, help=f"Show every violation, not only the first {VIOLATIONS_SHOWN}.")
-@click.option("--live", metavar="GRAPH", help="Judge a running graph: ros1, or ros1:http://host:11311.")
+@click.option(
+    "--live", metavar="GRAPH", help="Judge a running graph: ros1[:http://host:11311], rosbridge:ws://host:9090."
+)
 @click.option(
     "--for", "seconds", type=click.FloatRange(min=0), help="With --live: for so many seconds (else until Ctrl-C)."
 )
@@ -109,18 +111,12 @@ def _live(
     system: System, nodes: tuple[str, ...], graph: str,
     how: tuple[float | None, str, Path | None, str | None], as_json: bool, show_all: bool,
 ) -> int:  # fmt: skip
-    from avow.base.diagnostics import Diagnostic, Rejected
-
-    from .live import follow
-    from .ros1 import Ros1, master_of
+    from .live import follow, graph_of
     from .session import session
 
-    if graph.partition(":")[0] != "ros1":
-        text = f"{graph!r} is no graph that can be listened to"
-        raise Rejected(Diagnostic("MON303", text, hint="ros1, or ros1:http://host:11311"))
     seconds, host, record, verdicts = how
     running = session(system, nodes)
-    found = follow(running, Ros1(master_of(graph), running.topics, host), seconds, record, verdicts, _warn)
+    found = follow(running, graph_of(graph, running.topics, host), seconds, record, verdicts, _warn)
 
     def until_interrupted() -> Iterator[tuple[int, Violation]]:
         try:

@@ -8,25 +8,23 @@ from __future__ import annotations
 import json
 import queue
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 
 from .coverage import coverage
-from .ros1 import Ros1, Spoken
+from .graphs import ERROR, OK, STALE, WARN, Graph, Status
+from .ros1 import Ros1, master_of
+from .rosbridge import Rosbridge
 from .session import Session
 from .tuning import LIVE_PAUSE, VERDICTS_EVERY
 from .watched import Violation
 
-DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
-OK, WARN, ERROR, STALE = range(4)
-"""Levels of a `diagnostic_msgs/DiagnosticStatus`."""
-
 
 def follow(
-    running: Session, graph: Ros1, seconds: float | None, record: Path | None, verdicts: str | None,
+    running: Session, graph: Graph, seconds: float | None, record: Path | None, verdicts: str | None,
     warn: Callable[[str], None],
 ) -> Iterator[Violation]:  # fmt: skip
     """Judge what a graph says, for some time (None: until interrupted). Deadlines pass by this machine's clock. Raises
@@ -66,15 +64,10 @@ def follow(
 class Board:
     """The verdicts on a topic: each clause a status, at once when one is broken, else once a second."""
 
-    def __init__(self, running: Session, graph: Ros1, topic: str) -> None:
-        from rosbags.typesys import Stores, get_typestore
-
+    def __init__(self, running: Session, graph: Graph, topic: str) -> None:
         self.running = running
-        self._store = get_typestore(Stores.ROS1_NOETIC)
-        definition, digest = self._store.generate_msgdef("diagnostic_msgs/msg/DiagnosticArray", ros_version=1)
-        self._said: Spoken = graph.speak(topic, DIAGNOSTICS, definition, digest)
+        self._say = graph.diagnostics(topic, running.system.name)
         self._next = 0.0
-        self._number = 0
         self._latest: dict[str, Violation] = {}
 
     def broken(self, found: list[Violation]) -> None:
@@ -83,38 +76,35 @@ class Board:
 
     def refresh(self) -> None:
         """Say how it stands, if it is time to."""
-        if time.monotonic() < self._next:
-            return
-        self._next = time.monotonic() + VERDICTS_EVERY
-        types = self._store.types
-        statuses = []
-        for name, level, text, values in self.standing():
-            pairs = [types["diagnostic_msgs/msg/KeyValue"](key=key, value=value) for key, value in values]
-            made = types["diagnostic_msgs/msg/DiagnosticStatus"](
-                level=level, name=name, message=text, hardware_id=self.running.system.name, values=pairs
-            )
-            statuses.append(made)
-        now = time.time_ns()
-        stamp = types["builtin_interfaces/msg/Time"](sec=now // 10**9, nanosec=now % 10**9)
-        header = types["std_msgs/msg/Header"](seq=self._number, stamp=stamp, frame_id="")
-        self._number += 1
-        whole = types["diagnostic_msgs/msg/DiagnosticArray"](header=header, status=statuses)
-        self._said.say(bytes(self._store.serialize_ros1(whole, "diagnostic_msgs/msg/DiagnosticArray")))
+        if time.monotonic() >= self._next:
+            self._next = time.monotonic() + VERDICTS_EVERY
+            self._say(list(self.standing()))
 
-    def standing(self) -> Iterator[tuple[str, int, str, list[tuple[str, str]]]]:
-        """Each clause: its name, level, words, and counts; and each other thing that was told."""
+    def standing(self) -> Iterator[Status]:
+        """Each clause, and each other thing that was told."""
         told = dict(self._latest)
         for monitor, clause, _, tally in self.running.clauses():
             name = f"{monitor.setup.node.name}.{clause}"
             latest = told.pop(name, None)
-            counts = [("published", str(tally.published)), ("broken", str(tally.broken))]
+            counts = (("published", str(tally.published)), ("broken", str(tally.broken)))
             if latest is not None and tally.broken:
-                yield name, ERROR, latest.text(), counts
+                yield Status(name, ERROR, latest.text(), counts)
             elif not tally.judged:
-                yield name, STALE, tally.reason or "not judged yet", counts
+                yield Status(name, STALE, tally.reason or "not judged yet", counts)
             elif tally.undecided or tally.order:
-                yield name, WARN, coverage(tally), counts
+                yield Status(name, WARN, coverage(tally), counts)
             else:
-                yield name, OK, coverage(tally), counts
+                yield Status(name, OK, coverage(tally), counts)
         for name, violation in told.items():
-            yield name, ERROR, violation.text(), []
+            yield Status(name, ERROR, violation.text())
+
+
+def graph_of(text: str, topics: Iterable[str], host: str) -> Graph:
+    """``ros1``, ``ros1:http://host:11311``, ``rosbridge:ws://host:9090``. Raises Rejected."""
+    kind, _, address = text.partition(":")
+    if kind == "ros1":
+        return Ros1(master_of(text), topics, host)
+    if kind == "rosbridge" and address.startswith(("ws://", "wss://")):
+        return Rosbridge(address, topics)
+    hint = "ros1, ros1:http://host:11311, or rosbridge:ws://host:9090"
+    raise Rejected(Diagnostic("MON303", f"{text!r} is no graph that can be listened to", hint=hint))

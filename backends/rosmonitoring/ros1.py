@@ -6,6 +6,7 @@ length and one message after the other. The header of a publisher's answer has t
 
 from __future__ import annotations
 
+import itertools
 import os
 import queue
 import socket
@@ -13,9 +14,8 @@ import struct
 import threading
 import time
 import xmlrpc.client
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from socketserver import ThreadingMixIn
 from typing import Any
 from urllib.parse import urlparse
@@ -24,20 +24,11 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import plainer
 
-from .bags import Event
+from .graphs import Heard, Status
 from .tuning import FRAME_BYTES, HEADER_BYTES, QUEUED_MESSAGES
 
 CALLER = "/avow_monitor"
 HOST = "127.0.0.1"
-
-
-@dataclass(frozen=True, slots=True)
-class Heard:
-    """One message, or (`event` None) what is wrong with a publisher."""
-
-    topic: str
-    event: Event | None
-    trouble: str = ""
 
 
 class _Server(ThreadingMixIn, SimpleXMLRPCServer):
@@ -101,6 +92,31 @@ class Ros1:
         self._spoken[topic] = spoken
         self._asked("registerPublisher", CALLER, topic, kind, self.uri)
         return spoken
+
+    def diagnostics(self, topic: str, system: str) -> Callable[[Sequence[Status]], None]:
+        """What says verdicts on a topic. Raises Rejected without the package rosbags."""
+        store, full = _typestore("ROS1_NOETIC"), "diagnostic_msgs/msg/DiagnosticArray"
+        definition, digest = store.generate_msgdef(full, ros_version=1)
+        spoken = self.speak(topic, "diagnostic_msgs/DiagnosticArray", definition, digest)
+        types, numbers = store.types, itertools.count()
+
+        def say(statuses: Sequence[Status]) -> None:
+            now = time.time_ns()
+            stamp = types["builtin_interfaces/msg/Time"](sec=now // 10**9, nanosec=now % 10**9)
+            header = types["std_msgs/msg/Header"](seq=next(numbers), stamp=stamp, frame_id="")
+            made = [
+                types["diagnostic_msgs/msg/DiagnosticStatus"](
+                    level=status.level,
+                    name=status.name,
+                    message=status.text,
+                    hardware_id=system,
+                    values=[types["diagnostic_msgs/msg/KeyValue"](key=k, value=v) for k, v in status.values],
+                )
+                for status in statuses
+            ]
+            spoken.say(bytes(store.serialize_ros1(types[full](header=header, status=made), full)))
+
+        return say
 
     def _asked(self, call: str, *arguments: Any) -> tuple[int, str, Any]:
         try:
@@ -254,20 +270,27 @@ def _exactly(line: socket.socket, count: int) -> bytes:
     return b"".join(parts)
 
 
+def _typestore(name: str) -> Any:
+    """Raises Rejected without the package rosbags."""
+    try:
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        hint = "pip install 'avow[bags]'"
+        raise Rejected(Diagnostic("MON202", "messages of ROS 1 need the package rosbags", hint=hint)) from None
+    return get_typestore(Stores[name])
+
+
 def reader(topic: str, fields: Mapping[str, str]) -> Callable[[bytes], dict[str, Any]]:
     """What a publisher's messages hold, by the definition that it sent. Raises ValueError where it contradicts itself,
     Rejected without the package rosbags."""
-    try:
-        from rosbags.serde import SerdeError
-        from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
-    except ImportError:
-        hint = "pip install 'avow[bags]'"
-        raise Rejected(Diagnostic("MON202", "reading messages needs the package rosbags", hint=hint)) from None
+    store = _typestore("EMPTY")
+    from rosbags.serde import SerdeError
+    from rosbags.typesys import TypesysError, get_types_from_msg
+
     kind = fields.get("type", "")
     package, _, name = kind.partition("/")
     full = f"{package}/msg/{name}"
     try:
-        store = get_typestore(Stores.EMPTY)
         store.register(get_types_from_msg(fields.get("message_definition", ""), full))
         _, digest = store.generate_msgdef(full, ros_version=1)
     except (TypesysError, KeyError) as error:

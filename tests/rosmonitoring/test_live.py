@@ -17,7 +17,7 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
-from avow.backends.rosmonitoring.live import follow
+from avow.backends.rosmonitoring.live import follow, graph_of
 from avow.backends.rosmonitoring.ros1 import Ros1, frame, header, master_of, read_header, reader
 from avow.backends.rosmonitoring.session import session
 from avow.backends.rosmonitoring.watched import Violation
@@ -161,6 +161,50 @@ def test_no_master_is_told() -> None:
         pass
     with pytest.raises(Rejected, match="no address"):
         master_of("ros1:ftp://x")
+
+
+def test_a_graph_behind_rosbridge(make_system: Callable[..., System]) -> None:
+    """Its protocol, by a server of the test's own: subscriptions, messages, a null for NaN, verdicts."""
+    server = pytest.importorskip("websockets.sync.server")
+    asked: list[dict[str, Any]] = []
+    ready = threading.Event()
+
+    def talk(line: Any) -> None:
+        for text in line:
+            asked.append(json.loads(text))
+            if sum(one["op"] == "subscribe" for one in asked) == 2 and not ready.is_set():
+                ready.set()
+                for value in (1.5, 120.5, None, 7.0):
+                    line.send(json.dumps({"op": "publish", "topic": "/s", "msg": {"data": value}}))
+                line.send(json.dumps({"op": "status", "level": "warning", "msg": "something is wrong"}))
+                line.send("no JSON")
+
+    with server.serve(talk, "127.0.0.1", 0) as listening:
+        threading.Thread(target=listening.serve_forever, daemon=True).start()
+        address = f"rosbridge:ws://127.0.0.1:{listening.socket.getsockname()[1]}"
+        running = session(make_system(RCL, MAPPING))
+        warned: list[str] = []
+        graph = graph_of(address, running.topics, "127.0.0.1")
+        found = list(follow(running, graph, 3.0, None, "/verdicts", warned.append))
+        listening.shutdown()
+    assert [(v.clause, v.index) for v in found] == [("low", 2), ("out.s", 3)]
+    assert warned == ["rosbridge: something is wrong", "rosbridge said what is no message"]
+    published = [one for one in asked if one["op"] == "publish"]
+    levels = {status["name"]: status["level"] for status in published[-1]["msg"]["status"]}
+    assert levels == {"n.low": 2, "n.out.s": 2}
+    assert published[-1]["msg"]["status"][0]["values"][0] == {"key": "published", "value": "4"}
+
+
+@pytest.mark.parametrize("text", ["ros2", "rosbridge:http://x", "rosbridge", "dds:0"])
+def test_other_graphs_are_refused(text: str) -> None:
+    with pytest.raises(Rejected, match="no graph that can be listened to"):
+        graph_of(text, (), "127.0.0.1")
+
+
+def test_no_rosbridge_is_told() -> None:
+    pytest.importorskip("websockets")
+    with pytest.raises(Rejected, match="no rosbridge answers"), graph_of("rosbridge:ws://127.0.0.1:1", ("s",), ""):
+        pass
 
 
 ROS = Path("/usr/lib/python3/dist-packages/rospy")

@@ -1,0 +1,102 @@
+"""A graph behind rosbridge: its topics as JSON over a WebSocket, for ROS 1 and ROS 2 alike.
+
+rosbridge says neither how messages are made (that is the plan's to say) nor whether any were lost, and its JSON has
+null where a number is NaN or infinite: unreadable, never a value.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
+from typing import Any
+
+from avow.base.diagnostics import Diagnostic, Rejected
+
+from .graphs import Heard, Status
+from .tuning import FRAME_BYTES, QUEUED_MESSAGES
+
+
+class Rosbridge:
+    """Hears the topics of a graph; use it as a context."""
+
+    def __init__(self, address: str, topics: Iterable[str]) -> None:
+        self.address = address
+        self.topics = tuple(topic if topic.startswith("/") else f"/{topic}" for topic in topics)
+        self.heard: queue.Queue[Heard] = queue.Queue(QUEUED_MESSAGES)
+        self.dropped = 0
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Rosbridge:
+        """Raises Rejected where nobody answers, or without the package websockets."""
+        try:
+            from websockets.exceptions import WebSocketException
+            from websockets.sync.client import connect
+        except ImportError:
+            hint = "pip install 'avow[monitor]'"
+            raise Rejected(Diagnostic("MON301", "rosbridge needs the package websockets", hint=hint)) from None
+        try:
+            self._line: Any = self._stack.enter_context(connect(self.address, max_size=FRAME_BYTES))
+            for topic in self.topics:
+                self._send({"op": "subscribe", "topic": topic})
+        except (OSError, WebSocketException, ValueError, TimeoutError) as error:
+            text = f"no rosbridge answers at {self.address}: {error}"
+            raise Rejected(Diagnostic("MON303", text, hint="--live rosbridge:ws://host:9090")) from None
+        threading.Thread(target=self._listen, daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def _send(self, message: dict[str, Any]) -> None:
+        self._line.send(json.dumps(message))
+
+    def _listen(self) -> None:
+        from websockets.exceptions import WebSocketException
+
+        try:
+            for frame in self._line:
+                self._put(self._read(frame, time.time()))
+        except (OSError, WebSocketException) as error:
+            self._put(Heard("", None, f"rosbridge: {error}"))
+        else:
+            self._put(Heard("", None, "rosbridge has closed the connection"))
+
+    def _read(self, frame: str | bytes, now: float) -> Heard:
+        try:
+            found = json.loads(frame)
+            if found["op"] == "publish" and found["topic"] in self.topics and isinstance(found["msg"], dict):
+                return Heard(found["topic"], {**found["msg"], "topic": found["topic"], "time": now})
+            return Heard("", None, f"rosbridge: {str(found.get('msg', found))[:200]}")
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            return Heard("", None, "rosbridge said what is no message")
+
+    def _put(self, heard: Heard) -> None:
+        try:
+            self.heard.put_nowait(heard)
+        except queue.Full:
+            self.dropped += 1
+
+    def diagnostics(self, topic: str, system: str) -> Callable[[Sequence[Status]], None]:
+        """What says verdicts on a topic."""
+        self._send({"op": "advertise", "topic": topic, "type": "diagnostic_msgs/DiagnosticArray"})
+
+        def say(statuses: Sequence[Status]) -> None:
+            now = time.time_ns()
+            made = [
+                {
+                    "level": status.level,
+                    "name": status.name,
+                    "message": status.text,
+                    "hardware_id": system,
+                    "values": [{"key": key, "value": value} for key, value in status.values],
+                }
+                for status in statuses
+            ]
+            stamp = {"secs": now // 10**9, "nsecs": now % 10**9}
+            self._send({"op": "publish", "topic": topic, "msg": {"header": {"stamp": stamp}, "status": made}})
+
+        return say
