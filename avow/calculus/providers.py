@@ -9,7 +9,7 @@ only the whole system can settle.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 
 from avow.base.diagnostics import Severity
@@ -40,6 +40,8 @@ class ProviderClaim:
     """The assumption, and what the plan assumes of the environment that bears on it, by label."""
     promised: tuple[Mapping[str, Term], ...]
     """The contracts of the providers of its inputs, each by ``node.clause``."""
+    first: Mapping[str, Term] = field(default_factory=dict)
+    """What is remembered before the first step, of all that these formulas remember."""
 
     @property
     def clause(self) -> str:
@@ -49,7 +51,7 @@ class ProviderClaim:
     @property
     def is_whole(self) -> bool:
         """Whether the digest is that of the formulas."""
-        return self.digest == _meaning(self.assumed, (indexed(part).digest for part in self.promised))
+        return self.digest == _meaning({**self.assumed, **self.first}, (indexed(part).digest for part in self.promised))
 
     @property
     def formulas(self) -> dict[str, Term]:
@@ -100,8 +102,10 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
         Severity.ERROR,
         clause.span,
     )
-    meaning = _meaning(assumed, (p.digest for p in given.values()))
-    return ProviderClaim(claim, meaning, assumed, tuple(p.terms for p in given.values()))
+    spoken = free_variables(goal).union(*(free_variables(f) for p in given.values() for f in p.terms.values()))
+    first = {label: fact for label, fact in whole.blank().items() if free_variables(fact) & spoken}
+    meaning = _meaning({**assumed, **first}, (p.digest for p in given.values()))
+    return ProviderClaim(claim, meaning, assumed, tuple(p.terms for p in given.values()), first)
 
 
 def _meaning(assumed: Mapping[str, Term], promised: Iterable[str]) -> str:
@@ -130,7 +134,10 @@ def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
     because = None
     match answer.status:
         case "sat" if any(CELL in v.name for f in asked.formulas.values() for v in free_variables(f)):
-            verdict, text = Verdict.UNKNOWN, "it can be met of some memory; whether a run comes to it is not asked"
+            begun = solve({**asked.formulas, **asked.first}, effort=bounds.effort, seed=bounds.seed, shown=False)
+            verdict, text = Verdict.PROVED, "at the first step of a run"
+            if begun.status != "sat":
+                verdict, text = Verdict.UNKNOWN, "not at the first step of a run; whether at a later one is not asked"
         case "sat":
             what = f"{about} and what its providers guarantee"
             verdict, text = in_every_size({}, asked.formulas, what=what, effort=bounds.effort, seed=bounds.seed)

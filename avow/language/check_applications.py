@@ -33,11 +33,13 @@ from avow.language.syntax import (
 )
 from avow.language.terms import (
     Apply,
+    Arithmetic,
     Builtin,
     Construct,
     EnumValue,
     Index,
     Length,
+    Literal,
     Past,
     SequenceRange,
     SequenceTerm,
@@ -63,6 +65,8 @@ class Applications(Names):
             if self.scope.taken(name) is None:
                 if name == "length":
                     return self.length(tree, arguments)
+                if name == "indices":
+                    return self.indices(tree, arguments)
                 if name in _BUILTINS:
                     return self.builtin_operation(tree, Builtin(name), arguments)
                 if name in _PAST:
@@ -149,6 +153,15 @@ class Applications(Names):
             self.error("RCL303", message, arguments[0])
             return None
         return Length(made[0], NATURAL, self.span(tree))
+
+    def indices(self, tree: Application, arguments: Sequence[TermSyntax]) -> Term | None:
+        """``indices(s)`` is ``<0 upto length(s) - 1>``."""
+        length = self.length(tree, arguments)
+        if length is None:
+            return None
+        span = self.span(tree)
+        last = Arithmetic("-", length, Literal(1, NATURAL, span), INTEGER, span)
+        return SequenceRange(Literal(0, NATURAL, span), last, SequenceSort(NATURAL), span)
 
     def builtin_operation(self, tree: Syntax, name: Builtin, arguments: Sequence[TermSyntax]) -> Term | None:
         formulas = OPERATORS[name].typing.startswith("formulas")

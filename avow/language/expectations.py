@@ -31,6 +31,8 @@ def explain(
     start: str, tokens: Sequence[Token], at: int, found: Token, expected: frozenset[str], reports: Reports
 ) -> None:
     """Report the token `found`, which is at that position and where one of `expected` (terminals) should stand."""
+    if expected == {"COLON", "COMMA"}:  # after a port's name, most need its type
+        expected = frozenset({"COLON"})
     hint = _hint(start, tokens, at, found, expected)
     if found.type == "$END" and tokens:
         last = tokens[-1]

@@ -98,8 +98,6 @@ def _in_ports(
 ) -> str | None:
     colons = "COLON" in [t.type for t in tokens[max(at - 3, 0) : at + 2]]
     if expected == {"COLON"}:
-        if found.type == "COMMA":
-            return "each has a type of its own: `a : REAL, b : REAL`"
         if found.type == "EQUALS":
             return "write `name : type`"
         if found.type in ("MINUS", "DOT", "SLASH", "NUMBER"):

@@ -246,10 +246,12 @@ class _Build:
         return ConstantDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
 
     def ports(self, c: list[Any]) -> PortList:
-        return PortList(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2])) if c else PortList(0, 0, 1, ())
+        ports = tuple(port for group in c[::2] for port in group)
+        return PortList(ports[0].start, ports[-1].end, _deepest(ports), ports) if c else PortList(0, 0, 1, ())
 
-    def port(self, c: list[Any]) -> PortDeclaration:
-        return PortDeclaration(c[0].start, c[2].end, c[2].depth + 1, c[0], c[2])
+    def port(self, c: list[Any]) -> tuple[PortDeclaration, ...]:
+        """``a, b : BOOL``: each name with the type."""
+        return tuple(PortDeclaration(name.start, c[-1].end, c[-1].depth + 1, name, c[-1]) for name in c[:-2:2])
 
     def topics(self, c: list[Any]) -> TopicList:
         return TopicList(c[0].start, c[-1].end, _deepest(c[::2]), tuple(c[::2])) if c else TopicList(0, 0, 1, ())

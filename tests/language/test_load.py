@@ -333,3 +333,22 @@ def test_formula_errors_are_placed_in_the_plan(contract: Contract, node: Node) -
         with pytest.raises(Rejected) as caught:
             parse_formula(text, node, contract, Span("plan.yaml", 7, 12, 7, 30))
         assert all(d.span is not None and d.span.file == "plan.yaml" for d in caught.value.diagnostics), text
+
+
+def test_ports_of_one_type_may_share_it() -> None:
+    one, _ = check_text("node n { inputs( a, b : BOOL, s : <REAL> ) outputs( x : BOOL ) topics() guarantee( x ) }", "n")
+    other, _ = check_text(
+        "node n { inputs( a : BOOL, b : BOOL, s : <REAL> ) outputs( x : BOOL ) topics() guarantee( x ) }", "n"
+    )
+    assert one is not None
+    assert other is not None
+    assert one.nodes == other.nodes
+
+
+def test_indices_are_the_positions_of_a_sequence() -> None:
+    head = "node n { inputs( s : <REAL> ) outputs( x : BOOL ) topics() guarantee"
+    short, _ = check_text(f"{head}( forall(i in indices(s) | s(i) > 0) ) }}", "n")
+    long, _ = check_text(f"{head}( forall(i in <0 upto length(s) - 1> | s(i) > 0) ) }}", "n")
+    assert short is not None
+    assert long is not None
+    assert short.nodes == long.nodes
