@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,6 +20,8 @@ from avow.solving.limits import from_seconds, spent
 from avow.solving.questions import solve
 from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
+from avow.solving.smtlib import export
+from avow.solving.translation import Unsupported
 
 from .invariants import Sequences, candidates
 from .program import Step
@@ -50,6 +53,8 @@ class Conditions:
     combined: bool = False
     """Rounded results are told apart also at sums and products of two numbers: a second try, which costs more."""
     settler: Settler = field(default_factory=Settler)
+    scripts: dict[str, str] = field(default_factory=dict)
+    """Name → SMT-LIB of what was proved: `unsat` means that it holds."""
     proved: list[Term] = field(default_factory=list)
     """Formulas of which Z3 says that they cannot hold."""
     unkept: tuple[str, ...] = ()
@@ -173,11 +178,19 @@ class Conditions:
         effort = min(self.left(), from_seconds(seconds))
         return self.settler.settles(hypotheses, check.goal, effort=effort) == "unsat"
 
-    def proves(self, facts: Sequence[Term], goal: Term) -> bool:
+    def proves(self, facts: Sequence[Term], goal: Term, name: str) -> bool:
         if self.settler.proves(facts, goal, effort=self.left()):
-            self.proved.append(conjunction((*facts, negation(goal))))
+            self.keep(facts, goal, name)
             return True
         return False
+
+    def keep(self, facts: Sequence[Term], goal: Term, name: str) -> None:
+        """What was proved, for the second solver and for the archive."""
+        self.proved.append(conjunction((*facts, negation(goal))))
+        labelled = {**{f"F{k}": fact for k, fact in enumerate(facts, start=1)}, "denied": negation(goal)}
+        with contextlib.suppress(Unsupported):
+            file = f"{len(self.scripts) + 1:03d}-{name}.smt2"
+            self.scripts[file] = export(labelled, comment=f"{name}: holds if unsat")
 
     def never(self, run: Run, end: End) -> bool:
         """Whether the facts exclude a way out; what is assumed is not among them."""
@@ -189,8 +202,8 @@ class Conditions:
         for check in run.checks:
             facts = (*assumed, *run.facts[: check.facts], check.guard)
             if check.candidate is not None:
-                self.proved.append(conjunction((*facts, negation(check.goal))))
-            elif not self.proves(facts, check.goal):
+                self.keep(facts, check.goal, f"invariant-line-{check.line}")
+            elif not self.proves(facts, check.goal, f"safe-line-{check.line}"):
                 name = self.reading.file.name
                 self._log.append(f"line {check.line}: not shown: {check.what}")
                 return False, f"{name}:{check.line}: not shown that {check.what}", self.models(facts, check.goal)
@@ -202,7 +215,7 @@ class Conditions:
         for end in run.ends:
             wanted = substitute(goal, self.outputs(end))
             facts = (*assumed, *run.facts[: end.facts], end.guard)
-            if self.proves(facts, wanted):
+            if self.proves(facts, wanted, f"{_plain(clause.name)}-line-{end.line}"):
                 self._log.append(f"{clause.name}: proved at the return of line {end.line}")
                 continue
             self._log.append(f"{clause.name}: not proved at the return of line {end.line}")
@@ -226,7 +239,7 @@ class Conditions:
             for end in run.ends:
                 after = {v: end.outputs[f"memory.{v.name}"] for v in free}
                 facts = (*assumed, *run.facts[: end.facts], end.guard)
-                if not self.proves(facts, substitute(clause.formula, after)):
+                if not self.proves(facts, substitute(clause.formula, after), f"kept-{_plain(clause.name)}"):
                     yield f"memory: {clause.name} holds at every step: it is not shown that a step keeps it"
                     break
 
@@ -254,6 +267,10 @@ class Conditions:
                 values[variable] = _sequence(model.get(length), model.get(elements))
             restored.append(values)
         return restored
+
+
+def _plain(name: str) -> str:
+    return "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
 
 
 def _sequence(length: Any, elements: Any) -> Any:

@@ -17,7 +17,7 @@ from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, Re
 from avow.language.terms import Term
 
 from .rounding import around
-from .tuning import LENGTHS, TRIES
+from .tuning import LENGTHS, SHIFTED, TRIES
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,10 @@ class Drawing:
         related = self.chance.random() < 0.6
         wild = self.chance.random() < 0.08
         base = self.chance.choice(self.pool.floats)
-        if related and self.chance.random() < 0.5:
+        turn = self.chance.random()
+        if related and turn < 0.3:  # a number with all its digits: differences of such are rounded
+            base *= self.chance.random()
+        elif related and turn < 0.6:
             base = abs(self.chance.choice((1.0, 2.0, 3.0, 7.0, 10.0, 1e3, 1e6)) + self.chance.choice((0.0, base)))
         return {name: self.value(sort, base if related else None, wild) for name, sort in self.sorts.items()}
 
@@ -158,3 +161,16 @@ def beside(case: Mapping[str, Any], sorts: Mapping[str, Sort]) -> Iterator[dict[
     for name, options in zip(names, choices, strict=True):
         found = [{**one, name: option} for one in found for option in options][:64]
     yield from found
+
+
+def shifted(case: Mapping[str, Any], chance: random.Random) -> Iterator[dict[str, Any]]:
+    """Cases whose numbers lie as far apart as those of an exact case, elsewhere: what a solver says of rounding holds
+    of some doubles with such differences, seldom of the nearest."""
+    numbers = {name: value for name, value in case.items() if isinstance(value, Fraction)}
+    if not numbers or any(abs(value) > 10**12 for value in numbers.values()):
+        return
+    least = min(numbers.values())
+    for _ in range(SHIFTED):
+        start = Fraction(chance.uniform(0.0, 2.0 ** chance.randrange(-4, 5)))
+        ends = {name: around(value - least + start) for name, value in numbers.items()}
+        yield {**case, **{name: chance.choice(pair) for name, pair in ends.items()}}

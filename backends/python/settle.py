@@ -36,7 +36,7 @@ from .cpython import Told, ask, case_of
 from .judging import Formula, NoValue, Seen, meets, returned, seen
 from .machine import fraction, run
 from .reading import Reading, load
-from .samples import Drawing, beside, numbers_of, pool
+from .samples import Drawing, beside, numbers_of, pool, shifted
 from .translate import kind_of
 from .tuning import APART, RUN_SECONDS, VALIDATED
 
@@ -116,9 +116,10 @@ class Work:
             self.unkept = conditions.unkept
             left = [(o.id, job.clause(o)) for o in still if found[o.id].verdict is Verdict.UNKNOWN]
             if left and any(found[name].details.get("rounded_at_lines") for name, _ in left) and not reading.exact:
-                again = replace(conditions, combined=True, settler=Settler(), proved=[])
+                again = replace(conditions, combined=True, settler=Settler(), proved=[], scripts={})
                 found |= {n: f for n, f in again.settle(left).items() if f.verdict is Verdict.PROVED}
-            self.logs["conditions.log"] = conditions.log()
+                self.logs |= {f"again-{name}": text for name, text in again.scripts.items()}
+            self.logs |= {"conditions.log": conditions.log(), **conditions.scripts}
             shown = [case for f in found.values() for case in f.models]
             wanted = [c for model in shown for c in self.near(model)]
             if wanted:
@@ -285,7 +286,7 @@ class Work:
             case[port.name] = plain
         if self.reading.exact:
             return [case]
-        return list(beside(case, sorts))[:CASES_KEPT]
+        return [*list(beside(case, sorts))[:CASES_KEPT], *shifted(case, random.Random(self.limits.seed))]
 
     # -- outcomes ----------------------------------------------------------------------------------------
 

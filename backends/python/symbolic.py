@@ -56,7 +56,7 @@ from .program import (
     assigned,
 )
 from .rounding import finite, gaps, no_overflow, rounded
-from .tuning import BESIDE, MOST_NAMES
+from .tuning import BESIDE, MOST_NAMES, UNROLLED
 
 ZERO = Literal(0, INTEGER)
 
@@ -234,6 +234,10 @@ class Run:
     # -- loops -------------------------------------------------------------------------------------------
 
     def loop(self, loop: For, state: State, top: bool) -> State | None:
+        if isinstance(loop.count, Extreme) and all(isinstance(item, Const) for item in loop.count.items):
+            turns = max(int(item.value) for item in loop.count.items if isinstance(item, Const))
+            if turns <= UNROLLED:
+                return self.unrolled(loop, turns, state, top)
         count = self.named("count", self.value(loop.count, state))
         names = set(assigned(loop.body))
         carried = tuple(sorted(name for name in names if name in state.values))
@@ -278,6 +282,27 @@ class Run:
             if word == "break":
                 gone.values = {name: gone.values[name] for name in state.values}
                 result = self.meet(result, gone)
+        return result
+
+    def unrolled(self, loop: For, turns: int, state: State, top: bool) -> State | None:
+        """A loop whose turns are counted in the text: one after the other."""
+        names = tuple(state.values)
+        current: State | None = state
+        broken: State | None = None
+        for k in range(turns):
+            if current is None:
+                break
+            current.values[loop.counter] = Literal(k, INTEGER)
+            self._left.append([])
+            current = self.block(loop.body, current, top)
+            for gone, word in self._left.pop():
+                if word == "continue":
+                    current = self.meet(current, gone)
+                else:
+                    broken = self.meet(broken, gone)
+        result = self.meet(current, broken)
+        if result is not None:
+            result.values = {name: result.values[name] for name in names}
         return result
 
     # -- expressions -------------------------------------------------------------------------------------

@@ -21,6 +21,12 @@ BESIDE = 6
 COMBINED = 10
 """Numbers whose sums and products of two are thresholds on a second try: more would drown the solver."""
 
+SHIFTED = 150
+"""Cases with the differences of a solver's values: one in some ten of them rounds as the solver says."""
+
+UNROLLED = 16
+"""Turns of a loop over `range` of a constant that are run one by one, without an invariant: windows of filters."""
+
 INLINED_DEPTH = 8
 """Calls within calls beyond which a step is refused; recursion is told at once."""
 

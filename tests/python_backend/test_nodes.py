@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from source_nodes import LIMITER, LIMITER_RCL, NODES, TRICKS, WATCHDOG_RCL, Example, mutants
 
+from avow.backend_kit.protocol import Limits
+from avow.backends.python import BACKEND
 from avow.base.verdict import Object, Verdict
 
 
@@ -97,3 +99,30 @@ def test_a_hidden_state_is_told_with_its_line(tmp_path: Path) -> None:
     found = Example(source, LIMITER_RCL, "Limiter", {"vmax": 1.5}).settled(tmp_path)
     assert {o.verdict for o in found.values()} == {Verdict.UNKNOWN}
     assert "node.py:11: self.n is changed by a step" in found["same"].summary
+
+
+UNROLLED = """class Limiter:
+    def __init__(self, params):
+        self.vmax = params["vmax"]
+
+    def step(self, v):
+        total = 0.0
+        for i in range(4):
+            if i == 3:
+                break
+            if v > 100.0:
+                continue
+            total = total + 0.5
+        return min(total, self.vmax)
+"""
+
+
+def test_a_counted_loop_needs_no_invariant(tmp_path: Path) -> None:
+    ports = "node limiter { inputs( v : REAL ) outputs( u : REAL ) topics()"
+    rcl = f"{ports} guarantee g ( out.u == (if in.v > 100 then 0 else 1.5) ) }}"
+    job = Example(UNROLLED, rcl, "Limiter", {"vmax": 1.5}).job(tmp_path)
+    report = BACKEND.discharge(job, tmp_path, Limits())
+    assert [o.verdict for o in report.outcomes] == [Verdict.PROVED], report.outcomes[0].summary
+    scripts = [text for name, text in report.logs.items() if name.endswith(".smt2")]
+    assert scripts
+    assert all("(check-sat)" in text for text in scripts)
