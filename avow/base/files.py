@@ -50,7 +50,9 @@ def write(path: Path, content: str | bytes) -> bool:
     to, and stays what it is."""
     data = content.encode() if isinstance(content, str) else content
     if path.exists() and not path.is_file() and not path.is_dir():
-        with path.open("wb") as stream:
+        descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)  # of a pipe that nobody reads: an error, not a wait
+        os.set_blocking(descriptor, True)
+        with os.fdopen(descriptor, "wb") as stream:
             stream.write(data)
         return True
     if path.is_file() and path.read_bytes() == data:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import read_regular
 from avow.language.contract import Contract
 from avow.language.lexer import KEYWORDS
 from avow.system.formulas import check_formulas
@@ -155,6 +156,6 @@ def _follows(found: Diagnostic, told: frozenset[str]) -> bool:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text("utf-8", "replace")
+        return read_regular(path).decode("utf-8", "replace")
     except OSError:
         return ""

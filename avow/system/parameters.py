@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.files import read_regular
 from avow.system.paths import inside
 from avow.system.plan import Source
 from avow.system.strict_yaml import read_yaml
@@ -22,7 +23,7 @@ def parameters(root: Path, source: Source) -> tuple[Mapping[str, Any], tuple[Dia
     place, path = source.place.at("source", "parameters"), inside(root, source.parameters)
     try:
         assert path is not None
-        data = path.read_bytes()
+        data = read_regular(path)
         piece, faults = read_yaml(data, str(path))
         loaded = yaml.safe_load(data)
     except Rejected as rejected:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from avow.base.days import wrong_day
 from avow.base.diagnostics import Diagnostic, Rejected, Span
-from avow.base.files import digest
+from avow.base.files import digest, read_regular
 from avow.base.verdict import unsaid
 from avow.ros.launch import Launched
 from avow.system.launched import read_launched
@@ -82,7 +82,7 @@ def read_rest(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...], frozense
 
 def _document(path: Path) -> tuple[Piece, tuple[Diagnostic, ...]]:
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
     except OSError as error:
         raise Rejected(Diagnostic("PLAN100", f"{path} cannot be read: {error.strerror}")) from None
     return read_yaml(data, str(path))

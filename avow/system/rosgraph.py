@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.files import read_regular
 from avow.ros.listing import is_info, parse_info
 from avow.system.graph import Graph
 from avow.system.plan import System
@@ -51,7 +52,7 @@ class Account:
 def read_ros_graph(path: Path) -> RosGraph:
     """Raises Rejected, located, for a file that is none of the known forms."""
     try:
-        data = path.read_bytes()[: ROS_GRAPH_BYTES + 1]
+        data = read_regular(path)[: ROS_GRAPH_BYTES + 1]
         text = data.decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise Rejected(_fault(path, 1, f"the ROS graph cannot be read: {error}")) from None

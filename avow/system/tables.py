@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Span
+from avow.base.files import read_regular
 from avow.system.plan import Table
 from avow.system.schema import suggest
 from avow.system.strict_yaml import Piece
@@ -27,7 +28,7 @@ def read_csv(name: str, path: Path, span: Span) -> tuple[Table | None, tuple[Dia
         return None, (Diagnostic("PLAN109", f"scenario.{name}: {message}", span, notes=notes),)
 
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_regular(path).decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError:
         return fault(f"{path.name} is not UTF-8 text")
     except OSError as error:

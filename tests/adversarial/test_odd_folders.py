@@ -68,6 +68,15 @@ def test_a_pipe_where_the_ledger_should_be(place: Path, name: str) -> None:
     assert run(place, AVOW, "verify", "s")[0] != 0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["contracts/s/plan.yaml", "reports/s/report.json"])
+def test_a_pipe_in_another_file_s_place_is_not_waited_for(place: Path, name: str) -> None:
+    (place / name).parent.mkdir(parents=True, exist_ok=True)
+    (place / name).unlink(missing_ok=True)
+    os.mkfifo(place / name)
+    assert run(place, AVOW, "verify", "s")[0] == 2
+
+
 def test_a_contract_that_is_a_link_out_of_the_folder(place: Path) -> None:
     (place / "outside.rcl").write_text(RCL)
     contract = place / "contracts" / "s" / "s.rcl"
