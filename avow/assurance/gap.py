@@ -195,7 +195,7 @@ def suggest(view: ObligationView, demand: Demand | None, facts: Facts) -> Sugges
         if view.obligation.kind is Kind.REQUIREMENT:
             return Suggestion("add what it rests on under `supported_by`, or state it as a formula", cost=20)
         if view.obligation.kind is Kind.COMPOSITION and _wants_a_reason(view):
-            return Suggestion(_reason_wanted(view.obligation.name), cost=5)
+            return Suggestion(reason_wanted(view.obligation.name), cost=5)
         return Suggestion(
             "narrow the question (a scenario in the plan), allow more `seconds`, or accept it with a reason", cost=20
         )
@@ -245,7 +245,8 @@ def _wants_a_reason(view: ObligationView) -> bool:
     return not view.obligation.formula or view.obligation.name.startswith("environment.")
 
 
-def _reason_wanted(name: str) -> str:
+def reason_wanted(name: str) -> str:
+    """Where in the plan the reason belongs that a condition of the composition lacks."""
     goal, _, key = name.partition(".")
     if name.startswith("start."):
         return "say what a delayed edge of the loop carries first: `connections: [{…, delayed: true, initial: …}]`"

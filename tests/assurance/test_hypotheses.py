@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from assurance.sample import rover_case
 from avow.assurance.case import conclude
 from avow.assurance.facts import Facts, facts_of_case
+from avow.assurance.gap import reason_wanted
 from avow.base.verdict import Hypothesis, HypothesisKind, Verdict, bound
 from avow.evidence.ledger import Entry
 from avow.evidence.status import Status
@@ -72,3 +75,16 @@ def test_what_rests_on_a_limit_is_checked_at_most() -> None:
     assert found.obligation(at).standing is Status.CHECKED
     assert limit.text in found.obligation(at).hypotheses
     assert limit.text in [h.text for h in found.hypotheses]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("whole.loop.mem", "compose: {whole: {entered: {because: …}}}"),
+        ("D1.one-output", "compose: {D1: {one_output: {because: …}}}"),
+        ("start.mem", "initial: …"),
+        ("environment.in.r", "environment: {in.r: {assume: …, because: …}}"),
+    ],
+)
+def test_the_hint_where_a_reason_belongs_names_a_key_that_plans_have(name: str, words: str) -> None:
+    assert words in reason_wanted(name)
