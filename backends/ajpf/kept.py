@@ -1,4 +1,5 @@
-"""AJPF's answers kept between runs: one property takes it seconds to hours, and the same files have the same answer.
+"""AJPF's answers, and what AIL told of runs, kept: one property takes seconds to hours, and the same files have the
+same answer.
 
 Only what it decided is kept, with all that it printed, under a digest of everything that it was given: program,
 environment, property, MCAPL's own files, Java. The note is bound to this user (`notes`): an edited one is none.
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 
@@ -37,10 +39,21 @@ def keep(key: str, answer: Answer) -> None:
     if answer.said not in (Said.HOLDS, Said.VIOLATED):
         return
     said = {"said": str(answer.said), "path": list(answer.path), "log": answer.log, "framework": answer.framework}
-    try:
+    with suppress(OSError):
         write_note(_path(key), said)
-    except OSError:
-        return
+
+
+def told(key: str) -> str | None:
+    """What AIL printed in a run with these files, where that was kept."""
+    data = read_note(_path(key))
+    text = None if data is None else data.get("told")
+    return text if isinstance(text, str) else None
+
+
+def keep_told(key: str, text: str) -> None:
+    """Where it cannot be written, the run will be done again."""
+    with suppress(OSError):
+        write_note(_path(key), {"told": text})
 
 
 def _path(key: str) -> Path:

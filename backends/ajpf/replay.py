@@ -7,13 +7,14 @@ then; our run says what should be told. Where they part, one of the two interpre
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from avow.base.process import ToolMissing, run
 
+from . import kept
 from .ajpf_tool import BRIEF, Installation, prepare
 from .explore import Graph, System
 from .files import BUILDER
@@ -93,12 +94,24 @@ def replay(
     installation: Installation, setup: Setup, graph: Graph, lasso: Lasso, folder: Path
 ) -> tuple[str | None, str]:
     """How AIL's run differs from ours, None where it does not; and AIL's output. In `folder` the environment's class is
-    compiled once for all runs of the setup. Raises Unable."""
+    compiled once for all runs of the setup. What AIL told of a run that agreed is kept (`kept`). Raises Unable."""
     moments, script = expected(graph, lasso)
+    source = environment_class(setup.environment, agents=len(setup.programs), scripted=True)
+    ail = f"env = {CLASS}\nmas.file = agent.gwen\nmas.builder = {BUILDER}\n"
+    files = {"agent.gwen": program_text(setup.programs), "agent.ail": ail, f"{CLASS}.java": source}
+    key = kept.key({**files, SCRIPT: script.text()}, "replay", installation.mark())
+    output = kept.told(key)
+    if output is not None:
+        return _difference(moments, output), output
+    output = _run(installation, files, script, folder)
+    difference = _difference(moments, output)
+    if difference is None:  # anything else may come of the machine, and is tried again
+        kept.keep_told(key, output)
+    return difference, output
+
+
+def _run(installation: Installation, files: Mapping[str, str], script: Script, folder: Path) -> str:
     if not (folder / f"{CLASS}.class").is_file():
-        source = environment_class(setup.environment, agents=len(setup.programs), scripted=True)
-        ail = f"env = {CLASS}\nmas.file = agent.gwen\nmas.builder = {BUILDER}\n"
-        files = {"agent.gwen": program_text(setup.programs), "agent.ail": ail, f"{CLASS}.java": source}
         wrong = prepare(installation, folder, files)
         if wrong is not None:
             raise Unable(wrong)
@@ -108,15 +121,15 @@ def replay(
         done = run(command, cwd=folder, seconds=REPLAY_SECONDS, env={"AJPF_HOME": str(installation.home)})
     except ToolMissing as error:
         raise Unable(str(error)) from None
-    told = [line.removeprefix(MARK) for line in done.stdout.splitlines() if line.startswith(MARK)]
-    return _difference(moments, [_VARIABLE.sub("_", line) for line in told]), done.stdout + done.stderr
+    return f"{done.stdout}\n{done.stderr}"
 
 
 class Unable(Exception):  # noqa: N818 - it names a state, not a fault
     """AIL could not be run; the text says why."""
 
 
-def _difference(moments: Sequence[Moment], told: Sequence[str]) -> str | None:
+def _difference(moments: Sequence[Moment], output: str) -> str | None:
+    told = [_VARIABLE.sub("_", line.removeprefix(MARK)) for line in output.splitlines() if line.startswith(MARK)]
     for at, moment in enumerate(moments):
         ours = moment.text()
         theirs = told[at] if at < len(told) else "nothing more"

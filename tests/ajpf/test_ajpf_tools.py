@@ -251,6 +251,9 @@ def test_a_run_that_refutes_is_done_again_by_ail(lift, tmp_path, monkeypatch):
     (answers,) = [o for o in report.outcomes if o.obligation.endswith("answers")]
     assert answers.verdict is Verdict.REFUTED
     assert "does the same run" in str(answers.details["properties"])
+    monkeypatch.setattr(replay, "run", lambda *a, **k: pytest.fail("what AIL told was not kept"))
+    (again,) = [o for o in BACKEND.discharge(job, tmp_path, Limits(seconds=120)).outcomes if o == answers]
+    assert "does the same run" in str(again.details["properties"])
 
 
 @pytest.mark.needs_ajpf
