@@ -46,9 +46,9 @@ class How(StrEnum):
 
 
 MEANINGS = {
-    How.DERIVED: "concluded by a tool from the guarantees",
-    How.BOUNDED: "concluded by a tool within a finite scenario",
-    How.ARGUED: "a person says that the guarantees amount to it",
+    How.DERIVED: "a tool concluded it",
+    How.BOUNDED: "a tool concluded it, within a finite scenario",
+    How.ARGUED: "a person says the guarantees amount to it",
     How.OPEN: "not shown, or what it rests on is not",
 }
 """How a requirement stands, for who meets the word for the first time."""

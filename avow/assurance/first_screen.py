@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -23,12 +24,14 @@ from avow.assurance.answers import (
 from avow.assurance.changes import MARKS, baseline_of
 from avow.assurance.model import Case, Gate, NodeView, ObligationView, RequirementView
 from avow.assurance.relied import EVIDENCE, EXHAUSTIVE, LETTERS, Relied, examined, seen, weakness, word
+from avow.assurance.weakenings import briefly
 from avow.base.plain import count
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 
 ROWS, WORST, NODES, SQUARES, LINES, OWNERS = 6, 3, 8, 12, 5, 3
 """So many requirements have a row each; else so many of the worst; nodes; squares for a node; changes; owners."""
+_CONFIDENT = re.compile(r"with [^(),]* confidence, ")
 _HOW_ORDER = (How.OPEN, How.ARGUED, How.BOUNDED, How.DERIVED)
 
 
@@ -121,7 +124,7 @@ def answers(
         bases=tuple(sorted(basis, key=lambda b: b.node)),
         more_nodes=f"and {count(len(basis) - NODES, 'node')} on no less" if len(basis) > NODES else "",
         weakest=weakest,
-        next_weakest=f"{following.title}, {following.words}" if following else "",
+        next_weakest=f"{following.title}, {_CONFIDENT.sub('', following.words)}" if following else "",
         refuted=_refuted(requirements, views, nodes),
         supposed=tuple(_lines(suppositions)),
         owned=f"{owned} of {len(suppositions)}" if suppositions else "",
@@ -131,7 +134,7 @@ def answers(
         statement=_statement(f"{verdict} ({warned})" if warned else verdict, suppositions, kinds),
         warned=warned,
         owners=_owners(suppositions),
-        weakened_by="; ".join(f"{w.count} {w.words}" for w in weakenings),
+        weakened_by=briefly(weakenings),
     )
 
 
@@ -179,18 +182,20 @@ def _basis(
     """A node's line, and how weak it is: its worst colour, then how much of it has that colour."""
     own = [v for v in views if v.obligation.kind is Kind.GUARANTEE and v.obligation.node == node.name]
     marks = [(_mark(view, relied), view) for view in own]
-    number = Counter(" ".join((said, *_examined(view, relied))) for (said, _), view in marks)
-    words = ", ".join(f"{many} {said}" for said, many in number.items()) or "no guarantees"
+    by_object: dict[str, Counter[str]] = {}
+    for (said, _), view in marks:
+        by_object.setdefault(_examined(view, relied), Counter())[said] += 1
+    counted = {what: ", ".join(f"{many} {said}" for said, many in of.items()) for what, of in by_object.items()}
+    words = "; ".join(" ".join((many, what)).strip() for what, many in counted.items()) or "no guarantees"
     squares = tuple((LETTERS.get(said, "✘"), tone) for (said, tone), _ in marks)
     worst = min((tone.rank for _, tone in squares), default=Tone.GREEN.rank)
     share = sum(tone.rank == worst for _, tone in squares) / max(1, len(squares))
     return NodeBasis(node.name, node.title, squares if len(squares) <= SQUARES else (), words), (worst, -share)
 
 
-def _examined(view: ObligationView, relied: Mapping[str, Relied]) -> tuple[str, ...]:
-    """What was looked at, where the claim is relied upon."""
-    found = examined(relied[view.id]) if view.id in relied and view.standing.supports else ""
-    return (found,) if found else ()
+def _examined(view: ObligationView, relied: Mapping[str, Relied]) -> str:
+    """What was looked at, where the claim is relied upon; else nothing."""
+    return examined(relied[view.id]) if view.id in relied and view.standing.supports else ""
 
 
 def basis_of(node: NodeView, case: Case) -> NodeBasis:
@@ -253,7 +258,7 @@ def _owners(suppositions: Sequence[Supposition]) -> str:
 
 def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
     if not changes.against:
-        return (("", "No report has been signed: all of this is new."),)
+        return (("", "No report has been signed."),)
     shown = [(MARKS.get(e.kind, "▼"), e.words) for e in changes.entries]
     if len(shown) > LINES:
         worse = sum(e.worse for e in changes.entries[LINES - 1 :])

@@ -15,6 +15,7 @@ from avow.base.plain import count
 from avow.base.verdict import HypothesisKind, Object, in_words
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
+from avow.isolation.level import Isolation
 from avow.isolation.observed import ISOLATION
 
 WORDS = {
@@ -85,21 +86,28 @@ def word(status: Status) -> str:
     return WORDS.get(status, "open")
 
 
+_APART: Mapping[str, str] = {
+    Isolation.SEALED: ", sealed",
+    Isolation.PROCESSES: ", own process",
+    Isolation.NONE: ", not isolated",
+}
+
+
 def examined(relied: Relied) -> str:
-    """What was looked at: ``of the source in float64 (isolation sealed)``; empty of a person's word."""
+    """What was looked at: ``(source in float64, sealed)``; empty of a person's word."""
     if relied.status not in (*EXHAUSTIVE, Status.TESTED, Status.MONITORED):
         return ""
     record = relied.record
-    apart = f" (isolation {record.details[ISOLATION]})" if record.details.get(ISOLATION) else ""
+    apart = _APART.get(str(record.details.get(ISOLATION, "")), "")
     match record.of:
         case Object.MODEL:
-            return f"of a model{apart}"
+            return f"(model{apart})"
         case Object.SOURCE:
-            return f"of the source in {record.numbers}{apart}"
+            return f"(source in {record.numbers}{apart})"
         case Object.BINARY:
-            return f"of the binary in {record.numbers}{apart}"
+            return f"(binary in {record.numbers}{apart})"
         case Object.RECORDING:
-            return f"of recordings{apart}"
+            return f"(recordings{apart})"
 
 
 def upper_bound(record: Evidence) -> float | None:

@@ -34,6 +34,29 @@ _WORDS = {
 }
 
 
+_BRIEFLY = {
+    "argued": "argued",
+    "unconfirmed": "unconfirmed",
+    "bounded": "bounded",
+    "unowned": "without owner",
+    "sampled": "sampled",
+    "read": "only read",
+    "single": "by one method",
+    "tied": "tied by hand",
+    "unrun": "not answered",
+    "conditional": "on conditions",
+    "advice": "remarks",
+    "excused": "excused",
+    "believed": "from earlier runs",
+}
+"""The same for the first screen, where it leads to the words."""
+
+
+def briefly(found: Iterable[Weakening]) -> str:
+    """``2 argued, 19 by one method``."""
+    return ", ".join(f"{w.count} {_BRIEFLY[w.key]}" for w in found)
+
+
 def weakenings(
     views: Sequence[ObligationView],
     requirements: Sequence[RequirementView],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any
 from urllib.parse import quote
@@ -127,7 +128,7 @@ def _boxes(cells: Sequence[dict[str, Any]], basis: NodeBasis) -> list[tuple[Tone
     if len(cells) <= NODE_BOXES:
         return [(cell["tone"], (cell["word"], cell["view"].obligation.claim)) for cell in cells]
     tones = {cell["word"]: cell["tone"] for cell in cells}
-    return [(tones.get(part.split(" ")[1], Tone.RED), (part, "")) for part in basis.words.split(", ")]
+    return [(tones.get(part.split(" ")[1], Tone.RED), (part, "")) for part in re.split("[,;] ", basis.words)]
 
 
 def _word(record: Evidence) -> str:

@@ -157,7 +157,7 @@ def _first(case: Case) -> dict[str, Any]:
         "based_on": [[b.title, [[letter, tone.value] for letter, tone in b.squares], b.words] for b in a.based_on],
         "more_nodes": a.more_nodes,
         "weakest": a.refuted or _weakest(case),
-        "weakened_by": f"What weakens the case: {a.weakened_by}." if a.weakened_by else "",
+        "weakened_by": f"Weakened by: {a.weakened_by}." if a.weakened_by else "",
         "next": f"Next weakest: {a.next_weakest}." if a.next_weakest and not a.refuted else "",
         "supposed": [[line.about, f"{line.number} {line.says}{line.more and '; '}{line.more}"] for line in a.supposed],
         "owned": _owned(case),

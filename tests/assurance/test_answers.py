@@ -17,7 +17,7 @@ from avow.assurance.case import conclude_again
 from avow.assurance.changes import KINDS, baseline_of
 from avow.assurance.first_screen import WARNED, _lines, _owners
 from avow.assurance.model import Case
-from avow.assurance.weakenings import _WORDS, _weakening
+from avow.assurance.weakenings import _BRIEFLY, _WORDS, _weakening
 from avow.base.plain import identifiers, words_of
 from avow.base.verdict import Hypothesis, HypothesisKind, Link, Verdict, bound
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
@@ -298,7 +298,9 @@ def test_which_suppositions_there_are_and_who_answers_for_them_is_said_in_a_line
 
 def test_weakenings_are_named_and_counted_on_the_first_screen() -> None:
     found = rover_case()
-    assert found.answers.weakened_by.split("; ") == [f"{w.count} {w.words}" for w in found.weakenings]
+    said = found.answers.weakened_by.split(", ")
+    assert [int(part.split(" ")[0]) for part in said] == [w.count for w in found.weakenings]
+    assert _BRIEFLY.keys() == _WORDS.keys()
     for many in (1, 2):
         said = [_weakening(key, ("x",) * many).words for key in _WORDS]
         assert not any("{" in words for words in said)

@@ -1,7 +1,7 @@
 """The mode logic as it runs on the device."""
 
 
-def step(on, pressure, last, since):
+def step(on, pressure, last, elapsed):
     if pressure > 40 or (on and last == "alarm"):
         return {"mode": "alarm"}
     if not on:
@@ -9,5 +9,5 @@ def step(on, pressure, last, since):
     if last == "standby":
         return {"mode": "inhale"}
     if last == "inhale":
-        return {"mode": "inhale" if since < 10 else "exhale"}
-    return {"mode": "exhale" if since < 20 else "inhale"}
+        return {"mode": "inhale" if elapsed < 10 else "exhale"}
+    return {"mode": "exhale" if elapsed < 20 else "inhale"}
