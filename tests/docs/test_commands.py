@@ -127,6 +127,7 @@ CODES = {"avow sanity docs/examples/ventilator/conflict.rcl": 1}
 ELSEWHERE = {
     "avow init robot --from-": "tests/ros/test_drafts.py",
     "avow monitor SYSTEM --serve": "tests/rosmonitoring/test_monitor_command.py talks with it",
+    "avow monitor SYSTEM --live": "tests/rosmonitoring/test_live.py",
     "avow verify --on": "tests/scale/test_executors.py",
     "avow verify --sandbox": "it needs a tool: tests/isolation",
     "avow worker": "tests/scale/test_executors.py",
