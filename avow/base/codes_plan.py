@@ -148,6 +148,12 @@ PLAN_CODES: dict[str, Code] = {
             remedy="Use a rule for this shape, or select other nodes.",
         ),
         Code(
+            "PLAN135",
+            "no derived contract with memory",
+            "A derived contract speaks of one step, and a clause of one of its nodes speaks of others.",
+            remedy="Compare or export nodes without such clauses.",
+        ),
+        Code(
             "PLAN126",
             "ports do not fit",
             "A node cannot stand in for another that has other inputs or outputs.",

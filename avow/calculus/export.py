@@ -10,21 +10,27 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.calculus.composition import Composition
 from avow.calculus.derivation import Goal
 from avow.calculus.hierarchy import carried, innermost
 from avow.formulas.formula import free_variables, rename, substitute
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.sorts import FunctionSort
-from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import Quantified, Quantifier, Role, Term, Variable, histories
 from avow.system.plan import Endpoint
 
 
 def derived_contract(composition: Composition, goal: Goal) -> Contract:
     """The contract of the selected nodes taken together, as one node with the goal's name; of subsystems among them,
-    the nodes inside count."""
+    the nodes inside count. Raises Rejected for a clause that speaks of other steps."""
     frame = composition.frame
     nodes = composition.leaves(goal, goal.nodes)
+    for owner in nodes:
+        for clause in frame.system.contract.node(owner).clauses:
+            for record in histories(clause.formula)[:1]:
+                what = f"{owner}.{clause.name} speaks of other steps (`{record.operator}`)"
+                raise Rejected(Diagnostic("PLAN135", f"{what}, and no contract is derived of it", clause.span))
     names = _Names()
     outputs: dict[str, Port] = {}
     for node in nodes:

@@ -157,7 +157,7 @@ class Finder:
                 add(found)
                 progress = progress or bool(found)
                 marks = {item.claim.digest for item in assumed if item in done}
-                if marks >= set(self.known.assumptions[name]):
+                if name in self.known.assumptions and marks >= set(self.known.assumptions[name]):
                     add(item for item in mine if item.how is How.GUARANTEE)
                     waiting.remove(name)
                     progress = True

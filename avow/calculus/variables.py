@@ -14,7 +14,7 @@ from avow.formulas.formula import digest, free_variables, substitute
 from avow.language.contract import Node, Port
 from avow.language.printer import show_sort
 from avow.language.sorts import Sort
-from avow.language.terms import Role, Term, Variable
+from avow.language.terms import TRUE, Role, Term, Variable
 from avow.system.folding import leaves, own_inputs
 from avow.system.formulas import Assumed, environment_assumptions, initial_condition, ports_of
 from avow.system.graph import Edge, Graph, dataflow
@@ -257,7 +257,9 @@ def frame(system: System) -> Frame:
         if remembers(node) and node.name not in inside:
             made = compile_node(node)
             ports = tuple(Port(Role.INPUT, c.name, c.sort, show_sort(c.sort)) for c in made.cells)
-            nodes[node.name] = replace(made.node, inputs=(*node.inputs, *ports))
+            # a promise that has no formula of one step is no hypothesis; an assumption that has none stays, and open
+            kept = tuple(replace(g, formula=TRUE) if g.name in made.unsaid else g for g in made.node.guarantees)
+            nodes[node.name] = replace(made.node, inputs=(*node.inputs, *ports), guarantees=kept)
             cells[node.name] = made.cells
     constants = frozenset(entry.port for entry in system.plan.environment if entry.constant)
     return Frame(system, graph, environment_assumptions(system, graph), own, constants, cells, nodes)

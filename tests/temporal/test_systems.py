@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 from helpers import some
 
+from avow.base.diagnostics import Rejected
 from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
+from avow.calculus.export import derived_contract
 from avow.calculus.obligations import all_obligations, settle_all
 from avow.evaluation.evaluate import compile_term
 from avow.evaluation.running import Keeper
@@ -156,3 +158,36 @@ def test_what_is_drawn_is_a_contract(tmp_path: Path) -> None:
     folder = system(tmp_path, *drawn(0))
     contract, found = check_text((folder / "system.rcl").read_text(), "system.rcl")
     assert contract is not None, found
+
+
+CONTRACTS = """node a {{ inputs( f : NATURAL --> BOOL ) outputs( g : NATURAL --> BOOL, w : BOOL, v : BOOL ) topics()
+  guarantee seen ( forall(i in NATURAL | out.g(i) <=> once(in.f(i))) )
+  guarantee up ( w -> eventually(v) ) guarantee soon ( w -> within[200 ms](v) ) guarantee plain ( v or not w ) }}
+node b {{ inputs( g : NATURAL --> BOOL, w : BOOL, v : BOOL ) outputs( z : BOOL ) topics()
+  assume grows ( forall(i in NATURAL | previous(in.g(i), FALSE) -> in.g(i)) )
+  assume stays ( previous(v, FALSE) -> v ) assume plain ( v or not w ) {} guarantee z ( z ) }}"""
+
+
+def made(folder: Path, assumed: str) -> dict[str, Verdict]:
+    (folder / "system.rcl").write_text(CONTRACTS.format(assumed))
+    (folder / "plan.yaml").write_text("{}")
+    return verdicts(folder)
+
+
+def test_what_is_remembered_of_each_value(tmp_path: Path) -> None:
+    """A cell for every number; what no step can break is no hypothesis, and keeps no other from being one."""
+    found = made(tmp_path, "")
+    assert found["whole.b.grows"] is Verdict.PROVED
+    assert found["whole.b.plain"] is Verdict.PROVED
+    assert found["whole.b.stays"] is Verdict.REFUTED
+
+
+def test_of_a_node_that_assumes_more_than_steps_can_break_nothing_is_proved(tmp_path: Path) -> None:
+    assert Verdict.PROVED not in made(tmp_path, "assume ever ( w -> eventually(v) )").values()
+
+
+def test_no_contract_is_derived_of_clauses_with_memory(tmp_path: Path) -> None:
+    made(tmp_path, "")
+    composition = compose(load_system(tmp_path))
+    with pytest.raises(Rejected, match="other steps"):
+        derived_contract(composition, composition.whole)
