@@ -94,12 +94,24 @@ def _groups(
     for path in dict.fromkeys(paths):
         if path.is_dir():
             groups.append(_system(path, found))
+        elif path.suffix != ".rcl" and len(path.parts) == 1 and not path.exists():
+            found.extend(_no_system(path))
         elif separately:
             groups.append(([path], _off(path.parent)))
         else:
             by_folder.setdefault(path.parent, []).append(path)
     groups += [(files, _off(folder)) for folder, files in by_folder.items()]
     return groups
+
+
+def _no_system(path: Path) -> Iterator[Diagnostic]:
+    from avow.base.diagnostics import Rejected
+    from avow.base.workspace import system_folder
+
+    try:
+        system_folder(str(path))
+    except Rejected as rejected:
+        yield from rejected.diagnostics
 
 
 def _system(folder: Path, found: list[Diagnostic]) -> tuple[list[Path], frozenset[str]]:

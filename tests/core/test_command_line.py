@@ -28,6 +28,7 @@ NO_QUESTIONS = {
         "diff",
         "doctor",
         "explain",
+        "fretish",
         "fmt",
         "graph",
         "init",
@@ -143,6 +144,13 @@ def test_usage_and_input_that_are_wrong_end_with_2(
         main(arguments)
     assert ended.value.code == 2
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_check_says_which_systems_there_are(place: Path) -> None:
+    done = CliRunner().invoke(LEAVES["check"], ["m"], standalone_mode=False)
+    assert done.return_value == 2
+    assert "there is no system 'm'" in done.output
+    assert "known here: n" in done.output
 
 
 def test_the_table_of_exit_codes_is_in_one_place() -> None:
