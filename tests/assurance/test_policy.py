@@ -13,7 +13,7 @@ from avow.assurance.gap import independent
 from avow.assurance.model import Case, MethodInfo
 from avow.assurance.policy import costs, profile, profile_names, read_policy, techniques
 from avow.base.diagnostics import Rejected, Span
-from avow.base.verdict import Link, Verdict
+from avow.base.verdict import Link, Object, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.record import SIGNED_BY, Evidence
 from avow.evidence.status import Status
@@ -168,6 +168,16 @@ def test_age_reviewers_links_hypotheses() -> None:
     assert "tie is mapped" in gate(the_case(strict, replace(PROOF, link=Link.MAPPED)))[1]
     assert "rests on hypotheses" in gate(the_case(strict, replace(PROOF, hypotheses=("h",))))[1]
     assert TODAY.isoformat() == "2026-11-21"
+
+
+def test_what_was_verified_and_in_which_numbers() -> None:
+    asked = {"guarantees": {"high": {"one_of": ["proved"], "of": ["source"], "numbers": ["float64"]}}}
+    real = replace(PROOF, of=Object.SOURCE, numbers="float64")
+    assert gate(the_case(asked, real))[0]
+    assert "it is of a model, source is asked" in gate(the_case(asked, PROOF))[1]
+    assert "a REAL is exact in it, float64 is asked" in gate(the_case(asked, replace(real, numbers="exact")))[1]
+    words = next(b.words for b in the_case(asked, real).answers.bases if b.squares)
+    assert words == "1 proved (source in float64)"
 
 
 @pytest.mark.parametrize(("until", "good"), [("2026-11-21", True), ("2026-11-20", False), ("some day", False)])
