@@ -20,7 +20,8 @@ from avow.solving.limits import from_seconds
 @click.option("--all", "everything", is_flag=True, help="Show also inputs that never change.")
 def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: bool, everything: bool) -> int:
     """Run the contracts: the environment gives values of the plan's scenario, each node answers with any output that
-    meets its guarantees. SYSTEM is a system's name or folder.
+    meets its guarantees. SYSTEM is a system's name or folder. Of nodes that remember other runs are tried before one
+    that gets stuck is shown.
 
     Code 1 where the system gets stuck: a node has no answer that its contract allows. Code 2 without a usable scenario.
     """
@@ -34,6 +35,7 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
     from avow.calculus.variables import frame
     from avow.formulas.values import show
     from avow.system.load import load_path
+    from avow.tuning.bounds import WALKS
 
     loaded = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
     try:
@@ -41,6 +43,11 @@ def command(path: Path, seed: int, steps: int | None, seconds: float, as_json: b
         scenario = loaded.plan.scenario
         length = steps or (scenario.steps if scenario else None) or 20
         walk = machine.walk(Random(seed), length)
+        for again in range(1, WALKS if machine.cells else 1):  # an answer may leave a memory that no answer suits
+            if walk.stuck is None:
+                break
+            other = machine.walk(Random(seed + again), length)
+            walk = other if other.stuck is None else walk
     except CannotRun as reason:
         raise Rejected(Diagnostic("CLI006", f"{loaded.name} cannot be run: {reason}")) from None
     given = [values for choices in machine.environment.values() for values in choices]

@@ -8,6 +8,10 @@ GAME_MEMORIES = 300
 GAME_ANSWERS = 256
 """Inputs and outputs at one step of such a game: each is evaluated from each memory."""
 
+WALKS = 20
+"""Runs that `avow simulate` tries before it shows one that got stuck, where nodes remember: a choice at random may end
+where a better one would go on."""
+
 RUN_TO_AN_EXAMPLE = 6
 """Steps of a run at whose end an example is looked for: each adds a copy of the contract to the question."""
 

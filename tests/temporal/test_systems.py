@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from helpers import some
 
 from avow.base.diagnostics import Rejected
@@ -16,6 +17,7 @@ from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.export import derived_contract
 from avow.calculus.obligations import all_obligations, settle_all
+from avow.cli.simulate import command as simulate
 from avow.evaluation.evaluate import compile_term
 from avow.evaluation.running import Keeper
 from avow.formulas.formula import substitute
@@ -191,3 +193,16 @@ def test_no_contract_is_derived_of_clauses_with_memory(tmp_path: Path) -> None:
     composition = compose(load_system(tmp_path))
     with pytest.raises(Rejected, match="other steps"):
         derived_contract(composition, composition.whole)
+
+
+TRAP = """node n { inputs( a : BOOL ) outputs( b : BOOL ) topics()
+  guarantee g ( not (previous(out.b, FALSE) and a and b) and ((previous(out.b, FALSE) and a) -> b) ) }"""
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_run_that_goes_on_is_shown_where_some_answer_ends_it(seed: int, tmp_path: Path) -> None:
+    (tmp_path / "system.rcl").write_text(TRAP)
+    (tmp_path / "plan.yaml").write_text("{}")
+    done = CliRunner().invoke(simulate, [str(tmp_path), "--steps", "4", "--seed", str(seed)])
+    assert done.exit_code == 0, done.output
+    assert "stuck" not in done.output
