@@ -5,9 +5,11 @@ from __future__ import annotations
 import time
 
 import pytest
+from click.testing import CliRunner
 
 from avow.backend_kit.protocol import Limits
 from avow.backends.ajpf import BACKEND
+from avow.backends.ajpf.command import command
 from avow.backends.ajpf.environment import read_environment
 from avow.backends.ajpf.explore import explore
 from avow.backends.ajpf.interpreter import Semantics
@@ -109,3 +111,15 @@ def test_a_machine_without_java_or_spin_gives_the_same_verdicts(lift, tmp_path, 
     assert {o.obligation: o.verdict for o in without.outcomes} == {o.obligation: o.verdict for o in with_tools.outcomes}
     assert {o.verdict for o in without.outcomes} == {Verdict.CHECKED}
     assert "Spin" not in without.tool
+
+
+def test_a_rule_that_asks_for_too_much_ends_the_search(tmp_path):
+    """Six of forty beliefs, in every way: 4,096,000,000 of them."""
+    beliefs = "\n".join(f"n({k})" for k in range(40))
+    rule = "big :- n(A), n(B), n(C), n(D), n(E), n(F), never;"
+    (tmp_path / "a.gwen").write_text(
+        f"GWENDOLEN\n:name: ag\n:Initial Beliefs:\n{beliefs}\n:Reasoning Rules:\n{rule}\n:Initial Goals:\ng [perform]\n"
+        ":Plans:\n+!g [perform] : { B big } <- act;\n"
+    )
+    told = CliRunner().invoke(command, ["run", str(tmp_path / "a.gwen")])
+    assert "ask for too much" in told.output

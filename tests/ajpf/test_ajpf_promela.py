@@ -9,6 +9,7 @@ from random import Random
 import pytest
 import yaml
 from helpers import some
+from rich_agents import rich_agent
 from runner_graph import runner_graph
 from small_agents import case, formula
 from small_societies import society
@@ -77,7 +78,7 @@ def test_spin_says_of_the_program_what_ajpf_says(tmp_path, folder, name):
         [
             (make, seed, semantics, fair)
             for seed in range(7000, 7060)
-            for make in (case, society)
+            for make in (case, society, rich_agent)
             for semantics in Semantics
             for fair in (False, True)
         ],
