@@ -16,11 +16,13 @@ from avow.language.bounds import constant
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL
 from avow.language.terms import (
     FALSE,
+    RESPONSES,
     TRUE,
     And,
     Arithmetic,
     Compare,
     Conditional,
+    History,
     Iff,
     Implies,
     In,
@@ -47,10 +49,26 @@ _ZERO = Literal(0, NATURAL)
 
 def with_value(claim: Term) -> Term:
     """The claim, and that it has a value. The same of what it gives is that again."""
+    if any(isinstance(part, History) for part in subterms(claim)):
+        claim = _at_their_steps(claim)
+        if isinstance(claim, Implies) and any(map(_is_response, subterms(claim.right))):
+            return Implies(with_value(claim.left), claim.right, claim.span)
     needed = _needed(claim)
-    if needed == TRUE or demanded(claim) is not claim:
+    if needed == TRUE or demanded(claim) is not claim or _is_response(claim):
         return claim
     return And((*_parts(needed), *_parts(claim)), claim.span)
+
+
+def _at_their_steps(term: Term) -> Term:
+    """What speaks of other steps has its conditions at those: a formula without a value was not so there."""
+    parts = tuple(map(_at_their_steps, term.children))
+    if isinstance(term, History):
+        parts = tuple(with_value(part) if part.sort == BOOL else part for part in parts)
+    return term if parts == term.children else term.rebuild(parts)
+
+
+def _is_response(term: Term) -> bool:
+    return isinstance(term, History) and term.operator in RESPONSES
 
 
 def demanded(claim: Term) -> Term:
@@ -133,6 +151,8 @@ def _risks(atom: Term, sequences: Collection[Variable] | None, facts: Facts) -> 
             if not any(_follows(each, facts) for each in asked):
                 yield asked[0]
     for part in atom.children:
+        if isinstance(atom, History) and part.sort == BOOL:
+            continue  # its own conditions stand in it
         if part.sort == BOOL or isinstance(part, Conditional):
             yield from _parts(defined(part, sequences, facts))
         else:

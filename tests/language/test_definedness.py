@@ -192,3 +192,19 @@ def test_clauses_say_so() -> None:
     (clause,) = contract.nodes[0].assumptions
     assert show_term(clause.formula, "rcl") == "in.x != 0 and 1 / in.x > 3"
     assert clause.written == parse_formula("1 / x > 3", NODE)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("once(1 / x > 2)", "once(in.x != 0 and 1 / in.x > 2)"),
+        ("b -> within[3 steps](1 / x > 2)", "in.b -> within[3 steps](in.x != 0 and 1 / in.x > 2)"),
+        ("1 / x > 2 -> within[3 steps](b)", "(in.x != 0 and 1 / in.x > 2) -> within[3 steps](in.b)"),
+        ("once(x != 0 -> 1 / x > 2)", "once(in.x != 0 -> 1 / in.x > 2)"),
+    ],
+)
+def test_what_speaks_of_other_steps_has_its_conditions_there(text: str, said: str) -> None:
+    contract, found = check_text(TEXT.replace("b or not b", text), "n.rcl")
+    assert contract is not None, found
+    (clause,) = contract.nodes[0].guarantees
+    assert show_term(clause.formula, "rcl") == said
