@@ -156,7 +156,7 @@ class Records:
     """The cells of some formulas, made as they are asked for."""
 
     cells: list[Cell] = field(default_factory=list)
-    _values: dict[Term, Term] = field(default_factory=dict)
+    _values: dict[str, Term] = field(default_factory=dict)
     _first: Cell | None = None
 
     def clause(self, formula: Term) -> Term:
@@ -172,9 +172,10 @@ class Records:
     def term(self, term: Term) -> Term:
         """A term of the past as one of this step. Raises Unsaid."""
         if isinstance(term, History):
-            if term not in self._values:
-                self._values[term] = self._record(term)
-            return self._values[term]
+            meaning = digest(term)  # what means the same has one cell: a cell is named by its meaning
+            if meaning not in self._values:
+                self._values[meaning] = self._record(term)
+            return self._values[meaning]
         parts = term.children
         made = tuple(map(self.term, parts))
         return term if all(one is other for one, other in zip(parts, made, strict=True)) else term.rebuild(made)

@@ -190,6 +190,9 @@ def test_equal_records_share_a_cell() -> None:
     once = History(Past.ONCE, (A,), BOOL)
     records.clause(And((once, Not(once), History(Past.ROSE, (A,), BOOL))))
     assert len(records.cells) == 2
+    one, other = Compare("<", Literal(1, NATURAL), N), Compare(">", N, Literal(1, NATURAL))
+    records.clause(And((History(Past.ONCE, (one,), BOOL), History(Past.ONCE, (other,), BOOL))))
+    assert len({cell.name for cell in records.cells}) == len(records.cells) == 3
 
 
 def test_what_no_first_steps_can_break_is_left_out_and_leaves_no_cell() -> None:
