@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, assert_never
 
@@ -20,7 +20,21 @@ from avow.language.lexer import KEYWORDS, quote
 from avow.language.load import check_text
 
 from .meaning import Unsaid, demands, remarks
-from .sentence import Call, Denied, Expression, Minus, Name, Number, Sentence, Sign, Truth, Unreadable, parse
+from .sentence import (
+    Call,
+    Denied,
+    Expression,
+    Minus,
+    Name,
+    Number,
+    Scope,
+    Sentence,
+    Sign,
+    Truth,
+    Unreadable,
+    is_assumption,
+    parse,
+)
 from .sentence import parse_expression as parsed
 
 
@@ -31,6 +45,7 @@ class Requirement:
     name: str
     text: str
     span: Span
+    project: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +60,17 @@ class Given:
 @dataclass(frozen=True, slots=True)
 class Project:
     requirements: tuple[Requirement, ...]
-    variables: Mapping[tuple[str, str], Given] = field(default_factory=dict)
-    """By component and name."""
+    variables: tuple[tuple[tuple[str, str, str], Given], ...] = ()
+    """With project (empty where the file does not say it), component and name of each."""
+
+    def of(self, project: str, component: str) -> dict[str, Given]:
+        """What is said of a component's names. Raises Rejected where two things are said of one."""
+        found: dict[str, Given] = {}
+        for (where, owner, name), given in self.variables:
+            here = owner == component and (where == project or not where or not project)
+            if here and found.setdefault(name, given) != given:
+                raise Rejected(Diagnostic("FRET001", f"two different variables `{name}` of component `{component}`"))
+        return found
 
 
 def read(path: Path) -> Project:
@@ -71,7 +95,12 @@ def read(path: Path) -> Project:
         message = f"{path} is not what FRET exports: a list of requirements, each with its `fulltext`"
         raise Rejected(Diagnostic("FRET001", message))
     requirements = [
-        Requirement(str(r.get("reqid") or f"R{k}"), r["fulltext"], _place(text, r["fulltext"], str(path)))
+        Requirement(
+            str(r.get("reqid") or f"R{k}"),
+            r["fulltext"],
+            _place(text, r["fulltext"], str(path)),
+            str(r.get("project") or ""),
+        )
         for k, r in enumerate(listed, start=1)
     ]
     variables = found.get("variables") if isinstance(found, dict) else None
@@ -99,16 +128,16 @@ def _place(text: str, sentence: str, file: str) -> Span:
     return Span(file, line, column, line, column + len(sentence))
 
 
-def _given(variables: list[Any]) -> dict[tuple[str, str], Given]:
-    found: dict[tuple[str, str], Given] = {}
+def _given(variables: list[Any]) -> tuple[tuple[tuple[str, str, str], Given], ...]:
+    found = []
     for v in variables:
         if not isinstance(v, dict) or not isinstance(v.get("variable_name"), str) or not v.get("idType"):
             continue
         means = v.get("modeRequirement") if v["idType"] == "Mode" else v.get("assignment")
         kind = _TYPES.get(str(v.get("dataType")), "")
-        key = (str(v.get("component_name")), v["variable_name"])
-        found[key] = Given(str(v["idType"]), kind, means if isinstance(means, str) else "")
-    return found
+        key = (str(v.get("project") or ""), str(v.get("component_name")), v["variable_name"])
+        found.append((key, Given(str(v["idType"]), kind, means if isinstance(means, str) else "")))
+    return tuple(found)
 
 
 _TYPES = {
@@ -131,7 +160,7 @@ class Nodes:
 def nodes(project: Project, outputs: frozenset[str] = frozenset()) -> Nodes:
     """The nodes; of the names that FRET says nothing of, `outputs` are outputs, if any are given. Raises Rejected."""
     faults: list[Diagnostic] = []
-    components: dict[str, list[tuple[Requirement, Sentence]]] = {}
+    components: dict[str, tuple[str, str, list[tuple[Requirement, Sentence]]]] = {}
     if not project.requirements:
         raise Rejected(Diagnostic("FRET001", "there is no sentence in the file"))
     for requirement in project.requirements:
@@ -141,17 +170,37 @@ def nodes(project: Project, outputs: frozenset[str] = frozenset()) -> Nodes:
             place = replace(requirement.span, column=requirement.span.column + error.column - 1)
             faults.append(Diagnostic("FRET002", f"{requirement.name}: {error.message}", place))
             continue
-        components.setdefault(sentence.component, []).append((requirement, sentence))
+        word = _word(sentence.component)
+        of, component, found = components.setdefault(word, (requirement.project, sentence.component, []))
+        if (of, component) != (requirement.project, sentence.component):
+            what = (
+                _clash(component, sentence.component, word)
+                if of == requirement.project
+                else (
+                    f"component `{component}` of project {of or '(none)'} and `{sentence.component}` of "
+                    f"{requirement.project or '(none)'} would be one node: export one project at a time"
+                )
+            )
+            faults.append(Diagnostic("FRET003", f"{requirement.name}: {what}", requirement.span))
+            continue
+        found.append((requirement, sentence))
         faults += [
             Diagnostic("FRET004", f"{requirement.name}: {text}", requirement.span, Severity.WARNING)
             for text in remarks(sentence)
         ]
     constants: dict[str, str] = {}
+    words: dict[str, str] = {}
     texts = [
-        _Node(component, found, project, outputs, constants, faults).text() for component, found in components.items()
+        _Node(component, found, project.of(of, component), outputs, constants, words, faults).text()
+        for of, component, found in components.values()
     ]
     text = _context(constants) + "\n".join(filter(None, texts))
-    return Nodes(format_text(text, "fretish.rcl") if any(texts) else "", tuple(faults))
+    if not any(texts):
+        return Nodes("", tuple(faults))
+    _, told = check_text(text, "fretish.rcl")
+    if wrong := [d for d in told if d.is_error]:
+        raise Rejected(*faults, Diagnostic("FRET003", f"the nodes together are no RCL: {wrong[0].message}"))
+    return Nodes(format_text(text, "fretish.rcl"), tuple(faults))
 
 
 class _Node:
@@ -161,22 +210,25 @@ class _Node:
         self,
         component: str,
         found: list[tuple[Requirement, Sentence]],
-        project: Project,
+        given: Mapping[str, Given],
         outputs: frozenset[str],
         constants: dict[str, str],
+        words: dict[str, str],
         faults: list[Diagnostic],
     ) -> None:
         self.name = _word(component)
         self.found = found
         self.faults = faults
-        self.given = {name: given for (of, name), given in project.variables.items() if of == component}
+        self.given = given
         self.outputs = outputs or frozenset(name for _, s in found for name in _names(_answered(s.response)))
         self.types: dict[str, str] = {}
         self.same: list[tuple[str, str]] = []
         self.ports: dict[str, str] = {}
         """Names that clauses speak of, each with `in` or `out`."""
         self.constants = constants
-        """Of all nodes."""
+        self.words = words
+        """RCL's names, each with FRET's. These two are of all nodes: outputs feed inputs of their name."""
+        self.scoped = False
         self.within: tuple[str, ...] = ()
 
     def text(self) -> str:
@@ -187,33 +239,33 @@ class _Node:
         self._spread()
         clauses: list[str] = []
         taken: set[str] = set()
+        sources: dict[str, Requirement] = {}
         for requirement, sentence in self.found:
+            self.scoped = sentence.scope is not Scope.ALWAYS
             try:
                 for demand in demands(sentence, self._say):
                     name = _unused(_word(requirement.name) + demand.suffix, taken)
                     clauses.append(self._clause(name, requirement, demand.formula))
+                    sources[clauses[-1]] = requirement
             except Unsaid as error:
                 self.faults.append(Diagnostic("FRET003", f"{requirement.name}: {error}", requirement.span))
-        clauses = sorted(filter(self._sound, clauses), key=lambda clause: not clause.lstrip().startswith("assume"))
+        clauses = [clause for clause in clauses if self._sound(clause, sources[clause])]
+        clauses.sort(key=lambda clause: not clause.lstrip().startswith("assume"))
         return self._written(clauses) if clauses else ""
 
     def _clause(self, name: str, requirement: Requirement, formula: str) -> str:
-        assumed = "assum" in requirement.name.lower()
         said = quote(" ".join(requirement.text.split()))
-        return f"  {'assume' if assumed else 'guarantee'} {name} {said} ( {formula} )"
+        return f"  {'assume' if is_assumption(requirement.name) else 'guarantee'} {name} {said} ( {formula} )"
 
-    def _sound(self, clause: str) -> bool:
+    def _sound(self, clause: str, source: Requirement) -> bool:
         """Whether the checker takes the clause; what it says is the reason why it is left out."""
         besides = [] if clause.lstrip().startswith("guarantee") else ["  guarantee ( TRUE )"]
         found, diagnostics = check_text(self.context() + self._written([clause, *besides]), "fretish.rcl")
         if found is not None:
             return True
         error = next(d for d in diagnostics if d.is_error)
-        name = clause.split(maxsplit=2)[1]
-        place = next(r.span for r, _ in self.found if name.startswith(_word(r.name)))
-        self.faults.append(
-            Diagnostic("FRET003", f"{name}: its clause is no RCL: {error.message}", place, hint=error.hint)
-        )
+        message = f"{source.name}: its clause is no RCL: {error.message}"
+        self.faults.append(Diagnostic("FRET003", message, source.span, hint=error.hint))
         return False
 
     def _written(self, clauses: list[str]) -> str:
@@ -310,6 +362,10 @@ class _Node:
         match name, arguments:
             case (("preBool" | "preInt" | "preReal"), [first, value]):
                 return f"previous({value}, {first})"
+            case (("persisted" | "occurred"), [_, _]) if self.scoped:
+                raise Unsaid(
+                    f"inside a scope `{name}` looks back to the scope's beginning only, which no clause here says"
+                )
             case (("persisted" | "occurred"), [steps, formula]):
                 return f"{'held' if name == 'persisted' else 'once'}[{steps} steps]({formula})"
             case (("abs" | "absInt" | "absReal"), [_]):
@@ -320,6 +376,8 @@ class _Node:
                 raise Unsaid(f"Avow does not know the function `{name}` of {len(arguments)} arguments")
 
     def _named(self, name: str) -> str:
+        if (other := self.words.setdefault(_word(name), name)) != name:
+            raise Unsaid(_clash(other, name, _word(name)))
         given = self.given.get(name, Given())
         if given.means and given.kind in ("Internal", "Mode"):
             if re.fullmatch(r"-?\d+(\.\d+)?", given.means.strip()):
@@ -334,6 +392,9 @@ class _Node:
         """What a name stands for, which FRET has as an expression of Lustre."""
         if name in self.within:
             raise Unsaid(f"`{name}` is defined by itself")
+        if (found := re.search(r"(?<!<)->|--", means)) is not None:
+            reason = {"->": "speaks of the first step", "--": "begins a comment"}[found[0]]
+            raise Unsaid(f"what `{name}` stands for is not read: `{found[0]}` {reason} in Lustre")
         said = re.sub(r"\bnot\b", "!", re.sub(r"\band\b", "&", re.sub(r"\bor\b", "|", means)))
         before = self.within
         self.within = (*before, name)
@@ -378,6 +439,10 @@ def _names(part: Expression) -> Iterable[str]:
             return
         case _:
             assert_never(part)
+
+
+def _clash(one: str, other: str, word: str) -> str:
+    return f"`{one}` and `{other}` would both be `{word}` in RCL: rename one of them"
 
 
 def _word(name: str) -> str:

@@ -118,6 +118,11 @@ class Sentence:
     duration: Duration | None = None
 
 
+def is_assumption(name: str) -> bool:
+    """Whether FRET's tools take a requirement of that name as an assumption."""
+    return "assum" in name.lower()
+
+
 class Unreadable(Exception):  # noqa: N818 - it names what happened
     """No FRETish: what was found, and the column, counted from 1."""
 
@@ -234,18 +239,31 @@ def _expression(tree: Any) -> Expression:
         "number": lambda: Number(str(parts[0])),
         "true": lambda: Truth(True),
         "false": lambda: Truth(False),
+        "group": lambda: _expression(parts[0]),
         "denied": lambda: Denied(_expression(parts[0])),
         "minus": lambda: Minus(_expression(parts[-1])),
         "implies": lambda: Sign("=>", _expression(parts[0]), _expression(parts[1])),
         "call": lambda: Call(str(parts[0]), tuple(map(_expression, parts[1:]))),
     }
     if tree.data == "sign_implies":
-        left, _, *inner = parts
+        left, arrow, *inner = parts
+        _alone(arrow, left)
         return Sign("=>", _expression(left), Sign("=>", *map(_expression, inner)))
     if tree.data == "sign":
         left, operator, right = parts
+        _alone(operator, left)
         return Sign(_SIGNS.get(str(operator).lower(), str(operator)), _expression(left), _expression(right))
     return make[tree.data]()
 
+
+def _alone(arrow: Token, left: Any) -> None:
+    """FRET's grammar takes a chain of arrows from the left, and the tools that it hands the text to from the right."""
+    if arrow.type in _ARROWS and left.data == "sign" and left.children[1].type in _ARROWS:
+        raise Unreadable(
+            f"a chain of arrows is read in two ways: write parentheses before this `{arrow}`", arrow.column or 1
+        )
+
+
+_ARROWS = ("IMPLIES", "IFF")
 
 _SIGNS = {"->": "=>", "<->": "<=>", "xor": "xor", "mod": "mod"}

@@ -32,6 +32,8 @@ from avow.language.terms import (
     Widen,
 )
 
+from .sentence import is_assumption
+
 
 @dataclass(frozen=True, slots=True)
 class Partial:
@@ -53,11 +55,20 @@ def to_fretish(contract: Contract) -> Partial:
         twice = {p.name for p in node.inputs} & {p.name for p in node.outputs}
         for clause in node.clauses:
             try:
-                lines.append(f"{clause.name}: {_sentence(node, clause, twice)}\n")
+                lines.append(f"{_named(node, clause)}: {_sentence(node, clause, twice)}\n")
             except _Beyond as error:
                 message = f"{node.name}.{clause.name}: FRETish cannot say {error}"
                 missing.append(Diagnostic("FRET005", message, clause.span))
     return Partial("".join(lines), tuple(missing))
+
+
+def _named(node: Node, clause: Clause) -> str:
+    """The name tells assumptions from guarantees."""
+    if clause in node.assumptions:
+        return clause.name if is_assumption(clause.name) else f"{clause.name}_assumption"
+    if is_assumption(clause.name):
+        raise _Beyond("a guarantee whose name has `assum` in it, which makes an assumption of it")
+    return clause.name
 
 
 def _sentence(node: Node, clause: Clause, twice: set[str]) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from avow.base.diagnostics import Rejected
 from avow.fretish.project import nodes, read
 from avow.fretish.sentence import Unreadable, parse
 from avow.fretish.writing import to_fretish
@@ -167,3 +168,85 @@ def test_what_fretish_cannot_say_is_told_by_name() -> None:
     told = " ".join(d.message for d in found.missing)
     for word in ("g1", "g2", "both called `x`", "`counted`"):
         assert word in told, told
+
+
+@pytest.mark.parametrize(
+    ("sentences", "left_out"),
+    [
+        (["the n shall always satisfy a.b => x", "the n shall always satisfy a_b => y"], "`a.b` and `a_b`"),
+        (["when a.b the n shall immediately satisfy x", "the n shall always satisfy a_b"], "`a.b` and `a_b`"),
+        (["the m shall always satisfy a.b", "the n shall always satisfy a_b => y"], "`a.b` and `a_b`"),
+        (["the n shall always satisfy rose => x", "the n shall always satisfy rose_ => y"], "`rose` and `rose_`"),
+        (["the a.b shall always satisfy x > 3", "the a_b shall always satisfy x < 3"], "`a.b` and `a_b`"),
+        (["the n shall always satisfy x", "the n shall always satisfy x => y => z"], "a chain of arrows"),
+        (["the n shall always satisfy x", "the n shall always satisfy x <=> y => z"], "a chain of arrows"),
+        (["the n shall always satisfy x", "the n shall always satisfy x => y => if z then w"], "a chain of arrows"),
+        (
+            ["the n shall always satisfy x", "in m the n shall always satisfy persisted(2, x)"],
+            "looks back to the scope",
+        ),
+        (["the n shall always satisfy x", "in m when occurred(2, y) the n shall satisfy x"], "looks back to the scope"),
+    ],
+)
+def test_what_would_become_another_claim_is_left_out(tmp_path: Path, sentences: list[str], left_out: str) -> None:
+    """Two names of FRET's never become one of RCL's, and what is read in two ways is not read."""
+    path = tmp_path / "x.txt"
+    path.write_text("\n".join(sentences))
+    found = nodes(read(path))
+    (fault,) = [fault for fault in found.faults if fault.is_error]
+    assert left_out in fault.message
+    assert fault.span is not None
+    assert fault.span.line == 2
+    assert [c.name for node in contract(found.text).nodes for c in node.clauses] == ["R1"]
+
+
+@pytest.mark.parametrize(
+    ("means", "left_out"),
+    [
+        ("false -> level > 3", "speaks of the first step"),
+        ("level > 3 -- 4", "begins a comment"),
+        ("a => b => level > 3", "a chain of arrows"),
+        ("level > 3", ""),
+        ("(a <-> b) or a => (b => level - -3 > 2)", ""),
+    ],
+)
+def test_what_a_name_stands_for_is_read_as_lustre(tmp_path: Path, means: str, left_out: str) -> None:
+    path = tmp_path / "x.json"
+    listed = [{"reqid": "R", "fulltext": "the n shall always satisfy high => x"}]
+    high = {"component_name": "n", "variable_name": "high", "idType": "Internal", "assignment": means}
+    path.write_text(json.dumps({"requirements": listed, "variables": [high]}))
+    found = nodes(read(path))
+    assert bool(found.text) is (not left_out)
+    assert [left_out in fault.message for fault in found.faults] == [True] * bool(left_out)
+
+
+def test_two_projects_in_a_file_are_not_mixed(tmp_path: Path) -> None:
+    path = tmp_path / "x.json"
+    listed = [{"reqid": p, "project": p, "fulltext": f"the n{p} shall always satisfy c > 1"} for p in "PQ"]
+    constant = {"variable_name": "c", "idType": "Internal", "dataType": "integer"}
+
+    def write(one: str, other: str) -> None:
+        both = [
+            {**constant, "project": p, "component_name": f"n{p}", "assignment": v}
+            for p, v in zip("PQ", (one, other), strict=True)
+        ]
+        path.write_text(json.dumps({"requirements": listed, "variables": both}))
+
+    write("1", "2")
+    assert "c > 1" in (text := nodes(read(path)).text)
+    assert "(2) > 1" in text
+    listed[1]["fulltext"] = "the nP shall always satisfy y"
+    write("1", "2")
+    assert "export one project" in nodes(read(path)).faults[0].message
+    twice = [{**constant, "component_name": "nP", "assignment": v} for v in "12"]
+    path.write_text(json.dumps({"requirements": listed, "variables": twice}))
+    with pytest.raises(Rejected, match="two different variables `c`"):
+        nodes(read(path))
+
+
+def test_a_sentence_s_name_tells_assumptions_from_guarantees() -> None:
+    text = """node n { inputs( a : BOOL ) outputs( x : BOOL ) topics()
+      assume A1 ( in.a ) assume assumed ( in.a ) guarantee G1 ( out.x ) guarantee presumably_assumed ( out.x ) }"""
+    found = to_fretish(contract(text))
+    assert [line.partition(":")[0] for line in found.text.splitlines()] == ["A1_assumption", "assumed", "G1"]
+    assert "presumably_assumed" in found.missing[0].message
