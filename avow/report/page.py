@@ -19,6 +19,7 @@ from avow.assurance.naming import short
 from avow.assurance.policy import techniques
 from avow.assurance.remarks import REMARK
 from avow.assurance.traceability import Row
+from avow.backend_kit.timeline import in_words, picture, timelines
 from avow.base.verdict import said
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
@@ -57,6 +58,7 @@ def environment() -> Environment:
         "gate_line": wording.gate_line,
         "derivation": _derivation,
         "draw_map": draw_map,
+        "draw_timelines": _timelines,
         "example_run": example.run,
         "example_values": example.values,
         "small_values": example.small_values,
@@ -165,6 +167,15 @@ def _subscripts(escaped: str) -> str:
         return f'<span class="stream">{written}</span>' if symbol in "io" else written
 
     return _SUBSCRIPT.sub(typeset, escaped)
+
+
+def _timelines(details: Mapping[str, Any]) -> Markup:
+    """What was heard in the recorded runs, and where it was wrong; empty where no evidence says so."""
+    figures = [
+        Markup('<figure class="lanes">{}<figcaption>{}</figcaption></figure>').format(picture(one), in_words(one))
+        for one in timelines(details)
+    ]
+    return Markup("\n").join(figures)
 
 
 def _math(text: str) -> Markup:

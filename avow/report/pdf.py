@@ -12,6 +12,7 @@ from avow.assurance.model import Case, ObligationView, SourceView
 from avow.assurance.modules import RequirementModule, requirement_modules
 from avow.assurance.naming import short
 from avow.assurance.remarks import REMARK
+from avow.backend_kit.timeline import in_words, picture, timelines
 from avow.base.verdict import Counterexample
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
@@ -223,6 +224,7 @@ def _obligation(case: Case, view: ObligationView) -> dict[str, Any]:
                 "summary": f"{e.summary}. How it was measured: {protocol(e)}" if protocol(e) else e.summary,
                 "bound": bound_text(e.bound),
                 "counter": _counter(case, e.counterexample) if e.counterexample else None,
+                "lanes": [{"svg": str(picture(t, alone=True)), "told": in_words(t)} for t in timelines(e.details)],
             }
             for e in evidence
         ],

@@ -306,7 +306,7 @@ def outline(evidence: Evidence) -> str:
 
 def details_text(evidence: Evidence) -> str:
     """Whatever else a method left in its details, as indented text."""
-    shown = {"outline", "proof_outline", "triples", "mutation", RETRY, "protocol"}
+    shown = {"outline", "proof_outline", "triples", "mutation", RETRY, "protocol", "timeline"}
     rest = {
         key: value for key, value in evidence.details.items() if key not in shown and value not in ("", [], {}, None)
     }

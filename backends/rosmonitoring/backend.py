@@ -14,6 +14,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.verdict import Counterexample, Link, Object, Outcome, Verdict
 from avow.ros.sources import message_files
 from avow.system.paths import inside
+from avow.tuning.shown import TIMELINES
 
 from .codes import CODES
 from .coverage import coverage, old
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from avow.system.plan import System
 
     from .engine import Monitor
+    from .lanes import Signals
     from .options import Setup
     from .watched import Violation
 
@@ -35,7 +37,7 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "4"
+    version = "5"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING
@@ -147,6 +149,8 @@ class RosMonitoringBackend(Backend):
         outcomes = tuple(_outcome(o.id, o.name, runs, _spoken(job, o), _excuse(job, runs)) for o in job.obligations)
         for obligation, outcome in zip(job.obligations, outcomes, strict=True):
             outcome.details["rml"] = refused.get(obligation.name, "translated")
+            if drawn := _timelines(job, found, runs, obligation):
+                outcome.details["timeline"] = drawn
         return Report(outcomes, "avow monitor", __version__, (), logs)
 
 
@@ -173,6 +177,8 @@ class _Run:
     """What one trace showed."""
 
     def __init__(self, name: str, monitor: Monitor) -> None:
+        from .lanes import Marks
+
         self.name = name
         self.monitor = monitor
         self.digest = ""
@@ -181,11 +187,14 @@ class _Run:
         self.violations: list[Violation] = []
         self.first: dict[str, Violation] = {}
         self.mapping_faults = 0
+        self.marks = Marks()
+        self.heard: Signals | None = None
 
     def note(self, violations: Iterable[Violation]) -> None:
         from .watched import Fault
 
         for violation in violations:
+            self.marks.note(violation)
             self.mapping_faults += violation.fault is Fault.MAPPING
             self.first.setdefault(f"{violation.fault.name}/{violation.clause}", violation)
             if len(self.violations) < VIOLATIONS_KEPT:
@@ -202,6 +211,7 @@ class _Run:
 
 
 def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
+    from .lanes import signals
     from .options import origin, readable
     from .session import judge
     from .traces import digest_trace
@@ -222,6 +232,8 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
                 run.unknown = f"{name}: time was up after {monitor.events} events"
                 break
         run.note(monitor.finish())
+        if monitor.events:
+            run.heard = signals([monitor.setup], path, where, monitor.events, monitor.listens)
     except Rejected as error:
         # by the plan's name for it: where the folder lies on this machine is no part of what was found
         told = ((f"{name}, line {d.span.line}" if d.span else name, d.message) for d in error.diagnostics)
@@ -229,6 +241,22 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
     except OSError as error:
         run.trouble = f"{name}: {error.strerror or error}"
     return run
+
+
+def _timelines(job: Job, found: Setup, runs: list[_Run], obligation: Obligation) -> list[dict[str, Any]]:
+    """A picture's content for each trace, those with a finding first."""
+    from avow.backend_kit.timeline import to_json
+
+    from .lanes import timeline
+
+    clauses = [(found, job.clause(obligation))]
+    drawn = [
+        timeline(run.name, run.monitor.events, run.heard, run.marks, clauses, lambda node, name: name)
+        for run in runs
+        if run.heard is not None
+    ]
+    drawn.sort(key=lambda one: not any(lane.marks for lane in one.lanes))
+    return [to_json(one) for one in drawn[:TIMELINES]]
 
 
 def _excuse(job: Job, runs: list[_Run]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sys
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
     from avow.system.plan import System
 
+    from .lanes import Marks
     from .session import Session
     from .watched import Violation
 
@@ -41,6 +43,9 @@ if TYPE_CHECKING:
     "--verdicts", metavar="TOPIC", help="With --live: say verdicts there, as diagnostic_msgs/DiagnosticArray."
 )
 @click.option(
+    "--timeline", type=click.Path(path_type=Path), help="Draw signals and violations there, as SVG (live: of --record)."
+)
+@click.option(
     "--configuration", type=click.Path(path_type=Path), help="Write ROSMonitoring's configuration of all nodes there."
 )
 @click.option("--serve", "port", type=click.IntRange(0, 65535), help="Answer ROSMonitoring's monitors on this port.")
@@ -55,6 +60,7 @@ def command(
     host: str,
     record: Path | None,
     verdicts: str | None,
+    timeline: Path | None,
     configuration: Path | None,
     port: int | None,
 ) -> int:
@@ -74,7 +80,11 @@ def command(
     if live is not None:
         if trace is not None or port is not None:
             raise click.UsageError("give a TRACE, --live or --serve")
-        return _live(loaded, nodes, live, (seconds, host, record, verdicts), as_json, show_all)
+        if timeline is not None and record is None:
+            raise click.UsageError("with --live, --timeline needs --record: it is drawn from the record")
+        return _live(loaded, nodes, live, (seconds, host, record, verdicts), _Telling(as_json, show_all, timeline))
+    if timeline is not None and trace in (None, "-"):
+        raise click.UsageError("--timeline needs a TRACE that can be read twice: a file, or a folder")
     if port is not None:
         if trace is not None:
             raise click.UsageError("give a TRACE or --serve, not both")
@@ -82,13 +92,20 @@ def command(
         return 0
     if trace is None:
         raise click.UsageError("give a TRACE, or --serve PORT")
-    return _judge(loaded, nodes, trace, as_json, show_all)
+    return _judge(loaded, nodes, trace, _Telling(as_json, show_all, timeline))
+
+
+@dataclass(frozen=True, slots=True)
+class _Telling:
+    """How the verdicts are told."""
+
+    as_json: bool
+    show_all: bool
+    timeline: Path | None
 
 
 def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
     """Write ROSMonitoring's configuration. Raises Rejected."""
-    from avow.base.diagnostics import Diagnostic, Rejected
-
     from .configuration import of_system
     from .options import NAME
     from .session import session
@@ -99,17 +116,13 @@ def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
         methods = [m for m in system.plan.node(node).methods if m.backend == NAME]
         options: dict[str, Any] = dict(methods[0].options.data) if methods else {}
         parts.append((monitor.setup, options))
-    text = of_system(parts)
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise Rejected(Diagnostic("MON304", f"{path} cannot be written: {error.strerror}")) from None
+    _write(path, of_system(parts))
     click.echo(f"{path}: {len(parts)} monitors")
 
 
 def _live(
     system: System, nodes: tuple[str, ...], graph: str,
-    how: tuple[float | None, str, Path | None, str | None], as_json: bool, show_all: bool,
+    how: tuple[float | None, str, Path | None, str | None], telling: _Telling,
 ) -> int:  # fmt: skip
     from .live import follow, graph_of
     from .session import session
@@ -126,46 +139,73 @@ def _live(
             for violation in running.finish():
                 yield 0, violation
 
-    return _told(running, until_interrupted(), str(record or ""), as_json, show_all)
+    return _told(running, until_interrupted(), str(record or ""), telling)
 
 
 def _warn(text: str) -> None:
     click.echo(text, err=True)
 
 
-def _judge(system: System, nodes: tuple[str, ...], trace: str, as_json: bool, show_all: bool) -> int:
+def _judge(system: System, nodes: tuple[str, ...], trace: str, telling: _Telling) -> int:
     from .session import session
 
     running = session(system, nodes, None if trace == "-" else Path(trace))
-    return _told(running, _violations(running, trace), trace, as_json, show_all)
+    return _told(running, _violations(running, trace), trace, telling)
 
 
-def _told(
-    running: Session, violations: Iterator[tuple[int, Violation]], trace: str, as_json: bool, show_all: bool
-) -> int:
+def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: str, telling: _Telling) -> int:
     """Show what was found, and what became of each clause; the exit code."""
+    from .lanes import Marks
     from .session import violation_json
     from .traces import digest_trace
 
     shown: list[dict[str, Any]] = []
     count = 0
+    marks = Marks()
     for line, violation in violations:
         count += 1
-        if not show_all and count > VIOLATIONS_SHOWN:
+        marks.note(violation)
+        if not telling.show_all and count > VIOLATIONS_SHOWN:
             continue
-        if as_json:
+        if telling.as_json:
             shown.append({**violation_json(violation), "line": line})
         else:
             click.echo(violation.text())
-    if as_json:
+    if telling.timeline is not None:
+        _draw(running, Path(trace), marks, telling.timeline)
+    if telling.as_json:
         digest = "" if trace in ("-", "") else digest_trace(Path(trace))
         whole = {**running.summary(), "trace": trace, "sha256": digest, "violations": shown}
         click.echo(json.dumps(whole, indent=2, ensure_ascii=False))
     else:
-        if not show_all and count > VIOLATIONS_SHOWN:
+        if not telling.show_all and count > VIOLATIONS_SHOWN:
             click.echo(f"… and {count - VIOLATIONS_SHOWN} more (--all shows them)")
         _print_summary(running)
     return 0 if running.clean and _anything_judged(running) and not running.unmonitored() else 1
+
+
+def _draw(running: Session, trace: Path, marks: Marks, path: Path) -> None:
+    """The timeline of all guarantees that were judged. Raises Rejected."""
+    from avow.backend_kit.timeline import picture
+
+    from .lanes import signals, timeline
+    from .options import origin
+
+    setups = [monitor.setup for monitor in running.monitors]
+    heard = signals(setups, trace, origin(running.system), running.events, running.listens)
+    clauses = [(setup, clause) for setup in setups for clause in setup.node.guarantees]
+    drawn = timeline(trace.name, running.events, heard, marks, clauses, lambda node, name: f"{node}.{name}")
+    _write(path, f"{picture(drawn, alone=True)}\n")
+
+
+def _write(path: Path, text: str) -> None:
+    """Raises Rejected."""
+    from avow.base.diagnostics import Diagnostic, Rejected
+
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise Rejected(Diagnostic("MON304", f"{path} cannot be written: {error.strerror}")) from None
 
 
 def _violations(running: Session, trace: str) -> Iterator[tuple[int, Violation]]:

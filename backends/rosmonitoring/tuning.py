@@ -73,3 +73,9 @@ LIVE_PAUSE = 0.1
 
 VERDICTS_EVERY = 1.0
 """Seconds between two messages of verdicts where nothing is broken, as ROS's diagnostics are."""
+
+TIMELINE_EVENTS = 100_000
+"""Events whose values are read for the picture of a run: a few seconds; of a longer run, one event in so many."""
+
+WORD_LENGTH = 60
+"""Characters of a value in that picture: more have no room in it."""

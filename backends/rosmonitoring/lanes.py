@@ -1,0 +1,165 @@
+"""The timeline of a judged trace: the signals that its clauses speak of, and where something was wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from avow.backend_kit.timeline import (
+    Columns,
+    Lane,
+    Mark,
+    Stretch,
+    Timeline,
+    joined_marks,
+    joined_stretches,
+    runs,
+)
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.formulas.formula import free_variables
+from avow.formulas.values import Value, show
+from avow.language.contract import Clause
+from avow.language.sorts import IntegerSort, NaturalSort, RealSort, Sort
+from avow.tuning.shown import TIMELINE_PORTS
+
+from .bags import Origin, is_bag
+from .options import Setup, same_topic
+from .reading import Reader, reader
+from .rules import Choice, Fields, heard_through
+from .traces import Recorded, not_text, read_lines, read_trace
+from .tuning import TIMELINE_EVENTS, WORD_LENGTH
+from .watched import Fault, Violation, time_text
+from .wires import MappingError
+
+_KINDS = {
+    Fault.GUARANTEE: "broken",
+    Fault.EXCUSED: "excused",
+    Fault.ASSUMPTION: "assumption",
+    Fault.PROVIDER: "assumption",
+    Fault.SILENT: "silent",
+    Fault.RATE: "rate",
+    Fault.MAPPING: "unreadable",
+}
+
+
+@dataclass(slots=True)
+class Marks:
+    """Where something was wrong: (node, clause or variable) → marks by kind, bounded however many there are."""
+
+    found: dict[tuple[str, str], dict[str, Columns[Mark]]] = field(default_factory=dict)
+
+    def note(self, violation: Violation) -> None:
+        kind, at = _KINDS[violation.fault], max(violation.index, 1)
+        columns = self.found.setdefault((violation.node, violation.clause), {})
+        mark = Mark(kind, at, at, 1, violation.time)
+        columns.setdefault(kind, Columns(joined_marks)).put(at, mark)
+
+    def of(self, node: str, name: str) -> tuple[Mark, ...]:
+        return tuple(mark for columns in self.found.get((node, name), {}).values() for mark in columns.items())
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """What a trace said of some variables, (node, variable) → its stretches."""
+
+    found: Mapping[tuple[str, str], tuple[Stretch, ...]]
+    start: str
+    end: str
+    every: int
+
+
+def signals(setups: Iterable[Setup], path: Path, where: Origin, events: int, listens: Callable[[str], bool]) -> Signals:
+    """Read a trace of so many events once more, for its values; `listens` as when it was judged. Raises Rejected."""
+    every = max(1, -(-events // TIMELINE_EVENTS))
+    readers: dict[str, list[tuple[tuple[str, str], Sort, Reader]]] = {}
+    for setup in setups:
+        for name, rule in setup.rules.items():
+            if isinstance(rule, Fields | Choice):
+                one = ((setup.node.name, name), rule.variable.sort, reader(rule))
+                readers.setdefault(same_topic(rule.topic), []).append(one)
+    found: dict[tuple[str, str], Columns[Stretch]] = {}
+    start = end = ""
+    for index, recorded in _sampled(path, where, every, listens):
+        if index > events:
+            break
+        end = time_text(recorded.event.get("time"))
+        start = start or end
+        for key, sort, read in readers.get(same_topic(str(recorded.event.get("topic", ""))), ()):
+            try:
+                said = _said(read(recorded.event, None), sort)
+            except MappingError:
+                continue  # it has a mark
+            found.setdefault(key, Columns(joined_stretches)).put(index, Stretch(index, index, said))
+    return Signals({key: runs(columns.items()) for key, columns in found.items()}, start, end, every)
+
+
+def timeline(
+    name: str, events: int, heard: Signals, marks: Marks, clauses: Sequence[tuple[Setup, Clause]],
+    named: Callable[[str, str], str],
+) -> Timeline:  # fmt: skip
+    """A lane for each of the clauses, for each assumption that was broken, and for each variable that they speak of."""
+    wanted = {(setup.node.name, clause.name) for setup, clause in clauses}
+    spoken = {
+        (setup.node.name, heard_through(rule))
+        for setup, clause in clauses
+        for v in free_variables(clause.formula)
+        if (rule := setup.rules.get(v.qualified)) is not None
+    }
+    setups = {setup.node.name: setup for setup, _ in clauses}
+    spoken_of = [(node, name) for node, setup in setups.items() for name in setup.rules if (node, name) in spoken]
+    told = [
+        (setup.node.name, clause.name)
+        for setup in setups.values()
+        for clause in setup.node.clauses
+        if (setup.node.name, clause.name) in wanted
+        or (clause in setup.node.assumptions and marks.of(setup.node.name, clause.name))
+    ]
+    ports = [key for key in spoken_of if marks.of(*key)]
+    ports += [key for key in spoken_of if key not in ports][: max(0, TIMELINE_PORTS - len(ports))]
+    lanes = [Lane(named(*key), (), marks.of(*key)) for key in told]
+    lanes += [Lane(named(*key), heard.found.get(key, ()), marks.of(*key)) for key in spoken_of if key in ports]
+    return Timeline(name, max(events, 1), heard.start, heard.end, tuple(lanes), heard.every)
+
+
+def _said(value: Value, sort: Sort) -> tuple[float, float] | str:
+    if isinstance(sort, RealSort | IntegerSort | NaturalSort):
+        try:
+            number = float(value)  # type: ignore[arg-type]
+        except OverflowError:
+            number = 1e308 if value > 0 else -1e308  # type: ignore[operator]
+        return number, number
+    text = show(value)
+    return text if len(text) <= WORD_LENGTH else text[: WORD_LENGTH - 1] + "…"
+
+
+def _sampled(path: Path, where: Origin, every: int, listens: Callable[[str], bool]) -> Iterator[tuple[int, Recorded]]:
+    """About one event in so many, each with its number among all."""
+    if is_bag(path):
+        for recorded in read_trace(path, where, listens):
+            if _chosen(recorded.index, every):
+                yield recorded.index, recorded
+        return
+    index = 0
+
+    def lines(file: Iterable[str]) -> Iterator[str]:
+        nonlocal index
+        for line in file:
+            if line and not line.isspace():
+                index += 1
+                if _chosen(index, every):
+                    yield line
+
+    try:
+        with path.open(encoding="utf-8-sig", errors="strict", newline="\n") as file:
+            for recorded in read_lines(lines(file), str(path)):
+                yield index, recorded
+    except UnicodeDecodeError:
+        raise not_text(str(path)) from None
+    except OSError as error:
+        raise Rejected(Diagnostic("MON201", f"cannot read {path}: {error.strerror or error}")) from None
+
+
+def _chosen(index: int, every: int) -> bool:
+    """By a hash of the number: topics that take turns would fall in step with a plain count."""
+    return every == 1 or (index * 2654435761 >> 16) % every == 0
