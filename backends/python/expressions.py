@@ -119,6 +119,13 @@ class Expressions:
 
     # -- names -------------------------------------------------------------------------------------------
 
+    def local(self, name: str) -> bool:
+        """Whether the function that is read has this name itself: it is then not the module's."""
+        scope = self.scope
+        return name == scope.receiver or any(
+            name in held for held in (scope.own, scope.bound, scope.sequences, scope.aliases)
+        )
+
     def is_object(self, name: str) -> bool:
         return name == self.scope.receiver and name not in self.scope.own and bool(name)
 
@@ -144,11 +151,9 @@ class Expressions:
         match node:
             case ast.Constant(value=bool() | int() | float() | str() as value):
                 return value
-            case ast.Name(id=name) if name not in self.scope.own:
-                if name in self.scope.aliases:
-                    return self.scope.aliases[name]
-                if name in self.scope.bound or name in self.scope.sequences:
-                    return None
+            case ast.Name(id=name) if name in self.scope.aliases and name not in self.scope.own:
+                return self.scope.aliases[name]
+            case ast.Name(id=name) if not self.local(name):
                 return self.literal(self.parts.constants.get(name))
             case ast.Attribute(value=ast.Name(id="math"), attr="pi") if self.is_module("math"):
                 return math.pi
@@ -156,7 +161,9 @@ class Expressions:
                 if attribute in self.mappings:
                     return self.mappings[attribute]
                 return self.literal(self.parts.of_class.get(attribute))
-            case ast.Attribute(value=ast.Name(id=name), attr=attribute) if name == self.parts.node.name:
+            case ast.Attribute(value=ast.Name(id=name), attr=attribute) if (
+                name == self.parts.node.name and not self.local(name)
+            ):
                 return self.literal(self.parts.of_class.get(attribute))
             case ast.Subscript(value=value, slice=ast.Constant(value=str(key))):
                 whole = self.constant(value)
@@ -166,10 +173,12 @@ class Expressions:
                     return whole[key]
             case ast.Call(func=ast.Attribute(value=value, attr="get"), args=[ast.Constant(value=str(key)), *rest]):
                 whole = self.constant(value)
-                if isinstance(whole, Mapping) and not node.keywords and len(rest) <= 1:
-                    if key in whole:
-                        return whole[key]
-                    return self.constant(rest[0]) if rest else None
+                default = self.constant(rest[0]) if len(rest) == 1 else None
+                known = default is not None or all(isinstance(item, ast.Constant) for item in rest)
+                if isinstance(whole, Mapping) and not node.keywords and len(rest) <= 1 and known:
+                    return whole.get(key, default)  # what stands for want of it is evaluated anyhow
+            case ast.Dict(keys=[]):
+                return {}
             case ast.Call(func=ast.Name(id="float"), args=[value], keywords=[]):
                 inner = self.constant(value)
                 if type(inner) in (int, float):
@@ -188,8 +197,7 @@ class Expressions:
 
     def is_module(self, name: str) -> bool:
         """Whether a name is an imported module here."""
-        taken = name in self.scope.own or name in self.scope.bound or name in self.scope.sequences
-        return not taken and name not in self.scope.aliases and name in self.parts.modules
+        return not self.local(name) and name in self.parts.modules
 
     # -- numbers -----------------------------------------------------------------------------------------
 
@@ -220,7 +228,10 @@ class Expressions:
             ):
                 if any(isinstance(p, Inlined) for p in parts(one)):
                     raise Refusal(line, "a call that is looked for among values")
-                members = [self.equated("==", one, self.expression(item), line) for item in node.elts]
+                looked = [self.expression(item) for item in node.elts]
+                if not all(isinstance(p, Const | Name | Unary) for item in looked for p in parts(item)):
+                    raise Refusal(line, "values looked among have to be constants or names: Python evaluates them all")
+                members = [self.equated("==", one, item, line) for item in looked]
                 if members:
                     among: Expr = Junction("or", tuple(members)) if len(members) > 1 else members[0]
                     return among if isinstance(op, ast.In) else Unary("not", among, Kind.BOOL)
@@ -251,7 +262,7 @@ class Expressions:
 
     def call(self, func: ast.expr, arguments: Sequence[ast.expr], line: int) -> Expr:
         match func:
-            case ast.Name(id=name) if name in self.scope.own or name in self.scope.bound:
+            case ast.Name(id=name) if self.local(name):
                 raise Refusal(line, f"{name} is called, and is a local name")
             case ast.Name(id="min" | "max" as name) if len(arguments) >= 2:
                 items = self.alike([self.number(a) for a in arguments], line, name)
@@ -272,7 +283,9 @@ class Expressions:
                     return Unary("abs", _floating(self.number(arguments[0]), line), Kind.FLOAT)
             case ast.Attribute(value=ast.Name(id="math"), attr=name) if name in _FINITE and self.is_module("math"):
                 if len(arguments) == 1:
-                    self.number(arguments[0])
+                    asked = self.number(arguments[0])
+                    if not isinstance(asked, Const | Name) or asked.kind is not Kind.FLOAT:
+                        raise Refusal(line, f"{name} is asked of something else than a float's name")
                     return Const(_FINITE[name], Kind.BOOL)
             case ast.Name(id=name) if name in self.parts.functions:
                 return self.inline(self.parts.functions[name], arguments, False, line)

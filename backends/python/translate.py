@@ -39,7 +39,7 @@ from .program import (
     assigned,
 )
 from .tuning import INLINED_DEPTH
-from .whole_file import Parts, Refusal
+from .whole_file import Parts, Refusal, binders
 
 
 def kind_of(sort: Sort) -> Kind | None:
@@ -83,6 +83,8 @@ class Translator(Expressions):
         self.making = True
         """`__init__` is read, not `step`."""
         self.changed: dict[str, int] = {}
+        self.branches = 0
+        """Conditions and loops around the statement that is read."""
 
     def step(self) -> Step:
         """The whole class."""
@@ -285,6 +287,8 @@ class Translator(Expressions):
             case ast.Attribute(value=ast.Name(id=receiver), attr=attribute) if receiver == self.scope.receiver:
                 constant = self.constant(value) if self.making else None
                 if isinstance(constant, Mapping):
+                    if self.branches or attribute in self.mappings:
+                        raise Refusal(line, f"self.{attribute} is a mapping, and bound under a condition or twice")
                     self.mappings[attribute] = constant
                     return If(Const(True, Kind.BOOL), (), (), line)
                 if not self.making:
@@ -317,10 +321,12 @@ class Translator(Expressions):
     ) -> tuple[list[Statement], bool]:
         condition = self.truth(test)
         before = set(self.scope.bound)
+        self.branches += 1
         then, one = self.block(body)
         after = self.scope.bound
         self.scope.bound = set(before)
         otherwise, other = self.block(orelse)
+        self.branches -= 1
         match one, other:
             case True, True:
                 self.scope.bound &= after
@@ -337,7 +343,9 @@ class Translator(Expressions):
         count, first, position = self.iterated(statement, counter, line)
         before = set(self.scope.bound)
         head = [self.assign(name, value, line) for name, value in first]
+        self.branches += 1
         body, _ = self.block(statement.body)
+        self.branches -= 1
         self.scope.bound = before  # a loop may have no turn
         here = range(line - 2, max(line, statement.end_lineno or line))
         comments = tuple((k + 1, text) for k in here if (text := _invariant(self.lines, k)))
@@ -429,15 +437,12 @@ def _plain_arguments(function: ast.FunctionDef) -> list[str]:
 
 def _bound_names(function: ast.FunctionDef) -> frozenset[str]:
     """The names that its body binds: local everywhere in it. Arguments that it leaves alone are not among them."""
-    found: set[str] = set()
     for part in ast.walk(function):
-        if isinstance(part, ast.Name) and not isinstance(part.ctx, ast.Load):
-            found.add(part.id)
-        elif isinstance(part, ast.FunctionDef | ast.Lambda | ast.ClassDef | ast.NamedExpr) and part is not function:
+        if isinstance(part, ast.FunctionDef | ast.Lambda | ast.ClassDef | ast.NamedExpr) and part is not function:
             raise Refusal(part.lineno, "a function, class or name bound within an expression or function")
-        elif isinstance(part, ast.Import | ast.ImportFrom | ast.comprehension):
+        if isinstance(part, ast.Import | ast.ImportFrom | ast.comprehension):
             raise Refusal(getattr(part, "lineno", function.lineno), "an import or comprehension within a function")
-    return frozenset(found)
+    return frozenset(name for name, _ in binders(*function.body))
 
 
 def _loaded(target: ast.Name | ast.Attribute) -> ast.expr:

@@ -7,15 +7,35 @@ says so with its line.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 BUILTINS = frozenset({"min", "max", "abs", "len", "range", "enumerate", "float", "int", "bool", "dict", "object"})
 """What a step may call; bound anywhere in the file, it means something else."""
 
-MODULES = frozenset({"__future__", "math", "typing", "collections.abc", "enum"})
-"""What may be imported: none of it changes what other code does."""
+MODULES: Mapping[str, frozenset[str]] = {
+    "__future__": frozenset({"annotations"}),
+    "math": frozenset(name for name in dir(math) if not name.startswith("_")),
+    "typing": frozenset(
+        {"Any", "ClassVar", "Final", "List", "Literal", "Mapping", "Optional", "Sequence", "Tuple", "Union"}
+    ),
+    "collections.abc": frozenset({"Collection", "Iterable", "Iterator", "Mapping", "Sequence", "Sized"}),
+    "enum": frozenset({"Enum", "auto"}),
+}
+"""What may be imported, and what of it may be used: none of it changes what other code does, or leads to what does."""
+
+_LIBRARIES = frozenset({".py", ".pyc", ".pyd", ".pyw", ".so"})
+
+_NAMED = frozenset({"__author__", "__version__"})
+"""Names that Python itself takes no notice of."""
+
+_SHOWN = frozenset({"__repr__", "__str__"})
+"""Methods by which another class than the node's may say what it is."""
+
+_FRAMES = frozenset({"gi_frame", "cr_frame", "ag_frame", "tb_frame", "f_back", "f_builtins", "f_globals", "f_locals"})
+"""Attributes that lead from a value to the names of other code."""
 
 _TREACHEROUS = frozenset(
     {"setattr", "delattr", "exec", "eval", "globals", "locals", "vars", "compile", "__import__", "__builtins__"}
@@ -26,6 +46,23 @@ _TREACHEROUS = frozenset(
 _MUTATING = frozenset(
     {"update", "pop", "popitem", "clear", "setdefault", "append", "extend", "insert", "remove", "sort"}
 )
+
+
+def binders(*roots: ast.AST) -> Iterator[tuple[str, int]]:
+    """Every name that a part of these binds, and the line. Whatever syntax does it: a text in a node of the syntax
+    tree is one, unless it is known to be a use, so that what Python may yet come to bind names by is among them."""
+    for part in (inner for root in roots for inner in ast.walk(root)):
+        line = getattr(part, "lineno", 1)
+        match part:
+            case ast.Name(ctx=ast.Load()) | ast.Attribute() | ast.keyword() | ast.Constant() | ast.ImportFrom():
+                pass  # a use
+            case ast.alias(name=name, asname=other):
+                yield (other or name).partition(".")[0], line
+            case _:  # a definition, an argument, a target, a pattern, a handler, a parameter of a type, …
+                for _, value in ast.iter_fields(part):
+                    for name in value if isinstance(value, list) else [value]:
+                        if isinstance(name, str):
+                            yield name, line
 
 
 class Refusal(Exception):  # noqa: N818 - it says what happened
@@ -109,13 +146,9 @@ def _bound_when_run(tree: ast.Module) -> Iterator[Refusal]:
         if isinstance(statement, ast.If):
             if statement.orelse:
                 yield Refusal(statement.orelse[0].lineno, "a statement that runs when the file is loaded")
-            for inner in ast.walk(statement):
-                names = _names(inner) if isinstance(inner, ast.stmt) else []
-                if isinstance(inner, ast.Name) and not isinstance(inner.ctx, ast.Load):
-                    names = [inner.id]
-                for name in known & set(names):
-                    at = getattr(inner, "lineno", statement.lineno)
-                    yield Refusal(at, f"{name} is bound again when the file is run")
+            for name, line in binders(*statement.body):
+                if name in known:
+                    yield Refusal(line, f"{name} is bound again when the file is run")
 
 
 def _names(statement: ast.stmt) -> list[str]:
@@ -133,7 +166,11 @@ def _other_class(node: ast.ClassDef) -> Iterator[Refusal]:
     plain = all(isinstance(b, ast.Name) and b.id in {"object", "Enum"} for b in node.bases)
     if node.decorator_list or node.keywords or not plain:
         yield Refusal(node.lineno, f"the class {node.name} has a decorator, a base or a metaclass")
+    elements = any(isinstance(b, ast.Name) and b.id == "Enum" for b in node.bases)
+    allowed, hidden = (_SHOWN, "_") if elements else (_SHOWN | {"__init__"}, "__")
     for inner in node.body:
+        if isinstance(inner, ast.FunctionDef) and inner.name not in allowed and inner.name.startswith(hidden):
+            yield Refusal(inner.lineno, f"the method {inner.name} may run when the file is loaded")
         simple = isinstance(inner, ast.FunctionDef | ast.Pass) or next(_constants([inner]), None) is not None
         if not simple and not (isinstance(inner, ast.Expr) and isinstance(inner.value, ast.Constant)):
             yield Refusal(inner.lineno, f"a statement that runs when the class {node.name} is made")
@@ -187,6 +224,7 @@ def _twice(body: list[ast.stmt], where: str) -> Iterator[Refusal]:
 
 
 def _imports(tree: ast.Module, file: Path) -> Iterator[Refusal]:
+    beside = tuple(file.parent.iterdir())
     for part in ast.walk(tree):
         if isinstance(part, ast.Import):
             names = [alias.name for alias in part.names]
@@ -202,31 +240,51 @@ def _imports(tree: ast.Module, file: Path) -> Iterator[Refusal]:
             if name not in MODULES:
                 yield Refusal(part.lineno, f"the import of {name}: what it runs is not looked at")
             head = name.partition(".")[0]
-            if (file.parent / f"{head}.py").exists() or (file.parent / head).exists():
+            if any(p.name.partition(".")[0] == head for p in beside if p.is_dir() or p.suffix in _LIBRARIES):
                 yield Refusal(part.lineno, f"a file beside this one is called {head}, as the module is")
+            if isinstance(part, ast.ImportFrom):
+                for taken in sorted({alias.name for alias in part.names} - MODULES.get(name, frozenset())):
+                    yield Refusal(part.lineno, f"{taken} of {name} is not known to leave other code as it is")
+    yield from _used(tree)
+
+
+def _used(tree: ast.Module) -> Iterator[Refusal]:
+    """A module's name stands for nothing but one of its parts that may be used."""
+    heads = {a.name.partition(".")[0] for part in ast.walk(tree) if isinstance(part, ast.Import) for a in part.names}
+    plain: set[int] = set()
+    for part in ast.walk(tree):
+        if isinstance(part, ast.Attribute) and isinstance(part.ctx, ast.Load):
+            whole = part.value.value if isinstance(part.value, ast.Attribute) else part.value
+            if isinstance(whole, ast.Name) and part.attr in MODULES.get(ast.unparse(part.value), ()):
+                plain.add(id(whole))
+    for part in ast.walk(tree):
+        if isinstance(part, ast.Name) and part.id in heads and id(part) not in plain:
+            yield Refusal(part.lineno, f"{part.id} stands here for more than a known part of the module")
 
 
 def _everywhere(tree: ast.Module) -> Iterator[Refusal]:
     """What no part of the file may have, whether a step comes there or not."""
+    for name, line in binders(tree):
+        if name in BUILTINS:
+            yield Refusal(line, f"{name} is bound anew")
     for part in ast.walk(tree):
         line = getattr(part, "lineno", 1)
         match part:
             case ast.Name(id=name) if name in _TREACHEROUS:
                 yield Refusal(line, f"{name} can change or read what the text does not show")
-            case ast.Name(id=name, ctx=ast.Store() | ast.Del()) if name in BUILTINS:
-                yield Refusal(line, f"{name} is bound anew")
-            case ast.arg(arg=name) if name in BUILTINS:
-                yield Refusal(line, f"{name} is bound anew")
-            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) if name in BUILTINS:
-                yield Refusal(line, f"{name} is bound anew")
-            case ast.alias(name=name, asname=other) if (other or name).partition(".")[0] in BUILTINS:
-                yield Refusal(line, f"{other or name} is bound anew")
-            case ast.ExceptHandler(name=str(name)) if name in BUILTINS:
-                yield Refusal(line, f"{name} is bound anew")
-            case ast.MatchAs(name=str(name)) | ast.MatchStar(name=str(name)) if name in BUILTINS:
-                yield Refusal(line, f"{name} is bound anew")
-            case ast.Attribute(attr=name) if name.startswith("__") and name.endswith("__"):
+            case ast.Name(id=name, ctx=ctx) if _dunder(name) and name not in _NAMED:
+                if name != "__name__" or not isinstance(ctx, ast.Load):
+                    yield Refusal(line, f"{name} changes or reads what the text does not show")
+            case ast.Attribute(attr=name) if _dunder(name) or name in _FRAMES:
                 yield Refusal(line, f"the attribute {name} reaches behind the text")
+            case ast.NamedExpr():
+                yield Refusal(line, "a name is bound within an expression")
+            case ast.AugAssign(op=ast.BitOr()):
+                yield Refusal(line, "|= changes a mapping")
+            case ast.AnnAssign(annotation=annotation) if _calls(annotation):
+                yield Refusal(line, "a call in an annotation or default runs when the file is loaded")
+            case ast.ClassDef() if any(_private(name) for name in _written(part)):
+                yield Refusal(line, f"{part.name} has names that begin with __, which Python changes within a class")
             case ast.Attribute(attr=name) if name in _MUTATING:
                 yield Refusal(line, f".{name} changes a mapping or list")
             case ast.Subscript(ctx=ast.Store()):
@@ -235,9 +293,11 @@ def _everywhere(tree: ast.Module) -> Iterator[Refusal]:
                 yield Refusal(line, "a name of another scope is bound")
             case ast.Delete():
                 yield Refusal(line, "del")
+            case ast.FunctionDef() | ast.ClassDef() if getattr(part, "type_params", None):
+                yield Refusal(line, f"{part.name} has parameters of types")
             case ast.FunctionDef(decorator_list=[_, *_]) | ast.AsyncFunctionDef(decorator_list=[_, *_]):
                 yield Refusal(line, f"the function {part.name} is decorated")
-            case ast.FunctionDef(args=arguments, returns=returns) if _runs(arguments, returns):
+            case ast.FunctionDef(args=arguments, returns=returns) if _calls(arguments, returns):
                 yield Refusal(line, "a call in an annotation or default runs when the file is loaded")
             case ast.AsyncFunctionDef() | ast.Await() | ast.Yield() | ast.YieldFrom():
                 yield Refusal(line, "a generator or coroutine")
@@ -245,13 +305,32 @@ def _everywhere(tree: ast.Module) -> Iterator[Refusal]:
                 yield Refusal(line, "a text that names what reaches behind the text")
 
 
-def _runs(arguments: ast.arguments, returns: ast.expr | None) -> bool:
-    return any(isinstance(part, ast.Call) for root in (arguments, returns) if root for part in ast.walk(root))
+def _calls(*roots: ast.AST | None) -> bool:
+    return any(isinstance(part, ast.Call) for root in roots if root for part in ast.walk(root))
+
+
+def _dunder(name: str) -> bool:
+    return name.startswith("__") and name.endswith("__")
+
+
+def _private(name: str) -> bool:
+    return name.startswith("__") and not name.endswith("__")
+
+
+def _written(node: ast.AST) -> Iterator[str]:
+    """The names in a part, whether they are used or bound."""
+    yield from (name for name, _ in binders(node))
+    for part in ast.walk(node):
+        match part:
+            case ast.Name(id=name) | ast.Attribute(attr=name):
+                yield name
+            case _:  # no use of a name; a keyword is none either
+                pass
 
 
 def _written_elsewhere(tree: ast.Module, parts: Parts) -> Iterator[Refusal]:
     """What the class holds or is called by, written where it does not stand: outside its methods, or in one that is
-    neither `__init__` nor reached by `step`."""
+    neither `__init__` nor reached by `step`; and an attribute of anything else than a method's own object."""
     reached = reachable(parts, "step") | reachable(parts, "__init__")
     allowed: dict[int, str] = {}
     for name in reached:
@@ -260,11 +339,21 @@ def _written_elsewhere(tree: ast.Module, parts: Parts) -> Iterator[Refusal]:
         allowed |= {id(inner): first for inner in ast.walk(method)}
     used = {n.attr for name in reached for n in ast.walk(parts.methods[name]) if isinstance(n, ast.Attribute)}
     used |= {*parts.methods, *parts.of_class}
+    objects = {
+        id(inner): method.args.args[0].arg
+        for node in tree.body
+        if isinstance(node, ast.ClassDef)
+        for method in node.body
+        if isinstance(method, ast.FunctionDef) and method.args.args
+        for inner in ast.walk(method)
+    }
     for part in ast.walk(tree):
         if not isinstance(part, ast.Attribute) or isinstance(part.ctx, ast.Load):
             continue
         own = isinstance(part.value, ast.Name) and part.value.id == allowed.get(id(part))
-        if not own and part.attr in used:
+        if not own and not (isinstance(part.value, ast.Name) and part.value.id == objects.get(id(part))):
+            yield Refusal(part.lineno, f"{part.attr} of what is no method's own object is written")
+        elif not own and part.attr in used:
             yield Refusal(part.lineno, f"{part.attr} is written here too, outside what a step does")
         elif own and (part.attr in parts.methods or part.attr in parts.of_class):
             yield Refusal(part.lineno, f"{part.attr} of the class is hidden by an attribute")
