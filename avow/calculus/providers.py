@@ -23,6 +23,7 @@ from avow.language.terms import TRUE, Term, Variable
 from avow.sanity.analysis import Bounds, SanityResult, as_outcome, listing
 from avow.sanity.claims import Claim, Property
 from avow.solving.questions import solve
+from avow.solving.second import CONTRADICTED, doubted
 from avow.solving.sizes import in_every_size
 from avow.system.formulas import ports_of
 from avow.system.plan import Endpoint
@@ -141,6 +142,8 @@ def _settle(asked: ProviderClaim, node: Node, bounds: Bounds) -> SanityResult:
         case "sat":
             what = f"{about} and what its providers guarantee"
             verdict, text = in_every_size({}, asked.formulas, what=what, effort=bounds.effort, seed=bounds.seed)
+        case "unsat" if doubted(answer, asked.formulas):
+            verdict, text = Verdict.ERROR, CONTRADICTED
         case "unsat" if about in answer.core:
             others = [label for label in answer.core if label != about]
             verdict, text = Verdict.REFUTED, f"no provider can meet it: {listing(others)} {_exclude(others)} it"

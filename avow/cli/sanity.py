@@ -30,10 +30,11 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
     """Ask of every node whether its contract is worth verifying: can its assumptions hold, do its guarantees agree, is
     there an output for every input that it allows, does every clause say something?
 
-    SYSTEM is a system's name or folder, or an .rcl file. Code 1 where something is refuted that is an error, 2 for bad
-    input.
+    SYSTEM is a system's name or folder, or an .rcl file. Code 1 where something is refuted that is an error, or where
+    two solvers contradict each other, 2 for bad input.
     """
     from avow.base.diagnostics import Diagnostic, Rejected
+    from avow.base.verdict import Verdict
     from avow.base.workspace import system_folder
     from avow.calculus import providers
     from avow.calculus.interpretation import interpretation, ranges
@@ -62,7 +63,7 @@ def command(path: Path, nodes: tuple[str, ...], as_json: bool, everything: bool,
         click.echo(json.dumps({"results": [to_json(result) for result in results]}, indent=1, ensure_ascii=False))
     else:
         _listing(results, everything)
-    return 1 if any(result.fails for result in results) else 0
+    return 1 if any(result.fails or result.verdict is Verdict.ERROR for result in results) else 0
 
 
 def to_json(result: SanityResult) -> dict[str, Any]:
@@ -103,6 +104,7 @@ _COLOURS = {
     "checked": "cyan",
     "unknown": "yellow",
     "refuted": "red",
+    "error": "red",
 }
 
 
@@ -137,12 +139,14 @@ def _listing(results: list[SanityResult], everything: bool) -> None:
         console.print(Text(f"more than one value is allowed for the same inputs: {names} (--all shows which)", "dim"))
     refuted = [r for r in results if r.verdict is Verdict.REFUTED]
     unknown = sum(r.verdict is Verdict.UNKNOWN for r in results)
+    broken = sum(r.verdict is Verdict.ERROR for r in results)
+    contradicted = f", {broken} on which two solvers contradict each other" if broken else ""
     errors = sum(r.fails for r in refuted)
     hidden = 0 if everything else sum(bool(r.because) for r in refuted)
     consequences = f", {hidden} consequences of these not listed" if hidden else ""
     console.print(
-        f"{len(results)} claims: {len(results) - len(refuted) - unknown} hold, "
-        f"{len(refuted)} refuted ({errors} of them errors{consequences}), {unknown} unknown"
+        f"{len(results)} claims: {len(results) - len(refuted) - unknown - broken} hold, "
+        f"{len(refuted)} refuted ({errors} of them errors{consequences}), {unknown} unknown{contradicted}"
     )
 
 

@@ -180,7 +180,7 @@ class _Analysis:
         """What was not refuted is, if it fails for some number of elements of the unspecified types."""
         from avow.solving.sizes import in_every_size
 
-        if finding.verdict is Verdict.REFUTED:
+        if finding.verdict in (Verdict.REFUTED, Verdict.ERROR):
             return finding
         verdict, reason = in_every_size(
             self.assumptions, self.guarantees, what="the guarantees", effort=self.limit, seed=self.seed
@@ -267,7 +267,10 @@ class _Analysis:
 
         answer, bounded = self._realizability()
         if answer.verdict is Verdict.PROVED:
-            if self._other("assumptions-satisfiable").verdict is Verdict.REFUTED:
+            allowed = self._other("assumptions-satisfiable")
+            if allowed.verdict is Verdict.ERROR:
+                return replace(allowed, because="assumptions-satisfiable")
+            if allowed.verdict is Verdict.REFUTED:
                 return Finding(Verdict.PROVED, "vacuously: no input is allowed", because="assumptions-satisfiable")
             verdict = Verdict.CHECKED if bounded else Verdict.PROVED
             return Finding(verdict, _resting(answer.needed), answer.needed, engine=answer.engine, bounded=bounded)
@@ -319,6 +322,8 @@ class _Analysis:
             )
             if finding.verdict is Verdict.REFUTED:
                 impossible.append((number, finding))
+            elif finding.verdict is Verdict.ERROR:
+                return finding
             elif finding.verdict is not Verdict.PROVED:
                 undecided = finding
         if impossible:
@@ -394,6 +399,7 @@ class _Analysis:
         from avow.sanity.realizability import Group, groups
         from avow.solving.counterexample import show_values
         from avow.solving.questions import solve
+        from avow.solving.second import CONTRADICTED, doubted
 
         output = self.node.output(name).variable
         alone = Group({}, (output,))
@@ -409,6 +415,8 @@ class _Analysis:
         for given in self._attempts():
             answer = solve(question, effort=self.limit, seed=self.seed, given=given, shown=False)
             if answer.status == "unsat" and not given:
+                if doubted(answer, question):
+                    return Finding(Verdict.ERROR, CONTRADICTED)
                 return Finding(Verdict.PROVED, engine=answer.engine, because=self._if_refuted("consistent"))
             if answer.status == "sat":
                 values = {v: value for v, value in {**answer.values, **given}.items() if v.role is not Role.BOUND}
@@ -439,6 +447,7 @@ class _Analysis:
     def _possible(self, formulas: Mapping[str, Term], several: str, one: str, limit: int | None = None) -> Finding:
         """Can they hold together? If not, the texts say so of the smallest set that cannot."""
         from avow.solving.questions import solve
+        from avow.solving.second import CONTRADICTED, doubted
 
         limit = min(limit or self.limit, self.limit)
         answer = solve(formulas, effort=limit, seed=self.seed, shown=False)
@@ -451,6 +460,8 @@ class _Analysis:
         match answer.status:
             case "sat":
                 return Finding(Verdict.PROVED, engine=answer.engine)
+            case "unsat" if doubted(answer, formulas):
+                return Finding(Verdict.ERROR, CONTRADICTED)
             case "unsat":
                 text = several if len(answer.core) > 1 else one
                 return Finding(Verdict.REFUTED, text.format(listing(answer.core)), answer.core, engine=answer.engine)

@@ -18,6 +18,7 @@ from avow.sanity.claims import Claim, Property, triggers
 from avow.sanity.results import Bounds, Finding, listing
 from avow.sanity.viability import Viability, viable
 from avow.solving.questions import solve
+from avow.solving.second import CONTRADICTED, doubted
 from avow.system.formulas import ports_of
 from avow.temporal.cells import Remembering, compile_node
 from avow.tuning.bounds import RUN_TO_AN_EXAMPLE
@@ -134,6 +135,8 @@ class OverRuns:
         limit, seed = self.bounds.effort, self.bounds.seed
         anywhere = solve(formulas, effort=limit, seed=seed, shown=False)
         if anywhere.status == "unsat":
+            if doubted(anywhere, formulas):
+                return Finding(Verdict.ERROR, CONTRADICTED)
             return Finding(Verdict.REFUTED, excluded.format(listing(anywhere.core)), anywhere.core)
         kept = conjunction((*self.assumptions.values(), *self.guarantees.values()))
         facts: dict[str, Term] = {}
@@ -153,6 +156,8 @@ class OverRuns:
         within = {**formulas, "memory": self.viability.reachable}
         ever = solve(within, effort=limit, seed=seed, shown=False)
         if ever.status == "unsat":
+            if doubted(ever, within):
+                return Finding(Verdict.ERROR, CONTRADICTED)
             named = tuple(label for label in ever.core if label != "memory")
             return Finding(Verdict.REFUTED, excluded.format(listing(named)), named)
         return Finding(Verdict.UNKNOWN, open_still)

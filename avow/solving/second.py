@@ -7,11 +7,12 @@ read, says nothing.
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
-from avow.formulas.formula import disjunction
+from avow.formulas.formula import conjunction, disjunction
 from avow.language.terms import FALSE, Term
 from avow.solving import smtlib
+from avow.solving.questions import Solution
 from avow.solving.translation import Unsupported
 from avow.tuning.effort import SECOND_OPINION_EFFORT
 
@@ -28,3 +29,12 @@ def contradicted(impossible: Iterable[Term], *, effort: int = SECOND_OPINION_EFF
     except Unsupported:
         return False
     return smtlib.ask_cvc5(script, effort=max(1, min(effort, SECOND_OPINION_EFFORT))) == "sat"
+
+
+def doubted(answer: Solution, formulas: Mapping[str, Term], *, effort: int = SECOND_OPINION_EFFORT) -> bool:
+    """Whether cvc5 says that the labelled formulas which an `unsat` names can hold together. What is `unsat` by cvc5's
+    own word is not asked again."""
+    if answer.status != "unsat" or answer.engine == "cvc5":
+        return False
+    conflicting = [formula for label, formula in formulas.items() if label in answer.core]
+    return contradicted([conjunction(conflicting or formulas.values())], effort=effort)

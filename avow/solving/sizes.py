@@ -16,6 +16,7 @@ from avow.formulas.formula import conjunction, disjunction
 from avow.language.sorts import OpaqueSort
 from avow.language.terms import TRUE, Compare, Not, Quantified, Quantifier, Role, Term, Variable
 from avow.solving.questions import opaque_sorts, solve
+from avow.solving.second import CONTRADICTED, doubted
 from avow.tuning.bounds import SIZES_COMBINED, SIZES_TRIED
 
 _MORE = max(SIZES_TRIED) + 1
@@ -26,19 +27,21 @@ def in_every_size(
     assumptions: Mapping[str, Term], wanted: Mapping[str, Term], *, what: str, effort: int, seed: int = 0
 ) -> tuple[Verdict, str]:
     """Whether values meet all formulas whatever number of elements the unspecified types have, of those numbers that
-    the assumptions allow. `what` they are, for people: `refuted` and `unknown` come with the reason; `proved` where no
-    such type occurs."""
+    the assumptions allow. `what` they are, for people: `refuted`, `unknown` and `error` (two solvers contradict each
+    other) come with the reason; `proved` where no such type occurs."""
     together = {**assumptions, **wanted}
     sorts = sorted({sort for f in together.values() for sort in opaque_sorts(f)}, key=lambda sort: sort.name)
     verdict, reason = Verdict.PROVED, ""
     for sizes in _sizes(len(sorts)):
         types = {f"size of {sort.name}": _has(sort, size) for sort, size in zip(sorts, sizes, strict=True)}
-        found = solve({**together, **types}, effort=effort, seed=seed, shown=False).status
-        if found == "sat":
+        found = solve({**together, **types}, effort=effort, seed=seed, shown=False)
+        if found.status == "sat":
             continue
         allowed = solve({**assumptions, **types}, effort=effort, seed=seed, shown=False).status
         where = _told(sorts, sizes)
-        if allowed == "sat" and found == "unsat":
+        if allowed == "sat" and found.status == "unsat":
+            if doubted(found, {**together, **types}):
+                return Verdict.ERROR, CONTRADICTED
             return Verdict.REFUTED, f"nothing meets {what} where {where}"
         if allowed != "unsat" and verdict is Verdict.PROVED:
             verdict, reason = Verdict.UNKNOWN, f"it is open whether anything meets {what} where {where}"

@@ -17,7 +17,7 @@ from avow.evidence.obligation import Obligation
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
 from avow.formulas.formula import conjunction, free_variables, negation
 from avow.formulas.values import show as show_value
-from avow.language.terms import FALSE, TRUE, Not, Role, Variable
+from avow.language.terms import FALSE, TRUE, Not, Role, Term, Variable
 from avow.solving.limits import from_seconds, spent, until
 from avow.solving.limits import told as told_effort
 from avow.solving.questions import Entailment, entails, z3_version
@@ -305,10 +305,11 @@ def _every_run(work: Work, limits: Limits) -> Settled:
     return _proved(Settled(triple, Verdict.PROVED, "proved", conditions=len(wanted)), wanted, deadline)
 
 
-def _proved(settled: Settled, wanted: Sequence[Condition], deadline: float) -> Settled:
-    """What Z3 has proved; an error where a second solver finds values for which a condition fails."""
+def _proved(settled: Settled, wanted: Sequence[Condition], deadline: float, impossible: Term = FALSE) -> Settled:
+    """What Z3 has proved; an error where a second solver finds values for which a condition fails, or such as are
+    `impossible` where the triple is vacuous."""
     broken = [conjunction((*c.hypotheses, negation(c.goal))) for c in wanted]
-    if contradicted([negation(settled.triple.fidelity), *broken], effort=_left(deadline)):
+    if contradicted([negation(settled.triple.fidelity), impossible, *broken], effort=_left(deadline)):
         return Settled(settled.triple, Verdict.ERROR, CONTRADICTED)
     return settled
 
@@ -398,11 +399,12 @@ def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Sett
         if answer.verdict is not Verdict.PROVED:
             failed.append((condition, answer))
     if not failed:
-        vacuous = _vacuous(triple, work.settler, deadline)
+        vacuous, impossible = _vacuous(triple, work.settler, deadline)
         if not vacuous and _endless(triple, work, deadline):
             why = "its loops never end where it applies, and a node that never answers guarantees nothing"
             return Settled(triple, Verdict.UNKNOWN, why)
-        return _proved(Settled(triple, Verdict.PROVED, "proved", None, vacuous, len(wanted)), wanted, deadline)
+        proved = Settled(triple, Verdict.PROVED, "proved", None, vacuous, len(wanted))
+        return _proved(proved, wanted, deadline, impossible)
     shown = breach(triple, program, [c for c, _ in failed], max(1000, _left(deadline)))
     if shown is not None:
         return Settled(triple, Verdict.REFUTED, shown.why, shown)
@@ -416,15 +418,17 @@ def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Sett
     return Settled(triple, Verdict.UNKNOWN, why)
 
 
-def _vacuous(triple: Triple, settler: Settler, deadline: float) -> str:
-    """A triple that every program meets says nothing of this one."""
+def _vacuous(triple: Triple, settler: Settler, deadline: float) -> tuple[str, Term]:
+    """A triple that every program meets says nothing of this one: why it is one (or nothing), and what was proved to
+    be impossible."""
     if settler.settles([triple.pre], triple.post, effort=min(2000, _left(deadline))) == "sat":
-        return ""  # and then some input meets the precondition too
+        return "", FALSE  # and then some input meets the precondition too
     if settler.proves([triple.pre], FALSE, effort=min(2000, _left(deadline))):
-        return f"no input meets the precondition {show(triple.pre)}"
+        return f"no input meets the precondition {show(triple.pre)}", triple.pre
+    denied = conjunction((triple.pre, negation(triple.post)))
     if settler.proves([triple.pre], triple.post, effort=min(2000, _left(deadline))):
-        return "it holds whatever a program does: it says nothing of this one"
-    return ""
+        return "it holds whatever a program does: it says nothing of this one", denied
+    return "", FALSE
 
 
 def _endless(triple: Triple, work: Work, deadline: float) -> bool:

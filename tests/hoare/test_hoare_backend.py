@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,11 @@ from helpers import some
 
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backends.hoare import BACKEND
+from avow.backends.hoare import backend as settling
+from avow.backends.hoare.outline import show
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Link, Outcome, Verdict
+from avow.language.terms import Term
 from avow.solving import second
 from hoare.systems import make_job, sensor
 
@@ -172,6 +176,24 @@ def test_a_tautology_is_proved_but_vacuous(tmp_path: Path) -> None:
     rcl = rcl.replace("(250 <= in.r -> out.colour == red)", "250 <= in.r -> out.colour == red")
     outcome = settle(job(tmp_path, rcl, LISTING, PAPERS_TABLE))["G1"]
     assert (outcome.verdict, outcome.vacuous) == (Verdict.PROVED, True)
+
+
+def test_that_a_proof_is_vacuous_is_asked_of_a_second_solver(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Term] = []
+
+    def contradicted(impossible: Iterable[Term], **_: object) -> bool:
+        asked.extend(impossible)
+        return False
+
+    monkeypatch.setattr(f"{settling.__name__}.contradicted", contradicted)
+    rcl = MEANT.replace("(0 <= in.r and in.r < 120 ->", "(in.r < 0 and in.r > 0 ->")
+    assert rcl != MEANT
+    nothing = settle(job(tmp_path, rcl, LISTING, PAPERS_TABLE))["G1"]
+    details = nothing.details["triples"]
+    assert isinstance(details, list)
+    vacuous = [triple["pre"] for triple in details if triple["vacuous"]]
+    assert vacuous
+    assert set(vacuous) <= {show(formula) for formula in asked}
 
 
 ONE = """

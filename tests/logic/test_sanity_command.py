@@ -13,6 +13,7 @@ from click.testing import CliRunner, Result
 
 from avow.base.diagnostics import Rejected
 from avow.cli.sanity import command
+from avow.solving import second
 
 GOOD = """node n { inputs(r : REAL) outputs(v : REAL) topics() assume(in.r >= 0)
   guarantee low (in.r < 5 -> out.v == 1) guarantee high (in.r >= 5 -> out.v == in.r) }"""
@@ -59,6 +60,47 @@ def test_a_bad_contract(tmp_path: Path, root: Path) -> None:
     assert 4 <= float(answer["counterexample"]["values"]["in.r"]) < 5
     assert "guarantee low demands out.v = 1" in answer["counterexample"]["text"]
     assert answer["conflicts"][0]["clauses"] == ["low", "high"]
+
+
+@pytest.mark.parametrize(
+    ("text", "claim"),
+    [
+        (GOOD.replace("assume(in.r >= 0)", "assume(in.r > 0 and in.r < 0)"), "assumptions-satisfiable"),
+        (GOOD.replace("in.r >= 5 ->", "").replace("in.r < 5 -> out.v == 1", "out.v == in.r + 1"), "consistent"),
+        (GOOD.replace("in.r < 5 ->", "in.r < -1 ->"), "vacuous-low"),
+        (GOOD.replace("out.v == 1", "out.v == out.v"), "tautology-low"),
+        (GOOD.replace("low (", "more ( in.r > 6 -> out.v == in.r ) guarantee low ("), "redundant-more"),
+        (GOOD, "undetermined-v"),
+        (
+            "context { T : {}; } node n { inputs( a : T ) outputs( b : T ) topics() guarantee( out.b != in.a ) }",
+            "consistent",
+        ),
+        (GOOD.replace("in.r < 5 ->", "previous(in.r, 0) < 0 and in.r < -1 ->"), "vacuous-low"),
+    ],
+)
+def test_what_two_solvers_do_not_agree_on_is_an_error(
+    tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch, text: str, claim: str
+) -> None:
+    monkeypatch.setattr(second.importlib.util, "find_spec", lambda _: object())
+    monkeypatch.setattr(second.smtlib, "ask_cvc5", lambda *_, **__: "unknown")
+    agreed = as_json(tmp_path, text, root)
+    assert agreed[claim]["verdict"] in ("refuted", "proved")
+    monkeypatch.setattr(second.smtlib, "ask_cvc5", lambda *_, **__: "sat")
+    found = as_json(tmp_path, text, root)
+    assert found[claim]["verdict"] == "error"
+    assert found[claim]["explanation"] == second.CONTRADICTED
+    result, code = run(tmp_path, text)
+    assert code == 1
+    assert "two solvers contradict each other" in result.stdout
+
+
+def test_a_contract_that_may_be_empty_is_not_realizable_for_want_of_inputs(
+    tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(second.importlib.util, "find_spec", lambda _: object())
+    monkeypatch.setattr(second.smtlib, "ask_cvc5", lambda *_, **__: "sat")
+    found = as_json(tmp_path, GOOD.replace("assume(in.r >= 0)", "assume(in.r > 0 and in.r < 0)"), root)
+    assert {found[name]["verdict"] for name in ("assumptions-satisfiable", "consistent", "realizable")} == {"error"}
 
 
 def test_every_property_has_its_words_in_the_schema(root: Path) -> None:
