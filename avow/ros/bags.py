@@ -15,6 +15,12 @@ from avow.ros.sources import DISTRIBUTIONS, from_store, message_files
 
 Event = Mapping[str, Any]
 
+ENVELOPE = ("topic", "time")
+"""What an event says beside its message's fields."""
+
+WHOLE = "_message"
+"""Where an event has its whole message, if that has fields of those names."""
+
 SUFFIXES = (".bag", ".db3", ".mcap")
 
 
@@ -49,6 +55,19 @@ class Carried:
     counts: Mapping[str, int]
     """Topic → how many messages."""
     ros2: bool = False
+
+
+def enveloped(message: Mapping[str, Any], topic: str, time: float) -> Event:
+    """A message as an event: its fields, its topic and when it came. Fields that bear those two names are not lost."""
+    whole = {WHOLE: message} if any(name in message for name in ENVELOPE) else {}
+    return {**message, **whole, "topic": topic, "time": time}
+
+
+def message_of(event: Event, field: str) -> Any:
+    """Where an event has a field of its message: not what it says itself, though that bears the same name."""
+    if field not in ENVELOPE:
+        return event
+    return event.get(WHOLE, event.get("data"))
 
 
 def is_bag(path: Path) -> bool:
@@ -91,16 +110,14 @@ def messages(
         plain = plainer(reader.typestore.fielddefs)
         kind = functools.cache(lambda said: as_message(said, "")[0])
         for connection, time, raw in reader.messages():
-            event: dict[str, Any] = {}
+            event: Mapping[str, Any] = {}
             topic = connection.topic
             if topic in parted:
                 topic, found = calls.part(topic, plain(reader.deserialize(raw, kind(connection.msgtype))))
-                event = dict(found)
+                event = found
             elif wanted(topic):
                 event = plain(reader.deserialize(raw, kind(connection.msgtype)))
-            event["topic"] = topic
-            event["time"] = time / 1e9
-            yield event
+            yield enveloped(event, topic, time / 1e9)
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from avow.ros.bags import message_of
 from avow.ros.definitions import FLOATS, INTEGERS, Array, Definitions, Message, Scalar, Wire
 from avow.ros.listing import Listed, Listing
 from avow.tuning.shown import DRAFTED_FIELDS, DRAFTED_WORDS
@@ -368,7 +369,7 @@ def watch(known: Definitions, types: Mapping[str, str]) -> tuple[dict[tuple[str,
 
     def note(event: Any) -> None:
         for path in paths.get(event["topic"], ()):
-            value = event
+            value = message_of(event, str(path[0]))
             for step in path:
                 value = value.get(step) if isinstance(value, dict) else None
             seen[event["topic"], path].note(value)

@@ -302,7 +302,7 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
         bound["oldest"] = {of: round(age, 6) for of, age in ages.items()}
     passages = [(topic, p) for run in runs for topic, p in run.monitor.passages(names)]
     lost, disordered = sum(p.lost for _, p in passages), sum(p.disordered for _, p in passages)
-    uncounted = sorted({topic for topic, p in passages if not p.counted})
+    uncounted = sorted({f"the messages of {topic} {p.uncounted}" for topic, p in passages if p.uncounted})
     bound |= {"lost": lost} if not uncounted else {}
     bound |= {"out_of_order": disordered} if disordered else {}
     unpaired = any(t.unpaired for t in tallies)
@@ -344,8 +344,7 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
         return answer(Verdict.UNKNOWN, f"event {silent.index}: {silent.explanation}")
     setup = runs[0].monitor.setup
     if setup.losses is not None and (uncounted or lost > setup.losses):
-        where = f"the messages of {', '.join(uncounted)} have no numbers (header.seq)" if uncounted else ""
-        return answer(Verdict.UNKNOWN, where or f"{lost} messages were lost, and {setup.losses} may be")
+        return answer(Verdict.UNKNOWN, "; ".join(uncounted) or f"{lost} messages were lost, and {setup.losses} may be")
     aged = next((of for of, age in ages.items() if setup.max_age is not None and age > setup.max_age), None)
     if aged is not None:
         return answer(Verdict.UNKNOWN, f"{aged} was {ages[aged]:.6g} s old when an answer came: too old (`max_age`)")

@@ -21,6 +21,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.formulas.values import Value
+from avow.ros.bags import WHOLE
 
 from .coverage import Tally
 from .engine import Monitor
@@ -210,10 +211,12 @@ class Compiled:
     def _flush(self) -> None:
         """Bring the engine up to date with what was passed over."""
         self._count()
-        waiting = [topic for topic in self._topics.values() if topic.last is not None]
+        # in the order of the lines, since one topic may be written in two ways: `/scan` and `scan`
+        last = sorted((t.last.start(), t, t.last) for t in self._topics.values() if t.last is not None)
+        waiting = [topic for _, topic, _ in last]
         if not waiting:
             return
-        events = [event_of(topic.last.group(0)[:-1].decode(), "", 0) for topic in waiting if topic.last is not None]
+        events = [event_of(match.group(0)[:-1].decode(), "", 0) for _, _, match in last]
         for watch in self._watches:
             for topic, event in zip(waiting, events, strict=True):
                 if event is not None and watch.plans.get(same_topic(topic.name)) is not None:
@@ -465,7 +468,9 @@ def _leads(rule: object) -> Callable[[Path], bool]:
                 wanted += [place.key if isinstance(place, Lookup) else place for place in places]
         case _:  # no message carries it
             pass
-    wanted += [("data", *path) for path in wanted]
+    # which item `ranges[-1]` is depends on how many there are: all of them count
+    wanted = [tuple(itertools.takewhile(lambda step: isinstance(step, str) or step >= 0, path)) for path in wanted]
+    wanted += [(place, *path) for path in wanted for place in ("data", WHOLE)]
     return lambda path: any(path[: len(way)] == way for way in wanted)
 
 

@@ -157,11 +157,10 @@ class Monitor:
             watched.tally.published += 1
             watched.tally.unreadable += 1
         for watched in self._due(updated, event, found):
-            if watched.inputs:
-                watched.tally.aged({n: self.timing.heard[n] for n in watched.inputs if n in self.timing.heard}, event)
             if watched.paired:
                 self._ask(watched, event)
             else:
+                watched.tally.aged({n: self.timing.heard[n] for n in watched.inputs if n in self.timing.heard}, event)
                 self._judge(watched, event, found)
             for name, source in watched.held:
                 watched.memory.pop(name, None)
@@ -279,6 +278,7 @@ class Monitor:
                     tally.order += 1
                     tally.reason = tally.reason or cases
                 continue
+            tally.aged({name: asked.since[name] for name in watched.paired}, asked.event)
             verdicts = {self._verdict(watched, values) for values in cases}
             if len(verdicts) > 1:
                 tally.order += 1

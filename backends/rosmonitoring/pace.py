@@ -83,8 +83,8 @@ class Passage:
     """The latest `header.seq`, where there is one."""
     lost: int = 0
     disordered: int = 0
-    counted: bool = False
-    """The messages have numbers, so that a loss would show."""
+    uncounted: str = ""
+    """Why a loss need not show."""
     latest: Fraction | None = None
 
     def heard(self, event: Mapping[str, Any], now: Fraction) -> None:
@@ -93,12 +93,14 @@ class Passage:
         self.latest = now
         number = sequence(event)
         if number is None:
+            self.uncounted = "have no numbers (header.seq)"
             return
-        self.counted = True
         if self.last:
             gap = number - self.last[0]
             self.lost += max(0, gap - 1)
             self.disordered += gap <= 0
+            if gap <= 0:  # never set, several publishers, or one that began anew
+                self.uncounted = self.uncounted or "have numbers (header.seq) that do not rise"
         self.last[:] = [number]
 
 

@@ -51,6 +51,8 @@ class Asked:
     inputs: tuple[str, ...]
     time: Fraction
     key: object = None
+    since: dict[str, float] = field(default_factory=dict)
+    """When the oldest message came that each input's value may be of."""
 
 
 @dataclass(slots=True)
@@ -145,6 +147,7 @@ class Pairing:
         for when, _, value in sorted(self.seen.get(name, ()), key=lambda one: one[0]):
             if when <= start:
                 current, before = [value], True
+                asked.since[name] = float(when)
             elif when <= end:
                 current.append(value)
         if not current:
@@ -162,9 +165,11 @@ class Pairing:
     def _same_key(self, name: str, asked: Asked) -> list[Value] | str:
         if asked.key is None:
             return "the answer has no key"
-        found = [value for _, key, value in self.seen.get(name, ()) if key == asked.key]
+        alike = [(when, value) for when, key, value in self.seen.get(name, ()) if key == asked.key]
+        found = [value for _, value in alike]
         if not found:
             return f"no message of {name} bears the answer's {self.answers.by}"
+        asked.since[name] = float(min(when for when, _ in alike))
         if found[-1] is None:
             return f"a message of {name} could not be read"
         return [found[-1]] if all(value == found[-1] for value in found) else f"several messages of {name} bear the key"

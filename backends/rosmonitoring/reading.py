@@ -23,6 +23,7 @@ from avow.language.sorts import (
     StringSort,
     TupleSort,
 )
+from avow.ros.bags import ENVELOPE, message_of
 from avow.ros.definitions import Array, Wire
 
 from .numbers import Decimal, NotANumber, exact, whole
@@ -45,8 +46,12 @@ def reader(rule: Fields | Choice) -> Reader:
             return _scalar(rule, sort)
 
 
-def at(message: Any, path: Path) -> Any:
-    """The part of a message that a path leads to. Raises MappingError."""
+def at(event: Message, path: Path) -> Any:
+    """The part of an event's message that a path leads to. Raises MappingError."""
+    return _within(message_of(event, str(path[0])) if path else event, path)
+
+
+def _within(message: Any, path: Path) -> Any:
     place = message
     for depth, name in enumerate(path):
         if isinstance(name, int):
@@ -171,7 +176,7 @@ def _scalar(rule: Fields, sort: Sort) -> Reader:
         pairs = tuple(zip(rule.paths, made, strict=True))
         return _with_default(rule, lambda message, old: tuple([read(at(message, p)) for p, read in pairs]))
     path, read = rule.paths[0], made[0]
-    if len(path) == 1 and isinstance(path[0], str):
+    if len(path) == 1 and isinstance(path[0], str) and path[0] not in ENVELOPE:
         return _with_default(rule, _one_field(path, path[0], read))
     return _with_default(rule, lambda message, old: read(at(message, path)))
 
@@ -224,21 +229,21 @@ def _points(rule: Fields, sorts: tuple[Sort, ...]) -> Callable[[Message], list[t
     """The tuples that a message brings; a tuple with no reading among its parts is not brought."""
     each, pairs = rule.each, tuple(zip(rule.paths, _converters(rule, sorts), strict=True))
 
-    def one(message: Message) -> tuple[Value, ...] | None:
+    def one(message: Message, part: Callable[[Any, Path], Any]) -> tuple[Value, ...] | None:
         try:
-            return tuple([read(at(message, p)) for p, read in pairs])
+            return tuple([read(part(message, p)) for p, read in pairs])
         except NoReading:
             return None
 
     if each is None:
-        return lambda message: [point] if (point := one(message)) is not None else []
+        return lambda message: [point] if (point := one(message, at)) is not None else []
     way = each
 
     def several(message: Message) -> list[tuple[Value, ...]]:
         items = at(message, way)
         if not isinstance(items, list):
             raise MappingError(f"the field {shown(way)} is not a list")
-        return [point for item in items if (point := one(item)) is not None]
+        return [point for item in items if (point := one(item, _within)) is not None]
 
     return several
 

@@ -19,6 +19,7 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause
 from avow.language.sorts import BoolSort, DataSort, EnumSort, FunctionSort, NaturalSort, Sort, StringSort
 from avow.language.terms import Role
+from avow.ros.bags import ENVELOPE
 from avow.ros.calls import is_part
 
 from .options import Setup, same_topic
@@ -435,6 +436,8 @@ def _pattern(topic: str, fields: Sequence[tuple[Path, str]], inside: bool) -> st
     for path, text in fields:
         if not path:
             raise NotRml("a rule takes the whole message as one value")
+        if path[0] in ENVELOPE:
+            raise NotRml(f"the field {path[0]} bears the name of what an event says itself")
         place = tree
         steps = [str(step) for step in path]
         for step in steps[:-1]:

@@ -22,7 +22,7 @@ from urllib.parse import urlparse
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.ros.bags import plainer
+from avow.ros.bags import enveloped, plainer
 
 from .graphs import Heard, Status
 from .tuning import FRAME_BYTES, HEADER_BYTES, QUEUED_MESSAGES
@@ -162,7 +162,7 @@ class Ros1:
                 while not self._over.is_set():
                     raw = frame(line, FRAME_BYTES)
                     now = time.time()
-                    self._put(Heard(topic, {**read(raw), "topic": topic, "time": now}))
+                    self._put(Heard(topic, enveloped(read(raw), topic, now)))
         except (OSError, ValueError, xmlrpc.client.Error) as error:
             if not self._over.is_set() and not isinstance(error, EOFError):
                 self._put(Heard(topic, None, f"{topic} from {uri}: {error}"))

@@ -15,6 +15,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
+from avow.ros.bags import enveloped
 
 from .graphs import Heard, Status
 from .tuning import FRAME_BYTES, QUEUED_MESSAGES
@@ -69,7 +70,7 @@ class Rosbridge:
         try:
             found = json.loads(frame)
             if found["op"] == "publish" and found["topic"] in self.topics and isinstance(found["msg"], dict):
-                return Heard(found["topic"], {**found["msg"], "topic": found["topic"], "time": now})
+                return Heard(found["topic"], enveloped(found["msg"], found["topic"], now))
             return Heard("", None, f"rosbridge: {str(found.get('msg', found))[:200]}")
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return Heard("", None, "rosbridge said what is no message")

@@ -135,7 +135,7 @@ class Session:
                 if (tally := monitor.tallies.get(clause.name)) is not None
             ]
             topics = {
-                topic: {"lost": p.lost if p.counted else None, "out_of_order": p.disordered}
+                topic: {"lost": None if p.uncounted else p.lost, "out_of_order": p.disordered}
                 for topic, p in monitor.passages()
             }
             name = monitor.setup.node.name

@@ -194,6 +194,65 @@ def test_the_case_study_is_judged_alike(case_folder: Path, tmp_path: Path) -> No
     assert len(expected) > 100
 
 
+PLACES = """
+context { Place : REAL x REAL --> BOOL; Cause : { near(REAL), far(REAL) }; }
+node n {
+  inputs( at : Place, cause : Cause )
+  outputs( s : REAL, last : REAL )
+  topics( a/P at matches(in.at), a/C cause matches(in.cause), a/S s matches(out.s), a/L last matches(out.last) )
+  assume near_enough ( forall(x, y in REAL | in.at(x, y) -> x + y <= 7) )
+  guarantee low ( out.s <= 4 )
+  guarantee beside ( forall(x, y in REAL | in.at(x, y) -> out.s + y <= 9) )
+  guarantee told ( in.cause == near(5) -> out.s <= 3 )
+  guarantee ended ( out.last + 1 <= 6 )
+}
+"""
+
+
+@pytest.mark.parametrize("seed", some(range(12), 3))
+def test_whatever_a_path_leads_to_is_looked_at(seed: int, make_system: Callable[..., System], tmp_path: Path) -> None:
+    """Items from the front and from the end, fields within fields, under `data`, of the event's own names; topics with
+    a slash and without."""
+    rng = random.Random(seed)
+    forms = ["x", "ys[-1]", "ys[0]", "ys[-2]", "p.x", "ps[-1].x", "ps[1].ys[-1]", "time", "topic"]
+
+    def number() -> float:
+        return rng.choice((0.5, 1.5, 5.0)) if rng.random() < 0.9 else rng.choice((3.5, 6.5))
+
+    def message() -> dict[str, Any]:
+        own = {"x": number(), "ys": [number(), number()], "p": {"x": number()}}
+        return {**own, "ps": [{"x": number()}, {"x": number(), "ys": [number()]}], "what": rng.choice(("near", "far"))}
+
+    passed = broken = 0
+    for at in range(3):
+        one, two = rng.sample(forms, 2)
+        mapping = {"in.at": [one, two], "out.s": rng.choice(forms), "out.last": rng.choice(forms)}
+        mapping["in.cause"] = {"constructor": "what", "near": [rng.choice(forms)], "far": [rng.choice(forms)]}
+        events: list[dict[str, Any]] = []
+        body = {topic: message() for topic in ("at", "cause", "s", "last")}
+        for k in range(250):
+            topic = rng.choice([*body])
+            if rng.random() < 0.2:
+                body[topic] = {**body[topic], **{key: message()[key] for key in rng.sample([*body[topic]], 1)}}
+            told = {"topic": number(), "time": number()} if rng.random() < 0.02 else {"topic": 1.5, "time": 0.5}
+            inside = rng.random() < 0.5
+            events.append(
+                {
+                    **({} if inside else body[topic]),
+                    "data": {**told, **(body[topic] if inside else {})},
+                    "topic": rng.choice(("", "/")) + topic,
+                    "time": k / 10,
+                }
+            )
+        found, quiet = both(
+            setup_of(make_system(PLACES, mapping, when="any")), written(tmp_path / f"{at}.jsonl", events, rng)
+        )
+        passed += quiet
+        broken += found
+    assert passed > 40
+    assert broken > 20
+
+
 @pytest.mark.parametrize(
     ("second", "words"),
     [

@@ -10,8 +10,11 @@ import pytest
 
 from avow.backends.rosmonitoring.engine import Monitor
 from avow.backends.rosmonitoring.options import setup
+from avow.backends.rosmonitoring.rml_translate import translate
+from avow.backends.rosmonitoring.watched import Fault
 from avow.base.diagnostics import Diagnostic
 from avow.formulas.values import Data, Element, FunctionValue, Sequence, Value
+from avow.ros.bags import enveloped
 from avow.system.plan import System
 
 MESSAGES = {
@@ -237,3 +240,20 @@ def test_variables_that_look_alike_need_their_fields(make_system: Callable[..., 
     one = {"p/Pose": "float64 px\nstring mode"}
     faults = faults_of(make_system(SHARED, {}, messages=one))
     assert ["would both be read from" in d.message for d in faults] == [True]
+
+
+@pytest.mark.parametrize("field", ["topic", "time"])
+def test_a_field_named_as_what_the_event_says_itself_is_the_messages(
+    field: str, make_system: Callable[..., System]
+) -> None:
+    rcl = "node n { inputs( r : REAL ) outputs( s : REAL ) topics( a/S s matches(out.s) ) guarantee g ( out.s <= 4 ) }"
+    system = make_system(rcl, messages={"a/S": f"float64 {field}\nstring data"})
+    found, faults = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+    assert not faults
+    monitor = Monitor(found)
+    assert monitor.step(enveloped({field: 3.5, "data": "x"}, "s", 9.0)) == []
+    assert [v.fault for v in monitor.step(enveloped({field: 5.5, "data": "x"}, "s", 1.0))] == [Fault.GUARANTEE]
+    assert [v.fault for v in monitor.step({"topic": "s", "time": 2, "data": {field: 5.5}})] == [Fault.GUARANTEE]
+    assert [v.fault for v in monitor.step({"topic": "s", "time": 2, "data": "x"})] == [Fault.MAPPING]
+    assert monitor.values == {}
+    assert "bears the name" in translate(found, system.contract.node("n").guarantees).refused["g"]

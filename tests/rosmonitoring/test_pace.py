@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import random
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -156,6 +158,59 @@ def test_losses_beyond_what_is_allowed_are_no_evidence(make_system: Callable[...
     for event in events:
         event.pop("header")
     assert "have no numbers" in evidence(make_system, events, losses=1).summary
+
+
+@pytest.mark.parametrize(
+    ("numbers", "words"),
+    [
+        ([0] * 8, "do not rise"),
+        ([1, None, None, None, None, None, None, None], "have no numbers"),
+        ([1, 2, 3, 1, 2, 3, 4, 5], "do not rise"),
+        ([1, 1, 2, 2, 3, 3, 4, 4], "do not rise"),
+        ([5, 6, 7, 8, 9, 10, 11, 12], ""),
+    ],
+)
+def test_losses_that_no_number_would_show_are_unknown(
+    numbers: list[int | None], words: str, make_system: Callable[..., System]
+) -> None:
+    events: list[Event] = []
+    for at, number in enumerate(numbers):
+        one: Event = {"topic": "r", "time": at, "data": 1.0}
+        events.append({**one, "header": {"seq": number}} if number is not None else one)
+        events.append({"topic": "s", "time": at + 0.1, "data": 1.0, "header": {"seq": at}})
+    found = evidence(make_system, events, losses=0)
+    assert found.verdict is (Verdict.UNKNOWN if words else Verdict.MONITORED)
+    assert words in found.summary
+    assert ("lost" in found.bound) is (not words)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("by", ["key", "stamp", "order", "latency"])
+def test_the_age_is_that_of_the_input_which_was_answered(
+    by: str, seed: int, make_system: Callable[..., System]
+) -> None:
+    rng = random.Random(seed)
+    own = {"input": "id", "output": "id"}
+    answers: dict[str, Any] = {"by": by, "because": "so", **(own if by in ("key", "stamp") else {})}
+    if by == "latency":
+        answers = {"latency": "5 s", "jitter": "5 s", "because": "so"}
+    heard = [Fraction(at) + Fraction(rng.randrange(10), 10) for at in range(0, 60, 2)]
+    late = [at + Fraction(rng.randrange(1, 60), 10) for at in heard]
+    if by == "order":
+        late = sorted(late)
+    events = [{"topic": "r", "time": float(at), "data": 1.0, "id": k} for k, at in enumerate(heard)]
+    events += [{"topic": "s", "time": float(at), "data": 1.0, "id": k} for k, at in enumerate(late)]
+    events.sort(key=lambda event: event["time"])
+    found = evidence(make_system, events, answers=answers, decided=0.5, max_age="100 s")
+    assert found.verdict is Verdict.MONITORED, found.summary
+    oldest = max(answered - at for at, answered in zip(heard, late, strict=True))
+    if by == "latency":  # nobody knows which it was: the oldest that it may have been
+        assert found.bound["oldest"]["in.r"] >= 5
+        return
+    assert found.bound["oldest"]["in.r"] == pytest.approx(float(oldest))
+    too_old = evidence(make_system, events, answers=answers, max_age=f"{float(oldest) - 0.01} s")
+    assert too_old.verdict is Verdict.UNKNOWN
+    assert "too old" in too_old.summary
 
 
 @pytest.mark.parametrize("rate", ["0 Hz ± 20 %", "10 Hz ± 100 %"])
