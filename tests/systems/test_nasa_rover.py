@@ -17,9 +17,12 @@ from avow.base.verdict import Outcome, Verdict
 from avow.calculus.composition import Composition, compose
 from avow.calculus.derivation import Phase, Rule
 from avow.calculus.obligations import composition_obligations, requirement_obligations, settle_all
+from avow.calculus.variables import frame
 from avow.cli import simulate
 from avow.evaluation.evaluate import compile_term
 from avow.formulas.values import FunctionValue
+from avow.pipeline.slices import sanity_slice
+from avow.sanity.analysis import analyse
 from avow.system.load import load_system
 from avow.system.plan import System
 
@@ -341,3 +344,13 @@ def test_the_environment_assumptions_hold_of_the_grid() -> None:
             assert all(pair in STEPS for pair in itertools.pairwise(way))
             assert [AWAY[cell, g] for cell in way] == list(range(AWAY[a, g], -1, -1))
     assert all(AWAY[b, g] <= AWAY[a, g] + 1 for a, b in STEPS for g in FREE)
+
+
+@pytest.mark.parametrize("planner", ["ComputePlan2Charging", "ComputePlan2Destination"])
+def test_that_a_plan_begins_at_the_start_does_not_follow_from_the_rest(planner: str) -> None:
+    """What shows it is a table that the solver finds late, for the scenario's map: it must not be lost unseen."""
+    system = load_system(FOLDER)
+    whole, node = frame(system), system.contract.node(planner)
+    cut = sanity_slice(whole, node)
+    (found,) = analyse(node, scenario=cut.given, ranges=cut.ranges, wanted={"redundant-from_start"})
+    assert found.verdict is Verdict.PROVED
