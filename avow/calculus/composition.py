@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from avow.base.verdict import Verdict
 from avow.calculus.certificates import Certificates
 from avow.calculus.derivation import ClauseName, Goal, Settled, SideCondition
-from avow.calculus.discharge import Answers, Bounds, settle
+from avow.calculus.discharge import Answers, Bounds, Told, settle
 from avow.calculus.hierarchy import Level, composed_node, innermost, level, shown_contract, with_persistence
 from avow.calculus.kept_answers import ask_once
 from avow.calculus.meaning import Meanings
@@ -40,6 +40,8 @@ class Composition:
     """The nodes of the system as a whole."""
     around: Mapping[str, str] = field(default_factory=dict)
     """Node or subsystem → the subsystem that it is directly in."""
+    told: Told | None = field(default=None, compare=False)
+    """Hears of each side condition of a goal as soon as it is settled."""
     _level_meanings: dict[str, Meanings] = field(default_factory=dict)
     _answers: dict[str, Answers] = field(default_factory=dict)
     _machine: Machine | None = None
@@ -53,7 +55,7 @@ class Composition:
     def settled(self, goal: Goal, bounds: Bounds) -> Answers:
         """The goal's side conditions, settled once."""
         if goal.name not in self._answers:
-            self._answers[goal.name] = settle(self.frame_of(goal), goal, bounds)
+            self._answers[goal.name] = settle(self.frame_of(goal), goal, bounds, self.told)
         return self._answers[goal.name]
 
     def stands(self, goal: Goal, bounds: Bounds) -> Verdict:

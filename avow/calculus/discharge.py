@@ -9,7 +9,7 @@ prove itself. Where proofs would do that, others are looked for; where there are
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from avow.base.graphs import components, cycle_in
@@ -61,10 +61,18 @@ class Answers:
         return Verdict.UNKNOWN if verdicts - {Verdict.PROVED} else Verdict.PROVED
 
 
-def settle(frame: Frame, goal: Goal, bounds: Bounds | None = None) -> Answers:
+Told = Callable[[str, Settled], None]
+"""What hears of a goal's side condition, by the goal's name: the answer may change yet where proofs go in a circle."""
+
+
+def settle(frame: Frame, goal: Goal, bounds: Bounds | None = None, told: Told | None = None) -> Answers:
     """Discharge every side condition of a derivation, and judge its loops."""
     solver = _Solver(frame, frozenset(goal.nodes), bounds or Bounds(), frozenset(goal.root.assumed))
-    settled = {condition: solver.condition(condition) for condition in goal.conditions}
+    settled: dict[SideCondition, Settled] = {}
+    for condition in goal.conditions:
+        settled[condition] = solver.condition(condition)
+        if told is not None:
+            told(goal.name, settled[condition])
     settled = _break_circles(solver, settled)
     loops = tuple(_loop(frame, goal, part, settled) for part in goal.root.walk() if part.rule is Rule.R4)
     return Answers(goal, settled, loops)

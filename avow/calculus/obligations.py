@@ -76,21 +76,26 @@ def discharge(system: System, obligations: Sequence[Obligation], limits: TimeLim
 
 def settle_all(composition: Composition, obligations: Sequence[Obligation], limits: TimeLimits) -> tuple[Outcome, ...]:
     """As `discharge`, of derivations that are made already (they remember what was settled)."""
+    return tuple(settle_each(composition, obligations, limits))
+
+
+def settle_each(composition: Composition, obligations: Sequence[Obligation], limits: TimeLimits) -> Iterator[Outcome]:
+    """As `settle_all`, each outcome as soon as it is there."""
     bounds = Bounds(from_seconds(limits.seconds), limits.seed)
 
     made = tuple(_tasks(composition))
     resting = Resting(composition, {task.obligation.name: task.obligation for task in made})
     tasks = {task.obligation.id: task for task in (*made, *_requirements(composition))}
-    outcomes: list[Outcome] = []
     for obligation in obligations:
         task = tasks.get(obligation.id)
         if task is None:
-            outcomes.append(questions.vanished(obligation.id))
+            outcome = questions.vanished(obligation.id)
+            yield replace(outcome, details={**outcome.details, **told(bounds.effort)})
             continue
         answer = task.ask(composition, bounds)
         goal = getattr(task.ask, "goal", None) if obligation.kind is Kind.COMPOSITION else None
-        outcomes.append(answer.outcome(obligation.id, resting.behind(answer, goal)))
-    return tuple(replace(o, details={**o.details, **told(bounds.effort)}) for o in outcomes)
+        outcome = answer.outcome(obligation.id, resting.behind(answer, goal))
+        yield replace(outcome, details={**outcome.details, **told(bounds.effort)})
 
 
 @dataclass(frozen=True, slots=True)

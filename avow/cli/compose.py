@@ -10,6 +10,7 @@ import click
 
 from avow.base.verdict import in_words
 from avow.cli.options import ContractArgument, json_option, seconds_option, seed_option
+from avow.cli.progress import progress
 from avow.solving.limits import from_seconds
 
 if TYPE_CHECKING:
@@ -39,14 +40,15 @@ def command(
     """Combine the contracts of a system's nodes by the rules R1-R4, and discharge the side conditions.
 
     SYSTEM is a system's name or folder, or an .rcl file (without a plan, ports of one name are connected). Code 1 where
-    a side condition is refuted or not inductive, or a loop cannot start, 2 for bad input.
+    a side condition is refuted or not inductive, or a loop cannot start, 2 for bad input. A terminal's stderr tells the
+    answers as they come; who interrupts it gets those so far.
     """
     from avow.base.diagnostics import Diagnostic, Rejected
     from avow.base.verdict import Verdict
     from avow.base.workspace import system_folder
     from avow.calculus.composition import compose
     from avow.calculus.discharge import Bounds
-    from avow.calculus.obligations import composition_obligations, settle_all
+    from avow.calculus.obligations import composition_obligations, settle_each
     from avow.system.load import load_path
 
     system = load_path(path if path.suffix == ".rcl" or path.is_dir() else system_folder(str(path)))
@@ -82,7 +84,14 @@ def command(
     obligations = [o for o in composition_obligations(system) if o.name.startswith(prefixes)]
 
     limits = _Limits(seconds, seed)
-    outcomes = settle_all(composition, obligations, limits)
+    asked = {o.name for o in obligations} | {f"{goal.name}.{c.about}" for goal in chosen for c in goal.conditions}
+    with progress(len(asked)) as telling:
+        composition.told = lambda goal, found: telling.tell(f"{goal}.{found.condition.about}", str(found.verdict))
+        settled = []
+        for obligation, outcome in zip(obligations, settle_each(composition, obligations, limits), strict=True):
+            telling.tell(obligation.name, str(outcome.verdict))
+            settled.append(outcome)
+    outcomes = tuple(settled)
     if as_json:
         click.echo(json.dumps(to_json(composition, chosen, obligations, outcomes), indent=1, ensure_ascii=False))
     else:

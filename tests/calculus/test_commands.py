@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import sys
 import time
 from pathlib import Path
 from xml.etree import ElementTree
@@ -13,11 +15,15 @@ from jsonschema import Draft202012Validator
 
 from avow.base.process import run
 from avow.base.verdict import Verdict
+from avow.calculus import discharge as discharging
 from avow.calculus.composition import compose
+from avow.calculus.derivation import Settled, SideCondition
 from avow.calculus.notation import as_html, write_goal
 from avow.calculus.obligations import composition_obligations, discharge
+from avow.cli import main
 from avow.cli.compose import command as compose_command
 from avow.cli.graph import command as graph_command
+from avow.cli.progress import progress
 from avow.cli.refines import command as refines_command
 from avow.cli.simulate import command as simulate_command
 from avow.system.graph import dataflow
@@ -47,6 +53,46 @@ def test_compose_prints_and_decides(tmp_path: Path) -> None:
     code, output = invoke(compose_command, str(tmp_path / "system.rcl"))
     assert code == 1
     assert "a.x = " in output
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_compose_tells_a_terminal_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make(tmp_path, GOOD)
+    for terminal, told in ((Terminal(), True), (io.StringIO(), False)):
+        with monkeypatch.context() as patched:
+            patched.setattr(sys, "stderr", terminal)
+            with progress(2) as telling:
+                telling.tell("whole.b.A1\x1b[2J", "proved")
+        assert ("… 1 of 2: whole.b.A1?[2J proved" in terminal.getvalue()) == told
+        assert "\x1b" not in terminal.getvalue()
+    assert "…" not in invoke(compose_command, str(tmp_path))[1]
+
+
+def test_compose_that_is_interrupted_tells_what_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = GOOD + node("c", "y : REAL", "z : REAL", "A: in.y < 2", "G: out.z == 0")
+    make(tmp_path, text)
+    asked = discharging._Solver.condition
+
+    def condition(self: discharging._Solver, side: SideCondition) -> Settled:
+        if side.consumer == "c":
+            raise KeyboardInterrupt
+        return asked(self, side)
+
+    monkeypatch.setattr(discharging._Solver, "condition", condition)
+    with pytest.raises(SystemExit) as ended:
+        main(["compose", str(tmp_path)])
+    shown = capsys.readouterr()
+    assert ended.value.code == 130
+    assert shown.out == ""
+    assert "proved    whole.b.A1" in shown.err
+    assert "1 of " in shown.err
+    assert "none is final" in shown.err
 
 
 def test_compose_json(tmp_path: Path) -> None:
