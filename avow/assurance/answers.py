@@ -46,9 +46,9 @@ class How(StrEnum):
 
 
 MEANINGS = {
-    How.DERIVED: "a tool concluded it",
-    How.BOUNDED: "a tool concluded it, within a finite scenario",
-    How.ARGUED: "a person says the guarantees amount to it",
+    How.DERIVED: "a tool concluded it from guarantees",
+    How.BOUNDED: "only within a finite scenario",
+    How.ARGUED: "a person says guarantees amount to it",
     How.OPEN: "not shown, or what it rests on is not",
 }
 """How a requirement stands, for who meets the word for the first time."""
@@ -69,7 +69,7 @@ ABOUT = {
     Sort.PLATFORM: "about the platform",
     Sort.MODELS: "about models",
     Sort.SAMPLING: "about samples",
-    Sort.MEANING: "about wording",
+    Sort.MEANING: "about requirements' meaning",
 }
 """What a supposition of each sort is about, after its number: ``2 about the world``."""
 
@@ -146,6 +146,13 @@ class WeakestEvidence:
     words: str
     """What was seen, with its bound, as a sentence without its full stop."""
     needed_by: tuple[str, ...] = ()
+    beside: int = field(default=0, metadata=LATER)
+    """So many requirements have their weakest evidence in another guarantee of the same node."""
+
+    @property
+    def others(self) -> str:
+        """After the requirements that need it: why more of them name the same node."""
+        return f"; {self.beside} on other guarantees of this node" if self.beside else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,10 +285,15 @@ class Answers:
     weakened_by: str = field(default="", metadata=LATER)
     """Which the ways are in which the case is weakened; empty where there is none."""
 
+    objects: str = field(default="", metadata=LATER)
+    """What the words mean that say what was looked at: *model*, *source*…"""
+
     @property
     def legend(self) -> str:
-        """What the words in the column *how it stands* mean, of those that are used."""
-        return "; ".join(f"{how}: {MEANINGS[how]}" for how, _ in self.by_how)
+        """What the words in the column *how it stands* mean, of those that are used, and how strong they are."""
+        told = "; ".join(f"{how}: {MEANINGS[how]}" for how, _ in self.by_how)
+        holds = any(how is not How.OPEN for how, _ in self.by_how)
+        return f"{told}. None is stronger than its evidence" if holds else told
 
     @property
     def beside(self) -> str:

@@ -197,7 +197,10 @@ def conclude(facts: Facts) -> Case:
     weakest = weakest_of(basis, by_id, relied, titles)
     following = weakest_of(basis, by_id, relied, titles, beside=weakest.node) if weakest else None
     if weakest is not None:
-        weakest = replace(weakest, needed_by=tuple(r.id for r in requirements if weakest.claim in r.closure))
+        needing = tuple(r.id for r in requirements if weakest.claim in r.closure)
+        rest = [r.weakest_evidence for r in requirements if r.id not in needing and r.weakest_evidence]
+        beside = sum(w.node == weakest.node and w.claim != weakest.claim for w in rest)
+        weakest = replace(weakest, needed_by=needing, beside=beside)
     code = exit_code(found)
     told = answers(
         requirements,

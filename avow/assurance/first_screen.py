@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -23,15 +22,25 @@ from avow.assurance.answers import (
 )
 from avow.assurance.changes import MARKS, baseline_of
 from avow.assurance.model import Case, Gate, NodeView, ObligationView, RequirementView
-from avow.assurance.relied import EVIDENCE, EXHAUSTIVE, LETTERS, Relied, examined, seen, weakness, word
-from avow.assurance.weakenings import briefly
+from avow.assurance.relied import (
+    EVIDENCE,
+    EXHAUSTIVE,
+    LETTERS,
+    OBJECTS,
+    Relied,
+    examined,
+    looked_at,
+    seen,
+    weakness,
+    word,
+)
+from avow.assurance.weakenings import briefly, of_weakening
 from avow.base.plain import count
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 
 ROWS, WORST, NODES, SQUARES, LINES, OWNERS = 6, 3, 8, 12, 5, 3
 """So many requirements have a row each; else so many of the worst; nodes; squares for a node; changes; owners."""
-_CONFIDENT = re.compile(r"with [^(),]* confidence, ")
 _HOW_ORDER = (How.OPEN, How.ARGUED, How.BOUNDED, How.DERIVED)
 
 
@@ -117,14 +126,14 @@ def answers(
         tone=tone,
         by_how=by_how,
         counts=" · ".join(f"{many} {how}" for how, many in by_how) or "no requirement",
-        weakened=f"weakened in {count(kinds, 'way')}" if kinds else "not weakened",
+        weakened=of_weakening(kinds) if kinds else "no weakening",
         gates=f"policy: {good} of {count(len(asked), 'gate')} pass" + ("es" if len(asked) == 1 else ""),
         listed=_listed(requirements),
         based_on=tuple(basis[:NODES]),
         bases=tuple(sorted(basis, key=lambda b: b.node)),
         more_nodes=f"and {count(len(basis) - NODES, 'node')} on no less" if len(basis) > NODES else "",
         weakest=weakest,
-        next_weakest=f"{following.title}, {_CONFIDENT.sub('', following.words)}" if following else "",
+        next_weakest=f"{following.title}, {following.words}" if following else "",
         refuted=_refuted(requirements, views, nodes),
         supposed=tuple(_lines(suppositions)),
         owned=f"{owned} of {len(suppositions)}" if suppositions else "",
@@ -135,6 +144,7 @@ def answers(
         warned=warned,
         owners=_owners(suppositions),
         weakened_by=briefly(weakenings),
+        objects=_objects(views, relied),
     )
 
 
@@ -198,6 +208,13 @@ def _examined(view: ObligationView, relied: Mapping[str, Relied]) -> str:
     return examined(relied[view.id]) if view.id in relied and view.standing.supports else ""
 
 
+def _objects(views: Sequence[ObligationView], relied: Mapping[str, Relied]) -> str:
+    """What the words mean that say what was looked at, of those that the nodes' lines use."""
+    shown = [v for v in views if v.obligation.kind is Kind.GUARANTEE and v.id in relied and v.standing.supports]
+    used = {looked_at(relied[view.id]) for view in shown}
+    return "; ".join(told for what, told in OBJECTS.items() if what in used)
+
+
 def basis_of(node: NodeView, case: Case) -> NodeBasis:
     """A node's line of the first screen, for any node of a finished case."""
     found = next((b for b in case.answers.bases if b.node == node.name), None)
@@ -258,7 +275,7 @@ def _owners(suppositions: Sequence[Supposition]) -> str:
 
 def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:
     if not changes.against:
-        return (("", "No report has been signed."),)
+        return (("", "None has been signed."),)
     shown = [(MARKS.get(e.kind, "▼"), e.words) for e in changes.entries]
     if len(shown) > LINES:
         worse = sum(e.worse for e in changes.entries[LINES - 1 :])
@@ -300,5 +317,5 @@ def _statement(verdict: str, suppositions: Sequence[Supposition], kinds: int) ->
         accepted = "I accept supposition S1 as listed"
     else:
         accepted = f"I accept suppositions S1 to S{len(suppositions)} as listed"
-    known = f"I know of the {count(kinds, 'kind')} of weakening" if kinds else "no weakening is known"
+    known = f"I know of the {of_weakening(kinds)}" if kinds else "no weakening is known"
     return f"By signing I say: I agree with the verdict “{verdict}”, {accepted}, and {known}."

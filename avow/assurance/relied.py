@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 from avow.assurance.model import ObligationView
 from avow.base.plain import count
@@ -87,27 +88,42 @@ def word(status: Status) -> str:
 
 
 _APART: Mapping[str, str] = {
-    Isolation.SEALED: ", sealed",
-    Isolation.PROCESSES: ", own process",
-    Isolation.NONE: ", not isolated",
+    Isolation.SEALED: "run sealed",
+    Isolation.PROCESSES: "run in a process of its own",
+    Isolation.NONE: "run without isolation",
 }
+OBJECTS: Mapping[Object, str] = {
+    Object.MODEL: "model: what runs may differ",
+    Object.SOURCE: "source: the node's program as written",
+    Object.BINARY: "binary: the node's program as built",
+    Object.RECORDING: "recordings: of its runs",
+}
+"""What was looked at, for who meets the word for the first time."""
+
+
+def looked_at(relied: Relied) -> Object | None:
+    """None of a person's word."""
+    return relied.record.of if relied.status in (*EXHAUSTIVE, Status.TESTED, Status.MONITORED) else None
 
 
 def examined(relied: Relied) -> str:
-    """What was looked at: ``(source in float64, sealed)``; empty of a person's word."""
-    if relied.status not in (*EXHAUSTIVE, Status.TESTED, Status.MONITORED):
-        return ""
-    record = relied.record
-    apart = _APART.get(str(record.details.get(ISOLATION, "")), "")
-    match record.of:
+    """What was looked at: ``(source in float64)``; empty of a person's word."""
+    match looked_at(relied):
+        case None:
+            return ""
         case Object.MODEL:
-            return f"(model{apart})"
+            return "(model)"
         case Object.SOURCE:
-            return f"(source in {record.numbers}{apart})"
+            return f"(source in {relied.record.numbers})"
         case Object.BINARY:
-            return f"(binary in {record.numbers}{apart})"
+            return f"(binary in {relied.record.numbers})"
         case Object.RECORDING:
-            return f"(recordings{apart})"
+            return "(recordings)"
+
+
+def kept_apart(record: Evidence) -> str:
+    """How what was run was kept from the judge's files and processes, in words; empty where nothing is recorded."""
+    return _APART.get(str(record.details.get(ISOLATION, "")), "")
 
 
 def upper_bound(record: Evidence) -> float | None:
@@ -140,7 +156,7 @@ def weakness(relied: Relied) -> tuple[int, float, int]:
 
 
 def seen(relied: Relied) -> str:
-    """What was seen, with its bound: ``47 runs, 0 failed (with 95 % confidence, at most 6.2 % fail)``."""
+    """What was seen, with its bound: ``47 runs, 0 failed (95 % confidence: at most 6.2 % fail)``."""
     bound = relied.record.bound
     match relied.status:
         case Status.PROVED:
@@ -149,7 +165,7 @@ def seen(relied: Relied) -> str:
             return "every case of a bounded model was looked at"
         case Status.TESTED if isinstance(bound.get("runs"), int):
             failures = bound.get("failures", 0)
-            return f"{count(bound['runs'], 'run')}, {failures} failed{_at_most(relied.record, 'at most')}"
+            return f"{count(bound['runs'], 'run')}, {failures} failed{_at_most(relied.record)}"
         case Status.TESTED if isinstance(bound.get("cases"), int):
             cases, triggered = bound["cases"], bound.get("triggered")
             if isinstance(triggered, int):
@@ -157,28 +173,30 @@ def seen(relied: Relied) -> str:
                 told = f"{few}{triggered} of {count(cases, 'case')} met its condition, none failed"
             else:
                 told = f"{count(cases, 'case')}, none failed"
-            return told + _at_most(relied.record, "fewer than")
+            return told + _at_most(relied.record)
         case Status.MONITORED if isinstance(bound.get("judged"), int):
             traces = bound.get("traces")
             on = f" on {count(len(traces), 'recorded run')}" if isinstance(traces, Mapping | list) and traces else ""
-            return f"observed {count(bound['judged'], 'time')}{on}"
+            return f"observed {count(bound['judged'], 'time')}{on}, none against it"
         case Status.REVIEWED:
             return "read by a person who accepts it" + (" on conditions" if relied.record.hypotheses else "")
         case _:  # no status of the others bounds how often it fails
             return f"{word(relied.status)}, without a bound on failures"
 
 
-def _at_most(record: Evidence, how: str) -> str:
+def _at_most(record: Evidence) -> str:
+    """Always with the confidence: without it the bound would seem to be certain."""
     bound, confidence = upper_bound(record), record.bound.get("confidence")
     if bound is None:
         return ", with no bound on failures"
-    sure = f"with {_percent(float(confidence))} confidence, " if isinstance(confidence, int | float) else ""
-    return f" ({sure}{how} {_percent(bound)} fail)"
+    if isinstance(confidence, int | float) and not isinstance(confidence, bool):
+        sure = f"{_rounded(float(confidence), ROUND_FLOOR)} confidence"
+    else:
+        sure = "confidence not recorded"
+    return f" ({sure}: at most {_rounded(bound, ROUND_CEILING)} fail)"
 
 
-def _percent(part: float) -> str:
-    """Rounded up: a bound that is shown smaller than it is would be none."""
-    from decimal import ROUND_CEILING, Context, Decimal
-
-    value = Context(prec=2, rounding=ROUND_CEILING).create_decimal(Decimal(str(part)) * 100)
+def _rounded(part: float, way: str) -> str:
+    """In percent, to two digits. A bound is rounded up: smaller than it is it is none; a confidence down."""
+    value = Context(prec=2, rounding=way).create_decimal(Decimal(str(part)) * 100)
     return f"{value.normalize():f} %"

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from avow.assurance.answers import How, Supposition, Weakening
 from avow.assurance.model import Handled, ObligationView, OpenItem, RequirementView
 from avow.assurance.relied import EXHAUSTIVE, Relied
+from avow.base.plain import count
 from avow.base.verdict import Link, Verdict
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
@@ -22,13 +23,16 @@ _WORDS = {
     "sampled": ("guarantee{s} sampled, not proved", "Other inputs and other runs may behave otherwise."),
     "read": ("guarantee{s} on a person's reading only", "No tool has looked at them."),
     "single": ("guarantee{s} with one method only", "An error of that tool would not be noticed."),
-    "tied": ("guarantee{s} tied by hand to what was examined", "That a person's table or measure fits is not shown."),
+    "tied": (
+        "guarantee{s} translated by a person for the tool",
+        "That a person's table or measure fits is not shown.",
+    ),
     "unrun": (
         "planned method{s} without an answer",
         "A tool is missing, gave up or failed; others answer for it.",
     ),
-    "conditional": ("review{s} accepted on conditions", "The reviewer names what must be so besides."),
-    "advice": ("piece{s} of advice open", "They fail nothing; read them."),
+    "conditional": ("review{s} with conditions", "The reviewer names what must be so besides."),
+    "advice": ("open remark{s}", "They fail nothing; read them."),
     "excused": ("finding{s} accepted by a person", "Somebody takes responsibility for what is not so."),
     "believed": ("answer{s} from earlier runs", "They were not computed afresh for this report."),
 }
@@ -42,14 +46,19 @@ _BRIEFLY = {
     "sampled": "sampled",
     "read": "only read",
     "single": "by one method",
-    "tied": "tied by hand",
+    "tied": "translated by a person",
     "unrun": "not answered",
-    "conditional": "on conditions",
+    "conditional": "reviewed with conditions",
     "advice": "remarks",
     "excused": "excused",
-    "believed": "from earlier runs",
+    "believed": "answered earlier",
 }
 """The same for the first screen, where it leads to the words."""
+
+
+def of_weakening(kinds: int) -> str:
+    """``6 kinds of weakening``: the one way in which any text counts them."""
+    return f"{count(kinds, 'kind')} of weakening"
 
 
 def briefly(found: Iterable[Weakening]) -> str:

@@ -9,18 +9,18 @@ from urllib.parse import quote
 
 from markupsafe import Markup, escape
 
-from avow.assurance.answers import Headline, How, NodeBasis, Supposition, Tone
+from avow.assurance.answers import Headline, How, NodeBasis, SupposedLine, Supposition, Tone
 from avow.assurance.changes import baseline_of
 from avow.assurance.first_screen import basis_of
 from avow.assurance.model import Case, ObligationView
 from avow.assurance.modules import NodeModule, RequirementModule, node_modules, requirement_modules
-from avow.assurance.relied import word
+from avow.assurance.relied import kept_apart, word
 from avow.assurance.trend import trend
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.report import wording
 from avow.report.page import asset, environment
-from avow.tuning.shown import NODE_BOXES
+from avow.tuning.shown import NODE_BOXES, SHEET_LETTERS
 
 TONE_MARKS = {Tone.GREEN: "✔", Tone.AMBER: "◐", Tone.RED: "✘", Tone.GREY: "▽"}
 _ORDER = (Tone.RED, Tone.AMBER, Tone.GREEN, Tone.GREY)
@@ -31,7 +31,7 @@ WORDS = (
     ("observed", "by a monitor, on recorded runs"),
     ("reviewed", "read by a person who says what was read"),
     ("supposed", "no evidence; a reason, an owner and a date"),
-    ("derived", "a tool concluded the requirement's formula from guarantees"),
+    ("derived", "a tool concluded the requirement's formula from guarantees, each as strong as its own evidence"),
     ("argued", "a person says that guarantees amount to the requirement's sentence"),
     ("open", "refuted, missing or stale, or resting on something that is, or on a supposition that has expired"),
     ("guarantee", "what a node's contract promises, if its assumptions hold"),
@@ -56,18 +56,21 @@ def render_answers(case: Case, json_digest: str = "") -> str:
             by_how=[(how, [r.id for r in case.requirements if r.how is how]) for how, _ in case.answers.by_how],
             content=baseline_of(case).content,
             full_reason=full_reason,
+            kept_apart=kept_apart,
             known=known,
             listed=case.listed,
             many=_many(case),
             modules=[_requirement(case, m) for m in requirement_modules(case)],
             node_modules=[_node(case, m) for m in node_modules(case)],
             json_digest=json_digest,
+            others=lambda line: others(case, line),
             refuted=_refuted,
             said_of=lambda name: ((said := case.said(name)) and said.reason) or "",
             some=some,
             titles={node.name for node in case.nodes},
             tone_of_how={how: _tone_of(case, how) for how in How},
             word=_word,
+            worded=worded(case),
             words=WORDS,
         )
     )
@@ -79,6 +82,16 @@ def full_reason(supposition: Supposition) -> str:
     parts += [text for text in supposition.text.split("\n") if text not in (supposition.because, supposition.says)]
     told = list(dict.fromkeys(p for p in parts if p and not any(p != q and p in q for q in parts)))
     return "; ".join(told)
+
+
+def others(case: Case, line: SupposedLine) -> list[Supposition]:
+    """The suppositions of a line's sort that it gives by number only."""
+    return [s for s in case.suppositions if s.number in line.others]
+
+
+def worded(case: Case) -> bool:
+    """Whether a printed first sheet has room for all suppositions in words; a sheet has no folds to open."""
+    return sum(len(s.words) for s in case.suppositions) + sum(len(r.text) for r in case.listed) <= SHEET_LETTERS
 
 
 def some(names: Sequence[str], most: int = 8) -> str:

@@ -6,7 +6,7 @@ import json
 from importlib import resources
 from typing import Any
 
-from avow.assurance.answers import Supposition
+from avow.assurance.answers import SupposedLine, Supposition
 from avow.assurance.changes import baseline_of
 from avow.assurance.model import Case, ObligationView, SourceView
 from avow.assurance.modules import RequirementModule, requirement_modules
@@ -17,7 +17,7 @@ from avow.base.verdict import Counterexample
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status
 from avow.report import example
-from avow.report.answers_page import TONE_MARKS, full_reason, some
+from avow.report.answers_page import TONE_MARKS, full_reason, others, some, worded
 from avow.report.maps import map_picture
 from avow.report.source import plain_lines
 from avow.report.wording import MARKS, bound_text, clean, in_lines, protocol, tone, worth
@@ -154,13 +154,14 @@ def _first(case: Case) -> dict[str, Any]:
             ]
             for r in case.listed
         ],
-        "legend": a.legend,
+        "legend": f"{a.legend}." if a.legend else "",
         "based_on": [[b.title, [[letter, tone.value] for letter, tone in b.squares], b.words] for b in a.based_on],
         "more_nodes": a.more_nodes,
+        "objects": f"{a.objects}." if a.objects else "",
         "weakest": a.refuted or _weakest(case),
-        "weakened_by": f"Weakened by: {a.weakened_by}." if a.weakened_by else "",
+        "weakened_by": f"Weakening: {a.weakened_by}." if a.weakened_by else "",
         "next": f"Next weakest: {a.next_weakest}." if a.next_weakest and not a.refuted else "",
-        "supposed": [[line.about, f"{line.number} {line.says}{line.more and '; '}{line.more}"] for line in a.supposed],
+        "supposed": [[line.about, *_supposed(case, line)] for line in a.supposed],
         "owned": _owned(case),
         "changed_against": a.changed_against,
         "changed": [f"{mark} {words}".strip() for mark, words in a.changed],
@@ -168,6 +169,14 @@ def _first(case: Case) -> dict[str, Any]:
         "signed": a.signed if a.signed.startswith("signed") else "",
         "content": f"What is signed has the digest {baseline_of(case).content[:16]}…",
     }
+
+
+def _supposed(case: Case, line: SupposedLine) -> tuple[str, str]:
+    """The line's suppositions in words, and the numbers of those that the page has no room for."""
+    first = f"{line.number} {line.says}"
+    if not worded(case):
+        return first, line.more
+    return "; ".join((first, *(f"{s.number} {s.words}" for s in others(case, line)))), ""
 
 
 def _owned(case: Case) -> str:
@@ -179,7 +188,7 @@ def _weakest(case: Case) -> str:
     found = case.answers.weakest
     if found is None:
         return "There is no evidence."
-    rests = f" On it rest {some(found.needed_by)}." if found.needed_by else ""
+    rests = f" On it rest {some(found.needed_by)}{found.others}." if found.needed_by else ""
     return f"{found.title}: “{found.quote}”. {found.words[:1].upper()}{found.words[1:]}.{rests}"
 
 

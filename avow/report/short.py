@@ -35,7 +35,7 @@ def terminal_lines(case: Case, command: str = "") -> list[str]:
     head = f" {a.changed_against[:1].lower()}{a.changed_against[1:]}"
     lines += [_cut(f"5 Changed{head.removesuffix(':')}")]
     lines += [_cut(f"  {mark} {words}".rstrip()) for mark, words in a.changed]
-    known = _cut_lines(f"weakened by: {a.weakened_by}", 3) if a.weakened_by else []
+    known = _cut_lines(f"weakening: {a.weakened_by}", 3) if a.weakened_by else []
     if len(lines) + len(known) < LINES:
         at = next(n for n, line in enumerate(lines) if line.startswith("4 Supposed"))
         lines = [*lines[:at], *known, *lines[at:]]
@@ -80,6 +80,8 @@ def markdown_head(case: Case) -> Iterator[str]:
     yield _md(a.legend)
     yield "## 2 What is it based on?"
     yield "\n".join(f"- {_md(b.title)}: {_md(b.words)}" for b in a.bases) or "Nothing."
+    if a.objects:
+        yield _md(f"{a.objects}.")
     yield "## 3 What is the weakest evidence?"
     yield _md(_weakest_words(case))
     yield "## 4 What is supposed, not shown?"

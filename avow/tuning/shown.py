@@ -82,6 +82,9 @@ ARGUMENT_ELEMENTS = 2500
 PDF_OBLIGATIONS = 500
 """Obligations in the PDF: nobody turns more pages; all are in report.json, and the PDF says so."""
 
+SHEET_LETTERS = 1400
+"""Letters of suppositions and listed requirements for which the first printed sheet has room."""
+
 PDF_COLUMNS = 9
 """Columns of a run that fit on a page; a wider one is told by its reason alone."""
 

@@ -204,7 +204,7 @@ def test_a_side_condition_brings_what_its_proof_used_and_a_guarantee_what_its_no
     assert found.weakest_evidence is not None
     assert (found.weakest_evidence.node, found.weakest_evidence.words) == (
         "a",
-        "10 cases, none failed (fewer than 30 % fail)",
+        "10 cases, none failed (confidence not recorded: at most 30 % fail)",
     )
     lost = case(made, listed, given_[1:]).requirements[0]
     assert lost.how is How.OPEN
@@ -304,7 +304,57 @@ def test_weakenings_are_named_and_counted_on_the_first_screen() -> None:
     for many in (1, 2):
         said = [_weakening(key, ("x",) * many).words for key in _WORDS]
         assert not any("{" in words for words in said)
-    assert _weakening("conditional", ("x",)).words == "review accepted on conditions"
+    assert _weakening("conditional", ("x",)).words == "review with conditions"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "method", "bound", "told"),
+    [
+        (
+            Verdict.TESTED,
+            "experiment",
+            {"runs": 47, "failures": 0, "failure probability at most": 0.0617, "confidence": 0.95},
+            "47 runs, 0 failed (95 % confidence: at most 6.2 % fail)",
+        ),
+        (
+            Verdict.TESTED,
+            "hypothesis",
+            {"cases": 300, "triggered": 4, "failure_probability_when_triggered_below": 0.527, "confidence": 0.95},
+            "only 4 of 300 cases met its condition, none failed (95 % confidence: at most 53 % fail)",
+        ),
+        (
+            Verdict.TESTED,
+            "hypothesis",
+            {"cases": 9, "failure_probability_below": 0.3, "confidence": 0.997},
+            "9 cases, none failed (99 % confidence: at most 30 % fail)",
+        ),
+        (
+            Verdict.MONITORED,
+            "rosmonitoring",
+            {"judged": 574, "traces": ["a", "b"]},
+            "observed 574 times on 2 recorded runs, none against it",
+        ),
+    ],
+)
+def test_what_was_seen_has_one_wording(verdict: Verdict, method: str, bound: dict[str, object], told: str) -> None:
+    found = case(subject(PROSE), [*GUARANTEES], [evidence(GUARANTEES[0], verdict, method, bound=bound)])
+    assert found.answers.weakest is not None
+    assert found.answers.weakest.words == told
+
+
+def test_requirements_on_another_guarantee_of_the_weakest_node_are_counted_beside_it() -> None:
+    def drawn(bound: float) -> dict[str, object]:
+        return {"cases": 10, "failure_probability_below": bound, "confidence": 0.95}
+
+    node = [guarantee("a", "g"), guarantee("a", "h")]
+    asked = [replace(PROSE, id=name, supported_by=(f"a.{g}",)) for name, g in (("R1", "g"), ("R2", "h"), ("R3", "h"))]
+    made = [evidence(g, Verdict.TESTED, "hypothesis", bound=drawn(b)) for g, b in zip(node, (0.5, 0.1), strict=True)]
+    found = case(system({"a": ["g", "h"]}, requirements=asked), node, made).answers.weakest
+    assert found is not None
+    assert (found.needed_by, found.others) == (("R1",), "; 2 on other guarantees of this node")
+    alone = case(system({"a": ["g"]}, requirements=asked[:1]), node[:1], made[:1]).answers.weakest
+    assert alone is not None
+    assert alone.others == ""
 
 
 def test_plain_words() -> None:

@@ -8,8 +8,10 @@ from typing import Any
 
 from avow.assurance.model import Case
 from avow.base.plain import identifiers
+from avow.report.answers_page import worded
 from avow.report.pdf import _data as pdf_data
 from avow.report.short import LINES, WIDTH, WORDS, comment, markdown_head, terminal_lines
+from avow.report.wording import clean
 from report.chromium import dark, frames_of, measure
 
 OWN_WORDS, ALL_WORDS, BOXES_WITHIN, CONTRAST = 280, 3000, 900, 4.5
@@ -66,6 +68,7 @@ def counts(found: Case, page: str) -> list[str]:
         ("PDF", f"{pdf['verdict']} {pdf['counts']}"),
     ):
         told += [f"{name} lacks {part!r}" for part in (a.verdict, *a.beside.split(" · ")) if part not in text]
+    told += words(found)
     if page.count('class="supposition"') != len(found.suppositions):
         told.append("a supposition stands not once on the page")
     if len(re.findall(r'<details id="requirement', page)) != len(found.requirements):
@@ -75,4 +78,26 @@ def counts(found: Case, page: str) -> list[str]:
     outside = re.sub(r"<details>.*?</details>", "", comment(found), flags=re.DOTALL)
     if len(outside.split()) > WORDS:
         told.append(f"the comment has {len(outside.split())} words, at most {WORDS}")
+    return told
+
+
+def words(found: Case) -> list[str]:
+    """One wording for one thing: bounds with their confidence, kinds of weakening, what was looked at, suppositions on
+    paper."""
+    a, told = found.answers, []
+    for said in (a.weakest.words if a.weakest else "", a.next_weakest):
+        if " fail)" in said and not re.search(r"confidence( not recorded)?: at most [0-9.]+ % fail\)", said):
+            told.append(f"a bound without its confidence: {said!r}")
+    if found.weakenings and a.weakened not in a.statement:
+        told.append(f"{a.weakened!r} is counted otherwise when it is signed: {a.statement!r}")
+    used = {word for b in a.bases for word in re.findall(r"\((\w+)", b.words)}
+    explained = {part.split(":")[0] for part in a.objects.split("; ") if part}
+    if used != explained:
+        told.append(f"looked at {sorted(used)}, explained {sorted(explained)}")
+    paper = pdf_data(found)["first"]
+    listed = " ".join(" ".join(line) for line in paper["supposed"])
+    if worded(found):
+        told += [f"on paper without words: {s.number}" for s in found.suppositions if clean(s.words) not in listed]
+    elif any(line.more and clean(line.more) not in listed for line in a.supposed):
+        told.append("on paper without a number")
     return told

@@ -14,11 +14,12 @@ from assurance.sample import evidence, guarantee, node_plan, rover_case, system
 from avow.assurance.codec import read_case
 from avow.assurance.model import Case
 from avow.base.verdict import Verdict
-from avow.report.answers_page import render_answers
+from avow.report.answers_page import render_answers, worded
 from avow.report.page import render_page
+from avow.report.pdf import _data as pdf_data
 from avow.system.plan import Requirement, Statement
 from report.chromium import measure
-from report.first_screen import counts, departures
+from report.first_screen import counts, departures, words
 from report.hostile import hostile_case
 from report.test_page import Page
 
@@ -141,6 +142,34 @@ REPORTS = sorted(path.parent for path in (Path(__file__).parents[2] / "reports")
 def test_the_shipped_systems_reports_keep_to_it(folder: Path, tmp_path: Path) -> None:
     found = read_case(folder)
     assert departures(found, render_answers(found), tmp_path) == []
+
+
+def test_words_that_differ_are_told() -> None:
+    found = large_case()
+    assert words(found) == []
+    a = found.answers
+    assert a.weakest is not None
+    for bad in (
+        replace(a, next_weakest="the arm, 47 runs, 0 failed (at most 6.2 % fail)"),
+        replace(a, weakest=replace(a.weakest, words="300 cases, none failed (fewer than 1 % fail)")),
+        replace(a, weakened="weakened in 3 ways"),
+        replace(a, objects=""),
+    ):
+        assert words(replace(found, answers=bad)) != []
+
+
+def test_suppositions_stand_in_words_on_paper_or_with_the_page_that_has_them() -> None:
+    found = rover_case()
+    assert worded(found)
+    assert words(found) == []
+    one = found.suppositions[0]
+    many = tuple(replace(one, number=f"S{at}", says="It is so " * 8) for at in range(1, 40))
+    line = replace(found.answers.supposed[0], number="S1", others=tuple(s.number for s in many[1:]))
+    full = replace(found, suppositions=many, answers=replace(found.answers, supposed=(line,)))
+    assert not worded(full)
+    assert words(full) == []
+    assert "also S2 to S39, in words under" in render_answers(full)
+    assert pdf_data(full)["first"]["supposed"][0][2] == "also S2 to S39"
 
 
 def test_counts_that_differ_are_told() -> None:
