@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from helpers import some
 
 from avow.ros.launch import Launched, read_launch
 
@@ -267,3 +272,112 @@ def test_files_that_include_one_another_end(tmp_path: Path) -> None:
     text = '<launch><include file="$(dirname)/a.launch"/><include file="$(dirname)/a.launch"/></launch>'
     found = read(tmp_path, text)
     assert any("too deeply" in d.message or "more elements" in d.message for d in found.unread)
+
+
+@dataclass
+class World:
+    """ROS 2's launch context: nothing of it ends but with a scoped group."""
+
+    truths: tuple[bool, ...]
+    namespace: str = ""
+    remaps: list[tuple[str, str]] = field(default_factory=list)
+    values: dict[str, str] = field(default_factory=lambda: {"word": "plain"})
+    started: dict[str, tuple[str, tuple[tuple[str, str], ...]]] = field(default_factory=dict)
+
+    def run(self, actions: list[tuple]) -> None:  # type: ignore[type-arg]
+        for kind, condition, what in actions:
+            if condition is not None and not (condition if isinstance(condition, bool) else self.truths[condition[0]]):
+                continue
+            kept = self.namespace, list(self.remaps), dict(self.values)
+            match kind:
+                case "push":
+                    self.namespace += f"/{self.values['word']}_{what}"
+                case "remap":
+                    self.remaps.append((what, f"{what}_{self.values['word']}"))
+                case "let":
+                    self.values["word"] = what
+                case "node":
+                    self.started[what] = (f"{self.namespace}/{what}", tuple(self.remaps))
+                case "group" | "scoped" | "include":
+                    self.run(what)
+            if kind == "scoped":
+                self.namespace, self.remaps, self.values = kept
+
+
+def actions(rng: random.Random, names: Iterator[int], depth: int) -> list[tuple]:  # type: ignore[type-arg]
+    found = []
+    for _ in range(rng.randrange(2, 5)):
+        condition = rng.choice((None, None, None, True, False, (rng.randrange(2),)))
+        kind = rng.choice(("push", "remap", "let", "node", "node", "group", "scoped", "include"))
+        if kind in ("group", "scoped", "include"):
+            found.append((kind, condition, actions(rng, names, depth - 1) if depth else []))
+        else:
+            what = f"n{next(names)}" if kind == "node" else rng.choice("abc")
+            found.append((kind, condition, what))
+    return found
+
+
+def written(folder: Path, files: Iterator[int], actions: list[tuple]) -> str:  # type: ignore[type-arg]
+    lines = []
+    for kind, condition, what in actions:
+        when = f' if="$(env X{condition[0]})"' if isinstance(condition, tuple) else ""
+        when = f' if="{str(condition).lower()}"' if isinstance(condition, bool) else when
+        match kind:
+            case "push":
+                lines.append(f'<push-ros-namespace namespace="$(var word)_{what}"{when}/>')
+            case "remap":
+                lines.append(f'<set_remap from="{what}" to="{what}_$(var word)"{when}/>')
+            case "let":
+                lines.append(f'<let name="word" value="{what}"{when}/>')
+            case "node":
+                lines.append(f'<node pkg="p" exec="e" name="{what}"{when}/>')
+            case "group" | "scoped":
+                scoped = 'scoped="false"' if kind == "group" else ""
+                lines.append(f"<group {scoped}{when}>{written(folder, files, what)}</group>")
+            case _:
+                name = f"file{next(files)}.launch.xml"
+                (folder / name).write_text(f"<launch>{written(folder, files, what)}</launch>")
+                lines.append(f'<include file="$(dirname)/{name}"{when}/>')
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("seed", some(range(40), 10))
+def test_what_is_said_of_a_node_without_a_doubt_is_so_whatever_is_not_known(seed: int, tmp_path: Path) -> None:
+    """Groups whose scope does not end, included files, values, and conditions on the environment, against a run of the
+    same actions under each of the environments."""
+    rng = random.Random(seed)
+    sure = 0
+    for at in range(20):
+        made = actions(rng, itertools.count(), 3)
+        folder = tmp_path / str(at)
+        folder.mkdir()
+        body = written(folder, itertools.count(), made)
+        # the outermost file has now and then nothing that only ROS 2 has
+        top = folder / "top.launch.xml"
+        (folder / "all.launch.xml").write_text(f'<launch><let name="word" value="plain"/>{body}</launch>')
+        top.write_text(
+            '<launch><include file="$(dirname)/all.launch.xml"/></launch>'
+            if rng.random() < 0.5
+            else (f'<launch><let name="word" value="plain"/>{body}</launch>')
+        )
+        read = read_launch([(top, {})], folder)
+        worlds = [World(truths) for truths in itertools.product((True, False), repeat=2)]
+        for world in worlds:
+            world.run(made)
+        for one in read.nodes:
+            if one.name and not one.unread:
+                last = one.name.rpartition("/")[2]
+                assert {world.started.get(last) for world in worlds} == {(one.name, one.remaps)}, body
+                sure += 1
+        known = {one.name.rpartition("/")[2] for one in read.nodes}
+        always = set.intersection(*(set(world.started) for world in worlds))
+        assert always <= known or any(not one.name for one in read.nodes), body
+    assert sure > 10
+
+
+@pytest.mark.parametrize("name", ["a.launch", "a.launch.xml"])
+def test_arguments_that_remap_otherwise_are_a_doubt(name: str, tmp_path: Path) -> None:
+    word = "type" if name == "a.launch" else "exec"
+    text = f'<launch><remap from="scan" to="x"/><node pkg="p" {word}="e" name="n" args="scan:=y"/></launch>'
+    (node,) = read(tmp_path, text, name).nodes
+    assert "its arguments remap scan too" in node.unread

@@ -75,6 +75,17 @@ class _Scope:
     def inner(self) -> _Scope:
         return replace(self, args=dict(self.args), remaps=list(self.remaps))
 
+    def take(self, inner: _Scope, doubt: tuple[str, ...]) -> None:
+        """What stands in a scope that does not end holds from here on: its namespace, arguments and remappings.
+        `doubt`: that of the scope when it began; more than this one's where it may not be there at all."""
+        sure = doubt == self.doubt
+        changed = {name: value for name, value in inner.args.items() if self.args.get(name) != value}
+        self.args.update(changed if sure else dict.fromkeys(changed, Unread("; ".join(doubt))))
+        if sure or inner.doubt != doubt or inner.remaps != self.remaps:
+            self.doubt = inner.doubt
+        self.lost = inner.lost or (not sure and inner.namespace != self.namespace)
+        self.namespace, self.remaps = inner.namespace, inner.remaps
+
 
 _SILENT = frozenset(
     [
@@ -107,15 +118,17 @@ class _Reading:
     count: int = 0
     packages: dict[str, Path] | None = None
 
-    def file(self, path: Path, given: dict[str, Text], outer: _Scope | None) -> None:
+    def file(self, path: Path, given: dict[str, Text], outer: _Scope | None) -> bool:
+        """Whether it shares its includer's scope."""
         self.files[path] = None
         try:
             parsed = _parsed(path)
         except WrongLaunch as wrong:
             self.unread.append(Diagnostic("ROS120", f"{path.name}: {wrong}", place(str(path), wrong.line)))
-            return
+            return False
         self.unread += parsed.unread
         ros1 = path.suffix not in (".py", ".yaml", ".yml") and not _is_ros2(parsed.elements)
+        ros1 = ros1 and (outer is None or outer.ros1)
         if outer is None:
             scope = _Scope(path, ros1, 0, args={} if ros1 else dict(given), given=given)
         elif ros1:
@@ -126,6 +139,8 @@ class _Reading:
         self.each(parsed.elements, scope)
         if outer is not None and not ros1:
             outer.namespace, outer.lost, outer.remaps = scope.namespace, scope.lost, scope.remaps
+            outer.doubt = scope.doubt
+        return not ros1
 
     def each(self, elements: Iterable[Element], scope: _Scope) -> None:
         for element in elements:
@@ -144,11 +159,15 @@ class _Reading:
             case tag if tag in _NODES:
                 self.node(element, replace(scope, doubt=doubt))
             case "group":
-                inner = replace(scope.inner() if element.get("scoped") != "False" else scope, doubt=doubt)
+                inner = replace(scope.inner(), doubt=doubt)
                 self.push(element, inner, element.get("ns"))
                 self.each(element.children, inner)
+                ends = self.shown(element.get("scoped") or "true", scope).strip().lower()
+                if ends not in ("true", "1"):
+                    unsure = () if ends in ("false", "0") else ("whether a group's scope ends is not known",)
+                    scope.take(replace(inner, doubt=(*inner.doubt, *unsure)), (*doubt, *unsure))
             case "timer":
-                self.each(element.children, replace(scope, doubt=doubt))
+                self.each(element.children, replace(scope.inner(), doubt=doubt))
             case "load_composable_node":
                 inner = replace(scope, doubt=doubt)
                 self.each((e for e in element.children if e.tag == "composable_node"), inner)
@@ -229,7 +248,7 @@ class _Reading:
             )
 
     def include(self, element: Element, scope: _Scope, doubt: tuple[str, ...]) -> None:
-        inner = replace(scope.inner() if scope.ros1 else scope, doubt=doubt)
+        inner = replace(scope.inner(), doubt=doubt)
         given: dict[str, Text] = dict(scope.args) if element.get("pass_all_args") in ("true", "1") else {}
         for part in element.children:
             name, value = part.get("name"), part.get("value")
@@ -251,10 +270,8 @@ class _Reading:
             self.tell(element, f"there is no file {path}")
         elif scope.depth >= LAUNCH_DEPTH:
             self.tell(element, "files are included within one another too deeply")
-        else:
-            self.file(path, given, inner)
-            if not scope.ros1:
-                scope.namespace, scope.lost, scope.remaps = inner.namespace, inner.lost, inner.remaps
+        elif self.file(path, given, inner):
+            scope.take(inner, doubt)
 
     def node(self, element: Element, outer: _Scope) -> None:
         scope = outer.inner()
@@ -267,6 +284,10 @@ class _Reading:
         doubt += own.doubt
         name, rest = self.command_line(element, scope, doubt)
         remaps = [*scope.remaps, *rest, *own.remaps]
+        others = [*scope.remaps, *own.remaps]
+        doubt += [
+            f"its arguments remap {old} too" for old, new in rest if any(o == old and n != new for o, n in others)
+        ]
         if scope.ros1:
             remaps = list(dict(remaps).items())
         whole = ""
