@@ -259,13 +259,12 @@ class Monitor:
         assert self._pairing is not None
         values = {**self.values, **watched.memory} if watched.held else self.values
         own = [n for n in (*watched.names, *self._assumed) if n not in self._paired]
-        if any(n not in values or n in self._supposed for n in watched.names if n not in self._paired):
-            watched.tally.early += 1
-            return
+        early = any(n not in values or n in self._supposed for n in watched.names if n not in self._paired)
+        watched.tally.early += early
         known = {n: values[n] for n in own if n in values}
         inputs = tuple(dict.fromkeys((*watched.paired, *(n for n in self._assumed if n in self._paired))))
         inputs = tuple(n for n in inputs if n in watched.paired or n in self._pairing.seen)
-        self._pairing.ask(watched, event, self.events, known, inputs)
+        self._pairing.ask(watched, event, self.events, known, inputs, waits=not early)
 
     def _settle(self, ready: Iterable[tuple[Asked, list[dict[str, Value]] | str]], found: list[Violation]) -> None:
         for asked, cases in ready:

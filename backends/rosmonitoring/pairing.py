@@ -83,13 +83,16 @@ class Pairing:
             known.popleft()
 
     def ask(
-        self, about: Any, event: Mapping[str, Any], index: int, values: dict[str, Value], inputs: tuple[str, ...]
-    ) -> None:
+        self, about: Any, event: Mapping[str, Any], index: int, values: dict[str, Value], inputs: tuple[str, ...],
+        *, waits: bool = True,
+    ) -> None:  # fmt: skip
+        """An answer has come. One that does not wait to be judged counts among the others all the same."""
         count = self.asked[id(about)][0] + 1 if id(about) in self.asked else 1
         key = count if self.answers.by == "order" else self._key(event, self.answers.output)
         asked = Asked(about, event, index, values, inputs, time_of(event), key)
         self.asked[id(about)] = count, asked
-        self.waiting.append(asked)
+        if waits:
+            self.waiting.append(asked)
 
     def uneven(self) -> str:
         """By order: why the k-th answer need not be that to the k-th message of an input; empty where it is. What

@@ -248,6 +248,37 @@ def test_the_kth_answer_is_held_against_the_kth_input(seed: int, make_system: Ca
     assert all(tally.decided == 60 for name, tally in tallies.items() if name != "positive")
 
 
+MEMORY = """
+node n {
+  inputs( r : REAL, last : REAL )
+  outputs( s : REAL )
+  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 s matches(out.s) )
+  guarantee same ( out.s == in.r or (in.last > 1000) )
+}
+"""
+
+
+@pytest.mark.parametrize("initial", [{}, {"initial": 0}])
+@pytest.mark.parametrize("seed", range(4))
+def test_an_answer_that_is_not_judged_is_counted(
+    seed: int, initial: dict[str, Any], make_system: Callable[..., System]
+) -> None:
+    """The first, where the step before is not known: the second is still the answer to the second input."""
+    rng = random.Random(seed)
+    values = [float(rng.randrange(900)) for _ in range(30)]
+    wrong = frozenset(rng.sample(range(1, 29), 3))
+    events: list[Event] = []
+    for k, value in enumerate(values):
+        pair = [("r", value), ("s", value + 0.5 * (k in wrong))]
+        for topic, told in reversed(pair) if k == 29 or rng.random() < 0.3 else pair:
+            events.append({"topic": topic, "time": len(events), "data": told})
+    mapping = {"in.r": "data", "out.s": "data", "in.last": {"previous": "out.s", **initial}}
+    violations, tallies = judge(make_system(MEMORY, mapping, answers=ORDER), events)
+    answers = [index for index, event in enumerate(events, start=1) if event["topic"] == "s"]
+    assert sorted(v.index for v in violations) == [answers[k] for k in sorted(wrong)]
+    assert tallies["same"].early == (not initial)
+
+
 @pytest.mark.parametrize(
     ("lost", "topic", "fine"),
     [(20, "r", False), (20, "s", False), (0, "r", False), (59, "r", False), (59, "s", True)],
