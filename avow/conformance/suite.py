@@ -24,6 +24,7 @@ from avow.language.sorts import BOOL
 from avow.language.terms import TRUE, And, History, Not, Past
 from avow.pipeline.evidence_keys import surroundings
 from avow.pipeline.work import method_job
+from avow.solving.smtlib import end_cvc5
 from avow.system.plan import System
 from avow.tuning.running import CONFORMANCE_PATIENCE
 
@@ -369,7 +370,9 @@ def _tree(folder: Path) -> dict[str, bytes]:
 
 
 def _children() -> set[int]:
-    """The processes that this one started and that still run; none where the system does not tell."""
+    """The processes that this one started and that still run; none where the system does not tell. The second solver's
+    is the pipeline's own, which keeps it for the next question: it is ended first."""
+    end_cvc5()
     if sys.platform != "linux":
         return set()
     found = set()

@@ -90,3 +90,8 @@ def ask_cvc5(script: str, *, effort: int = QUESTION_EFFORT) -> str | None:
 
 
 _cvc5 = Answering("avow.solving.cvc5_process")
+
+
+def end_cvc5() -> None:
+    """End the process that answers for it; the next question starts another."""
+    _cvc5.close()

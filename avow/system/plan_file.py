@@ -18,6 +18,7 @@ from avow.base.files import digest, read_regular
 from avow.base.verdict import unsaid
 from avow.ros.launch import Launched
 from avow.system.launched import read_launched
+from avow.system.methods_plan import read_methods
 from avow.system.paths import inside
 from avow.system.plan import (
     ComposeGoal,
@@ -27,7 +28,6 @@ from avow.system.plan import (
     EnvironmentInput,
     Finding,
     Located,
-    Method,
     NodePlan,
     Picture,
     Plan,
@@ -49,8 +49,6 @@ from avow.system.tables import domain, interpretation, plain, read_csv, read_row
 
 RESERVED = ("interpret", "domains", "steps")
 """Keys of `scenario` that are not tables."""
-
-_METHOD_ID = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,60}\Z")
 
 
 def read_plan(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...]]:
@@ -392,16 +390,11 @@ class _PlanReader:
     def nodes(self) -> Iterator[NodePlan]:
         for name, piece in self.entries("nodes"):
             criticality, title = piece.at("criticality"), piece.at("title")
-            used: set[str] = set()
-            methods: list[Method] = []
-            methods_piece = piece.at("methods")
-            for item in (methods_piece.items or []) if methods_piece else []:
-                method = self.method(name, item, used)
-                if method is not None:
-                    methods.append(method)
+            methods, faults = read_methods(name, piece)
+            self.faults += faults
             level = criticality.text if criticality else "medium"
             words = " ".join(title.text.split()) if title else ""
-            yield NodePlan(name, level, tuple(methods), piece.span, words, self.source(name, piece))
+            yield NodePlan(name, level, methods, piece.span, words, self.source(name, piece))
 
     def source(self, name: str, piece: Piece) -> Source | None:
         found, faults = read_source(name, piece)
@@ -410,46 +403,6 @@ class _PlanReader:
             path = self.resolve(part)
             _ = path is not None and self.present(part, path)
         return found
-
-    def method(self, node: str, item: Piece, used: set[str]) -> Method | None:
-        if item.entries is None:
-            backend, options = item.text, Piece(item.span, entries={})
-        else:
-            backend, options = next(iter(item.entries.items()))
-            if options.value is None and options.entries is None and options.items is None and not options.text:
-                options = Piece(options.span, entries={})
-        if options.entries is None and (options.items is not None or not isinstance(options.value, str)):
-            # A bare text (`review: reviews/x.yaml`) is for the backend's own schema to take or refuse.
-            self.fault("PLAN105", f"nodes.{node}: the options of {backend!r} must be a mapping", options.span)
-            return None
-        if not _METHOD_ID.match(backend):
-            self.fault("PLAN105", f"nodes.{node}: {backend!r} cannot be a backend's name", item.span)
-            return None
-        given = options.at("id")
-        name = given.text if given is not None else backend
-        if given is not None and (not _METHOD_ID.match(name) or name in used):
-            why = "is used twice" if name in used else "must be a word"
-            self.fault("PLAN110", f"nodes.{node}: the method's id {name!r} {why}", given.span)
-        number = 2
-        while name in used:
-            name = f"{backend}-{number}"
-            number += 1
-        used.add(name)
-        return Method(name, backend, options.located(), self.taken_on(node, name, options.at("guarantees")))
-
-    def taken_on(self, node: str, method: str, piece: Piece | None) -> tuple[str, ...]:
-        """The clauses that a method names; none where the plan does not say, which stands for all of the node's."""
-        if piece is None:
-            return ()
-        where = f"nodes.{node}: {method}: guarantees"
-        names = [part.text for part in piece.items] if piece.items is not None else [piece.text]
-        if not names or not all(names) or piece.entries is not None:
-            hint = "leave the key out for all of the node's guarantees, or the method for none"
-            self.fault("PLAN105", f"{where}: names of guarantees are wanted, one at least", piece.span, hint)
-        for index, name in enumerate(names):
-            if name in names[:index] and piece.items is not None:
-                self.fault("PLAN105", f"{where}: {name!r} stands there twice", piece.items[index].span)
-        return tuple(names)
 
     def findings(self, key: str) -> Iterator[Finding]:
         for piece in self.items(key):
