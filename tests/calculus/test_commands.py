@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 from jsonschema import Draft202012Validator
 
+from avow.base.diagnostics import Rejected
 from avow.base.process import run
 from avow.base.verdict import Verdict
 from avow.calculus import discharge as discharging
@@ -113,6 +114,14 @@ def test_compose_other_outputs(tmp_path: Path) -> None:
     assert invoke(compose_command, str(tmp_path), "--latex")[1].startswith("\\textbf{R1 (whole)}")
     assert "← x of a" in invoke(graph_command, str(tmp_path), "--flow")[1]
     assert "guarantee b_G1" in invoke(compose_command, str(tmp_path), "--rcl")[1]
+
+
+def test_no_contract_is_derived_of_nodes_that_remember(tmp_path: Path) -> None:
+    make(tmp_path, node("a", "e : BOOL", "x : BOOL", "G: out.x == previous(in.e, FALSE)"))
+    with pytest.raises(Rejected) as told:
+        invoke(compose_command, str(tmp_path), "--rcl")
+    (fault,) = told.value.diagnostics
+    assert (fault.code, fault.message.split(" (")[0]) == ("PLAN135", "a.G1 speaks of other steps")
 
 
 def test_simulate(tmp_path: Path) -> None:

@@ -236,7 +236,7 @@ class TestReview(Conformance):
             both(Verdict.REVIEWED),
             {"review.yaml": RECORD.replace("CONCLUSION", "accepted"), "code.py": "pass\n"},
             SCENARIO,
-            stamped,
+            prepare=stamped,
         ),
         Seeded(
             "rejected",

@@ -104,7 +104,7 @@ def test_dafny_accepts_what_is_written(place: Path, capsys: pytest.CaptureFixtur
 def test_wrong_notations_and_nodes(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, _, said = run("translate --to coq s", capsys)
     assert code == 2
-    assert "known: dafny, json, latex, rcl, rml, smtlib, text, unicode" in said
+    assert "known: dafny, fretish, json, latex, rcl, rml, smtlib, text, unicode" in said
     for notation in ("rml", "text"):
         code, _, said = run(f"translate --to {notation} --node q s", capsys)
         assert code == 2

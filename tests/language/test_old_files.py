@@ -131,7 +131,6 @@ SLIPS = [
     # ports and topics
     (node(inputs="r : real, s : bool, t : float64, u : Nat, st : Stat"),
      ["did you mean `REAL`?", "did you mean `BOOL`?", "did you mean `REAL`?", "did you mean `NATURAL`?"]),
-    (node(inputs="r, q : REAL, st : Stat"), ["a : REAL, b : REAL"]),
     (node(inputs="r : REAL; st : Stat"), ["separate them by commas"]),
     (node(inputs="r : Missing, st : Stat"), ["check this file with the one that declares it"]),
     (node(topics="std_msgs.Bool o matches(out.o)"), ["`std_msgs/…`"]),

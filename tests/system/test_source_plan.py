@@ -8,6 +8,7 @@ import pytest
 
 from avow.base.diagnostics import Rejected
 from avow.system.load import load_system
+from avow.system.parameters import parameters
 from avow.system.plan import Numbers, Source
 
 CONTRACT = """node watchdog { inputs( now : REAL, beat : BOOL, last : REAL, f : REAL --> REAL )
@@ -62,3 +63,10 @@ def test_faults(node: str, code: str, words: str, tmp_path: Path) -> None:
     with pytest.raises(Rejected) as caught:
         load(tmp_path, node)
     assert any(d.code == code and words in d.message for d in caught.value.diagnostics), caught.value.diagnostics
+
+
+@pytest.mark.parametrize("text", ["[1, 2]\n", "timeout: off\n", "timeout: 1:30\n"])
+def test_parameters_that_are_no_plain_mapping(text: str, tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text(text)
+    _, faults = parameters(tmp_path, Source("src.py", "Watchdog", "", "p.yaml", Numbers.FLOAT64, {}))
+    assert {d.code for d in faults} == {"PLAN130"}

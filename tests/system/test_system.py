@@ -240,7 +240,7 @@ def test_properties(tmp_path: Path, text: str, shown: str | None) -> None:
 
 
 def test_words_that_only_look_like_operators(tmp_path: Path) -> None:
-    text = "context { T : {next, until, always}; }\n" + node("a", "", "t : T, next : BOOL")
+    text = "context { T : {next, eventually, always}; }\n" + node("a", "", "t : T, next : BOOL")
     contract = make(tmp_path, text).contract
     assert isinstance(parse_property("a.t == next", contract), State)
     found = parse_property("next a.next", contract)
