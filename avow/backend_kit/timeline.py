@@ -241,7 +241,7 @@ def in_words(timeline: Timeline) -> str:
     ]
     part = f"; signals of one event in {timeline.every}, marks of all" if timeline.every > 1 else ""
     whole = f"{timeline.name}, {count(timeline.events, 'event')}{part}"
-    return f"{whole}: {'; '.join(told) or 'nothing broken'}"
+    return f"{whole}: {'; '.join(told) or 'no finding'}"
 
 
 def _height(lane: Lane) -> int:

@@ -119,7 +119,7 @@ TIMELINE_COLUMNS = 128
 """Columns of a run's timeline: some five points of a picture each. A power of two: columns are joined in pairs."""
 
 TIMELINE_PORTS = 12
-"""Ports of one timeline that have a lane; clauses with a finding always have one."""
+"""Ports of one timeline that have a lane; clauses and ports with a finding always have one."""
 
 TIMELINES = 4
 """Timelines of one guarantee in its evidence, those with a finding first."""

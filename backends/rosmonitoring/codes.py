@@ -81,7 +81,7 @@ CODES = register(
     declare(
         "MON301",
         "serving not installed",
-        "Serving an oracle needs a package that is not installed.",
+        "Serving an oracle, listening to rosbridge, or writing an MCAP needs a package that is not installed.",
         "`pip install 'avow[monitor]'`.",
     ),
     declare(
@@ -94,7 +94,7 @@ CODES = register(
         "MON304",
         "cannot be written",
         "A file that was to be written cannot be.",
-        "Correct the path of `--record` or `--configuration`.",
+        "Correct the path of `--record`, `--timeline`, `--mcap` or `--configuration`.",
     ),
     declare("MON302", "cannot listen", "The port is taken or not allowed.", "Choose another with `--serve`."),
 )

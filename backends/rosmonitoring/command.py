@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sys
+from contextlib import ExitStack
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
 
     from avow.system.plan import System
 
+    from .engine import Monitor
     from .lanes import Marks
+    from .mcap_file import Recorder
     from .session import Session
     from .watched import Violation
 
@@ -46,6 +49,9 @@ if TYPE_CHECKING:
     "--timeline", type=click.Path(path_type=Path), help="Draw signals and violations there, as SVG (live: of --record)."
 )
 @click.option(
+    "--mcap", type=click.Path(path_type=Path), help="Write verdicts and margins there, for Foxglove and PlotJuggler."
+)
+@click.option(
     "--configuration", type=click.Path(path_type=Path), help="Write ROSMonitoring's configuration of all nodes there."
 )
 @click.option("--serve", "port", type=click.IntRange(0, 65535), help="Answer ROSMonitoring's monitors on this port.")
@@ -61,6 +67,7 @@ def command(
     record: Path | None,
     verdicts: str | None,
     timeline: Path | None,
+    mcap: Path | None,
     configuration: Path | None,
     port: int | None,
 ) -> int:
@@ -74,6 +81,11 @@ def command(
     from avow.system.load import load_system
 
     loaded = load_system(system_folder(system))
+    telling = _Telling(as_json, show_all, timeline, mcap)
+    files = [path.resolve() for path in (record, timeline, mcap, configuration) if path is not None]
+    files += [Path(trace).resolve()] if trace is not None and trace != "-" else []
+    if len(set(files)) < len(files):
+        raise click.UsageError("two of the files are one: what it holds would be lost")
     if configuration is not None:
         _configure(loaded, nodes, configuration)
         return 0
@@ -82,17 +94,21 @@ def command(
             raise click.UsageError("give a TRACE, --live or --serve")
         if timeline is not None and record is None:
             raise click.UsageError("with --live, --timeline needs --record: it is drawn from the record")
-        return _live(loaded, nodes, live, (seconds, host, record, verdicts), _Telling(as_json, show_all, timeline))
+        if record is not None and record.suffix in (".mcap", ".bag", ".db3"):
+            raise click.UsageError(
+                f"--record writes JSON lines, not {record.suffix}; --mcap writes verdicts and margins"
+            )
+        return _live(loaded, nodes, live, (seconds, host, record, verdicts), telling)
     if timeline is not None and trace in (None, "-"):
         raise click.UsageError("--timeline needs a TRACE that can be read twice: a file, or a folder")
     if port is not None:
-        if trace is not None:
-            raise click.UsageError("give a TRACE or --serve, not both")
+        if trace is not None or mcap is not None:
+            raise click.UsageError("give a TRACE or --serve, not both; --mcap is of a TRACE or --live")
         _serve(loaded, nodes, port)
         return 0
     if trace is None:
         raise click.UsageError("give a TRACE, or --serve PORT")
-    return _judge(loaded, nodes, trace, _Telling(as_json, show_all, timeline))
+    return _judge(loaded, nodes, trace, telling)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +118,15 @@ class _Telling:
     as_json: bool
     show_all: bool
     timeline: Path | None
+    mcap: Path | None
+
+    @property
+    def monitor(self) -> type[Monitor]:
+        """Those that judge."""
+        from .engine import Monitor
+        from .judged import Telling
+
+        return Monitor if self.mcap is None else Telling
 
 
 def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
@@ -128,7 +153,7 @@ def _live(
     from .session import session
 
     seconds, host, record, verdicts = how
-    running = session(system, nodes)
+    running = session(system, nodes, make=telling.monitor)
     found = follow(running, graph_of(graph, running.topics, host), seconds, record, verdicts, _warn)
 
     def until_interrupted() -> Iterator[tuple[int, Violation]]:
@@ -149,8 +174,8 @@ def _warn(text: str) -> None:
 def _judge(system: System, nodes: tuple[str, ...], trace: str, telling: _Telling) -> int:
     from .session import session
 
-    running = session(system, nodes, None if trace == "-" else Path(trace))
-    return _told(running, _violations(running, trace), trace, telling)
+    running = session(system, nodes, None if trace == "-" else Path(trace), telling.monitor)
+    return _told(running, _violations(running, trace, telling.mcap is None), trace, telling)
 
 
 def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: str, telling: _Telling) -> int:
@@ -162,15 +187,19 @@ def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: 
     shown: list[dict[str, Any]] = []
     count = 0
     marks = Marks()
-    for line, violation in violations:
-        count += 1
-        marks.note(violation)
-        if not telling.show_all and count > VIOLATIONS_SHOWN:
-            continue
-        if telling.as_json:
-            shown.append({**violation_json(violation), "line": line})
-        else:
-            click.echo(violation.text())
+    with ExitStack() as stack:
+        recorder = None if telling.mcap is None else stack.enter_context(_recorder(running, telling.mcap))
+        for line, violation in violations:
+            count += 1
+            marks.note(violation)
+            if recorder is not None:
+                recorder.found(violation)
+            if not telling.show_all and count > VIOLATIONS_SHOWN:
+                continue
+            if telling.as_json:
+                shown.append({**violation_json(violation), "line": line})
+            else:
+                click.echo(violation.text())
     if telling.timeline is not None:
         _draw(running, Path(trace), marks, telling.timeline)
     if telling.as_json:
@@ -182,6 +211,18 @@ def _told(running: Session, violations: Iterator[tuple[int, Violation]], trace: 
             click.echo(f"… and {count - VIOLATIONS_SHOWN} more (--all shows them)")
         _print_summary(running)
     return 0 if running.clean and _anything_judged(running) and not running.unmonitored() else 1
+
+
+def _recorder(running: Session, path: Path) -> Recorder:
+    """An MCAP that hears each judgement. Raises Rejected."""
+    from .judged import Telling
+    from .mcap_file import Recorder
+
+    recorder = Recorder(path)
+    for monitor in running.monitors:
+        if isinstance(monitor, Telling):
+            monitor.tell = recorder.judged
+    return recorder
 
 
 def _draw(running: Session, trace: Path, marks: Marks, path: Path) -> None:
@@ -208,10 +249,11 @@ def _write(path: Path, text: str) -> None:
         raise Rejected(Diagnostic("MON304", f"{path} cannot be written: {error.strerror}")) from None
 
 
-def _violations(running: Session, trace: str) -> Iterator[tuple[int, Violation]]:
-    """With the line of the event at which each was found; the last line's where it took the whole run."""
+def _violations(running: Session, trace: str, fast: bool) -> Iterator[tuple[int, Violation]]:
+    """With the line of the event at which each was found; the last line's where it took the whole run. `fast`: only
+    what was found is asked for, not each judgement."""
     if trace != "-":
-        yield from running.run(Path(trace))
+        yield from running.run(Path(trace)) if fast else running.one_by_one(Path(trace))
         return
     from avow.base.diagnostics import Diagnostic, Rejected
 

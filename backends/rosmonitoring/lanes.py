@@ -24,6 +24,7 @@ from avow.language.sorts import IntegerSort, NaturalSort, RealSort, Sort
 from avow.tuning.shown import TIMELINE_PORTS
 
 from .bags import Origin, is_bag
+from .judged import as_float
 from .options import Setup, same_topic
 from .reading import Reader, reader
 from .rules import Choice, Fields, heard_through
@@ -124,10 +125,7 @@ def timeline(
 
 def _said(value: Value, sort: Sort) -> tuple[float, float] | str:
     if isinstance(sort, RealSort | IntegerSort | NaturalSort):
-        try:
-            number = float(value)  # type: ignore[arg-type]
-        except OverflowError:
-            number = 1e308 if value > 0 else -1e308  # type: ignore[operator]
+        number = as_float(value)  # type: ignore[arg-type]
         return number, number
     text = show(value)
     return text if len(text) <= WORD_LENGTH else text[: WORD_LENGTH - 1] + "…"

@@ -17,7 +17,7 @@ from .blame import Blame
 from .compiled import Compiled
 from .coverage import Tally
 from .engine import Monitor
-from .options import NAME, known_types, origin, readable, same_topic, setup
+from .options import NAME, Setup, known_types, origin, readable, same_topic, setup
 from .traces import read_trace
 from .watched import Fault, Violation
 
@@ -53,6 +53,16 @@ class Session:
         self.events += count
         if topic and not self.listens(topic):
             self.unheard[topic] = self.unheard.get(topic, 0) + count
+
+    def one_by_one(self, path: Path) -> Iterator[tuple[int, Violation]]:
+        """As `run`, by the engine alone: no event is passed over as being like another."""
+        line = 0
+        for recorded in read_trace(path, origin(self.system), self.listens):
+            line = recorded.line
+            for violation in self.step(recorded.event):
+                yield line, violation
+        for violation in self.finish():
+            yield line, violation
 
     def run(self, path: Path) -> Iterator[tuple[int, Violation]]:
         """Judge a whole trace: what was found, each with the line (0 in a bag) of its event. Raises Rejected."""
@@ -175,7 +185,12 @@ def _asked(kind: ClauseKind, tally: Tally) -> int:
     return tally.asked - (tally.early if kind is ClauseKind.ASSUMPTION else 0)
 
 
-def session(system: System, nodes: Sequence[str] = (), trace: Path | None = None) -> Session:
+def session(
+    system: System,
+    nodes: Sequence[str] = (),
+    trace: Path | None = None,
+    make: Callable[[Setup], Monitor] = Monitor,
+) -> Session:
     """Monitors for the named nodes, by default all, with the plan's mappings; where `trace` is a bag, also by what it
     says of its messages. Raises Rejected."""
     known = {node.name: node for node in system.contract.nodes if not node.relay}  # wiring says nothing itself
@@ -190,7 +205,7 @@ def session(system: System, nodes: Sequence[str] = (), trace: Path | None = None
         faults += problems
         faults += readable(found, trace, origin(system)) if trace is not None and not problems else ()
         if not problems:
-            monitors.append(Monitor(found))
+            monitors.append(make(found))
     if faults:
         raise Rejected(*faults)
     planned = [n.node for n in system.plan.nodes if any(m.backend == NAME for m in n.methods)]

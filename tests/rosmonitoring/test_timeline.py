@@ -118,7 +118,7 @@ def test_evidence_has_a_timeline_of_what_each_guarantee_reads(tmp_path: Path) ->
     assert found["slows"].lanes[2].stretches == (Stretch(2, 29, "fast"),)
     assert (found["slows"].events, found["slows"].start, found["slows"].end) == (30, "0", "2.9")
     assert in_words(found["bounded"]) == "run.jsonl, 30 events: bounded: broken 1 time, first at event 15 (t = 1.4)"
-    assert in_words(found["slows"]) == "run.jsonl, 30 events: nothing broken"
+    assert in_words(found["slows"]) == "run.jsonl, 30 events: no finding"
 
 
 def test_silence_and_broken_assumptions_have_marks(tmp_path: Path) -> None:

@@ -1,0 +1,160 @@
+"""A monitor that tells each judgement as it is made, with its margin: for those who plot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from avow.evaluation.evaluate import NotEvaluable, compile_term
+from avow.formulas.values import Value
+from avow.language.sorts import IntegerSort, NaturalSort, RealSort
+from avow.language.terms import And, Compare, Term
+
+from .coverage import Tally
+from .engine import Monitor
+from .pairing import Asked, time_of
+from .watched import Fault, Violation, Watched
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """Of one clause at one event: `held`, `broken`, `excused` (broken, with an assumption broken), `undecided`, or
+    `unpaired` (undecided which input was answered). `margin`: see `margin_of`."""
+
+    node: str
+    clause: str
+    event: int
+    time: Fraction
+    verdict: str
+    margin: float | None
+
+
+Margin = Callable[[Mapping[str, Value]], float | None]
+
+
+class Telling(Monitor):
+    """The engine itself; `tell` gets each judgement."""
+
+    tell: Callable[[Judgement], None] = staticmethod(lambda judgement: None)
+
+    def __post_init__(self) -> None:
+        self._margins: dict[str, Margin | None] = {}
+        self._cases: list[float] = []
+        self._now = Fraction(0)
+        Monitor.__post_init__(self)
+
+    def step(self, event: Mapping[str, Any]) -> list[Violation]:
+        self._now = time_of(event)
+        return Monitor.step(self, event)
+
+    def _judge(self, watched: Watched, event: Mapping[str, Any], found: list[Violation]) -> None:
+        held = {n for n, _ in watched.held}
+        values = {**{n: v for n, v in self.values.items() if n not in held}, **watched.memory}
+        before = replace(watched.tally)
+        Monitor._judge(self, watched, event, found)
+        self._tell(watched, before, self.events, self._now, self._margin(watched, values))
+
+    def _judge_part(
+        self, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any], found: list[Violation]
+    ) -> None:
+        before = replace(watched.tally)
+        Monitor._judge_part(self, watched, values, event, found)
+        self._tell(watched, before, self.events, self._now, None)
+
+    def _verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
+        margin = self._margin(watched, values)
+        self._cases += [] if margin is None else [margin]
+        return Monitor._verdict(self, watched, values)
+
+    def _settle(self, ready: Iterable[tuple[Asked, list[dict[str, Value]] | str]], found: list[Violation]) -> None:
+        for one in ready:
+            asked, cases = one
+            watched: Watched = asked.about
+            before, self._cases = replace(watched.tally), []
+            Monitor._settle(self, [one], found)
+            whole = not isinstance(cases, str) and len(self._cases) == len(cases)
+            margin = min(self._cases) if whole and self._cases else None
+            self._tell(watched, before, asked.index, time_of(asked.event), margin)
+
+    def _margin(self, watched: Watched, values: Mapping[str, Value]) -> float | None:
+        name = watched.clause.name
+        if name not in self._margins:
+            self._margins[name] = margin_of(watched.clause.formula)
+        margin = self._margins[name]
+        return None if margin is None or any(n not in values for n in watched.names) else margin(values)
+
+    def _tell(self, watched: Watched, before: Tally, event: int, time: Fraction, margin: float | None) -> None:
+        verdict = _verdict_between(before, watched.tally)
+        if verdict:
+            self.tell(Judgement(self.setup.node.name, watched.clause.name, event, time, verdict, margin))
+
+
+def _verdict_between(before: Tally, after: Tally) -> str:
+    """What was judged, by what was counted; empty where nothing was."""
+    if after.excused > before.excused:
+        return "excused"
+    if after.broken > before.broken:
+        return "broken"
+    if after.undecided > before.undecided:
+        return "undecided"
+    if after.order > before.order:
+        return "unpaired"
+    return "held" if after.judged > before.judged else ""
+
+
+def margin_of(formula: Term) -> Margin | None:
+    """How far a comparison of numbers is from being broken, negative where it is: of ``a <= b`` and ``a < b``, b - a;
+    of ``a == b``, minus their distance; of ``a != b``, their distance; of a conjunction, the least. None of any other
+    formula. At 0 the operator decides."""
+    match formula:
+        case And(items=items):
+            parts = [margin_of(item) for item in items]
+            known = [part for part in parts if part is not None]
+            if len(known) < len(parts):
+                return None
+            return lambda values: _least([part(values) for part in known])
+        case Compare(operator=operator, left=left, right=right) if isinstance(
+            left.sort, RealSort | IntegerSort | NaturalSort
+        ):
+            try:
+                one, other = compile_term(left), compile_term(right)
+            except NotEvaluable:
+                return None
+            return lambda values: _distance(operator, one, other, values)
+        case _:  # nothing with a threshold
+            return None
+
+
+def _least(found: list[float | None]) -> float | None:
+    known = [one for one in found if one is not None]
+    return min(known) if known and len(known) == len(found) else None
+
+
+def _distance(
+    operator: str, one: Callable[[Mapping[str, Value]], Value], other: Callable[[Mapping[str, Value]], Value],
+    values: Mapping[str, Value],
+) -> float | None:  # fmt: skip
+    try:
+        difference = Fraction(other(values)) - Fraction(one(values))  # type: ignore[arg-type]
+    except NotEvaluable:
+        return None
+    match operator:
+        case "<=" | "<":
+            margin = difference
+        case ">=" | ">":
+            margin = -difference
+        case "==":
+            margin = -abs(difference)
+        case _:  # !=
+            margin = abs(difference)
+    return as_float(margin)
+
+
+def as_float(number: Fraction | int) -> float:
+    """The nearest one, or the largest."""
+    try:
+        return float(number)
+    except OverflowError:
+        return 1e308 if number > 0 else -1e308
