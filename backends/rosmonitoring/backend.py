@@ -233,7 +233,7 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
                 break
         run.note(monitor.finish())
         if monitor.events:
-            run.heard = signals([monitor.setup], path, where, monitor.events, monitor.listens)
+            run.heard = signals([monitor.setup], path, where, monitor.events, run.marks, monitor.listens)
     except Rejected as error:
         # by the plan's name for it: where the folder lies on this machine is no part of what was found
         told = ((f"{name}, line {d.span.line}" if d.span else name, d.message) for d in error.diagnostics)

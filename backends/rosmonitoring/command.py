@@ -233,7 +233,7 @@ def _draw(running: Session, trace: Path, marks: Marks, path: Path) -> None:
     from .options import origin
 
     setups = [monitor.setup for monitor in running.monitors]
-    heard = signals(setups, trace, origin(running.system), running.events, running.listens)
+    heard = signals(setups, trace, origin(running.system), running.events, marks, running.listens)
     clauses = [(setup, clause) for setup in setups for clause in setup.node.guarantees]
     drawn = timeline(trace.name, running.events, heard, marks, clauses, lambda node, name: f"{node}.{name}")
     _write(path, f"{picture(drawn, alone=True)}\n")

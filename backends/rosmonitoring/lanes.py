@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -56,6 +56,10 @@ class Marks:
         mark = Mark(kind, at, at, 1, violation.time)
         columns.setdefault(kind, Columns(joined_marks)).put(at, mark)
 
+    def events(self) -> frozenset[int]:
+        """Where they begin."""
+        return frozenset(mark.first for kinds in self.found.values() for c in kinds.values() for mark in c.items())
+
     def of(self, node: str, name: str) -> tuple[Mark, ...]:
         return tuple(mark for columns in self.found.get((node, name), {}).values() for mark in columns.items())
 
@@ -70,8 +74,11 @@ class Signals:
     every: int
 
 
-def signals(setups: Iterable[Setup], path: Path, where: Origin, events: int, listens: Callable[[str], bool]) -> Signals:
-    """Read a trace of so many events once more, for its values; `listens` as when it was judged. Raises Rejected."""
+def signals(
+    setups: Iterable[Setup], path: Path, where: Origin, events: int, marks: Marks, listens: Callable[[str], bool]
+) -> Signals:
+    """Read a trace of so many events once more, for its values; `listens` as when it was judged. Of a long one, about
+    one event in so many is read, and those where the marks begin. Raises Rejected."""
     every = max(1, -(-events // TIMELINE_EVENTS))
     readers: dict[str, list[tuple[tuple[str, str], Sort, Reader]]] = {}
     for setup in setups:
@@ -81,7 +88,7 @@ def signals(setups: Iterable[Setup], path: Path, where: Origin, events: int, lis
                 readers.setdefault(same_topic(rule.topic), []).append(one)
     found: dict[tuple[str, str], Columns[Stretch]] = {}
     start = end = ""
-    for index, recorded in _sampled(path, where, every, listens):
+    for index, recorded in _sampled(path, where, every, marks.events(), listens):
         if index > events:
             break
         end = time_text(recorded.event.get("time"))
@@ -131,11 +138,13 @@ def _said(value: Value, sort: Sort) -> tuple[float, float] | str:
     return text if len(text) <= WORD_LENGTH else text[: WORD_LENGTH - 1] + "…"
 
 
-def _sampled(path: Path, where: Origin, every: int, listens: Callable[[str], bool]) -> Iterator[tuple[int, Recorded]]:
-    """About one event in so many, each with its number among all."""
+def _sampled(
+    path: Path, where: Origin, every: int, marked: Set[int], listens: Callable[[str], bool]
+) -> Iterator[tuple[int, Recorded]]:
+    """About one event in so many, and those that are marked, each with its number among all."""
     if is_bag(path):
         for recorded in read_trace(path, where, listens):
-            if _chosen(recorded.index, every):
+            if _chosen(recorded.index, every) or recorded.index in marked:
                 yield recorded.index, recorded
         return
     index = 0
@@ -145,7 +154,7 @@ def _sampled(path: Path, where: Origin, every: int, listens: Callable[[str], boo
         for line in file:
             if line and not line.isspace():
                 index += 1
-                if _chosen(index, every):
+                if _chosen(index, every) or index in marked:
                     yield line
 
     try:

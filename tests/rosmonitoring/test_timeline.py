@@ -143,7 +143,7 @@ def test_of_a_long_run_signals_are_sampled_and_no_finding_is_lost(
     assert found.every == 30
     assert sum(m.number for m in found.lanes[0].marks) == 3
     assert [m.first for m in found.lanes[0].marks] == [501, 1002, 3000]
-    assert found.lanes[1].stretches
+    assert 11.0 in {high for s in found.lanes[1].stretches if not isinstance(s.said, str) for _, high in [s.said]}
     assert "signals of one event in 30, marks of all" in in_words(found)
 
 
