@@ -31,7 +31,7 @@ from avow.formulas.conditions import conditions
 from avow.formulas.formula import conjunction, digest, sort_digest
 from avow.language.contract import Clause, ClauseKind, Node, Port
 from avow.language.printer import show_term
-from avow.language.terms import TRUE, Term
+from avow.language.terms import RESPONSES, TRUE, History, Term, subterms
 
 
 class Property(StrEnum):
@@ -129,8 +129,9 @@ def node_key(node: Node) -> str:
 def triggers(formula: Term) -> tuple[Term, ...]:
     """For each part of a guarantee that demands something only under a condition: that the condition can come about.
     ``forall(x | P(x) -> (Q(x) -> R))`` gives ``exists(x | P(x) and Q(x))``, and so does whatever means the same
-    (`avow.formulas.conditions`)."""
-    return tuple(dict.fromkeys(condition.formula for condition in conditions(formula)))
+    (`avow.formulas.conditions`). That a response does not come is no condition."""
+    found = dict.fromkeys(condition.formula for condition in conditions(formula))
+    return tuple(f for f in found if not any(isinstance(t, History) and t.operator in RESPONSES for t in subterms(f)))
 
 
 def _names(node: Node, clauses: tuple[Clause, ...]) -> tuple[str, ...]:

@@ -70,7 +70,7 @@ class OverRuns:
                 together = {**self.assumptions, **self.guarantees}
                 return self._possible(together, "no inputs and outputs meet {} at any step of a run")
             case Property.TAUTOLOGY | Property.REDUNDANT:
-                return self._said_already(claim)
+                return self._alone(claim)._said_already(claim)
             case Property.VACUOUS:
                 return self._vacuous(claim.subject or "")
             case Property.UNCONSTRAINED:
@@ -93,6 +93,15 @@ class OverRuns:
             text = found.reason or f"the environment can bring it{steps} to where no output meets the guarantees"
             return Finding(found.verdict, text, tuple(self.guarantees), found.run)
         return Finding(found.verdict, found.reason)
+
+    def _alone(self, claim: Claim) -> OverRuns:
+        """The node with the clauses that the claim is about: the others would keep runs from what is asked for."""
+        clause = self.node.clause(claim.subject or "")
+        if clause.kind is ClauseKind.GUARANTEE:
+            whole = claim.about is Property.REDUNDANT
+            return self if whole else OverRuns(replace(self.node, guarantees=(clause,)), self.bounds)
+        these = self.node.assumptions if claim.about is Property.REDUNDANT else (clause,)
+        return OverRuns(replace(self.node, assumptions=these, guarantees=()), self.bounds)
 
     def _said_already(self, claim: Claim) -> Finding:
         name = claim.subject or ""
@@ -119,16 +128,23 @@ class OverRuns:
     def _unconstrained(self, name: str) -> Finding:
         output = self.node.output(name).variable
         spoken = {label: f for label, f in self.guarantees.items() if output in free_variables(f)}
+        if not any(output in ports_of(clause.formula) for clause in self.node.guarantees):
+            return Finding(Verdict.REFUTED, f"no guarantee mentions out.{name}")
         if not spoken:
-            mentioned = any(output in ports_of(clause.formula) for clause in self.node.guarantees)
-            text = "it is only remembered" if mentioned else f"no guarantee mentions out.{name}"
-            return Finding(Verdict.UNKNOWN if mentioned else Verdict.REFUTED, text)
+            return Finding(Verdict.UNKNOWN, "it is only remembered")
         another = Variable(Role.OUTPUT, f"{name} (another)", output.sort)
         other = disjunction(negation(substitute(f, {output: another})) for f in spoken.values())
         together = {**self.assumptions, **self.guarantees, "another value": other}
         text = f"wherever the guarantees hold, they hold for every other value of out.{name} too"
         found = self._possible(together, text)
-        return Finding(found.verdict, text) if found.verdict is Verdict.REFUTED else found
+        if found.verdict is not Verdict.REFUTED:
+            return found
+        remembered = any(output in ports_of(cell.now) for cell in self.remembering.cells)
+        return (
+            Finding(Verdict.UNKNOWN, "it is remembered, and may matter later")
+            if remembered
+            else Finding(found.verdict, text)
+        )
 
     def _possible(self, formulas: Mapping[str, Term], excluded: str) -> Finding:
         """Can they hold together at some step of a run at whose earlier steps the contract was kept?"""

@@ -145,6 +145,47 @@ def test_claims_are_about_what_runs_can_reach() -> None:
     assert found["realizable"] is Verdict.PROVED
 
 
+def runs(assumed: Term, promised: list[Term], length: int) -> list[list[Step]]:
+    """All runs that keep the clauses at every step."""
+    found: list[list[Step]] = [[]]
+    for _ in range(length):
+        longer = [[*run, {"in.a": a, "out.b": b, "in.n": 1}] for run in found for a in BOTH for b in BOTH]
+        found = [run for run in longer if holds(assumed, run) and all(holds(g, run) for g in promised)]
+    return found
+
+
+@pytest.mark.parametrize("seed", some(range(2000, 2300), 12))
+def test_what_is_said_of_a_clause_is_so_in_every_run(seed: int) -> None:
+    """A tautology is one whatever else is promised, and an output of no matter matters at no later step either."""
+    assumed, promised = drawn(seed)
+    refuted = {r.name for r in analyse(node_of(assumed, promised)) if r.verdict is Verdict.REFUTED}
+    for k, own in enumerate(promised):
+        for name, others in ((f"tautology-g{k}", []), (f"redundant-g{k}", promised[:k] + promised[k + 1 :])):
+            if name in refuted:
+                for length in range(1, DEPTH):
+                    assert runs(assumed, [*others, own], length) == runs(assumed, [*others, own][:-1], length)
+    if "unconstrained-b" in refuted:
+        for run in runs(assumed, promised, DEPTH - 1):
+            for k, step in enumerate(run):
+                other = [*run[:k], {**step, "out.b": not step["out.b"]}, *run[k + 1 :]]
+                assert all(holds(g, other[: j + 1]) for g in promised for j in range(len(run)))
+
+
+@pytest.mark.parametrize(
+    ("name", "verdict"),
+    [("tautology-g1", Verdict.PROVED), ("tautology-never", Verdict.REFUTED), ("unconstrained-y", Verdict.UNKNOWN)],
+)
+def test_what_other_clauses_keep_runs_from_is_no_tautology(name: str, verdict: Verdict) -> None:
+    text = """node n { inputs( a : BOOL ) outputs( x : BOOL, y : BOOL ) topics()
+      guarantee g0 ( not x )
+      guarantee g1 ( a -> next(once(not x)) )
+      guarantee g2 ( changed(y) -> within[2 steps](a) )
+      guarantee never ( x -> x until x ) }"""
+    contract, _ = check_text(text, "n.rcl")
+    assert contract is not None
+    assert {result.name: result.verdict for result in analyse(contract.nodes[0])}[name] is verdict
+
+
 def test_what_is_not_a_safety_property_is_not_called_realizable() -> None:
     text = """node n { inputs( a : BOOL ) outputs( b : BOOL ) topics()
       guarantee g ( a -> eventually(b) ) guarantee h ( not b ) }"""
