@@ -71,16 +71,18 @@ def _sayable(tool: Backend, job: Job) -> tuple[Job, Mapping[str, str]]:
     return replace(job, system=system, node=_without(job.node), obligations=left), refused
 
 
-def _refusal(tool: Backend, node: Node, clause: Clause) -> str | None:
-    """Why a guarantee cannot be asked of a backend, if it cannot."""
-    if tool.remembers:
-        return None
+def refusal(judge: str, node: Node, clause: Clause) -> str | None:
+    """Why whoever judges single steps cannot be asked about a guarantee, if he cannot."""
     said = next(((c, found[0]) for c in (clause, *node.assumptions) if (found := histories(c.formula))), None)
     if said is None:
         return None
     where, record = said
     about = f"{node.name}.{clause.name}" if where is clause else f"{node.name}'s assumption {where.name}"
-    return f"{tool.name} judges single steps and has no `{_shown(record)}`, of which {about} speaks"
+    return f"{judge} judges single steps and has no `{_shown(record)}`, of which {about} speaks"
+
+
+def _refusal(tool: Backend, node: Node, clause: Clause) -> str | None:
+    return None if tool.remembers else refusal(tool.name, node, clause)
 
 
 def _shown(record: History) -> str:

@@ -333,6 +333,44 @@ def _demanded(trigger: Term, response: History) -> Term:
             raise Unsaid(f"`{response.operator}`, which no first steps of a run can break", span)
 
 
+def pending(formula: Term) -> Term | None:
+    """When a clause that is a response demands something of steps to come, as a formula of the past; None where it is
+    no response, or one that no first steps can break."""
+    if (found := _response(_unquantified(formula))) is None:
+        return None
+    trigger, response = conjunction(found[0]), found[1]
+    match response.operator:
+        case Past.NEXT:
+            return trigger
+        case Past.WITHIN | Past.FOR:
+            assert response.limit is not None
+            early = replace(response.limit, relation="<")
+            unmet = negation(response.arguments[0]) if response.operator is Past.WITHIN else TRUE
+            return History(Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL, early, response.span)
+        case Past.UNTIL:
+            going = negation(response.arguments[1])
+            return History(Past.SINCE, (going, conjunction((trigger, going))), BOOL, None, response.span)
+        case _:  # it comes at some time
+            return None
+
+
+def fulfilled(formula: Term) -> Term | None:
+    """When a clause ``T -> within[…](R)`` is met, as a formula of the past; None of other clauses."""
+    found = _response(_unquantified(formula))
+    if found is None or found[1].operator is not Past.WITHIN:
+        return None
+    trigger, wanted = conjunction(found[0]), found[1].arguments[0]
+    unmet = negation(wanted)
+    waiting = History(Past.SINCE, (unmet, conjunction((trigger, unmet))), BOOL)
+    return conjunction((wanted, disjunction((trigger, History(Past.PREVIOUS, (waiting, FALSE), BOOL)))))
+
+
+def _unquantified(formula: Term) -> Term:
+    while isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL:
+        formula = formula.body
+    return formula
+
+
 def written(amount: Term) -> int | None:
     """A number of steps that is written down."""
     value = amount.value if isinstance(amount, Literal) else None

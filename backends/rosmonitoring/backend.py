@@ -42,6 +42,7 @@ class RosMonitoringBackend(Backend):
     link = Link.MAPPED
     of = Object.RECORDING
     uses_steps = False
+    remembers = True
     options_schema = SCHEMA
     codes = CODES
     translations = {"rml": "an RML specification for each node, by the plan's mapping"}
@@ -51,6 +52,7 @@ class RosMonitoringBackend(Backend):
     )
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        from .memory import unmonitored
         from .options import setup
         from .told import readings, unholdable
 
@@ -64,6 +66,10 @@ class RosMonitoringBackend(Backend):
         for obligation in job.obligations:
             clause = job.clause(obligation)
             problems += unholdable(found, clause)
+            if (reason := unmonitored(found, clause)) and not faults:
+                message = f"{clause.name} cannot be monitored: {reason}"
+                problems.append(Diagnostic("MON103", message, clause.span, Severity.WARNING))
+                continue
             for variable, reason in found.hidden.items():
                 if _mentions(clause.formula, variable) and not faults:
                     message = f"{clause.name} cannot be monitored: {reason}"
@@ -303,6 +309,8 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
     passages = [(topic, p) for run in runs for topic, p in run.monitor.passages(names)]
     lost, disordered = sum(p.lost for _, p in passages), sum(p.disordered for _, p in passages)
     uncounted = sorted({f"the messages of {topic} {p.uncounted}" for topic, p in passages if p.uncounted})
+    open_ends = sum(t.open for t in tallies)
+    bound |= {"open": open_ends} if open_ends else {}
     bound |= {"lost": lost} if not uncounted else {}
     bound |= {"out_of_order": disordered} if disordered else {}
     unpaired = any(t.unpaired for t in tallies)
@@ -373,6 +381,8 @@ def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str]
         summary += f"; {lost} messages lost, {disordered} out of order"
     if decided < published:
         summary += f" ({lacking})"
+    if open_ends:
+        summary += f"; what it demands was open at the end of {open_ends} of {len(runs)} traces"
     vacuous = not any(t.triggered for t in tallies)
     if vacuous:
         summary += "; but its antecedent was never met"

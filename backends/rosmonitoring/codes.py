@@ -20,8 +20,8 @@ CODES = register(
     declare(
         "MON103",
         "cannot be monitored",
-        "The guarantee speaks of something that no topic shows.",
-        "Map it to a topic, or verify the guarantee with another method.",
+        "The guarantee speaks of something that no topic shows, or of other steps as monitors cannot follow.",
+        "Do what the message says (map it to a topic), or verify the guarantee with another method.",
         warning=True,
     ),
     declare(

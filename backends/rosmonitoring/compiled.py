@@ -446,7 +446,7 @@ def _remember(
 def _state(tally: Tally) -> tuple[int, ...]:
     return (
         tally.published, tally.judged, tally.broken, tally.undecided, tally.order, tally.early, tally.unreadable,
-        tally.partial, tally.supposed,
+        tally.partial, tally.supposed, tally.forgotten,
     )  # fmt: skip
 
 

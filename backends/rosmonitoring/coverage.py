@@ -28,6 +28,10 @@ class Tally:
     """Answers that were never whole, and that their parts alone do not decide."""
     supposed: int = 0
     """Answers that held by an initial value of the plan, before any message: neither for nor against."""
+    forgotten: int = 0
+    """Steps not decided, since steps before them went by unseen."""
+    open: int = 0
+    """Runs at whose end a response was still demanded, or may have been."""
     published: int = 0
     """Answers: publications of its outputs, those that make one answer counted once."""
     triggered: bool = False
@@ -76,10 +80,12 @@ def coverage(tally: Tally) -> str:
         (tally.early, "before the first value {}"),
         (tally.unreadable, "unreadable {}"),
         (tally.partial, "not part of a whole answer {}"),
+        (tally.forgotten, "undecided, since steps before went by unseen {}"),
         (tally.supposed, "held by the plan's initial value, before any message {}"),
     ]
     told = ", ".join(words.format(count) for count, words in parts if count)
     told += f"; {old(tally.ages)}" if tally.ages else ""
+    told += f"{'; ' if told else ''}a response was open at the end" if tally.open else ""
     return f"published {tally.published} times" + (f": {told}" if told else "")
 
 

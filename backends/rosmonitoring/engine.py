@@ -13,23 +13,25 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
-from avow.evaluation.truth import judge, judge_open
+from avow.evaluation.evaluate import NotEvaluable
+from avow.evaluation.truth import judge_open
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
 from avow.language.terms import Role
+from avow.temporal.cells import remembers
 from avow.tuning.effort import JUDGE_EFFORT
 
 from .coverage import Tally
+from .memory import UNSURE, SoFar, blamed, triggers_of, unmonitored, watch
 from .options import Setup, same_topic
 from .pace import Passage, Timing
 from .pairing import EARLY, Asked, Pairing, time_of
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Hold, Previous, heard_through
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
-from .watched import Fault, Violation, Watched, shown, time_text, trigger_of
+from .watched import Fault, Violation, Watched, shown, time_text
 from .wires import MappingError
 
 
@@ -67,6 +69,10 @@ class Monitor:
     _questions: int = OPEN_QUESTIONS
     _constant: list[Watched] = field(default_factory=list)
     """Clauses that no message changes: judged once, at the first event."""
+    _remembering: list[Watched] = field(default_factory=list)
+    """Clauses that speak of other steps."""
+    _so_far: SoFar | None = None
+    """Of a node whose clauses speak of other steps."""
 
     def __post_init__(self) -> None:
         self.timing = Timing(self.setup.fresh, self.setup.rates)
@@ -78,6 +84,8 @@ class Monitor:
             self._pairing = Pairing(answers)
             spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
             self._assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
+        elif remembers(self.setup.node):
+            self._so_far = SoFar()
         wanted = None if self.guarantees is None else set(self.guarantees)
         node = self.setup.node
         for clause in node.clauses:
@@ -123,7 +131,8 @@ class Monitor:
         if readers is None or not isinstance(topic, str):
             return found
         self.relevant += 1
-        self.timing.hear(event, same_topic(topic), names)
+        if self.timing.hear(event, same_topic(topic), names):
+            self._miss(set(names))
         self._watch_order(event)
         pairing = self._pairing
         if pairing is not None and pairing.waiting:
@@ -137,6 +146,7 @@ class Monitor:
                 new = read(event, old)
             except MappingError as error:
                 found.append(self._violation(Fault.MAPPING, name, event, str(error)))
+                self._miss({name})
                 # Its value is now unknown: what needs it waits for the next good message.
                 if getattr(self.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
                     self._forget(name)
@@ -197,8 +207,8 @@ class Monitor:
 
     @property
     def by_values(self) -> bool:
-        """Whether a verdict depends on the latest values alone."""
-        return self._pairing is None
+        """Whether a verdict depends on the latest values alone, and changes nothing for the next."""
+        return self._pairing is None and self._so_far is None
 
     def carried(self, topic: str) -> tuple[str, ...]:
         """The variables that a topic's messages carry."""
@@ -250,6 +260,7 @@ class Monitor:
                 values = {n: v for part in watched.fresh.values() for n, v in part.items()}
                 watched.fresh.clear()
                 self._judge_part(watched, values, {}, found)
+            watched.tally.open += watched.steps is not None and watched.steps.open
             if any(of not in self._seen for name in watched.names if (of := heard_through(self.setup.rules[name]))):
                 watched.only_supposed()
         return found
@@ -298,13 +309,13 @@ class Monitor:
                 found.append(self._violation(verdict, name, asked.event, said, watched, cases[0], asked.index))
 
     def _verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
-        truth = self._truth(watched, values)
+        truth = watched.truth_of(values, self.solver)
         if truth is None:
             return None
         if truth:
             return "held"
         for assumed in self._assumptions:
-            if all(n in values for n in assumed.names) and self._truth(assumed, values) is False:
+            if all(n in values for n in assumed.names) and assumed.truth_of(values, self.solver) is False:
                 return Fault.EXCUSED
         return Fault.GUARANTEE
 
@@ -330,6 +341,8 @@ class Monitor:
             if watched.outputs <= watched.fresh.keys():
                 watched.fresh.clear()
                 due.append(watched)
+        if self._so_far is not None:  # whether a guarantee was promised depends on what they find
+            due.sort(key=lambda watched: watched.clause.kind is not ClauseKind.ASSUMPTION)
         return due
 
     def _part(self, watched: Watched, name: str) -> dict[str, Value]:
@@ -353,8 +366,8 @@ class Monitor:
     ) -> None:
         """Judge what is known of an answer that never was whole: it is decided where the rest does not matter."""
         tally = watched.tally
-        truth = self._open(watched, values)
-        if truth is None:
+        self._lose(watched)
+        if self._so_far is not None or (truth := self._open(watched, values)) is None:
             tally.partial += 1
             return
         tally.judged += 1
@@ -373,7 +386,7 @@ class Monitor:
         truth = judge_open(watched.clause.formula, values, effort=JUDGE_EFFORT)
         if truth is False:
             for assumed in self._assumptions:
-                if any(n not in values for n in assumed.names) or self._truth(assumed, values) is not True:
+                if any(n not in values for n in assumed.names) or assumed.truth_of(values, self.solver) is not True:
                     return None
         return truth
 
@@ -388,25 +401,18 @@ class Monitor:
     def _watch(self, clause: Clause) -> None:
         tally = self.tallies[clause.name] = Tally()
         try:
-            names = tuple(sorted(free_names(clause.formula)))
-            hidden = [self.setup.hidden[n] for n in names if n in self.setup.hidden]
-            if hidden:
-                tally.reason, tally.hidden = hidden[0], True
-                return
-            trigger = trigger_of(clause.formula)
-            watched = Watched(
-                clause,
-                names,
-                compile_term(clause.formula),
-                None if trigger is None else compile_term(trigger),
-                compile_counterexample(clause.formula),
-                tally,
-            )
+            if reason := unmonitored(self.setup, clause):
+                raise NotEvaluable(reason)
+            watched = watch(clause, tally)
         except NotEvaluable as error:
             tally.reason = error.reason
             return
-        tally.triggered = trigger is None
-        triggers = self._triggers(names)
+        names = watched.names
+        if hidden := [self.setup.hidden[n] for n in names if n in self.setup.hidden]:
+            tally.reason, tally.hidden = hidden[0], True
+            return
+        tally.triggered = watched.trigger is None
+        triggers = triggers_of(self.setup, names)
         if self.setup.when == "outputs" and any(n.startswith(f"{Role.OUTPUT}.") for n in triggers):
             watched.outputs = frozenset(triggers)
             if len(triggers) > 1:
@@ -418,21 +424,15 @@ class Monitor:
             tally.unpaired = bool(paired) and self.setup.answers is None
             watched.paired = paired if self._pairing is not None else ()
             watched.inputs = tuple(n for n in names if n in self._paired)
+        if watched.steps is not None:
+            watched.steps.answers = any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)
+            self._remembering.append(watched)
         for name in triggers:
             self._clauses.setdefault(name, []).append(watched)
         if not triggers:
             self._constant.append(watched)
         if clause.kind is ClauseKind.ASSUMPTION:
             self._assumptions.append(watched)
-
-    def _triggers(self, names: tuple[str, ...]) -> tuple[str, ...]:
-        """The variables whose publication makes a clause judged."""
-        direct = tuple(n for n in names if isinstance(self.setup.rules[n], Fields | Choice))
-        outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
-        sources = tuple(rule.source for n in names if isinstance(rule := self.setup.rules[n], Previous))
-        if outputs and self.setup.when != "every":
-            return outputs
-        return direct or sources
 
     def _judge(self, watched: Watched, event: Mapping[str, Any], found: list[Violation]) -> None:
         values, versions, tally = self.values, self._versions, watched.tally
@@ -441,57 +441,58 @@ class Monitor:
             values = {**{n: v for n, v in values.items() if n not in held}, **watched.memory}
         if any(name not in values for name in watched.names):
             tally.early += 1
+            if watched.steps is not None and (watched.steps.answers or watched.steps.stepped):
+                self._lose(watched)  # a step went by; of inputs alone, the run begins when all have a value
             return
         supposed = any(name in self._supposed for name in watched.names)
+        lost = watched.steps is not None and watched.steps.lost
         key = (*[versions[n] for n in watched.names], supposed)
-        if key != watched.key or watched.held:
+        if watched.steps is not None:
+            watched.truth = watched.steps.step(watched, values, self.solver, self.events, supposed)
+        elif key != watched.key or watched.held:
             watched.key = key
-            watched.truth = self._truth(watched, values)
+            watched.truth = watched.truth_of(values, self.solver)
             if not supposed:
                 watched.note_trigger(values)
+        if self._so_far is not None:
+            self._so_far.note(watched)
+        if watched.truth is None and lost:
+            tally.forgotten += 1
+            return
         if supposed and watched.truth is not False:
             tally.supposed += 1
             return
         tally.judged += 1
         if watched.truth:
             return
-        if watched.truth is None:
+        blame = blamed(watched, self._assumptions, self.values, self.solver, self._so_far, self.events)
+        if blame is None:
             tally.undecided += 1
+            tally.reason = tally.reason or UNSURE
             return
         tally.broken += 1
-        fault, why = self._blame(watched.clause)
+        fault, why = blame
         if fault is Fault.EXCUSED:
             tally.excused += 1
         found.append(self._violation(fault, watched.clause.name, event, why, watched, values))
 
-    def _truth(self, watched: Watched, values: Mapping[str, Value]) -> bool | None:
-        try:
-            return bool(watched.holds(values))
-        except NotEvaluable as error:
-            answer = judge(watched.clause.formula, values, effort=JUDGE_EFFORT) if self.solver else None
-            if answer is None and not watched.tally.reason:
-                watched.tally.reason = error.reason
-            return answer
+    def _miss(self, names: Set[str]) -> None:
+        """Messages of these variables were lost, or could not be read."""
+        for watched in (*self._assumptions, *self._remembering):
+            if not names.isdisjoint(watched.names):
+                self._lose(watched)
 
-    def _blame(self, clause: Clause) -> tuple[Fault, str]:
-        said = clause.sentence or clause.text or show_term(clause.formula, "unicode")
-        if clause.kind is ClauseKind.ASSUMPTION:
-            return Fault.ASSUMPTION, said
-        for assumed in self._assumptions:
-            if all(n in self.values for n in assumed.names) and self._truth(assumed, self.values) is False:
-                return Fault.EXCUSED, f"{said}; but the assumption {assumed.clause.name} does not hold"
-        return Fault.GUARANTEE, said
+    def _lose(self, watched: Watched) -> None:
+        """A step of a clause went by unseen."""
+        if watched.steps is not None:
+            watched.steps.forget()
+        if self._so_far is not None and watched.clause.kind is ClauseKind.ASSUMPTION:
+            self._so_far.unsure = True
 
     def _violation(
-        self,
-        fault: Fault,
-        clause: str,
-        event: Mapping[str, Any],
-        explanation: str,
-        watched: Watched | None = None,
-        snapshot: Mapping[str, Value] | None = None,
-        index: int | None = None,
-    ) -> Violation:
+        self, fault: Fault, clause: str, event: Mapping[str, Any], explanation: str, watched: Watched | None = None,
+        snapshot: Mapping[str, Value] | None = None, index: int | None = None,
+    ) -> Violation:  # fmt: skip
         values, pairs = shown(watched, snapshot) if watched is not None and snapshot is not None else ((), ())
         time = time_text(event.get("time"))
         return Violation(fault, self.setup.node.name, clause, index or self.events, time, values, pairs, explanation)

@@ -87,14 +87,16 @@ class Passage:
     """Why a loss need not show."""
     latest: Fraction | None = None
 
-    def heard(self, event: Mapping[str, Any], now: Fraction) -> None:
+    def heard(self, event: Mapping[str, Any], now: Fraction) -> bool:
+        """Whether messages before this one were lost, or come later, by their numbers (which may never be set)."""
         if self.latest is not None and now < self.latest:
             self.disordered += 1
         self.latest = now
         number = sequence(event)
         if number is None:
             self.uncounted = "have no numbers (header.seq)"
-            return
+            return False
+        before = self.last[0] if self.last else number
         if self.last:
             gap = number - self.last[0]
             self.lost += max(0, gap - 1)
@@ -102,6 +104,7 @@ class Passage:
             if gap <= 0:  # never set, several publishers, or one that began anew
                 self.uncounted = self.uncounted or "have numbers (header.seq) that do not rise"
         self.last[:] = [number]
+        return number - before not in (0, 1)
 
 
 SEQUENCE = ("header", "seq")
@@ -156,12 +159,13 @@ class Timing:
             if name in names and (wrong := pace.beat(now)):
                 yield name, f"{name} is too fast: {wrong}", False
 
-    def hear(self, event: Mapping[str, Any], topic: str, names: Iterable[str]) -> None:
-        """A message of one of the monitor's topics."""
+    def hear(self, event: Mapping[str, Any], topic: str, names: Iterable[str]) -> bool:
+        """A message of one of the monitor's topics; whether others before it were lost, or came out of order."""
         now = time_of(event)
-        self.passages.setdefault(topic, Passage()).heard(event, now)
+        missed = self.passages.setdefault(topic, Passage()).heard(event, now)
         self.heard.update(dict.fromkeys(names, float(now)))
         self.newest = max(self.newest, math.nextafter(float(now), math.inf))
+        return missed
 
     def caught_up(self, event: Mapping[str, Any], topic: str, names: Iterable[str]) -> None:
         """Take over the latest of some messages whose times were looked at elsewhere."""

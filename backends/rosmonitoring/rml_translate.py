@@ -14,6 +14,7 @@ from fractions import Fraction
 from itertools import product
 from pathlib import PurePath
 
+from avow.backend_kit.one_step import refusal
 from avow.evaluation.evaluate import free_names
 from avow.formulas.values import Value
 from avow.language.contract import Clause
@@ -81,6 +82,8 @@ def translate(setup: Setup, guarantees: Sequence[Clause]) -> Translation:
     refused: dict[str, str] = {}
     for number, clause in enumerate(guarantees, start=1):
         try:
+            if reason := refusal("RML", setup.node, clause):
+                raise NotRml(reason)
             made = _Machine(setup, clause, f"g{number}")
             made.build()
             part = Specification((), tuple(made.events), (made.machine,))
@@ -136,11 +139,7 @@ class _Machine:
     """Of several outputs: each → name of the number that is 1 once it has been published since the last judgement."""
     events: list[EventType | Derived] = field(default_factory=list)
 
-    @property
-    def machine(self) -> Machine:
-        return self._machine
-
-    _machine: Machine = field(init=False)
+    machine: Machine = field(init=False)
 
     def build(self) -> None:
         names = sorted(free_names(self.clause.formula))
@@ -176,7 +175,7 @@ class _Machine:
         needed = self._needed(state, steps)
         kept = [at for at, name in enumerate(state) if name in needed]
         initial = self._initial(state)
-        self._machine = Machine(
+        self.machine = Machine(
             self.prefix.upper(),
             tuple(state[k] for k in kept),
             tuple(replace(step, then=tuple(step.then[k] for k in kept)) for step in steps),

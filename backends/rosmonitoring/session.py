@@ -136,6 +136,8 @@ class Session:
                     "unreadable": tally.unreadable,
                     "incomplete": tally.partial,
                     "by_initial_value": tally.supposed,
+                    "after_unseen": tally.forgotten,
+                    "open_at_end": tally.open,
                     "oldest": {of: round(age, 6) for of, age in tally.ages.items()},
                     "paired": not tally.unpaired,
                     "antecedent_met": tally.triggered,

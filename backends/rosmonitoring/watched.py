@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from avow.evaluation.evaluate import NotEvaluable
+from avow.evaluation.truth import judge
 from avow.formulas.values import Value, show
 from avow.language.contract import Clause
 from avow.language.terms import Implies, Quantified, Quantifier, Term, Variable
+from avow.tuning.effort import JUDGE_EFFORT
 
 from .coverage import Tally
 from .numbers import Decimal, NotANumber, exact
+
+if TYPE_CHECKING:
+    from .memory import Memory
 
 
 class Fault(StrEnum):
@@ -70,6 +75,19 @@ class Watched:
     """The observed inputs that its answers are held against."""
     paired: tuple[str, ...] = ()
     """The observed inputs that an answer has to be paired with."""
+    steps: Memory | None = None
+    """What it remembers, where it speaks of other steps."""
+
+    def truth_of(self, values: Mapping[str, Value], solver: bool) -> bool | None:
+        """Whether it holds of the values; None where neither evaluation nor, if it may be asked, Z3 can tell."""
+        try:
+            return bool(self.holds(values if self.steps is None else self.steps.at(values)))
+        except NotEvaluable as error:
+            known = values if self.steps is None else self.steps.known(values)
+            answer = judge(self.clause.formula, known, effort=JUDGE_EFFORT) if solver else None
+            if answer is None and not self.tally.reason:
+                self.tally.reason = error.reason
+            return answer
 
     def triggered(self, values: Mapping[str, Value]) -> bool:
         """Whether the antecedent is known to be met."""

@@ -1,0 +1,224 @@
+"""What a clause that speaks of other steps remembers while it is monitored: the cells of `avow.temporal`, no more.
+
+A step is a judgement of the clause. Where one went by unseen (a message was lost, could not be read, or an answer never
+was whole), all that is remembered is unknown from then on, until the steps that follow say it anew: what depends on it
+is not decided, and never held.
+"""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NoReturn
+
+from avow.evaluation.evaluate import NotEvaluable, compile_counterexample, compile_term, free_names
+from avow.evaluation.running import Keeper
+from avow.formulas.values import Value
+from avow.language.contract import Clause, ClauseKind
+from avow.language.printer import show_term
+from avow.language.sorts import BOOL, INTEGER, NATURAL
+from avow.language.terms import Quantified, Role, Term, histories
+from avow.temporal.cells import Cell, Records, Unsaid, fulfilled, in_the_past, pending
+
+from .coverage import Tally
+from .options import Setup
+from .rules import Choice, Fields, Previous
+from .watched import Fault, Watched, trigger_of
+
+
+class _Unknown:
+    """A value that nobody knows: whatever looks at it cannot be evaluated. Each is new, so that none is another's."""
+
+    __slots__ = ()
+
+    def _look(self, *_: object) -> NoReturn:
+        raise NotEvaluable("what the steps before have left is not known")
+
+    __bool__ = __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __hash__ = _look
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __neg__ = __abs__ = _look
+    __floordiv__ = __rfloordiv__ = __truediv__ = __rtruediv__ = __mod__ = __rmod__ = _look
+
+    def __getattr__(self, name: str) -> NoReturn:
+        self._look()
+
+
+numbers.Rational.register(_Unknown)  # a Fraction of it asks for its numerator
+
+
+class Memory:
+    """What one clause remembers."""
+
+    def __init__(self, cells: tuple[Cell, ...], formula: Term, waiting: Term | None) -> None:
+        self.formula = formula
+        """The clause as a formula of one step."""
+        self.open = False
+        """After the latest step, a response is demanded of later ones (or may be)."""
+        self.lost = False
+        """Steps went by unseen, and not all is known again."""
+        self.answers = False
+        """Its steps are answers of the node."""
+        self.stepped = 0
+        """The event of its latest step."""
+        self._keeper = Keeper(cells)
+        self._waiting = None if waiting is None else compile_term(waiting)
+        self._cells = {cell.before.qualified for cell in cells}
+        whole = not any(_quantified(term) for term in (formula, *(cell.now for cell in cells)))
+        plain = (BOOL, INTEGER, NATURAL)
+        self._open = {c.before.qualified for c in cells if c.sort in plain} if whole else set[str]()
+        """What may be unknown in a formula that is evaluated: where it does not matter, the formula is decided."""
+
+    def known(self, values: Mapping[str, Value]) -> dict[str, Value]:
+        """A step's valuation, of what is known."""
+        return self._keeper.at(values)
+
+    def at(self, values: Mapping[str, Value]) -> dict[str, Any]:
+        """A step's valuation, in which what is not known cannot be looked at."""
+        known = self.known(values)
+        return {**{name: _Unknown() for name in self._open if name not in known}, **known}
+
+    def advance(self, values: Mapping[str, Value], event: int) -> None:
+        """The step is over."""
+        self.stepped = event
+        valuation = self.at(values)
+        if self._waiting is not None:
+            try:
+                self.open = bool(self._waiting(valuation))
+            except NotEvaluable:
+                self.open = True
+        self._keeper.memory = {n: v for n, v in valuation.items() if n in self._cells}
+        self._keeper.advance(values)
+        self._keeper.memory = {n: v for n, v in self._keeper.memory.items() if not isinstance(v, _Unknown)}
+        self.lost = self.lost and self._keeper.memory.keys() != self._cells
+
+    def step(
+        self, watched: Watched, values: Mapping[str, Value], solver: bool, event: int, supposed: bool
+    ) -> bool | None:
+        """The clause at a step, which is then over. What an initial value of the plan says is not remembered."""
+        truth = watched.truth_of(values, solver)
+        if supposed:
+            self.stepped = event
+            self.forget()
+            return truth
+        watched.tally.triggered = watched.tally.triggered or watched.triggered(self.at(values))
+        self.advance(values, event)
+        return truth
+
+    def forget(self) -> None:
+        """A step went by unseen."""
+        self.lost, self.open = True, self._waiting is not None
+        self._keeper.memory = {}
+
+
+UNSURE = "it is not known whether the assumptions have held so far"
+
+
+@dataclass(slots=True)
+class SoFar:
+    """Whether the assumptions of a node that remembers have held so far: it promises nothing once one was broken."""
+
+    broken: str = ""
+    unsure: bool = False
+    """A message of an assumption was not seen, or nobody could tell whether one held."""
+
+    def note(self, watched: Watched) -> None:
+        """A clause was judged: an assumption?"""
+        if watched.clause.kind is not ClauseKind.ASSUMPTION:
+            return
+        if watched.truth is False:
+            self.broken = self.broken or watched.clause.name
+        self.unsure = self.unsure or watched.truth is None
+
+
+def blamed(
+    watched: Watched, assumptions: Sequence[Watched], values: Mapping[str, Value], solver: bool, so_far: SoFar | None,
+    event: int,
+) -> tuple[Fault, str] | None:  # fmt: skip
+    """Whose fault it is that a clause does not hold, and what is said; None where nobody can tell."""
+    if watched.truth is None:
+        return None
+    clause = watched.clause
+    said = clause.sentence or clause.text or show_term(clause.formula, "unicode")
+    if clause.kind is ClauseKind.ASSUMPTION:
+        return Fault.ASSUMPTION, said
+    for assumed in assumptions:
+        if assumed.steps is not None or any(n not in values for n in assumed.names):
+            continue
+        if assumed.truth_of(values, solver) is False:
+            if so_far is not None:
+                so_far.broken = so_far.broken or assumed.clause.name
+            return Fault.EXCUSED, f"{said}; but the assumption {assumed.clause.name} does not hold"
+    if so_far is not None and so_far.broken:
+        return Fault.EXCUSED, f"{said}; but the assumption {so_far.broken} did not hold before"
+    # an assumption about the node's own answers is judged with the answer, of which a part may be missing
+    late = (a.steps for a in assumptions if a.steps is not None and a.steps.answers and a.steps.stepped != event)
+    return None if so_far is not None and (so_far.unsure or any(late)) else (Fault.GUARANTEE, said)
+
+
+def watch(clause: Clause, tally: Tally) -> Watched:
+    """A clause under watch. Raises NotEvaluable where nothing can judge it."""
+    formula, trigger, steps = clause.formula, trigger_of(clause.formula), None
+    names = set[str]()
+    if told := histories(formula):
+        timed = next((h.operator for h in told if h.limit is not None and not h.limit.steps), None)
+        if timed is not None:
+            raise NotEvaluable(f"the monitors have no `{timed}` with a limit in seconds")
+        records = Records()
+        try:
+            formula = records.clause(formula)
+            trigger = fulfilled(clause.formula) or trigger_of(in_the_past(clause.formula))
+            trigger = None if trigger is None else records.term(trigger)
+            waiting = pending(clause.formula)
+            waiting = None if waiting is None else records.term(waiting)
+        except Unsaid as unsaid:
+            raise NotEvaluable(f"the monitors have no {unsaid.reason}") from None
+        steps = Memory(tuple(records.cells), formula, waiting)
+        names = {n for cell in records.cells for n in free_names(cell.now)}
+        names |= free_names(waiting) if waiting is not None else set()
+        names |= free_names(trigger) if trigger is not None else set()
+        names = (names | free_names(formula)) - {cell.before.qualified for cell in records.cells}
+        clause = replace(clause, formula=formula)
+    return Watched(
+        clause,
+        tuple(sorted(names if steps is not None else free_names(formula))),
+        compile_term(formula),
+        None if trigger is None else compile_term(trigger),
+        compile_counterexample(formula),
+        tally,
+        steps=steps,
+    )
+
+
+def triggers_of(setup: Setup, names: tuple[str, ...]) -> tuple[str, ...]:
+    """The variables whose publication makes a clause judged, of those that it speaks of."""
+    direct = tuple(n for n in names if isinstance(setup.rules[n], Fields | Choice))
+    outputs = tuple(n for n in direct if n.startswith(f"{Role.OUTPUT}."))
+    sources = tuple(rule.source for n in names if isinstance(rule := setup.rules[n], Previous))
+    if outputs and setup.when != "every":
+        return outputs
+    return direct or sources
+
+
+def unmonitored(setup: Setup, clause: Clause) -> str:
+    """Why a clause that speaks of other steps, or one whose node's assumptions do, is not monitored; empty where it
+    is."""
+    for about in dict.fromkeys((clause, *setup.node.assumptions)):
+        if not histories(about.formula):
+            continue
+        where = "" if about is clause else f"the assumption {about.name}: "
+        if setup.answers is not None and setup.answers.by != "arrival":
+            return f"{where}it speaks of other steps, whose order only `answers: {{by: arrival}}` tells"
+        try:
+            names = watch(about, Tally()).names
+        except NotEvaluable as error:
+            return where + error.reason
+        hidden = [setup.hidden[name] for name in names if name in setup.hidden]
+        if hidden and about is not clause:
+            return where + hidden[0]
+        if not hidden and not triggers_of(setup, names):
+            return f"{where}it speaks of other steps, and no message makes one"
+    return ""
+
+
+def _quantified(term: Term) -> bool:
+    return isinstance(term, Quantified) or any(map(_quantified, term.children))
