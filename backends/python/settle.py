@@ -42,6 +42,7 @@ from .tuning import APART, RUN_SECONDS, VALIDATED
 
 TOOL = "python conditions"
 NOT_FINITE = "inputs are finite"
+NOT_ROUNDED = "what is computed with are fractions, and nothing is rounded"
 
 
 def settle(job: Job, limits: Limits) -> Report:
@@ -305,7 +306,9 @@ class Work:
             vacuous = "none of the inputs tried meets the assumptions"
             return Outcome(obligation.id, Verdict.PROVED, f"{summary}; but {vacuous}", vacuous=True)
         details = {**found.details, OUTPUT_FOR_EVERY_INPUT: True}
-        return Outcome(obligation.id, Verdict.PROVED, summary, hypotheses=self.hypotheses(), details=details)
+        at = found.details.get("rounded_at_lines")
+        lines = at if isinstance(at, list) else []
+        return Outcome(obligation.id, Verdict.PROVED, summary, hypotheses=self.hypotheses(lines), details=details)
 
     def reals(self) -> list[str]:
         """The inputs that are REAL, or sequences of such."""
@@ -315,9 +318,13 @@ class Work:
 
         return [p.name for p in self.job.node.inputs if real(p.sort)]
 
-    def hypotheses(self) -> tuple[str, ...]:
+    def hypotheses(self, lines: Sequence[int]) -> tuple[str, ...]:
+        """`lines`: where floats would be rounded."""
         names = [f"in.{name}" for name in self.reals()]
-        if not names or self.reading.exact:
+        if self.reading.exact:
+            at = ", ".join(map(str, lines))
+            return (f"{NOT_ROUNDED}: {self.reading.file.name}, line {at}", *self.unkept) if lines else self.unkept
+        if not names:
             return self.unkept
         return (f"{NOT_FINITE}: {', '.join(names)}: no NaN, no infinity", *self.unkept)
 

@@ -442,9 +442,9 @@ class Run:
 
     def rounded(self, exact: Term, doubles: Sequence[Term], products: bool, state: State, line: int) -> Term:
         """The double next to an exact result, and the condition that there is one."""
+        self.rounds.append(line)
         if self.exact:
             return exact
-        self.rounds.append(line)
         exact = self.named("exact", exact)
         self.check(state, no_overflow(exact), "the result is no infinity", line)
         result = self.fresh("rounded", REAL)

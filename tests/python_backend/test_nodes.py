@@ -55,6 +55,9 @@ def test_reals_err_both_ways(timeout: str, numbers: str, late: Verdict, calm: Ve
     found = example.settled(tmp_path)
     assert (found["late"].verdict, found["calm"].verdict) == (late, calm), found
     assert found["late"].numbers == numbers
+    supposed = [h for h in found["fresh"].hypotheses if "nothing is rounded" in h]
+    assert bool(supposed) is (numbers == "exact")  # no answer about exact numbers is unconditional where floats round
+    assert all("line 9" in h for h in supposed)
 
 
 @pytest.mark.parametrize("name", ["limiter", "median", "scanmin"])
