@@ -107,4 +107,6 @@ def graph_of(text: str, topics: Iterable[str], host: str) -> Graph:
     if kind == "rosbridge" and address.startswith(("ws://", "wss://")):
         return Rosbridge(address, topics)
     hint = "ros1, ros1:http://host:11311, or rosbridge:ws://host:9090"
+    if kind == "dds":
+        hint += "; a graph of ROS 2 can be heard through its rosbridge_server"
     raise Rejected(Diagnostic("MON303", f"{text!r} is no graph that can be listened to", hint=hint))
