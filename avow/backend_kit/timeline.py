@@ -159,7 +159,7 @@ def _timeline(found: Any) -> Timeline | None:
             read = [_lane(one, events) for one in lanes]
             whole = tuple(lane for lane in read if lane is not None)
             return Timeline(name, events, start, end, whole, every) if len(whole) == len(lanes) else None
-        case _:
+        case _:  # not what a record of a timeline has
             return None
 
 
@@ -182,7 +182,7 @@ def _stretch(found: Any) -> Stretch | None:
             math.isfinite(low) and math.isfinite(high) and low <= high
         ):
             return Stretch(first, last, (float(low), float(high)))
-        case _:
+        case _:  # not what a record of a timeline has
             return None
 
 
@@ -190,7 +190,7 @@ def _mark(found: Any) -> Mark | None:
     match found:
         case [str(kind), int(first), int(last), int(number), str(time)] if kind in KINDS:
             return Mark(kind, first, last, number, time)
-        case _:
+        case _:  # not what a record of a timeline has
             return None
 
 
