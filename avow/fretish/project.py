@@ -392,6 +392,8 @@ class _Node:
         """What a name stands for, which FRET has as an expression of Lustre."""
         if name in self.within:
             raise Unsaid(f"`{name}` is defined by itself")
+        if len(self.within) > _DEEPEST:
+            raise Unsaid(f"`{name}` is defined through more than {_DEEPEST} other names")
         if (found := re.search(r"(?<!<)->|--", means)) is not None:
             reason = {"->": "speaks of the first step", "--": "begins a comment"}[found[0]]
             raise Unsaid(f"what `{name}` stands for is not read: `{found[0]}` {reason} in Lustre")
@@ -401,7 +403,10 @@ class _Node:
         try:
             expression = parsed(said)
             self._truth(expression)
-            return f"({self._say(expression)})"
+            text = f"({self._say(expression)})"
+            if len(text) > _LONGEST:
+                raise Unsaid(f"what `{name}` stands for has more than {_LONGEST} characters when written out")
+            return text
         except Unreadable as error:
             raise Unsaid(f"what `{name}` stands for is not read: {error.message} in `{means[:80]}`") from None
         finally:
@@ -412,6 +417,9 @@ def _context(constants: Mapping[str, str]) -> str:
     lines = "".join(f"  {_word(name)} = {value};\n" for name, value in sorted(constants.items()))
     return f"context {{\n{lines}}}\n\n" if lines else ""
 
+
+_DEEPEST, _LONGEST = 20, 20_000
+"""Of definitions in one another; no person follows more."""
 
 _SIGNS = {"=>": "->", "&": "and", "|": "or", "=": "=="}
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from lark import Lark, Token, Tree
 from lark.exceptions import UnexpectedInput, UnexpectedToken
@@ -118,6 +118,9 @@ class Sentence:
     duration: Duration | None = None
 
 
+_Read = TypeVar("_Read")
+
+
 def is_assumption(name: str) -> bool:
     """Whether FRET's tools take a requirement of that name as an assumption."""
     return "assum" in name.lower()
@@ -134,12 +137,19 @@ class Unreadable(Exception):  # noqa: N818 - it names what happened
 
 def parse(text: str) -> Sentence:
     """Raises Unreadable."""
-    return _sentence(_tree(text, "sentence"))
+    return _shallow(lambda: _sentence(_tree(text, "sentence")))
 
 
 def parse_expression(text: str) -> Expression:
     """Raises Unreadable."""
-    return _expression(_tree(text, "expression"))
+    return _shallow(lambda: _expression(_tree(text, "expression")))
+
+
+def _shallow(read: Callable[[], _Read]) -> _Read:
+    try:
+        return read()
+    except RecursionError:
+        raise Unreadable("the sentence is too deep to be one requirement", 1) from None
 
 
 def _tree(text: str, start: str) -> Any:

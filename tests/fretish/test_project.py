@@ -76,6 +76,7 @@ def test_sentences_become_clauses_that_mean_the_same_again(tmp_path: Path, sente
         ("the pump shall satisfy at the next occurrence of p, q", 24),
         ("x " * 3_000, 1),
         ("pump shall satisfy " + "(" * 500, 1),
+        ("pump shall satisfy " + "!" * 3_500 + "p", 1),
         ("", 1),
     ],
 )
@@ -218,6 +219,19 @@ def test_what_a_name_stands_for_is_read_as_lustre(tmp_path: Path, means: str, le
     found = nodes(read(path))
     assert bool(found.text) is (not left_out)
     assert [left_out in fault.message for fault in found.faults] == [True] * bool(left_out)
+
+
+@pytest.mark.parametrize("means", ["a{0} and a{0}", "!a{0}", "a{0} + a{0} + a{0} > 1"])
+def test_definitions_without_end_are_told(tmp_path: Path, means: str) -> None:
+    path = tmp_path / "x.json"
+    listed = [{"reqid": "R", "fulltext": "the n shall always satisfy a999 => x"}]
+    names = [
+        {"component_name": "n", "variable_name": f"a{k}", "idType": "Internal", "assignment": means.format(k - 1)}
+        for k in range(1, 1000)
+    ]
+    path.write_text(json.dumps({"requirements": listed, "variables": names}))
+    (fault,) = nodes(read(path)).faults
+    assert "defined through more than" in fault.message
 
 
 def test_two_projects_in_a_file_are_not_mixed(tmp_path: Path) -> None:
