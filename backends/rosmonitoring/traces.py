@@ -75,6 +75,8 @@ def event_of(line: str, name: str, number: int) -> Event | None:
         raise Rejected(_fault(name, number, error.colno, f"this is not JSON: {error.msg}")) from None
     except ValueError as error:
         raise Rejected(_fault(name, number, 1, str(error))) from None
+    if not isinstance(topic := event.get("topic"), str) or not topic:
+        raise Rejected(_fault(name, number, max(1, line.find('"topic"') + 1), "the event has no `topic`: a name"))
     if wrong := wrong_time(event):
         raise Rejected(_fault(name, number, max(1, line.find('"time"') + 1), wrong))
     return event

@@ -264,6 +264,7 @@ def test_whatever_a_path_leads_to_is_looked_at(seed: int, make_system: Callable[
         ('{"topic": "s", "time": 1, "data": 1} x', "not JSON"),
         ('{"topic": "s", "time": 1, "data": +1}', "not JSON"),
         ('{"topic": "s", "time": "1", "data": 1}', "no number of seconds"),
+        ('{"time": 1, "data": 200}', "no `topic`"),
     ],
 )
 def test_what_is_no_event_is_told_after_many_that_are(
