@@ -11,13 +11,15 @@ combinations than there were, so that both verdicts are right as long as the two
 from __future__ import annotations
 
 import itertools
+from bisect import insort
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from operator import itemgetter
 from typing import Any
 
-from avow.formulas.values import Value
+from avow.formulas.values import Value, show
 
 from .numbers import Decimal, NotANumber, exact
 from .reading import at
@@ -67,19 +69,31 @@ class Pairing:
     """Input → how many messages."""
     asked: dict[int, tuple[int, Asked]] = field(default_factory=dict)
     """By what is judged: how many answers, and the last of them."""
+    settled: Fraction | None = None
+    """By latency: no input of this time or an earlier one may come any more."""
+    late: str = ""
+    """Why it is no evidence: one came."""
 
     def saw(self, name: str, event: Mapping[str, Any], value: Value | None) -> None:
         known = self.seen.setdefault(name, deque())
         self.counts[name] = self.counts.get(name, 0) + 1
         key = self.counts[name] if self.answers.by == "order" else self._key(event, self.answers.input)
-        known.append((time_of(event), key, value))
         if self.answers.by == "latency":
+            now = time_of(event)
+            if self.settled is not None and now <= self.settled:
+                self.late = self.late or (
+                    f"a message of {name} has the time {show(now)}, and comes after answers up to then were judged: by "
+                    "latency, a trace has to be in the order of time"
+                )
+            insort(known, (now, key, value), key=itemgetter(0))
             # what is older than any window that is still open, but for the last of it, can no longer be asked for
             first = self.waiting[0].time if self.waiting else known[-1][0]
             since = first - self.answers.latency - 2 * self.answers.jitter
             while len(known) > 1 and known[1][0] <= since:
                 known.popleft()
-        elif len(known) > KEYS_KEPT:
+            return
+        known.append((time_of(event), key, value))
+        if len(known) > KEYS_KEPT:
             known.popleft()
 
     def ask(
@@ -95,8 +109,10 @@ class Pairing:
             self.waiting.append(asked)
 
     def uneven(self) -> str:
-        """By order: why the k-th answer need not be that to the k-th message of an input; empty where it is. What
-        came after the last answer need not have been answered yet."""
+        """Why the answers need not be paired rightly; empty where they are. By order, what came after the last answer
+        need not have been answered yet."""
+        if self.late:
+            return self.late
         for count, asked in self.asked.values() if self.answers.by == "order" else ():
             for name in asked.inputs:
                 whole = self.counts.get(name, 0)
@@ -118,6 +134,8 @@ class Pairing:
             if not due:
                 return
             self.waiting.popleft()
+            if self.answers.by == "latency":
+                self.settled = max(self.settled or Fraction(0), asked.time + self.answers.jitter)
             yield asked, found
 
     def _passed(self, asked: Asked, now: Fraction) -> bool:

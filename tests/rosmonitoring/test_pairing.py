@@ -131,6 +131,31 @@ def test_by_latency_the_verdicts_are_those_of_all_combinations(seed: int, make_s
     assert low.order + low.early == expected["open"]
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_by_latency_a_trace_out_of_order_is_judged_as_in_order_or_not_at_all(
+    seed: int, make_system: Callable[..., System]
+) -> None:
+    """Lines moved a little, or far."""
+    rng = random.Random(seed)
+    events = run(rng, frozenset(rng.sample(range(60), 8)))
+    reach = 10.0 ** rng.uniform(-3, 1)
+    moved = sorted(events, key=lambda event: float(event["time"]) + rng.uniform(0, reach))
+    answers = {"latency": "10 ms", "jitter": "10 ms", "because": "measured"}
+    found: list[Any] = []
+    for trace in (events, moved):
+        system = make_system(RCL, MAPPING, answers=answers)
+        made, faults = setup(system, system.contract.node("n"), system.plan.node("n").methods[0].options)
+        assert not faults
+        monitor = Monitor(made)
+        violations = [v for event in trace for v in monitor.step(event)] + monitor.finish()
+        about = {
+            name: (t.judged, t.broken) for name, t in monitor.tallies.items() if not t.unpaired and name != "positive"
+        }
+        found.append((sorted((v.clause, v.time) for v in violations if v.clause in about), about, monitor.backwards))
+    assert not found[0][2]
+    assert found[1][2] or found[1][:2] == found[0][:2]
+
+
 def test_by_stamp(make_system: Callable[..., System]) -> None:
     def stamped(topic: str, seconds: int, **fields: Any) -> Event:
         return {"topic": topic, "header": {"stamp": {"sec": seconds, "nanosec": 5}}, "time": 1, **fields}
