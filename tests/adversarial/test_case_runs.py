@@ -149,6 +149,7 @@ def told(folder: Path, seed: int, edits: int = 3) -> int:
     return count
 
 
+@pytest.mark.slow
 def test_no_case_says_what_some_run_breaks(tmp_path: Path) -> None:
     assert sum(told(tmp_path, seed) for seed in range(5)) > 0
 

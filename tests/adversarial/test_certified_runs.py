@@ -208,6 +208,7 @@ def kept(folder: Path, seed: int) -> int:
     return found
 
 
+@pytest.mark.slow
 def test_no_certificate_of_what_was_shows_what_is_false_now(tmp_path: Path) -> None:
     assert sum(kept(tmp_path, seed) for seed in range(12)) > 0
 

@@ -60,7 +60,7 @@ def run(root: Path, *words: str, stdin: bytes = b"") -> str:
     return said
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("words", [["check"], ["verify"], ["audit"], ["doctor"], ["report"]], ids=" ".join)
 def test_a_module_path_that_means_here_is_left(
     tmp_path: Path, words: list[str], monkeypatch: pytest.MonkeyPatch

@@ -35,7 +35,7 @@ def place(tmp_path: Path) -> Path:
     return root
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_commands_that_read_load_no_plug_in(place: Path) -> None:
     (place / "evil.py").write_text(EVIL)
     plan = place / "contracts" / "s" / "plan.yaml"
@@ -46,7 +46,7 @@ def test_commands_that_read_load_no_plug_in(place: Path) -> None:
     assert "not loaded" in text or "BACKEND005" in run(place, AVOW, "check", str(plan), "path")[1]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_module_of_the_folder_stands_in_for_another(place: Path) -> None:
     for name in ("z3.py", "json.py", "avow/__init__.py", "hypothesis.py", "lark.py"):
         (place / name).parent.mkdir(exist_ok=True)
@@ -57,7 +57,7 @@ def test_no_module_of_the_folder_stands_in_for_another(place: Path) -> None:
     assert not list(place.glob("**/executed"))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["artifacts/ledger/s.jsonl", "artifacts/ledger/index"])
 def test_a_pipe_where_the_ledger_should_be(place: Path, name: str) -> None:
     (place / "artifacts" / "ledger").mkdir(parents=True)
@@ -68,7 +68,7 @@ def test_a_pipe_where_the_ledger_should_be(place: Path, name: str) -> None:
     assert run(place, AVOW, "verify", "s")[0] != 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["contracts/s/plan.yaml", "reports/s/report.json"])
 def test_a_pipe_in_another_file_s_place_is_not_waited_for(place: Path, name: str) -> None:
     (place / name).parent.mkdir(parents=True, exist_ok=True)

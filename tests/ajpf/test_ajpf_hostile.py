@@ -45,6 +45,7 @@ def test_agents_that_count_for_ever_are_unfinished_not_checked(tmp_path):
     assert "more than 2000 states" in (graph.unfinished or "")
 
 
+@pytest.mark.slow
 def test_a_message_that_grows_is_unfinished(tmp_path):
     plans = "+.received(:tell, B) : { True } <- .send(From, :tell, s(B));"
     head = ":name: {}\n:Initial Beliefs:\n:Initial Goals:\n{}\n:Plans:\n"

@@ -56,6 +56,7 @@ def both(agents, wanted, made=Reduction, most=3_000):
     return answers, (len(whole), len(graph))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [loose_society, society])
 @pytest.mark.parametrize("first", some(range(0, 1000, 10), 2))
 def test_the_answers_are_those_of_the_whole_state_space(tmp_path, make, first):

@@ -58,7 +58,7 @@ def test_the_published_loops_never_start_and_are_degenerate(tmp_path: Path) -> N
     assert found["environment.radiationSensor.A1"].verdict is Verdict.UNKNOWN, "nobody says why 0 <= r"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_repaired_loop_stands_by_its_initial_values(tmp_path: Path) -> None:
     _, answers = settled(case_study(tmp_path, "remote_inspection", REPAIRED))
     assert answers.verdict is Verdict.PROVED
@@ -70,7 +70,7 @@ def test_the_repaired_loop_stands_by_its_initial_values(tmp_path: Path) -> None:
     assert answers.goal.root.assumed == ()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_initial_value_that_breaks_the_assumption_is_found(tmp_path: Path) -> None:
     plan = REPAIRED.replace(
         "exists(a, b in REAL | forall(x, y in REAL | out.at(x, y) <=> (x == a and y == b)))",
@@ -83,7 +83,7 @@ def test_an_initial_value_that_breaks_the_assumption_is_found(tmp_path: Path) ->
     assert answers.verdict is not Verdict.PROVED
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_waypoints_too_close_are_found_at_the_hair(tmp_path: Path) -> None:
     """With the tolerance of ±0.25 m, 0.5 m apart is too close and anything above is not."""
     just_enough = case_study(tmp_path, "remote_inspection", REPAIRED)
@@ -97,7 +97,7 @@ def test_waypoints_too_close_are_found_at_the_hair(tmp_path: Path) -> None:
     assert dict(shown.values).keys() >= {"navigation.at", "in.wayP"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_requirements(tmp_path: Path) -> None:
     found = outcomes(case_study(tmp_path, "remote_inspection", REPAIRED + SCENARIO))
     assert "REQ1" not in found, "prose is linked, not settled"

@@ -148,7 +148,7 @@ def test_refines(tmp_path: Path) -> None:
     assert json.loads(output)["nodes"][0]["clauses"][0]["counterexample"] == {"out.x": "0"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs_dafny
 @pytest.mark.parametrize(
     "name",
@@ -161,7 +161,7 @@ def test_the_rules_are_proved(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.needs_dafny
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_dafny_would_notice(tmp_path: Path) -> None:
     """The same proof without its persistence premise does not verify."""
     source = (PROOFS / "calculus.dfy").read_text()
@@ -220,7 +220,7 @@ def synthetic(count: int) -> str:
     return "".join(parts)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_chain_of_twenty_is_quick(tmp_path: Path) -> None:
     text_ = node("n0", "", "x0 : INTEGER", "G: out.x0 >= 0")
     for k in range(1, 20):
@@ -238,7 +238,7 @@ def test_a_chain_of_twenty_is_quick(tmp_path: Path) -> None:
     assert min(taken) < 0.5, taken
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_thousand_nodes(tmp_path: Path) -> None:
     system = make(tmp_path, synthetic(1000))
     start = time.process_time()

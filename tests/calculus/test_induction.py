@@ -37,7 +37,7 @@ def test_a_state_that_is_reached_refutes_with_the_run(tmp_path: Path) -> None:
     assert found.details["run"] == 4
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_state_that_is_not_shown_to_be_reached_refutes_nothing(tmp_path: Path) -> None:
     """n stays 0; but from 7, which is never reached, it would go on to 8."""
     text = counter("INTEGER", "G: (in.last < 5 -> out.n == 0) and (in.last >= 5 -> out.n == in.last + 1)")
@@ -53,7 +53,7 @@ def test_a_state_that_is_not_shown_to_be_reached_refutes_nothing(tmp_path: Path)
 
 @pytest.mark.parametrize(
     ("lag", "verdict"),
-    [(2, Verdict.PROVED), (3, Verdict.PROVED), pytest.param(5, Verdict.UNKNOWN, marks=pytest.mark.slow)],
+    [(2, Verdict.PROVED), (3, Verdict.PROVED), pytest.param(5, Verdict.UNKNOWN, marks=pytest.mark.nightly)],
 )
 def test_induction_over_several_steps(tmp_path: Path, lag: int, verdict: Verdict) -> None:
     """n keeps what the first of a row of delays holds: how many steps induction needs is the row's length."""
@@ -94,7 +94,7 @@ def test_a_side_condition_is_refuted_by_a_run(tmp_path: Path) -> None:
     assert "at step 4 of a run" in found.summary
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_side_condition_that_is_not_inductive_is_unknown(tmp_path: Path) -> None:
     text = counter("INTEGER", "G: in.last < 5 -> out.n == 0")
     plan = "connections: [{from: count.n, to: count.last, delayed: true, initial: 0}]\n"

@@ -42,7 +42,7 @@ def stands(composition: Composition) -> bool:
     return composition.stands(composition.whole, Bounds()) is Verdict.PROVED
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("block", range(5))
 def test_no_grouping_derives_what_enumeration_refutes(tmp_path: Path, block: int) -> None:
     stood = grouped = 0
@@ -71,7 +71,7 @@ def test_circular_support_is_refused_wherever_the_border_runs(tmp_path: Path, gr
     assert composition.stands(composition.whole, Bounds()) is Verdict.REFUTED
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_grouping_loses_little(tmp_path: Path) -> None:
     """Of what stands without subsystems, most stands with them: the calculus did not get sound by proving nothing."""
     flat = kept = 0

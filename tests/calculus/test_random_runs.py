@@ -270,7 +270,7 @@ def compare(tmp_path: Path, seed: int, told: Counter[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(SYSTEMS), pytest.param(range(SYSTEMS, 5 * SYSTEMS), marks=pytest.mark.slow)], ids=["few", "many"]
+    "seeds", [range(SYSTEMS), pytest.param(range(SYSTEMS, 5 * SYSTEMS), marks=pytest.mark.nightly)], ids=["few", "many"]
 )
 def test_runs_are_what_an_enumeration_finds(tmp_path: Path, seeds: range) -> None:
     told: Counter[str] = Counter()

@@ -144,7 +144,7 @@ class Enumeration:
         return None
 
 
-@pytest.mark.parametrize("block", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, BLOCKS))])
+@pytest.mark.parametrize("block", [0, *(pytest.param(n, marks=pytest.mark.nightly) for n in range(1, BLOCKS))])
 def test_no_derivation_stands_that_enumeration_refutes(tmp_path: Path, block: int) -> None:
     stood = conditions = 0
     for seed in range(block, SYSTEMS, BLOCKS):

@@ -141,7 +141,7 @@ def test_two_disjoint_loops_are_judged_apart(tmp_path: Path) -> None:
 # -- wide and large ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_fan_out_and_in_of_twenty(tmp_path: Path) -> None:
     wide = node("s", "", "x : INTEGER", "G: out.x >= 0")
     wide += "".join(

@@ -454,7 +454,7 @@ def test_bad_inclusions_are_located(tmp_path: Path) -> None:
     assert {Path(d.span.file).parent.name for d in rejected.value.diagnostics if d.span} == {"a", "b"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_of_two_of_two_is_soon_refused(tmp_path: Path) -> None:
     folder_of(tmp_path, "s0", node("n", "", "x0 : INTEGER"))
     for k in range(1, 16):

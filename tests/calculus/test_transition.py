@@ -267,7 +267,7 @@ def test_functions_over_delayed_edges(tmp_path: Path) -> None:
     assert found.verdict is Verdict.TESTED, "it grows beyond what the scenario has"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_search_that_would_take_for_ever_ends(tmp_path: Path) -> None:
     text = TYPES + node("a", "k : NATURAL", "p : Plan", "G: exists(i in NATURAL | i <= 9 and out.p(i) == in.k)")
     found = outcomes(make(tmp_path, text, plan_of("always a.k < 20", "NATURAL: 0..9")))["R"]

@@ -149,6 +149,7 @@ def test_the_good_lamp_is_proved(make_job: MakeJob, tmp_path: Path) -> None:
         assert outcome.verdict is Verdict.PROVED, outcome
 
 
+@pytest.mark.slow
 @pytest.mark.needs_dafny
 def test_only_the_broken_guarantee_is_unproved(make_job: MakeJob, tmp_path: Path) -> None:
     outcomes = settle(make_job, tmp_path, WRONG)

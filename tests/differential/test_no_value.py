@@ -70,6 +70,7 @@ def test_over_runs(text: str, tmp_path: Path) -> None:
     assert next(outcome for label, outcome in found.items() if label.endswith("R")).verdict is Verdict.REFUTED
 
 
+@pytest.mark.slow
 def test_refinement_and_sanity(claim: str) -> None:
     def one(formula: str) -> object:
         contract, faults = check_text(node("n", "", OUTPUTS, f"G: {formula}"), "n.rcl")
@@ -96,6 +97,7 @@ PROGRAM = {
 TOOLS = {"hoare": HOARE, "hypothesis": HYPOTHESIS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tool", ["hoare", "hypothesis"])
 def test_programs(claim: str, tool: str, tmp_path: Path) -> None:
     options, file, text = PROGRAM[tool]

@@ -154,7 +154,7 @@ def many(seeds: range, folder: Path, backend: str, tool: Any) -> dict[Verdict, i
     return total
 
 
-@pytest.mark.parametrize("seeds", [range(8), pytest.param(range(8, 48), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [range(8), pytest.param(range(8, 48), marks=pytest.mark.nightly)])
 def test_hoare_says_what_the_oracle_says(seeds: range, tmp_path: Path) -> None:
     found = many(seeds, tmp_path, "hoare", HOARE)
     assert found[Verdict.PROVED] > 10
@@ -162,7 +162,7 @@ def test_hoare_says_what_the_oracle_says(seeds: range, tmp_path: Path) -> None:
     assert Verdict.ERROR not in found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_hypothesis_says_what_the_oracle_says(tmp_path: Path) -> None:
     """It may miss what is there; of these it misses none."""
     found = many(range(12), tmp_path, "hypothesis", HYPOTHESIS)
@@ -170,7 +170,7 @@ def test_hypothesis_says_what_the_oracle_says(tmp_path: Path) -> None:
     assert found[Verdict.REFUTED] > 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs_dafny
 def test_dafny_proves_nothing_that_the_oracle_breaks(tmp_path: Path) -> None:
     found = many(range(3, 6), tmp_path, "dafny", DAFNY)
@@ -178,7 +178,7 @@ def test_dafny_proves_nothing_that_the_oracle_breaks(tmp_path: Path) -> None:
     assert Verdict.ERROR not in found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_wrong_oracle_or_translator_would_be_caught(tmp_path: Path) -> None:
     """A program other than the one that the oracle runs."""
     caught = 0
@@ -240,7 +240,7 @@ def mapping(name: str, sort: str) -> Any:
     return name
 
 
-@pytest.mark.parametrize("seeds", [range(20), pytest.param(range(20, 120), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [range(20), pytest.param(range(20, 120), marks=pytest.mark.nightly)])
 def test_the_monitor_says_what_the_oracle_says(seeds: range, tmp_path: Path) -> None:
     seen = {True: 0, False: 0}
     for seed in seeds:

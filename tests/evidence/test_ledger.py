@@ -184,7 +184,7 @@ def start(path: Path, name: str, most: int) -> subprocess.Popen[bytes]:
     return process
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_kill_9_loses_nothing_that_was_acknowledged(tmp_path: Path) -> None:
     path = tmp_path / "x.jsonl"
     for round_number in range(4):

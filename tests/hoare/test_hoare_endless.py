@@ -165,7 +165,7 @@ def lines(rng: random.Random, depth: int, indent: str) -> list[str]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(4))
 def test_random_loops_against_running_them(tmp_path: Path, seed: int) -> None:
     rng = random.Random(seed)

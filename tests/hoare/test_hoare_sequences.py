@@ -217,7 +217,7 @@ CLAIMS = (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", [0, 1])
 def test_what_is_proved_survives_random_runs(tmp_path: Path, seed: int) -> None:
     rng = random.Random(seed)

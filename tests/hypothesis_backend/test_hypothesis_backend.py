@@ -66,12 +66,12 @@ def test_a_right_subject_is_tested_and_no_more(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "broken", "reading"),
     [
-        pytest.param("r < 120", "r < 130", {"medium"}, ("120", "130"), marks=pytest.mark.slow),
+        pytest.param("r < 120", "r < 130", {"medium"}, ("120", "130"), marks=pytest.mark.nightly),
         ("r < 120", "r <= 120", {"medium"}, ("120", "120")),
         ("r < 250", "r <= 250", {"high"}, ("250", "250")),
-        pytest.param('"green" if', '"orange" if', {"low"}, ("0", "120"), marks=pytest.mark.slow),
+        pytest.param('"green" if', '"orange" if', {"low"}, ("0", "120"), marks=pytest.mark.nightly),
         ('"orange" if r < 250 else "red"', '"red" if r < 250 else "orange"', {"medium", "high"}, None),
-        pytest.param("done.add(command[1])", "done.add(command[1] + 1)", {"marks"}, None, marks=pytest.mark.slow),
+        pytest.param("done.add(command[1])", "done.add(command[1] + 1)", {"marks"}, None, marks=pytest.mark.nightly),
         ("done.add(command[1])", "done = {command[1]}", {"marks"}, None),
         ('== "inspect"', '!= "halt"', {"marks"}, None),
     ],
@@ -94,7 +94,7 @@ def test_seeded_faults_are_found(
             assert dict(shown.values)["in.before"] == "{}"  # shrunk: what does not matter is empty
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_seed_gives_the_same_answer(tmp_path: Path) -> None:
     wanted = job(tmp_path, STEP.replace("r < 120", "r < 130"))
     assert run(wanted, seed=3).outcomes == run(wanted, seed=3).outcomes
@@ -151,13 +151,14 @@ QUICK = ("answers by itself", "leaves hard", "lies about types", "patches the ju
 
 
 @pytest.mark.parametrize(
-    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in sorted(HOSTILE)]
+    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.nightly) for n in sorted(HOSTILE)]
 )
 def test_nothing_that_a_subject_does_is_green(tmp_path: Path, name: str) -> None:
     found = settle(job(tmp_path, HOSTILE[name], cases=60), seconds=20)
     assert not any(o.verdict.supports for o in found.values()), name
 
 
+@pytest.mark.slow
 def test_an_endless_subject_is_stopped(tmp_path: Path) -> None:
     found = settle(job(tmp_path, "import time\ndef step(**inputs):\n    while True: time.sleep(0.01)"), seconds=10)
     assert {o.verdict for o in found.values()} == {Verdict.ERROR}
@@ -174,7 +175,7 @@ def test_a_crash_is_shown_with_its_smallest_input(tmp_path: Path) -> None:
     assert "s.py, line 3" in low.summary
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_assumption_without_a_value_is_said_to_be_one(tmp_path: Path) -> None:
     rcl = "node n {{ inputs( a : REAL, b : REAL ) outputs( y : REAL ) topics() {} guarantee g ( out.y == in.a ) }}"
     text = "def step(a): return a"
@@ -373,7 +374,7 @@ def test_export_is_pure_and_golden(tmp_path: Path) -> None:
         assert text == golden.read_text(), f"{golden} differs: refresh it if the change is meant"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_export_runs_under_pytest(tmp_path: Path) -> None:
     """The file stands by itself: each guarantee is a test, and a fault fails its test only."""
     wanted = job(tmp_path / "contracts" / "sensors", STEP.replace("r < 120", "r < 130"), cases=60)

@@ -46,12 +46,14 @@ def test_the_repaired_nodes_pass(tmp_path: Path, root: Path, node: str, file: st
     ("old", "new", "broken"),
     [
         ("here + 1", "here + 2", {"next_waypoint", "end_of_mission"}),
-        pytest.param('("move", *following)', '("move", *place(wayP, EXIT))', {"next_waypoint"}, marks=pytest.mark.slow),
-        pytest.param('("inspect", here)', '("inspect", here + 1)', {"inspect_here"}, marks=pytest.mark.slow),
+        pytest.param(
+            '("move", *following)', '("move", *place(wayP, EXIT))', {"next_waypoint"}, marks=pytest.mark.nightly
+        ),
+        pytest.param('("inspect", here)', '("inspect", here + 1)', {"inspect_here"}, marks=pytest.mark.nightly),
         ('("red", "orange")', '("red",)', {"exit_on_danger", "abandon"}),
-        pytest.param('or phase == "leaving"', "", {"exit_on_danger", "abandon"}, marks=pytest.mark.slow),
+        pytest.param('or phase == "leaving"', "", {"exit_on_danger", "abandon"}, marks=pytest.mark.nightly),
         ("not inspected(here)", "inspected(here)", {"next_waypoint", "inspect_here"}),
-        pytest.param("EXIT = 0", "EXIT = 1", {"exit_on_danger"}, marks=pytest.mark.slow),
+        pytest.param("EXIT = 0", "EXIT = 1", {"exit_on_danger"}, marks=pytest.mark.nightly),
     ],
 )
 def test_agents_with_a_fault_are_refuted(tmp_path: Path, root: Path, old: str, new: str, broken: set[str]) -> None:
@@ -97,7 +99,7 @@ def thresholds(seed: int) -> tuple[str, str, str]:
     return rcl, program, function
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(6))
 def test_hoare_and_hypothesis_agree(tmp_path: Path, seed: int) -> None:
     rcl, program, function = thresholds(seed)

@@ -94,6 +94,7 @@ def test_the_right_ones_stand(tmp_path: Path, node: str) -> None:
     assert outcome.verdict is Verdict.TESTED, outcome.summary
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("node", "old", "new"), some(MUTANTS, 4))
 def test_every_near_miss_is_refuted(tmp_path: Path, node: str, old: str, new: str) -> None:
     assert old in RIGHT[node]

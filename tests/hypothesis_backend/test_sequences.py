@@ -43,6 +43,7 @@ SAME = "guarantee g ( out.u == in.r )"
 REAL = "inputs( r : REAL ) outputs( u : REAL )"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ports", "clauses", "step"),
     [

@@ -25,6 +25,7 @@ node n {{
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("formula", "assume", "subject"),
     some(

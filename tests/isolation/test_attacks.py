@@ -161,6 +161,7 @@ def settle(folder: Path, text: str) -> Report:
     return BACKEND.discharge(job, folder, Limits(seconds=30))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("name", some(ATTACKS, 6))
 def test_no_attack_is_believed(tmp_path: Path, name: str, level: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -61,6 +61,7 @@ def test_nothing_to_establish_and_wrong_labels_are_no_success(tmp_path: Path) ->
         assert "label" in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["remote_inspection", "remote_inspection_delayed", "remote_inspection_published"])
 def test_everything_that_is_proved_of_a_shipped_composition_has_a_certificate(name: str) -> None:
     system = load_system(CONTRACTS / name)

@@ -57,6 +57,7 @@ def over(written: Callable[[int], str], seeds: range, second: Apart | None = Non
     return told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("written", [lambda seed: Contracts(seed).text(), random_contract], ids=["types", "cases"])
 def test_generated_contracts(written: Callable[[int], str]) -> None:
     told = over(written, range(6))

@@ -66,7 +66,7 @@ _QUICK = ("->", "+-")
 
 
 @pytest.mark.parametrize(
-    "name", [name if name in _QUICK else pytest.param(name, marks=pytest.mark.slow) for name in LONG_FORMULAS]
+    "name", [name if name in _QUICK else pytest.param(name, marks=pytest.mark.nightly) for name in LONG_FORMULAS]
 )
 def test_a_chain_is_accepted_laid_out_and_translated(name: str) -> None:
     text = FRAME.format(names="red", formula=LONG_FORMULAS[name])

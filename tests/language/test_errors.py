@@ -179,6 +179,7 @@ node Agent {
     assert len(found) == 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [

@@ -80,7 +80,7 @@ _SPACES = (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_comments_anywhere(root: Path) -> None:
     source = random.Random(7)
     texts = [p.read_text("utf-8") for p in sorted(root.glob("contracts/*/*.rcl"))] + [BEFORE]

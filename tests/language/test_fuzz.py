@@ -23,7 +23,7 @@ ROUNDS = int(os.environ.get("AVOW_FUZZ", "300"))
 SEED = int(os.environ.get("AVOW_FUZZ_SEED", "20261121"))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_texts_of_every_kind(root: Path) -> None:
     before, sound = fuzzing.memory(), 0
     for text in fuzzing.texts(root, SEED, ROUNDS):

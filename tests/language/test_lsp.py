@@ -152,7 +152,7 @@ def test_whatever_is_sent(editor: Editor) -> None:
     assert editor.open(uri, TYPES + NODE) == ["RCL405"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_large_text_is_checked_when_its_author_pauses(editor: Editor) -> None:
     uri = "untitled:large"
     text = TYPES + "".join(NODE.replace("node n", f"node n{i}").split("\n")[1] + "\n" for i in range(600))

@@ -46,7 +46,7 @@ def made() -> list[tuple[str, tuple[str, ...], Contract]]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_layout_keeps_everything() -> None:
     for text, comments, contract in made():
         formatted = format_text(text, "f")
@@ -58,7 +58,7 @@ def test_layout_keeps_everything() -> None:
         assert all(" ".join(comment.split()) in laid_out for comment in comments), text
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_translation_keeps_the_meaning() -> None:
     for text, _, contract in made():
         again = contract_of(FORMATS["rcl"](contract))
@@ -68,7 +68,7 @@ def test_translation_keeps_the_meaning() -> None:
             assert FORMATS[notation](contract)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_smtlib_is_read_by_z3() -> None:
     import z3
 

@@ -304,7 +304,7 @@ def test_standing_of_a_guarantee(workspace: Path) -> None:
     assert standing(str(workspace / "f.rcl"))("n", "fine") is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_server_speaks_the_protocol(tmp_path: Path) -> None:
     pytest.importorskip("pygls")
     path = tmp_path / "f.rcl"

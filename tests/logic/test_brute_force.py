@@ -101,7 +101,7 @@ def test_normal_forms_keep_the_meaning(term: Term) -> None:
 
 @pytest.mark.parametrize(
     "outputs",
-    [OUTPUTS, pytest.param((*OUTPUTS, FUNCTION_OUTPUT), marks=pytest.mark.slow)],
+    [OUTPUTS, pytest.param((*OUTPUTS, FUNCTION_OUTPUT), marks=pytest.mark.nightly)],
     ids=["scalars", "with a function"],
 )
 def test_realizability_is_right(outputs: tuple[Variable, ...]) -> None:

@@ -155,7 +155,7 @@ def nested(levels: int) -> Term:
     return term
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_depth_is_no_obstacle() -> None:
     term = nested(4_000)
     assert depth(term) > 4_000

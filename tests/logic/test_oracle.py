@@ -80,7 +80,7 @@ def tally(seeds: Iterable[int]) -> Tally:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_few_contracts() -> None:
     found = tally(QUICK)
     assert not found.wrong, "\n".join(found.wrong)
@@ -88,7 +88,7 @@ def test_a_few_contracts() -> None:
     assert not found.unknown
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_verdict_is_right() -> None:
     found = tally(range(FIRST, FIRST + COUNT))
     print(found)
@@ -98,6 +98,7 @@ def test_every_verdict_is_right() -> None:
     assert found.hinging * 5 <= found.claims
 
 
+@pytest.mark.slow
 def test_a_flipped_verdict_is_caught() -> None:
     caught: set[Property] = set()
     missed: set[Property] = set()

@@ -15,6 +15,7 @@ from .contracts import formula, node
 SHORT = node("inputs() outputs( s : <INTEGER>, b : BOOL ) | guarantee( length(out.s) < 3 ) guarantee( out.b )")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "clause",
     [

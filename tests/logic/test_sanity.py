@@ -56,6 +56,7 @@ def test_a_good_contract_is_good(a: str, b: str) -> None:
     assert found["undetermined-v"].verdict is Verdict.PROVED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("clause", "faults"),
     some(
@@ -193,7 +194,7 @@ def repaired() -> dict[str, dict[str, SanityResult]]:
     return {n.name: results(n) for n in case_study("remote_inspection").nodes}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_repaired_nodes_are_realizable(repaired: dict[str, dict[str, SanityResult]]) -> None:
     for name, found in repaired.items():
         for claim in ("assumptions-satisfiable", "consistent", "realizable"):
@@ -203,6 +204,7 @@ def test_the_repaired_nodes_are_realizable(repaired: dict[str, dict[str, SanityR
     assert set(repaired["agent"]["realizable"].clauses) == {"exit_known", "one_waypoint"}
 
 
+@pytest.mark.slow
 def test_the_published_agent_is_not_realizable(published: dict[str, dict[str, SanityResult]]) -> None:
     result = published["agent"]["realizable"]
     assert result.verdict is Verdict.REFUTED
@@ -284,7 +286,7 @@ def test_a_scenario_gives_bounded_answers_only_where_needed() -> None:
     assert answer.bounded == (answer.verdict is Verdict.CHECKED)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_chain_of_equivalences_does_not_double_the_work_with_every_link() -> None:
     """Each `<=>` is read four ways when outputs are looked for: bounded, or 26 of them would take for ever."""
     import time

@@ -23,7 +23,7 @@ FIRST = int(os.environ.get("AVOW_SANITY_FIRST", "0"))
 SEEDS = range(FIRST, FIRST + COUNT) if COUNT else range(0, WHOLE, 7)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_verdict_is_right() -> None:
     wrong: list[str] = []
     unknown: Counter[str] = Counter()

@@ -53,7 +53,7 @@ def test_a_plan_may_be_what_an_assumption_names() -> None:
     assert verdict(WAYS.format(), "realizable") is Verdict.PROVED
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_but_not_where_the_plan_has_to_end_early() -> None:
     early = WAYS.format().replace("out.plan(in.length)", "out.plan(0)")
     assert verdict(early, "realizable") is Verdict.REFUTED

@@ -22,6 +22,7 @@ def verdicts(outputs: str, guarantee: str, assumption: str = "") -> dict[str, Ve
     return {r.name: r.verdict for r in analyse(found.nodes[0], wanted={"consistent", "realizable"})}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("outputs", "guarantee"),
     some(

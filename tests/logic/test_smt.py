@@ -199,7 +199,7 @@ def test_fractions_are_exact() -> None:
     assert NODE.input("b").sort == BOOL
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs_cvc5
 def test_another_solver_helps_where_z3_gives_up() -> None:
     answer = entails([], say("exists(i in NATURAL | i > in.r)"), effort=5_000)

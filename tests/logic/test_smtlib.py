@@ -41,7 +41,7 @@ def test_both_solvers_read_it_and_agree(hypothesis: str, goal: str) -> None:
         assert answer == "unsat"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs_cvc5
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 @given(formulas())
@@ -51,7 +51,7 @@ def test_cvc5_never_contradicts_z3(term: Term) -> None:
     assert other in {answer, "unknown"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs_cvc5
 @pytest.mark.parametrize("system", ["remote_inspection", "remote_inspection_published"])
 def test_the_case_study_s_clauses_export(system: str) -> None:

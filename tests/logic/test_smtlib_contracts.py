@@ -60,7 +60,7 @@ def ask_z3(script: str) -> str:
     return str(solver.check())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs_cvc5
 def test_the_exported_contract_has_the_verdict_of_sanity() -> None:
     said: Counter[str] = Counter()

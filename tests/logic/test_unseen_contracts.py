@@ -204,6 +204,7 @@ CONTRACTS = {
 LONG = ("a height of its own for each of a swarm",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*some((n for n in CONTRACTS if n not in LONG), 10), *some(LONG, 0)])
 def test_what_is_found(name: str) -> None:
     context, ports, clauses, faults, notes = CONTRACTS[name]

@@ -62,6 +62,7 @@ def place(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     return Workspace(workspace)
 
 
+@pytest.mark.slow
 def test_a_method_that_supports_everything_is_found_out(place: Workspace) -> None:
     surveyed = survey(place.contracts / "s")
     assert isinstance(surveyed, Survey), surveyed

@@ -37,7 +37,7 @@ def verify(workspace: Path, *options: str) -> tuple[dict[str, str], str]:
     return {p["obligation"]: p["grade"] for p in found["proofs"] if "/system/" in p["obligation"]}, done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_grades_in_cached_runs(workspace: Path) -> None:
     robot = workspace / "contracts/robot"
     (robot / "models").mkdir(parents=True)
@@ -105,7 +105,7 @@ accepted:
 NAMED = "compose: {D: {select: [a, b], rule: %s}}\n"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ways_in_through_cached_runs(workspace: Path) -> None:
     """What only the base case of an induction needs, refuted and accepted; a derivation that gets a name, another and
     none; two guarantees that swap names: each in a run over the records of the one before, held against a fresh one."""

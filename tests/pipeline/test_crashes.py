@@ -136,7 +136,7 @@ def undisturbed(fresh: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[
     return standing(folder), time.monotonic() - start
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("how", ["killed", "interrupted", "a worker killed"])
 def test_a_disturbed_run_is_taken_up(fresh: Path, undisturbed: tuple[object, float], tmp_path: Path, how: str) -> None:
     rng = random.Random(how)
@@ -186,7 +186,7 @@ def kill_one_below(pid: int, rng: random.Random) -> None:
             return
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("kilobytes", [8, 24, 40])
 def test_a_file_that_cannot_grow(
     fresh: Path, undisturbed: tuple[object, float], tmp_path: Path, kilobytes: int
@@ -209,7 +209,7 @@ def test_a_file_that_cannot_grow(
     is_whole(folder, undisturbed[0], answers(folder))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_clock_that_is_set_back_fails_the_gate(fresh: Path, tmp_path: Path) -> None:
     """Else a risk whose acceptance has expired would be accepted again."""
     folder = tmp_path / "robot"

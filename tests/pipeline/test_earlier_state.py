@@ -52,6 +52,7 @@ def marked(root: Path) -> dict[str, set[str]]:
     return {name: {p.name for p in files if MARK in p.read_text()} for name, files in found.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("breaks", some(["plan", "contract", "gone"], 1))
 def test_a_report_of_what_cannot_be_read_is_marked_until_it_can(workspace: Path, breaks: str) -> None:
     folder, page = workspace / "contracts" / "s", workspace / "reports" / "s" / "index.html"
@@ -89,7 +90,7 @@ def test_a_report_of_what_cannot_be_read_is_marked_until_it_can(workspace: Path,
     assert len(page.read_text()) == pytest.approx(len(whole), abs=200)  # run and time differ
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_verify_signs_its_attestations_where_there_is_a_key(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("cryptography")
     (workspace / "contracts" / "s" / "m.py").write_text("def step(x):\n    return 0\n")
@@ -122,7 +123,7 @@ def test_verify_signs_its_attestations_where_there_is_a_key(workspace: Path, mon
     assert place.read_text() == plain
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_attestations_are_envelopes_where_a_key_signs(workspace: Path) -> None:
     pytest.importorskip("cryptography")
     public = new_key_pair(workspace / "key")

@@ -72,6 +72,7 @@ def edit(folder: Path, old: str, new: str, name: str = "system.rcl") -> None:
     path.write_text(text.replace(old, new, 1))
 
 
+@pytest.mark.slow
 def test_the_new_workspace_verifies(made: Path) -> None:
     verdicts = {(e["obligation"], e["method"]): e["verdict"] for e in ledger(made)}
     assert verdicts["thermostat/thermostat/guarantee/warms", "hoare"] == "proved"
@@ -82,6 +83,7 @@ def test_the_new_workspace_verifies(made: Path) -> None:
     assert (made / "reports" / "index.html").is_file()
 
 
+@pytest.mark.slow
 def test_again_nothing_is_run(robot: Path) -> None:
     before = (robot / "reports" / "thermostat" / "index.html").stat().st_mtime_ns
     done = verify(robot)
@@ -91,7 +93,7 @@ def test_again_nothing_is_run(robot: Path) -> None:
     assert (robot / "reports" / "thermostat" / "index.html").stat().st_mtime_ns == before
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_comment_reruns_nothing_below_the_check(robot: Path) -> None:
     edit(robot, "Low = 18;", "Low = 18; // a cold room\n")
     records = len(ledger(robot))
@@ -108,7 +110,7 @@ def test_a_comment_reruns_nothing_below_the_check(robot: Path) -> None:
     assert checked.returncode == 0, checked.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_threshold_breaks_what_depends_on_it_and_nothing_else(robot: Path) -> None:
     edit(robot, "Low = 18;", "Low = 20;")
     records = len(ledger(robot))
@@ -128,13 +130,13 @@ def test_a_threshold_breaks_what_depends_on_it_and_nothing_else(robot: Path) -> 
     assert 18 <= float(value) < 20
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_changed_program_reruns_its_method_only(robot: Path) -> None:
     edit(robot, "// the control law", "// the law of control", "models/thermostat.imp")
     assert {s for s in ran(verify(robot)) if s.startswith("discharge")} == {"discharge thermostat:thermostat:hoare"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_wrong_program_is_refuted(robot: Path) -> None:
     edit(robot, "temperature < 18", "temperature <= 18", "models/thermostat.imp")
     done = verify(robot)
@@ -145,7 +147,7 @@ def test_a_wrong_program_is_refuted(robot: Path) -> None:
     assert dict(verdicts["rests", "hoare"]["counterexample"]["values"])["in.temperature"] == "18"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_deleted_outputs_come_back(robot: Path) -> None:
     shutil.rmtree(robot / "artifacts")
     shutil.rmtree(robot / "reports")
@@ -155,7 +157,7 @@ def test_deleted_outputs_come_back(robot: Path) -> None:
     assert ledger(robot)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_killed_run_is_taken_up(made: Path, tmp_path: Path) -> None:
     folder = tmp_path / "killed"
     shutil.copytree(made / "contracts", folder / "contracts")
@@ -177,7 +179,7 @@ def test_a_killed_run_is_taken_up(made: Path, tmp_path: Path) -> None:
     assert len(every) == len(set(every)), "an answer that the killed run had recorded was made again"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_runs_at_once_do_the_work_once(made: Path, tmp_path: Path) -> None:
     folder = tmp_path / "twice"
     shutil.copytree(made / "contracts", folder / "contracts")
@@ -191,7 +193,7 @@ def test_two_runs_at_once_do_the_work_once(made: Path, tmp_path: Path) -> None:
     assert len(every) == len(set(every))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_fresh_settles_everything_anew(robot: Path) -> None:
     before = len(ledger(robot))
     done = run(robot, "avow", "verify", "--fresh")
@@ -200,7 +202,7 @@ def test_fresh_settles_everything_anew(robot: Path) -> None:
     assert case(robot)["fresh"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_swapped_artifact_is_made_again(robot: Path) -> None:
     stamp = next(robot.glob("artifacts/thermostat/*/hoare/.export.json"))
     name = next(iter(json.loads(stamp.read_text())["files"]))
@@ -223,7 +225,7 @@ BAD = [
 """File, text in it, the slip in its place, where it is to be located, and a word of the message."""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_bad_input_is_located_in_one_run(made: Path, tmp_path: Path) -> None:
     shutil.copy(made / "dodo.py", tmp_path)
     for number, (name, old, new, _, _) in enumerate(BAD):
@@ -244,7 +246,7 @@ def test_every_bad_input_is_located_in_one_run(made: Path, tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("name", "old", "new", "where", "what"),
-    [bad if k == 4 else pytest.param(*bad, marks=pytest.mark.slow) for k, bad in enumerate(BAD)],
+    [bad if k == 4 else pytest.param(*bad, marks=pytest.mark.nightly) for k, bad in enumerate(BAD)],
 )
 def test_bad_input_is_located_and_ends_with_2(
     robot: Path, name: str, old: str, new: str, where: str, what: str
@@ -258,7 +260,7 @@ def test_bad_input_is_located_and_ends_with_2(
     assert what in text, text
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_broken_system_does_not_stop_the_others(robot: Path) -> None:
     (robot / "contracts" / "broken").mkdir()
     (robot / "contracts" / "broken" / "plan.yaml").write_bytes(b"\x00\xff\xfe: [")
@@ -272,7 +274,7 @@ def test_a_broken_system_does_not_stop_the_others(robot: Path) -> None:
     assert case(robot)["exit_code"] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_one_system_by_name(robot: Path) -> None:
     assert verify(robot, "verify:thermostat").returncode == 0
     assert verify(robot, "verify:nothere").returncode != 0
@@ -284,6 +286,7 @@ def test_the_stages_are_listed(made: Path) -> None:
         assert f"{stage}:thermostat" in done.stdout, stage
 
 
+@pytest.mark.slow
 def test_obligations_are_shown_as_a_table(robot: Path) -> None:
     done = verify(robot, "obligations")
     assert done.returncode == 0, done.stderr

@@ -116,6 +116,7 @@ def server() -> int:
     return forks._servers[0]._process.pid
 
 
+@pytest.mark.slow
 def test_it_answers_from_a_session_of_its_own(odd: Path, way: str, monkeypatch: pytest.MonkeyPatch) -> None:
     for said in ("this", "that"):  # a fork has the environment of now, not of the server's start
         monkeypatch.setenv("SAID", said)
@@ -139,6 +140,7 @@ def test_a_crash_is_a_verdict_and_takes_nothing_with_it(odd: Path, does: str, wh
     assert settle(odd, "answers")[0].verdict is Verdict.TESTED
 
 
+@pytest.mark.slow
 def test_a_work_that_hangs_is_killed_with_all_that_it_started(
     odd: Path, way: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -155,6 +157,7 @@ def test_a_work_that_hangs_is_killed_with_all_that_it_started(
     until(lambda: not any(map(alive, started)))
 
 
+@pytest.mark.slow
 def test_an_interrupt_ends_all_works(odd: Path, way: str) -> None:
     (odd / "pids").unlink(missing_ok=True)
     found: list[Outcome] = []
@@ -182,6 +185,7 @@ def test_works_at_once_do_not_hold_each_other(odd: Path, monkeypatch: pytest.Mon
     thread.join(30)
 
 
+@pytest.mark.slow
 def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
     (odd / "pids").unlink(missing_ok=True)
     script = f"""
@@ -208,7 +212,7 @@ def test_nothing_outlives_a_killed_avow(odd: Path, way: str) -> None:
         os.kill(pid, signal.SIGKILL)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_without_a_server_there_is_a_new_python(odd: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SAID", "without")
     monkeypatch.setattr(forks, "FORK_START", 0.0)

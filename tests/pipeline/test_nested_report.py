@@ -53,7 +53,7 @@ def status(workspace: Path) -> dict[str, tuple[str, list[str]]]:
     return {d["derivation"]["name"]: (d["status"], d["below"]) for d in found["derivations"]}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_is_built_on_a_subsystem_rests_on_its_inside(workspace: Path) -> None:
     robot = workspace / "contracts/robot"
     (robot / "models").mkdir(parents=True)

@@ -173,12 +173,12 @@ def hold(root: Path, seed: int, steps: int, seconds: float) -> None:
         assert said == world.verify(), (seed, done)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_law_on_a_short_walk(tmp_path: Path) -> None:
     hold(tmp_path / "w", 1, 1, 60)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_law_after_a_ledger_was_rolled_back(tmp_path: Path) -> None:
     world = World(tmp_path / "w", random.Random(3))
     assert world.verify()[1]["gate integrity"] == "passes"

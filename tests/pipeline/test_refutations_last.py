@@ -52,6 +52,7 @@ def case(place: Workspace) -> dict[str, object]:
     return found
 
 
+@pytest.mark.slow
 def test_a_case_is_tried_first_whatever_the_plan_asks_for(place: Workspace) -> None:
     assert ask(place, "def step(x, k):\n    return x\n") is Verdict.REFUTED
     value = case(place)["x"]["q"]  # type: ignore[index]
@@ -65,7 +66,7 @@ def test_a_case_is_tried_first_whatever_the_plan_asks_for(place: Workspace) -> N
     assert ask(place, rare) is Verdict.REFUTED, "another threshold is another claim, but the case is tried"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_was_good_before_the_refutation_is_asked_again(place: Workspace) -> None:
     assert ask(place, GOOD) is Verdict.TESTED
     assert not open_obligations(place, work(place), RUN)
@@ -78,14 +79,14 @@ def test_what_was_good_before_the_refutation_is_asked_again(place: Workspace) ->
     assert not open_obligations(place, work(place), RUN), "the case was tried, and refutes no more"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_case_that_is_no_input_any_more_is_left_out(place: Workspace) -> None:
     assert ask(place, "def step(x, k):\n    return x\n") is Verdict.REFUTED
     edit(place.contracts / "s" / "s.rcl", ("x : REAL", "x : {low, high}"))
     assert ask(place, "def step(x, k):\n    return 0\n") is Verdict.TESTED
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_method_that_is_taken_out_of_the_plan_takes_no_refutation_with_it(place: Workspace) -> None:
     assert ask(place, "def step(x, k):\n    return x\n") is Verdict.REFUTED
     plan = place.contracts / "s" / "plan.yaml"

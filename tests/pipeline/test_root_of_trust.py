@@ -38,7 +38,7 @@ def refuted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_edit_of_what_is_kept_changes_the_verdict(refuted: Path) -> None:
     edited = 0
     files = [f for f in (*refuted.glob("artifacts/**/*"), *refuted.glob("reports/**/*")) if f.is_file()]
@@ -64,7 +64,7 @@ def test_no_edit_of_what_is_kept_changes_the_verdict(refuted: Path) -> None:
     assert "edited by hand" not in (refuted / "reports" / "index.html").read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_note_of_a_good_run_does_not_fit_a_bad_one(refuted: Path) -> None:
     """A run that ends well, its notes kept; then the wrong program again, with these notes."""
     subject = refuted / "contracts" / "s" / "m.py"

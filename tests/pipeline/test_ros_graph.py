@@ -63,6 +63,7 @@ def test_a_graph_that_cannot_be_read_is_an_error_of_the_check(rover: Path) -> No
     assert finding.span.file.endswith(GRAPH)
 
 
+@pytest.mark.slow
 def test_another_graph_is_checked_again(rover: Path) -> None:
     workspace = Workspace(rover.parents[1])
     surveyed = survey(rover)

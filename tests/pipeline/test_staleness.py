@@ -368,7 +368,7 @@ def watched(folder: Path) -> System:
 
 
 @pytest.mark.parametrize(
-    "method", ["hypothesis", "rosmonitoring", pytest.param("ajpf", marks=pytest.mark.slow), "sanity"]
+    "method", ["hypothesis", "rosmonitoring", pytest.param("ajpf", marks=pytest.mark.nightly), "sanity"]
 )
 def test_who_says_that_it_needs_no_steps_does_not_look_at_them(tmp_path: Path, method: str) -> None:
     folder = copied(SHIPPED, tmp_path)
@@ -389,6 +389,7 @@ def test_who_says_that_it_needs_no_steps_does_not_look_at_them(tmp_path: Path, m
     assert outcomes
 
 
+@pytest.mark.slow
 def test_temporal_requirements_look_at_the_steps_and_others_do_not(tmp_path: Path) -> None:
     system = watched(copied(SHIPPED, tmp_path))
     composition = compose(system)

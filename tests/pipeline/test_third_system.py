@@ -67,7 +67,7 @@ def settle(work: Work, folder: Path) -> tuple[Outcome, ...]:
     return backend.discharge(job, folder, limits).outcomes
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_each_engine_settles_its_part(tmp_path: Path) -> None:
     system = survey(FERRY)
     assert isinstance(system, Survey)
@@ -85,7 +85,7 @@ def test_each_engine_settles_its_part(tmp_path: Path) -> None:
     assert not {Verdict.UNKNOWN, Verdict.ERROR, Verdict.NOT_RUN} & set(found.values())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_it_verifies(harbour: Path) -> None:
     code, found, text = verify(harbour)
     assert code == 0, text
@@ -96,7 +96,7 @@ def test_it_verifies(harbour: Path) -> None:
     assert found["system/requirement/SAFE", "compose"]["verdict"] == "proved"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_careless_pilot_is_caught_by_both_of_its_methods(harbour: Path) -> None:
     models = harbour / "contracts" / "ferry" / "models"
     program, function = models / "skipper.gwen", models / "harbour.py"
@@ -110,7 +110,7 @@ def test_a_careless_pilot_is_caught_by_both_of_its_methods(harbour: Path) -> Non
     assert ["in.level", "high"] in found["pilot/guarantee/waits", "hypothesis"]["counterexample"]["values"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_requirement_that_does_not_follow_is_refuted(harbour: Path) -> None:
     plan = harbour / "contracts" / "ferry" / "plan.yaml"
     plan.write_text(plan.read_text().replace("gauge.depth < 2.5 ->", "gauge.depth < 2.6 ->"))

@@ -66,6 +66,7 @@ def test_a_refusal_has_its_line_and_reason(tmp_path: Path) -> None:
     assert "while is not in the subset" in told.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -267,6 +267,7 @@ def compare(seed: int, cases: int = 12) -> int:
     return answered
 
 
+@pytest.mark.slow
 def test_generated_programs() -> None:
     assert sum(compare(seed, 5) for seed in range(25)) > 40, "most of them have answers"
 

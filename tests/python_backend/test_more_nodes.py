@@ -209,6 +209,7 @@ REFUTED = {("ratelimit", "near"), ("battery", "counts"), ("battery", "lv")}
 UNKNOWN = {("fence", "exact_in")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", some(["mean", "front", *sorted(NODES.keys() - {"mean", "front"})], 2))
 def test_what_is_shown_of_a_node(name: str, tmp_path: Path) -> None:
     for clause, found in NODES[name].settled(tmp_path).items():

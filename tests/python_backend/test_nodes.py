@@ -13,6 +13,7 @@ from avow.backends.python import BACKEND
 from avow.base.verdict import Object, Verdict
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NODES)
 def test_right_nodes_are_proved_from_their_source(name: str, tmp_path: Path) -> None:
     example = NODES[name]
@@ -22,6 +23,7 @@ def test_right_nodes_are_proved_from_their_source(name: str, tmp_path: Path) -> 
         assert (found.of, found.numbers) == (Object.SOURCE, "float64")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "mutant"), list(mutants()), ids=[name for name, _ in mutants()])
 def test_every_mutant_is_refuted(name: str, mutant: Example, tmp_path: Path) -> None:
     found = mutant.settled(tmp_path)
@@ -31,6 +33,7 @@ def test_every_mutant_is_refuted(name: str, mutant: Example, tmp_path: Path) -> 
     assert all(found[clause].counterexample is not None for clause in refuted)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRICKS)
 def test_no_trick_is_proved(name: str, tmp_path: Path) -> None:
     """Not even what holds of any number."""
@@ -39,6 +42,7 @@ def test_no_trick_is_proved(name: str, tmp_path: Path) -> None:
         assert not found.verdict.supports
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("timeout", "numbers", "late", "calm"),
     [
@@ -60,12 +64,14 @@ def test_reals_err_both_ways(timeout: str, numbers: str, late: Verdict, calm: Ve
     assert all("line 9" in h for h in supposed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["limiter", "median", "scanmin"])
 def test_finite_inputs_are_a_hypothesis(name: str, tmp_path: Path) -> None:
     for found in NODES[name].settled(tmp_path).values():
         assert any(h.startswith("inputs are finite") for h in found.hypotheses)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["limiter", "median", "scanmin"])
 def test_nan_passes_through_where_it_is_possible(name: str, tmp_path: Path) -> None:
     found = replace(NODES[name], options={"nan": "possible"}).settled(tmp_path)

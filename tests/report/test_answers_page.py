@@ -115,14 +115,15 @@ FAULTS = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.needs_chromium
-@pytest.mark.parametrize("name", ["rover", pytest.param("large", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["rover", pytest.param("large", marks=pytest.mark.nightly)])
 def test_in_a_browser_nothing_is_clipped_and_the_budgets_hold(name: str, tmp_path: Path) -> None:
     found = CASES[name]()
     assert departures(found, render_answers(found), tmp_path) == []
 
 
+@pytest.mark.slow
 @pytest.mark.needs_chromium
 def test_faults_of_layout_are_found(tmp_path: Path) -> None:
     text = render_answers(rover_case())
@@ -136,7 +137,7 @@ REPORTS = sorted(path.parent for path in (Path(__file__).parents[2] / "reports")
 
 
 @pytest.mark.needs_chromium
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(not REPORTS, reason="no system has been verified here: `doit verify`")
 @pytest.mark.parametrize("folder", REPORTS, ids=lambda folder: folder.name)
 def test_the_shipped_systems_reports_keep_to_it(folder: Path, tmp_path: Path) -> None:

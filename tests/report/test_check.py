@@ -51,6 +51,7 @@ def test_an_honest_report_agrees(place: Path) -> None:
     assert found(place) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     some(

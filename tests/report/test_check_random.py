@@ -120,11 +120,11 @@ def hunt(place: Path, times: int, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return missed
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_random_edits_are_found(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert hunt(place, 60, monkeypatch) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_thousand_random_edits_are_found(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert hunt(place, 1000, monkeypatch) == []

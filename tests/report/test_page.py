@@ -155,7 +155,7 @@ def test_a_person_who_sees_no_colours_and_no_pictures_misses_nothing() -> None:
     assert page.tags.count("th") == len([a for a in page.attributes if a[0] == "th" and a[1] == "scope"])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ten_thousand_obligations_stay_a_page() -> None:
     nodes = {f"n{n}": [f"g{k}" for k in range(100)] for n in range(20)}
     obligations = [guarantee(n, g) for n, gs in nodes.items() for g in gs]

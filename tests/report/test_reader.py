@@ -30,6 +30,7 @@ def reader(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Driven, P
 CLOSED = "[...document.querySelectorAll('details [id], details[id]')].filter((e) => !e.checkVisibility())"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_a_link_opens_every_fold_around_its_place(name: str, reader: tuple[Driven, Path]) -> None:
     tab, folder = reader
@@ -46,6 +47,7 @@ def test_a_link_opens_every_fold_around_its_place(name: str, reader: tuple[Drive
         assert -2 <= top <= 1000, target
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 @pytest.mark.parametrize("key", ["Enter", " "])
 def test_folds_open_and_close_by_keyboard(name: str, key: str, reader: tuple[Driven, Path]) -> None:
@@ -67,7 +69,7 @@ def test_folds_open_and_close_by_keyboard(name: str, key: str, reader: tuple[Dri
     assert tab.value(lost) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_nothing_is_clipped_in_the_page_of_all_claims(tmp_path: Path) -> None:
     page = render_page(rover_case())
     fault = page.replace("</style>", ".tree{position:relative;left:-60px}</style>")

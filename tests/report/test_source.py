@@ -105,7 +105,7 @@ def test_a_very_long_contract_is_shown_without_colours_and_with_few_anchors() ->
     assert len(shown_text) < 1.4 * len(text) + 1000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_colouring_takes_no_time_to_speak_of() -> None:
     """Texts that regular expressions like least."""
     import time

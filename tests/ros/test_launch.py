@@ -268,6 +268,7 @@ def test_what_is_no_launch_file_is_an_error_and_nothing_worse(tmp_path: Path, na
     assert found.nodes == ()
 
 
+@pytest.mark.slow
 def test_files_that_include_one_another_end(tmp_path: Path) -> None:
     text = '<launch><include file="$(dirname)/a.launch"/><include file="$(dirname)/a.launch"/></launch>'
     found = read(tmp_path, text)

@@ -389,6 +389,7 @@ def first_reported(system: System, events: list[dict[str, Any]], needed: set[str
     return None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(5), 2))
 def test_rml_engine_and_brute_force_agree(seed: int, make_system: Callable[..., System]) -> None:
     rng = random.Random(seed)

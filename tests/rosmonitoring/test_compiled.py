@@ -74,6 +74,7 @@ def written(path: Path, events: list[dict[str, Any]], rng: random.Random) -> Pat
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(12), 3))
 def test_generated_contracts_are_judged_alike(seed: int, make_system: Callable[..., System], tmp_path: Path) -> None:
     rng = random.Random(seed)

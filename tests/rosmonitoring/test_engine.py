@@ -135,6 +135,7 @@ FAULTS: dict[str, Change] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FAULTS)
 def test_each_guarantee_broken_once_is_caught_where_it_is_broken(name: str, case: System, nominal: list[Event]) -> None:
     events = copy.deepcopy(nominal)

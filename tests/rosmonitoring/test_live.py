@@ -103,6 +103,7 @@ def heard(
     return found, warned
 
 
+@pytest.mark.slow
 def test_what_a_graph_says_is_judged_and_recorded(
     master: Master, make_system: Callable[..., System], tmp_path: Path
 ) -> None:
@@ -229,7 +230,7 @@ print("ERROR" if ("n.low", 2) in said else said[-3:], flush=True)
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(
     not ROS.is_dir() or shutil.which("rosmaster") is None,
     reason="ROS 1 is not installed (python3-rospy, python3-rosmaster)",

@@ -20,7 +20,7 @@ def lines(path: Path, events: Iterable[Event]) -> Path:
     return path
 
 
-@pytest.mark.parametrize("count", [20_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [20_000, pytest.param(1_000_000, marks=pytest.mark.nightly)])
 def test_no_false_alarm(count: int, case: System, tmp_path: Path) -> None:
     running = session(case)
     assert list(running.run(lines(tmp_path / "t.jsonl", itertools.islice(mission(count), count)))) == []
@@ -30,6 +30,7 @@ def test_no_false_alarm(count: int, case: System, tmp_path: Path) -> None:
     assert judged["radiationSensor.low"] > count // 5
 
 
+@pytest.mark.slow
 def test_ten_million_events_would_take_no_more_memory(case: System, tmp_path: Path) -> None:
     """What is kept does not grow with the trace."""
     import tracemalloc
@@ -70,6 +71,7 @@ def off(event: Event) -> Event | None:
     return {**event, "posX": event["posX"] + 3.5} if event["topic"] == "at" and event["time"] > 20 else None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "told"),
     [

@@ -49,7 +49,7 @@ def test_what_is_refused_says_why(case: System) -> None:
             assert f"guarantee {name}: {reason}" in made.text
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_papers_agent_is_monitored_in_rml_as_by_the_engine(case: System, nominal: list[dict[str, Any]]) -> None:
     """On the nominal run, and on it with each command's place, constructor or waypoint changed."""
     found, _ = setup(case, case.contract.node("agent"), case.plan.node("agent").methods[0].options)

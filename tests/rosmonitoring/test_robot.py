@@ -25,6 +25,7 @@ def test_a_mission_without_faults_is_the_recorded_one(tmp_path: Path) -> None:
     assert (tmp_path / "run.jsonl").read_bytes() == (ROBOT / "traces/mission.jsonl").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "told"),
     [
@@ -61,6 +62,7 @@ def test_the_nodes_know_nothing_of_a_bus() -> None:
         assert not any(word in text for word in ("rospy", "import bus", "wiring", "publish")), path
 
 
+@pytest.mark.slow
 def test_what_monitors_cost_is_measured() -> None:
     done = subprocess.run(
         [sys.executable, str(ROBOT / "overhead.py"), "1"], capture_output=True, text=True, timeout=120, check=False

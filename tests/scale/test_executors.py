@@ -105,7 +105,7 @@ class Odd:
     def close(self) -> None: ...
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_same_is_recorded_however_works_are_carried_about(
     place: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -276,7 +276,7 @@ def machines() -> Iterator[Machines]:
     found.close()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_cluster_records_the_same_also_where_a_worker_is_killed(place: Workspace, machines: Machines) -> None:
     from avow.pipeline.cluster import Address, Cluster
 
@@ -338,7 +338,7 @@ def test_workers_killed_at_any_time_lose_nothing_and_leave_nothing(
     until(lambda: not machines.left(), 5)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_a_worker_pickles_is_not_read(machines: Machines, tmp_path: Path) -> None:
     from avow.pipeline.cluster import Address, Cluster, _fetched
 
@@ -388,7 +388,7 @@ def test_addresses_that_are_refused(text: str) -> None:
         Address.read(text)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_without_certificates_there_is_no_tls(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     from avow.base.diagnostics import Rejected

@@ -84,7 +84,7 @@ def formulas() -> st.SearchStrategy[Term]:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(st.lists(formulas(), max_size=3), formulas()), min_size=1, max_size=4))
 def test_one_solver_for_many_questions_says_what_the_whole_question_says(asked: list[tuple[list[Term], Term]]) -> None:

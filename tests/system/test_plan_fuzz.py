@@ -10,6 +10,7 @@ import pytest
 from . import plan_fuzzing
 
 
+@pytest.mark.slow
 def test_damaged_plans(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plan_fuzzing.language_load, "load_contract", plan_fuzzing.remembered)
     systems = plan_fuzzing.folders(root, tmp_path)

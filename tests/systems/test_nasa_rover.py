@@ -87,7 +87,7 @@ def test_every_published_requirement_stands_in_the_plan_with_its_sentence() -> N
 @pytest.mark.parametrize(
     "name",
     [
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("R1_kept", "R1_4")),
+        *(pytest.param(name, marks=pytest.mark.nightly) for name in ("R1_kept", "R1_4")),
         "R1_2",
         "R1_3",
         "R1_5",
@@ -107,7 +107,7 @@ def test_requirements_are_proved_and_not_vacuously(name: str) -> None:
     assert outcome.rests_on, "it rests on guarantees"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_battery_is_proved_by_induction_over_steps() -> None:
     outcome = requirement("R1")
     assert outcome.verdict is Verdict.PROVED, outcome.summary
@@ -119,6 +119,7 @@ def test_the_battery_is_proved_by_induction_over_steps() -> None:
 # -- the paper's derivations -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "rule", "consumers"),
     [
@@ -213,7 +214,7 @@ def test_every_step_on_the_grid_is_looked_at() -> None:
         assert "the scenario's values cut runs off" in outcome.summary
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_small_mission_on_the_grid(tmp_path: Path) -> None:
     of = compose(copy(tmp_path, SMALL, use="0.08"))
     for name in ("R1_grid", "PLANS_grid"):

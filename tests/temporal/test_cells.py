@@ -122,6 +122,7 @@ def disagreement(rng: random.Random) -> str | None:
     return None if first == broken(trigger, wanted, run) else show_term(Implies(trigger, wanted), "rcl")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_cells_are_what_the_definitions_say(seed: int) -> None:
     rng = random.Random(seed)

@@ -116,6 +116,7 @@ def verdicts(folder: Path) -> dict[str, Verdict]:
     return {o.name: outcome.verdict for o, outcome in zip(obligations, found, strict=True)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", some(range(300), 8))
 def test_no_run_says_otherwise(seed: int, tmp_path: Path) -> None:
     said, assumed, promised, required = drawn(seed)
@@ -176,6 +177,7 @@ def made(folder: Path, assumed: str) -> dict[str, Verdict]:
     return verdicts(folder)
 
 
+@pytest.mark.slow
 def test_what_is_remembered_of_each_value(tmp_path: Path) -> None:
     """A cell for every number; what no step can break is no hypothesis, and keeps no other from being one."""
     found = made(tmp_path, "")
@@ -188,6 +190,7 @@ def test_of_a_node_that_assumes_more_than_steps_can_break_nothing_is_proved(tmp_
     assert Verdict.PROVED not in made(tmp_path, "assume ever ( w -> eventually(v) )").values()
 
 
+@pytest.mark.slow
 def test_no_contract_is_derived_of_clauses_with_memory(tmp_path: Path) -> None:
     made(tmp_path, "")
     composition = compose(load_system(tmp_path))

@@ -114,6 +114,7 @@ KNOWN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KNOWN)
 def test_known_answers(name: str) -> None:
     text, verdict = KNOWN[name]
