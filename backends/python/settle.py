@@ -411,7 +411,7 @@ def _leaves(data: Any) -> list[Fraction]:
 def _written(text: str) -> list[Fraction]:
     values = [node.value for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant)]
     numbers = [v for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
-    return [Fraction(n) for n in numbers if math.isfinite(n)]
+    return [Fraction(n) for n in numbers if isinstance(n, int) or math.isfinite(n)]
 
 
 def _reason(reply: Any) -> str:

@@ -201,7 +201,9 @@ class Translator(Expressions):
         if name in self.calls or len(self.calls) > INLINED_DEPTH:
             raise Refusal(line, f"{name} calls itself, or calls go deeper than {INLINED_DEPTH}")
         names = _plain_arguments(definition)
-        receiver, names = (names[0], names[1:]) if method and names else ("", names)
+        if method and not names:
+            raise Refusal(line, f"{name} has no argument for its object")
+        receiver, names = (names[0], names[1:]) if method else ("", names)
         if len(names) != len(arguments) or any(isinstance(a, ast.Starred) for a in arguments):
             raise Refusal(line, f"{name} is called with other arguments than it takes")
         self.made += 1

@@ -14,8 +14,6 @@ from avow.backends.python.whole_file import binders
 RCL = """node n { inputs( v : REAL, n : INTEGER, m : INTEGER ) outputs( u : REAL ) topics()
  guarantee one ( out.u == 1 ) }"""
 PARAMETERS = {"a": 1.0, "strict": True, "p": {"x": 9.0}, "q": {"x": 1.0}}
-HERE = "n - n / (n - 3 * m - 31337) < 7.0"
-"""Divides by zero on the rare inputs."""
 
 
 def program(
@@ -59,6 +57,9 @@ TRICKS = {
     "a mapping by a condition": program(
         "self.p['x']", init="if params['strict']: self.p = params['p']\n        else: self.p = params['q']"
     ),
+    "a method without its object": program("self.f()", body="def f(): return 1.0"),
+    "an int that is no float": program("1.0 if n * 1.0 < 1" + "0" * 310 + ".0 - v else 9.0"),
+    "an int that no float is near": program("1.0 if n * 1.0 < 1" + "0" * 310 + " else 9.0"),
     "bound by a pattern below": program("K", head="K = 1.0", last="match v:\n            case K: pass"),
     "bound by a part of a pattern": program("K", head="K = 1.0", last="match v:\n            case [*K]: pass"),
     "bound by the rest of a pattern": program("K", head="K = 1.0", last="match v:\n            case {**K}: pass"),
