@@ -77,8 +77,12 @@ class Shortcut:
 
 
 def _reads_elsewhere(workspace: Workspace) -> bool:
-    """Whether a plan may read files outside ``contracts/``. Raises OSError."""
-    return any(b"launch" in path.read_bytes() for path in workspace.contracts.rglob("plan.yaml"))
+    """Whether a plan may read files outside ``contracts/``: `launch` stands in it beside comments, or what may spell it
+    otherwise. Raises OSError."""
+    plans = (path.read_bytes() for path in workspace.contracts.rglob("plan.yaml"))
+    lines = [line.lstrip() for plan in plans for line in plan.splitlines()]
+    said = (line for line in lines if not (line.startswith(b"#") and line.isascii()))  # YAML has further ends of lines
+    return any(b"launch" in line or b"\\" in line for line in said)
 
 
 def _stamp(workspace: Workspace) -> Path:

@@ -134,8 +134,17 @@ def test_what_doit_was_asked_for(line: str, names: tuple[str, ...]) -> None:
     assert read_wanted(line.split()) == names
 
 
-def test_where_a_plan_reads_launch_files_nothing_is_noted(settled: Workspace) -> None:
+@pytest.mark.parametrize(
+    ("text", "noted"),
+    [
+        ('"ros": {launch: [../../bringup.launch]}', False),
+        ('"ros": {"l\\x61unch": [../../bringup.launch]}', False),
+        ("# as is\u0085ros: {launch: [../../bringup.launch]}", False),
+        ("# the launch file remaps it\nsystem: crane\n", True),
+    ],
+)
+def test_where_a_plan_reads_launch_files_nothing_is_noted(settled: Workspace, text: str, noted: bool) -> None:
     """They stand outside contracts/, and say what else is read."""
-    (settled.contracts / "crane/plan.yaml").write_text('"ros": {launch: [../../bringup.launch]}')
+    (settled.contracts / "crane/plan.yaml").write_text(text, encoding="utf-8")
     run(settled)
-    assert Shortcut(settled).nothing_to_do(("verify",)) is None
+    assert (Shortcut(settled).nothing_to_do(("verify",)) is not None) == noted
