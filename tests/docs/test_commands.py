@@ -71,7 +71,11 @@ STAMPED = "avow review stamp thermostat thermometer"
 SIGNED = 'avow sign --report thermostat --as "A. Person, safety engineer" --until 2030-11-22'
 COMPOSED = "avow compose thermostat"
 MONITORED = "avow monitor thermostat contracts/thermostat/traces/morning.jsonl"
+FRETISH = "avow fretish requirements.json -o contracts/tank/system.rcl"
 INSTEAD = {
+    "avow fretish FILE": "avow fretish requirements.json",
+    "avow translate --to fretish contracts/tank/system.rcl": f"{FRETISH}"
+    " && avow translate --to fretish contracts/tank/system.rcl",
     "avow agent run FILE": "avow agent run lamp.gwen",
     "avow audit --new-key": KEYED,
     "avow audit --sign release.key": f"{KEYED} && avow audit --sign my.key",
@@ -267,6 +271,7 @@ def verified(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert tests in plan.read_text()
     plan.write_text(plan.read_text().replace(tests, f"{tests}      - review: {{record: reviews/thermometer.yaml}}\n"))
     (place / "requirements.csv").write_text("id,text,supported_by\nREQ9,It rests.,thermostat.rests\n")
+    (place / "requirements.json").write_text("T-1: the tank shall always satisfy level < 10\n")
     (place / "lamp.gwen").write_text(LAMP)
     done = bash("avow verify", place)
     assert done.returncode == 0, done.stdout + done.stderr
