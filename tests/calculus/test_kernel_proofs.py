@@ -13,7 +13,7 @@ PROOFS = Path(__file__).parents[2] / "avow/calculus/proofs"
 
 @pytest.mark.slow
 @pytest.mark.needs_dafny
-@pytest.mark.parametrize("name", ["kernel.dfy", "instances.dfy"])
+@pytest.mark.parametrize("name", ["kernel.dfy", pytest.param("instances.dfy", marks=pytest.mark.nightly)])
 def test_dafny_verifies(name: str) -> None:
     dafny = shutil.which("dafny") or shutil.which("Dafny")
     if dafny is None:

@@ -184,7 +184,7 @@ def test_any_word_may_be_the_name_of_a_clause_a_port_a_type_or_an_element() -> N
 
 
 @pytest.mark.needs_dafny
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_all_that_is_generated_for_the_case_studies_is_well_formed() -> None:
     for system in ("remote_inspection", "nasa_rover"):
         for node in load_contract([CONTRACTS / system / "system.rcl"]).nodes:
@@ -281,7 +281,7 @@ def crosscheck_node(tmp_path: Path) -> Contract:
 
 
 @pytest.mark.needs_dafny
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_dafny_and_z3_agree_on_meanings(tmp_path: Path) -> None:
     """One lemma a formula: what Z3 proves Dafny proves, what Z3 refutes it never does."""
     node = crosscheck_node(tmp_path).node("n")
