@@ -18,6 +18,7 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.language.format import format_text
 from avow.language.lexer import KEYWORDS, quote
 from avow.language.load import check_text
+from avow.language.terms import Builtin, Past
 
 from .meaning import Unsaid, demands, remarks
 from .sentence import (
@@ -460,9 +461,8 @@ def _word(name: str) -> str:
     return f"{word}_" if word in KEYWORDS or word in _OPERATORS else word
 
 
-_OPERATORS = frozenset(
-    ("previous", "rose", "fell", "changed", "once", "historically", "held", "counted", "next", "within", "eventually")
-) | frozenset(("abs", "min", "max", "mod", "div", "length", "xor", "implies", "true", "false", "topics"))
+_OPERATORS = {*Past, *Builtin, "length", "implies", "true", "false", "topics"}
+"""Words that mean something to RCL in some places."""
 
 
 def _unused(name: str, taken: set[str]) -> str:

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from avow.base.diagnostics import Diagnostic
+from avow.formulas.formula import free_variables
+from avow.formulas.values import show
 from avow.language.contract import Clause, Contract, Node
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort
 from avow.language.terms import (
@@ -73,7 +75,7 @@ def _named(node: Node, clause: Clause) -> str:
 
 def _sentence(node: Node, clause: Clause, twice: set[str]) -> str:
     formula = clause.formula
-    doubled = {part.name for part in _variables(formula)} & twice
+    doubled = {part.name for part in free_variables(formula)} & twice
     if doubled:
         raise _Beyond(f"an input and an output that are both called `{min(doubled)}`")
     match formula:
@@ -85,12 +87,6 @@ def _sentence(node: Node, clause: Clause, twice: set[str]) -> str:
             return f"{_condition(trigger)}the {node.name} shall immediately satisfy {_say(right)}"
         case _:  # one step
             return f"the {node.name} shall always satisfy {_say(formula)}"
-
-
-def _variables(term: Term) -> set[Variable]:
-    if isinstance(term, Variable):
-        return {term}
-    return set[Variable]().union(*map(_variables, term.children))
 
 
 def _condition(trigger: Term) -> str:
@@ -194,19 +190,8 @@ def _previous(term: History) -> str:
 
 
 def _number(value: Fraction) -> str:
-    if value < 0:
-        return f"(-{_number(-value)})"
-    if value.denominator == 1:
-        return str(value.numerator)
-    for digits in range(1, 20):
-        if (value * 10**digits).denominator == 1:
-            return _decimal(value, digits)
-    return f"({value.numerator} / {value.denominator})"
-
-
-def _decimal(value: Fraction, digits: int) -> str:
-    whole = str(int(value * 10**digits)).rjust(digits + 1, "0")
-    return f"{whole[:-digits]}.{whole[-digits:]}"
+    text = show(value).replace("/", " / ")
+    return f"({text})" if value < 0 or "/" in text else text
 
 
 def _name(name: str) -> str:
