@@ -7,7 +7,10 @@ import hashlib
 import os
 import stat
 import tempfile
+import time
 from pathlib import Path
+
+from avow.tuning.running import READER_SECONDS
 
 PART = ".part"
 """How the name of a file ends that is still being written; one that stays was left by a killed process."""
@@ -45,12 +48,25 @@ def is_intact(path: Path, sha: str) -> bool:
         return False
 
 
+def _open_special(path: Path) -> int:
+    """A device or a pipe, open for writing. A pipe that nobody reads within `READER_SECONDS` is an error, not a wait:
+    whoever reads it (`-o >(less)`) may open it a moment later than we do."""
+    end = time.monotonic() + READER_SECONDS
+    while True:
+        try:
+            return os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError as error:
+            if error.errno != errno.ENXIO or time.monotonic() > end:
+                raise
+            time.sleep(0.01)
+
+
 def write(path: Path, content: str | bytes) -> bool:
     """Put `content` in place of the file in one step; says whether that changed anything. A device or a pipe is written
     to, and stays what it is."""
     data = content.encode() if isinstance(content, str) else content
     if path.exists() and not path.is_file() and not path.is_dir():
-        descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)  # of a pipe that nobody reads: an error, not a wait
+        descriptor = _open_special(path)
         os.set_blocking(descriptor, True)
         with os.fdopen(descriptor, "wb") as stream:
             stream.write(data)

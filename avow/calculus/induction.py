@@ -18,7 +18,7 @@ from avow.formulas.formula import free_variables, rename
 from avow.formulas.values import Value, show
 from avow.language.sorts import FunctionSort
 from avow.language.terms import Role, Term, Variable
-from avow.solving.limits import spent, until
+from avow.solving.limits import effort_left, until
 from avow.solving.questions import Entailment
 from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_UNROLLING
 from avow.tuning.effort import QUICK_EFFORT
@@ -93,7 +93,7 @@ def deeper(asked: Steps, effort: int, seed: int = 0, claim_name: str = "the clai
     sure = 1  # so many steps from the beginning the claim is proved
 
     def ask(hypotheses: Mapping[str, Term]) -> Entailment | None:
-        left = int(end - spent())
+        left = effort_left(end)
         return implied(hypotheses, asked.claim, effort=min(QUICK_EFFORT, left), seed=seed) if left > 50 else None
 
     for length in range(2, LONGEST_UNROLLING + 1):

@@ -22,7 +22,7 @@ from avow.language.terms import Apply, Compare, Construct, In, Not, Quantified, 
 from avow.sanity.minimal_sets import UndecidedError, minimal_sets
 from avow.sanity.realizability import Formulas, Given, Group, Realizability, Search, groups, realizable
 from avow.solving.counterexample import show_values
-from avow.solving.limits import spent, until
+from avow.solving.limits import effort_left, spent, until
 from avow.solving.questions import Unsupported, replay, solve
 from avow.solving.z3_module import z3
 from avow.tuning.bounds import CONFLICTS
@@ -115,7 +115,7 @@ class _Search:
         for at in self.shown:
             if (core := self._core_at(at, chosen)) is not None:
                 return core
-        left = min(CONFLICT_SEARCH_EFFORT, int(self.deadline - spent()))
+        left = min(CONFLICT_SEARCH_EFFORT, effort_left(self.deadline))
         if left <= 0:
             raise UndecidedError
         formulas, outputs = self._part(chosen)
@@ -145,7 +145,7 @@ class _Search:
     def _beside(self, pair: frozenset[str]) -> None:
         """Look for an input at which each of the two can be met, and not both."""
         formulas, outputs = self._part(pair)
-        limit = min(CONFLICT_SEARCH_EFFORT, int(self.deadline - spent()))
+        limit = min(CONFLICT_SEARCH_EFFORT, effort_left(self.deadline))
         search = Search(self.inputs, Group(formulas, outputs), self.assumptions, {}, limit, self.seed)
         try:
             answer = search.refute([{label: formula} for label, formula in formulas.items()], limit)

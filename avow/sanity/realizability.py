@@ -25,7 +25,7 @@ from avow.language.sorts import SequenceSort
 from avow.language.terms import Apply, Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.proofs import confirmed, implied, refutes
 from avow.sanity.witness_search import Formulas, Given, Group, Realizability, Search, groups
-from avow.solving.limits import budget, spent
+from avow.solving.limits import budget, effort_left, spent
 from avow.tuning.effort import CONFIRMING_EFFORT, REALIZABLE_SHARE
 
 __all__ = ["Formulas", "Given", "Group", "Question", "Realizability", "Search", "groups", "possible", "realizable"]
@@ -67,13 +67,13 @@ def realizable(
 ) -> Realizability:
     """Decide it: see `Question`."""
     asked = Question(tuple(inputs), tuple(outputs), assumptions, guarantees, given or {}, effort, seed, doubtful)
-    start = spent()
+    end = spent() + effort
     with budget(effort * REALIZABLE_SHARE):
         for method in (_with_items, _with_functions):
             answer = method(asked)
             if answer is not None:
                 return answer
-        left = max(100, effort - int(spent() - start))
+        left = max(100, effort_left(end))
         return _grouped(replace(asked, effort=left))
 
 

@@ -16,7 +16,7 @@ from avow.language.terms import Quantified, Quantifier, Role, Term, Variable
 from avow.sanity.proofs import Proof
 from avow.sanity.witness_candidates import Definition, candidates
 from avow.sanity.witnesses import Cases, Fixed, Witness, instantiate, meanings_of, witnesses
-from avow.solving.limits import allowed, spend, spent, tried, until
+from avow.solving.limits import allowed, effort_left, spend, spent, tried, until
 from avow.solving.questions import Translator, Unsupported, check, entails, replay, search_tables, solve
 from avow.solving.translation import Expr, Meaning
 from avow.solving.z3_module import z3
@@ -91,7 +91,7 @@ class Search:
         self.reason = ""
 
     def left(self) -> int:
-        return int(self.deadline - spent())
+        return effort_left(self.deadline)
 
     def decide(self, doubtful: bool = False) -> Realizability:
         try:
@@ -247,7 +247,7 @@ class Search:
         end = until(limit)
         known = len(self.witnesses)
         while spent() < end and (few is None or len(self.witnesses) < known + WITNESS_REFUTATIONS):
-            inputs = self._defeat(self.group.guarantees, possible, int(end - spent()), few)
+            inputs = self._defeat(self.group.guarantees, possible, effort_left(end), few)
             if inputs is None:
                 return None
             before = len(self.witnesses)

@@ -52,6 +52,12 @@ def until(effort: float) -> float:
     return min(spent() + effort, _spent.end)
 
 
+def effort_left(deadline: float) -> int:
+    """Whole units of effort before a deadline, never below 0. Half a step is forgiven: fractions of a unit are rounded,
+    and what is left must not hang on what this thread had spent before it began."""
+    return max(0, math.floor(deadline - spent() + 0.5 / STEPS))
+
+
 def from_seconds(seconds: float) -> int:
     """The effort that a person's limit in seconds stands for; never 0."""
     return max(1, int(seconds * 1000))
@@ -91,7 +97,7 @@ def allowed(effort: int) -> int:
     """What is left of a question's effort within the budget; 0 if nothing is."""
     if math.isinf(_spent.end):
         return effort
-    return max(0, min(effort, int(_spent.end - spent())))
+    return min(effort, effort_left(_spent.end))
 
 
 def _clock() -> Callable[[], float]:

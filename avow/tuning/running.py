@@ -48,3 +48,6 @@ DRAFT_MESSAGES = 200_000
 COLLECTED = 100_000
 """Objects made before Python looks for those that hold each other: at its 700, that takes a twelfth of a run with much
 to do."""
+
+READER_SECONDS = 2
+"""How long a pipe that is written to may have no reader yet: who starts both starts the reader at once."""

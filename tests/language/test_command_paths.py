@@ -176,13 +176,19 @@ def test_fmt_writes_through_a_link_and_refuses_bad_input(place: Path) -> None:
 def test_writing_to_a_device_leaves_it_one(tmp_path: Path) -> None:
     """`-o /dev/null`, as root, must not put a file in its place."""
     import threading
+    import time
 
     from avow.base.files import write
 
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     got: list[bytes] = []
-    reader = threading.Thread(target=lambda: got.append(pipe.read_bytes()))
+
+    def read() -> None:
+        time.sleep(0.2)  # the reader opens it after the writer has tried
+        got.append(pipe.read_bytes())
+
+    reader = threading.Thread(target=read)
     reader.start()
     assert write(pipe, "text")
     reader.join(timeout=20)

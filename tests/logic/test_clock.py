@@ -20,6 +20,7 @@ from avow.solving.limits import (
     NO_ANSWER,
     allowed,
     budget,
+    effort_left,
     from_seconds,
     spend,
     spent,
@@ -118,6 +119,18 @@ def test_questions_within_a_budget_share_it() -> None:
                 assert allowed(60_000) == 0, "a block within cannot extend it"
         assert allowed(60_000) == 9_850
     assert allowed(60_000) == 60_000
+
+
+@pytest.mark.parametrize("before", [0, 1, 1_234_567_891, 987_654_321_987])
+def test_what_is_left_does_not_hang_on_what_was_spent_before(before: int) -> None:
+    """Fractions of a unit are rounded: one step too few once changed what a search was allowed."""
+    spend(before)
+    for _ in range(50):
+        spend(1)
+        end = until(100)
+        assert effort_left(end) == 100
+        with budget(100):
+            assert allowed(60_000) == 100
 
 
 def test_time_that_passes_is_no_effort() -> None:
