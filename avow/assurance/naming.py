@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from avow.evidence.obligation import Kind, Obligation
 
-ADVICE = ("redundant", "unconstrained", "undetermined", "unneeded")
+ADVICE = ("not-redundant", "constrained", "determined", "needed")
 """Sanity properties that are worth knowing, but that make nothing unsound."""
 
 FOUNDATION = ("assumptions-satisfiable", "consistent", "realizable")
@@ -26,22 +26,22 @@ _SANITY = {
     "assumptions-satisfiable": "its assumptions can hold together",
     "consistent": "its guarantees can hold together",
     "realizable": "its guarantees can always be met",
-    "tautology": "rules something out",
-    "vacuous": "can be triggered",
-    "redundant": "does not follow from the others",
-    "unconstrained": "is constrained",
-    "undetermined": "is determined by the inputs",
-    "unmeetable": "can be met by what its inputs come from",
-    "unneeded": "is needed",
+    "not-tautological": "rules something out",
+    "not-vacuous": "can be triggered",
+    "not-redundant": "does not follow from the others",
+    "constrained": "is constrained",
+    "determined": "is determined by the inputs",
+    "meetable": "can be met by what its inputs come from",
+    "needed": "is needed",
 }
-"""The good property that a sanity claim states: its id names the fault that is looked for."""
+"""What a sanity claim states, in words that follow a clause's name."""
 
 
 def short(claim: str) -> str:
     """``agent.low`` for a guarantee, ``REQ1``, ``D1``, else the id without the system (a supposition has none).
 
     Where the id of a claim misleads people, words: a sanity claim is ``agent.low (can be triggered)`` and not
-    ``agent/sanity/vacuous-low``, what the plan says of the environment ``what is supposed of in.away``.
+    ``agent/sanity/not-vacuous-low``, what the plan says of the environment ``what is supposed of in.away``.
     """
     kind, colon, name = claim.partition(":")
     if colon and kind in ("requirement", "derivation"):
@@ -70,7 +70,7 @@ def short(claim: str) -> str:
 
 def sanity_property(obligation: Obligation) -> str:
     """Which of the sanity properties an obligation is about: its name up to the clause, if it names one."""
-    for name in (*FOUNDATION, *ADVICE, "vacuous", "tautology", "unmeetable"):
+    for name in (*FOUNDATION, *ADVICE, "not-vacuous", "not-tautological", "meetable"):
         if obligation.name == name or (obligation.name.startswith(name) and not obligation.name[len(name)].isalnum()):
             return name
     return obligation.name

@@ -32,7 +32,9 @@ class Names:
                 self.clause[f"{o.node}.{o.name}"] = o.id
             elif is_foundation(o):
                 self.foundation.setdefault(o.node, []).append(o.id)
-            elif o.kind is Kind.SANITY and sanity_property(o) in ("vacuous", "tautology") and not is_advice(o):
+            elif (
+                o.kind is Kind.SANITY and sanity_property(o) in ("not-vacuous", "not-tautological") and not is_advice(o)
+            ):
                 for clause in o.clauses:
                     self.vacuity.setdefault(clause, []).append(o.id)
         self.discharged = {node.name: node.discharged_by for node in facts.nodes}

@@ -95,7 +95,7 @@ def _claim(whole: Frame, node: Node, clause: Clause) -> ProviderClaim | None:
     names = " and ".join(providers)
     verb = "guarantees" if len(providers) == 1 else "guarantee"
     claim = Claim(
-        Property.UNMEETABLE,
+        Property.MEETABLE,
         clause.name,
         f"What {names} {verb} can meet assumption {clause.name} of {node.name}.",
         show_term(clause.formula),

@@ -18,6 +18,7 @@ from avow.evidence.obligation import Kind
 from avow.evidence.signing import Signed, sign, signature_path, verify_signature
 from avow.pipeline.integrity import confirm, discrepancies
 from avow.pipeline.workload import Survey, survey
+from avow.system.names import renamed
 
 
 def ledger_names(place: Workspace, wanted: Sequence[str], anchors: Sequence[Anchor] = ()) -> tuple[str, ...]:
@@ -157,7 +158,8 @@ def find_claim(
         raise Rejected(Diagnostic("REPORT001", f"there is no report of {system} yet", hint=hint))
     known = [name for _, view in named for name in (short(view.id), view.id)]
     known += [name for case in cases for name in _others(case)]
-    near = difflib.get_close_matches(wanted, dict.fromkeys(known), n=3)
+    today = renamed(wanted)
+    near = [today] if today else difflib.get_close_matches(wanted, dict.fromkeys(known), n=3)
     guarantees = [short(view.id) for _, view in named if view.obligation.kind is Kind.GUARANTEE]
     such = f" (such as {guarantees[0]})" if guarantees else ""
     kinds = (

@@ -154,7 +154,7 @@ def _free(result: SanityResult) -> bool:
     """Whether it says only that an output is the implementation's to choose."""
     from avow.sanity.claims import Property
 
-    return result.about is Property.UNDETERMINED and result.verdict == "refuted" and not result.because
+    return result.about is Property.DETERMINED and result.verdict == "refuted" and not result.because
 
 
 def _style(result: SanityResult) -> str:

@@ -158,12 +158,12 @@ class _Analysis:
             Property.ASSUMPTIONS_SATISFIABLE: lambda _: self._satisfiable(),
             Property.CONSISTENT: lambda _: self._in_every_size(self._consistent()),
             Property.REALIZABLE: lambda _: self._in_every_size(self._realizable(), "consistent"),
-            Property.TAUTOLOGY: self._tautology,
-            Property.VACUOUS: self._vacuous,
-            Property.REDUNDANT: self._redundant,
-            Property.UNCONSTRAINED: self._unconstrained,
-            Property.UNDETERMINED: self._undetermined,
-            Property.UNNEEDED: self._unneeded,
+            Property.NOT_TAUTOLOGICAL: self._not_tautological,
+            Property.NOT_VACUOUS: self._not_vacuous,
+            Property.NOT_REDUNDANT: self._not_redundant,
+            Property.CONSTRAINED: self._constrained,
+            Property.DETERMINED: self._determined,
+            Property.NEEDED: self._needed,
         }
         return methods[claim.about](subject)
 
@@ -299,7 +299,7 @@ class _Analysis:
 
     # -- one clause ----------------------------------------------------------------------------------------------------
 
-    def _tautology(self, name: str) -> Finding:
+    def _not_tautological(self, name: str) -> Finding:
         clause = self.node.clause(name)
         if clause.kind is ClauseKind.ASSUMPTION:
             return self._fails_somewhere({}, clause.formula, "every input meets it: it assumes nothing", "")
@@ -313,7 +313,7 @@ class _Analysis:
             return finding
         return replace(finding, because=self._if_refuted("assumptions-satisfiable"))
 
-    def _vacuous(self, name: str) -> Finding:
+    def _not_vacuous(self, name: str) -> Finding:
         impossible = []
         undecided: Finding | None = None
         for number, trigger in enumerate(triggers(self.guarantees[name]), start=1):
@@ -329,7 +329,7 @@ class _Analysis:
         if impossible:
             first = impossible[0][1]
             empty = self._other("assumptions-satisfiable").verdict is Verdict.REFUTED
-            because = "assumptions-satisfiable" if empty else self._if_refuted(f"tautology-{name}")
+            because = "assumptions-satisfiable" if empty else self._if_refuted(f"not-tautological-{name}")
             clauses = tuple(c for c in first.clauses if c in self.assumptions)
             text = "what it demands is never demanded: its condition cannot come about"
             return Finding(
@@ -337,7 +337,7 @@ class _Analysis:
             )
         return undecided or Finding(Verdict.PROVED)
 
-    def _redundant(self, name: str) -> Finding:
+    def _not_redundant(self, name: str) -> Finding:
         kind = self.node.clause(name).kind
         others = self.assumptions if kind is ClauseKind.ASSUMPTION else {**self.assumptions, **self.guarantees}
         others = {other: formula for other, formula in others.items() if other != name}
@@ -346,12 +346,12 @@ class _Analysis:
         if finding.verdict is not Verdict.REFUTED:
             return finding
         whole = "assumptions-satisfiable" if kind is ClauseKind.ASSUMPTION else "consistent"
-        return replace(finding, because=self._if_refuted(whole) or self._if_refuted(f"tautology-{name}"))
+        return replace(finding, because=self._if_refuted(whole) or self._if_refuted(f"not-tautological-{name}"))
 
-    def _unneeded(self, name: str) -> Finding:
+    def _needed(self, name: str) -> Finding:
         from avow.sanity.realizability import realizable
 
-        if weaker := self._if_refuted(f"tautology-{name}") or self._if_refuted(f"redundant-{name}"):
+        if weaker := self._if_refuted(f"not-tautological-{name}") or self._if_refuted(f"not-redundant-{name}"):
             return Finding(Verdict.REFUTED, "it rules out nothing that the others do not", (name,), because=weaker)
         because = self._if_refuted("assumptions-satisfiable")
         unused = Finding(Verdict.REFUTED, "every guarantee can be met without it", (name,), because=because)
@@ -378,7 +378,7 @@ class _Analysis:
 
     # -- one output ----------------------------------------------------------------------------------------------------
 
-    def _unconstrained(self, name: str) -> Finding:
+    def _constrained(self, name: str) -> Finding:
         output = self.node.output(name).variable
         everything = conjunction(self.guarantees.values())
         if output not in free_variables(everything):
@@ -391,11 +391,11 @@ class _Analysis:
         if finding.verdict is not Verdict.REFUTED:
             return finding
         text = f"wherever the guarantees hold, they hold for every other value of out.{name} too"
-        blamed = [f"tautology-{g}" for g, f in self.guarantees.items() if output in free_variables(f)]
+        blamed = [f"not-tautological-{g}" for g, f in self.guarantees.items() if output in free_variables(f)]
         because = self._if_refuted("consistent") or next((b for b in blamed if self._if_refuted(b)), None)
         return replace(finding, explanation=text, clauses=(), because=because)
 
-    def _undetermined(self, name: str) -> Finding:
+    def _determined(self, name: str) -> Finding:
         from avow.sanity.realizability import Group, groups
         from avow.solving.counterexample import show_values
         from avow.solving.questions import solve
@@ -422,10 +422,10 @@ class _Analysis:
                 values = {v: value for v, value in {**answer.values, **given}.items() if v.role is not Role.BOUND}
                 text = f"the guarantees allow both values of out.{name}"
                 shown = Counterexample(show_values(values)) if values else None
-                because = self._if_refuted(f"unconstrained-{name}")
+                because = self._if_refuted(f"constrained-{name}")
                 return Finding(Verdict.REFUTED, text, counterexample=shown, because=because, engine=answer.engine)
         if self._by_definitions(question, self.limit // 2):
-            because = self._if_refuted(f"unconstrained-{name}")
+            because = self._if_refuted(f"constrained-{name}")
             return Finding(Verdict.REFUTED, f"the guarantees allow two values of out.{name}", because=because)
         return Finding(Verdict.UNKNOWN, answer.reason, engine=answer.engine)
 

@@ -1,22 +1,22 @@
 """What is asked of a contract before anything is verified against it: the sanity claims of a node.
 
-Every claim states the *good* thing, whatever the property is called, so that `proved` is always good and `refuted`
-always bad: `vacuous-G1` claims that guarantee G1 is *not* vacuous. Nothing here asks a solver.
+Every claim is named by the *good* thing that it states, so that `proved` is always good and `refuted`
+always bad: `not-vacuous-G1` claims that guarantee G1 is *not* vacuous. Nothing here asks a solver.
 
 | property                 | the claim                                                                | severity |
 |--------------------------|--------------------------------------------------------------------------|----------|
 | assumptions-satisfiable  | the assumptions can hold together                                        | error    |
 | consistent               | some allowed inputs and some outputs meet every guarantee                | error    |
 | realizable               | for all allowed inputs some output meets every guarantee                 | error    |
-| tautology                | the guarantee rules something out that the assumptions allow;            | error    |
+| not-tautological         | the guarantee rules something out that the assumptions allow;            | error    |
 |                          | an assumption rules some input out                                       | note     |
-| vacuous                  | what triggers the guarantee can happen                                   | error    |
-| redundant                | the guarantee (assumption) does not follow from the others               | warning  |
-| unconstrained            | the guarantees exclude some value of the output                          | warning  |
-| undetermined             | the inputs determine the output                                          | note     |
-| unmeetable               | the providers of its inputs leave room for the assumption (asked of a    | error    |
+| not-vacuous              | what triggers the guarantee can happen                                   | error    |
+| not-redundant            | the guarantee (assumption) does not follow from the others               | warning  |
+| constrained              | the guarantees exclude some value of the output                          | warning  |
+| determined               | the inputs determine the output                                          | note     |
+| meetable                 | the providers of its inputs leave room for the assumption (asked of a    | error    |
 |                          | whole system: `avow.calculus.providers`)                                 |          |
-| unneeded                 | the assumption rules out inputs for which no output meets the guarantees | note     |
+| needed                   | the assumption rules out inputs for which no output meets the guarantees | note     |
 """
 
 from __future__ import annotations
@@ -40,20 +40,20 @@ class Property(StrEnum):
     ASSUMPTIONS_SATISFIABLE = "assumptions-satisfiable"
     CONSISTENT = "consistent"
     REALIZABLE = "realizable"
-    TAUTOLOGY = "tautology"
-    VACUOUS = "vacuous"
-    REDUNDANT = "redundant"
-    UNCONSTRAINED = "unconstrained"
-    UNDETERMINED = "undetermined"
-    UNNEEDED = "unneeded"
-    UNMEETABLE = "unmeetable"
+    NOT_TAUTOLOGICAL = "not-tautological"
+    NOT_VACUOUS = "not-vacuous"
+    NOT_REDUNDANT = "not-redundant"
+    CONSTRAINED = "constrained"
+    DETERMINED = "determined"
+    NEEDED = "needed"
+    MEETABLE = "meetable"
 
 
 _SEVERITY = {
-    Property.REDUNDANT: Severity.WARNING,
-    Property.UNCONSTRAINED: Severity.WARNING,
-    Property.UNDETERMINED: Severity.NOTE,
-    Property.UNNEEDED: Severity.NOTE,
+    Property.NOT_REDUNDANT: Severity.WARNING,
+    Property.CONSTRAINED: Severity.WARNING,
+    Property.DETERMINED: Severity.NOTE,
+    Property.NEEDED: Severity.NOTE,
 }
 
 
@@ -75,7 +75,7 @@ class Claim:
 
     @property
     def name(self) -> str:
-        """``realizable``, ``vacuous-G1``: stable, and unique in the node."""
+        """``realizable``, ``not-vacuous-G1``: stable, and unique in the node."""
         return str(self.about) if self.subject is None else f"{self.about}-{self.subject}"
 
 
@@ -141,14 +141,16 @@ def _names(node: Node, clauses: tuple[Clause, ...]) -> tuple[str, ...]:
 def _of_guarantee(node: Node, clause: Clause) -> list[Claim]:
     common = (show_term(clause.formula), _names(node, (clause,)))
     found = [
-        _claim(Property.TAUTOLOGY, clause, f"Guarantee {clause.name} of {node.name} rules something out.", *common)
+        _claim(
+            Property.NOT_TAUTOLOGICAL, clause, f"Guarantee {clause.name} of {node.name} rules something out.", *common
+        )
     ]
     if triggers(clause.formula):
         sentence = f"What triggers guarantee {clause.name} of {node.name} can happen."
-        found.append(_claim(Property.VACUOUS, clause, sentence, *common))
+        found.append(_claim(Property.NOT_VACUOUS, clause, sentence, *common))
     if len(node.guarantees) > 1:
         sentence = f"Guarantee {clause.name} of {node.name} does not follow from the others."
-        found.append(_claim(Property.REDUNDANT, clause, sentence, *common))
+        found.append(_claim(Property.NOT_REDUNDANT, clause, sentence, *common))
     return found
 
 
@@ -157,13 +159,15 @@ def _of_assumption(node: Node, clause: Clause) -> list[Claim]:
         return []
     common = (show_term(clause.formula), _names(node, (clause,)))
     found = [
-        _claim(Property.TAUTOLOGY, clause, f"Assumption {clause.name} of {node.name} rules some input out.", *common)
+        _claim(
+            Property.NOT_TAUTOLOGICAL, clause, f"Assumption {clause.name} of {node.name} rules some input out.", *common
+        )
     ]
     if len(node.assumptions) > 1:
         sentence = f"Assumption {clause.name} of {node.name} does not follow from the others."
-        found.append(_claim(Property.REDUNDANT, clause, sentence, *common))
+        found.append(_claim(Property.NOT_REDUNDANT, clause, sentence, *common))
     sentence = f"Assumption {clause.name} of {node.name} rules out inputs for which no output meets the guarantees."
-    found.append(_claim(Property.UNNEEDED, clause, sentence, *common))
+    found.append(_claim(Property.NEEDED, clause, sentence, *common))
     return found
 
 
@@ -171,21 +175,21 @@ def _of_output(node: Node, port: Port, formula: str, names: tuple[str, ...]) -> 
     """`formula` and `names` are those of all guarantees."""
     return [
         Claim(
-            Property.UNCONSTRAINED,
+            Property.CONSTRAINED,
             port.name,
             f"The guarantees of {node.name} exclude some value of out.{port.name}.",
             formula,
             names,
-            _SEVERITY[Property.UNCONSTRAINED],
+            _SEVERITY[Property.CONSTRAINED],
             port.span,
         ),
         Claim(
-            Property.UNDETERMINED,
+            Property.DETERMINED,
             port.name,
             f"The inputs of {node.name} determine out.{port.name}.",
             formula,
             names,
-            _SEVERITY[Property.UNDETERMINED],
+            _SEVERITY[Property.DETERMINED],
             port.span,
         ),
     ]

@@ -69,13 +69,13 @@ class OverRuns:
             case Property.CONSISTENT:
                 together = {**self.assumptions, **self.guarantees}
                 return self._possible(together, "no inputs and outputs meet {} at any step of a run")
-            case Property.TAUTOLOGY | Property.REDUNDANT:
+            case Property.NOT_TAUTOLOGICAL | Property.NOT_REDUNDANT:
                 return self._alone(claim)._said_already(claim)
-            case Property.VACUOUS:
-                return self._vacuous(claim.subject or "")
-            case Property.UNCONSTRAINED:
-                return self._unconstrained(claim.subject or "")
-            case Property.UNDETERMINED | Property.UNNEEDED | Property.UNMEETABLE:
+            case Property.NOT_VACUOUS:
+                return self._not_vacuous(claim.subject or "")
+            case Property.CONSTRAINED:
+                return self._constrained(claim.subject or "")
+            case Property.DETERMINED | Property.NEEDED | Property.MEETABLE:
                 return Finding(Verdict.UNKNOWN, "not asked of clauses that speak of other steps")
             case _:
                 assert_never(claim.about)
@@ -98,9 +98,9 @@ class OverRuns:
         """The node with the clauses that the claim is about: the others would keep runs from what is asked for."""
         clause = self.node.clause(claim.subject or "")
         if clause.kind is ClauseKind.GUARANTEE:
-            whole = claim.about is Property.REDUNDANT
+            whole = claim.about is Property.NOT_REDUNDANT
             return self if whole else OverRuns(replace(self.node, guarantees=(clause,)), self.bounds)
-        these = self.node.assumptions if claim.about is Property.REDUNDANT else (clause,)
+        these = self.node.assumptions if claim.about is Property.NOT_REDUNDANT else (clause,)
         return OverRuns(replace(self.node, assumptions=these, guarantees=()), self.bounds)
 
     def _said_already(self, claim: Claim) -> Finding:
@@ -108,7 +108,7 @@ class OverRuns:
         kind = self.node.clause(name).kind
         own = self.assumptions if kind is ClauseKind.ASSUMPTION else self.guarantees
         others: Mapping[str, Term] = {} if kind is ClauseKind.ASSUMPTION else self.assumptions
-        if claim.about is Property.REDUNDANT:
+        if claim.about is Property.NOT_REDUNDANT:
             others = {**others, **{label: f for label, f in own.items() if label != name}}
         found = self._possible({**others, "": negation(own[name])}, "it follows from {}")
         needed = tuple(label for label in found.clauses if label)
@@ -117,7 +117,7 @@ class OverRuns:
         text = f"it follows from {listing(needed)}" if needed else "it holds at every step of every run"
         return Finding(found.verdict, text, needed)
 
-    def _vacuous(self, name: str) -> Finding:
+    def _not_vacuous(self, name: str) -> Finding:
         asked = [c.formula for c in self.remembering.node.guarantees if c.name == f"{name} {_TRIGGER}"]
         for trigger in asked:
             found = self._possible({**self.assumptions, "its trigger": trigger}, "{} cannot hold together in any run")
@@ -125,7 +125,7 @@ class OverRuns:
                 return found
         return Finding(Verdict.PROVED)
 
-    def _unconstrained(self, name: str) -> Finding:
+    def _constrained(self, name: str) -> Finding:
         output = self.node.output(name).variable
         spoken = {label: f for label, f in self.guarantees.items() if output in free_variables(f)}
         if not any(output in ports_of(clause.formula) for clause in self.node.guarantees):

@@ -42,7 +42,7 @@ class SanityResult:
     about: Property
     subject: str | None
     name: str
-    """``realizable``, ``vacuous-G1``."""
+    """``realizable``, ``not-vacuous-G1``."""
     claim: str
     verdict: Verdict
     severity: Severity

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 
 from avow.base.diagnostics import Diagnostic, Span
@@ -12,6 +13,25 @@ from avow.system.scenario_values import BASE_SORTS, domain_sort, unusable
 from avow.system.schema import suggest
 from avow.system.source_plan import check_memory
 from avow.system.strict_yaml import Piece
+
+_FORMER = {
+    "tautology": "not-tautological",
+    "vacuous": "not-vacuous",
+    "redundant": "not-redundant",
+    "unconstrained": "constrained",
+    "undetermined": "determined",
+    "unmeetable": "meetable",
+    "unneeded": "needed",
+}
+_FORMER_NAME = re.compile(rf"(^|/)({'|'.join(_FORMER)})(?=-|\*)")
+
+
+def renamed(obligation: str) -> str | None:
+    """Today's id of a sanity claim, or pattern of such ids, given the one that named the fault; None for any other."""
+    if "/guarantee/" in obligation:
+        return None
+    today = _FORMER_NAME.sub(lambda found: found[1] + _FORMER[found[2]], obligation)
+    return today if today != obligation else None
 
 
 def check_names(plan: Plan, root: Piece, contract: Contract) -> tuple[Diagnostic, ...]:
@@ -206,6 +226,10 @@ def _findings(root: Piece, nodes: dict[str, Node]) -> Iterator[Diagnostic]:
             obligation = item.at("obligation")
             if obligation is None:
                 continue
+            for piece in (obligation, *_text_items(item.at("matched"))):
+                if today := renamed(piece.text):
+                    message = f"{key}: sanity's {piece.text!r} is now named by the good thing that it states"
+                    yield Diagnostic("PLAN106", message, piece.span, hint=f"write {today!r}")
             owner = obligation.text.split("/")[0]
             if owner not in nodes and owner != "system" and not set(owner) & set("*?["):
                 yield _unknown(f"{key}: node", owner, [*nodes, "system"], obligation.span)

@@ -361,7 +361,7 @@ def rover_parts() -> tuple[System, list[Obligation], list[Evidence], dict[tuple[
             by_name[f"{node}.{name}"] = guarantee(node, name, claim, formula, line)
             obligations.append(by_name[f"{node}.{name}"])
             line += 3
-    redundant = obligation("radiationSensor", Kind.SANITY, "redundant-high", "No guarantee follows from the others")
+    redundant = obligation("radiationSensor", Kind.SANITY, "not-redundant-high", "No guarantee follows from the others")
     side = obligation(
         SYSTEM_LEVEL,
         Kind.COMPOSITION,

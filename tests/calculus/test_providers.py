@@ -37,7 +37,7 @@ def found(system: System, name: str) -> dict[str, SanityResult]:
 )
 def test_what_providers_exclude(tmp_path: Path, assumption: str, verdict: Verdict, core: set[str]) -> None:
     pump = node("pump", "level : REAL, flow : REAL, own : REAL", "on : BOOL", f"A A: {assumption}")
-    result = found(make(tmp_path, PLANT + pump), "pump")["unmeetable-A"]
+    result = found(make(tmp_path, PLANT + pump), "pump")["meetable-A"]
     assert result.verdict is verdict, result.explanation
     assert set(result.clauses) == core
 
@@ -50,7 +50,7 @@ def test_what_comes_from_no_node_is_not_asked_about(tmp_path: Path) -> None:
 def test_a_delayed_edge_brings_what_was_guaranteed_one_step_before(tmp_path: Path) -> None:
     counter = node("counter", "n : NATURAL", "n : NATURAL", "A A: in.n > 100", "G G: out.n < 50")
     plan = "connections:\n  - {from: counter.n, to: counter.n, delayed: true, initial: '200'}\n"
-    result = found(make(tmp_path, counter, plan), "counter")["unmeetable-A"]
+    result = found(make(tmp_path, counter, plan), "counter")["meetable-A"]
     assert result.verdict is Verdict.REFUTED
     assert set(result.clauses) == {"counter.A", "counter.G one step before"}
 
@@ -58,7 +58,7 @@ def test_a_delayed_edge_brings_what_was_guaranteed_one_step_before(tmp_path: Pat
 def test_providers_that_cannot_hold_themselves_are_to_blame(tmp_path: Path) -> None:
     plant = node("plant", "", "level : REAL", "G low: out.level <= 10", "G high: out.level > 11")
     pump = node("pump", "level : REAL", "on : BOOL", "A A: in.level > 0")
-    result = found(make(tmp_path, plant + pump), "pump")["unmeetable-A"]
+    result = found(make(tmp_path, plant + pump), "pump")["meetable-A"]
     assert result.verdict is Verdict.REFUTED
     assert result.because == "plant/consistent"
 
@@ -68,5 +68,5 @@ def test_the_command_lists_it(tmp_path: Path) -> None:
     make(tmp_path, PLANT + pump)
     run = CliRunner().invoke(command, [str(tmp_path), "--json"])
     results = {r["name"]: r for r in json.loads(run.output)["results"]}
-    assert results["unmeetable-hot"]["verdict"] == "refuted"
+    assert results["meetable-hot"]["verdict"] == "refuted"
     assert "no provider can meet it: plant.low excludes it" in CliRunner().invoke(command, [str(tmp_path)]).output

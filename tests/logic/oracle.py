@@ -7,14 +7,14 @@ A claim *holds* of the cases listed, where its output ranges over the values of 
 | assumptions-satisfiable | an input meets the assumptions: it is *allowed*                                      |
 | consistent              | an allowed input has a *good* output, one that meets every guarantee                 |
 | realizable              | every allowed input has a good output                                                |
-| tautology               | an allowed input has an output that the guarantee excludes;                          |
+| not-tautological        | an allowed input has an output that the guarantee excludes;                          |
 |                         | an input fails the assumption                                                        |
-| vacuous                 | each of the guarantee's triggers comes about, at an allowed input with some output   |
-| redundant               | an allowed input has an output that meets all guarantees but this one;               |
+| not-vacuous             | each of the guarantee's triggers comes about, at an allowed input with some output   |
+| not-redundant           | an allowed input has an output that meets all guarantees but this one;               |
 |                         | an input meets all assumptions but this one                                          |
-| unconstrained           | a good output is good no longer for another value of this output                     |
-| undetermined            | no allowed input has two good outputs that differ in this one                        |
-| unneeded                | an input that meets all assumptions but this one has no good output                  |
+| constrained             | a good output is good no longer for another value of this output                     |
+| determined              | no allowed input has two good outputs that differ in this one                        |
+| needed                  | an input that meets all assumptions but this one has no good output                  |
 
 Infinite types are cut off, which decides no less where the clauses that limit them (`random_contracts.LIMIT`) apply.
 Where they do not (a guarantee by itself, the limits themselves), an example decides, and that there is none does not.
@@ -161,15 +161,15 @@ class Survey:
         possible = all(any(on) for on in zip(*(case.triggered[name] for case in cases), strict=True)) and bool(cases)
         alone = any(case.failed == {name} for case in cases)
         return {
-            f"tautology-{name}": Fact(excludes, self.all_outputs),
-            f"vacuous-{name}": Fact(possible, self.all_outputs),
-            f"redundant-{name}": Fact(alone, self.all_outputs or not name.startswith(LIMIT)),
+            f"not-tautological-{name}": Fact(excludes, self.all_outputs),
+            f"not-vacuous-{name}": Fact(possible, self.all_outputs),
+            f"not-redundant-{name}": Fact(alone, self.all_outputs or not name.startswith(LIMIT)),
         }
 
     def _of_output(self, place: int, output: Variable) -> dict[str, Fact]:
         return {
-            f"unconstrained-{output.name}": Fact(any(self._is_constrained(place, s) for s in self.allowed)),
-            f"undetermined-{output.name}": Fact(
+            f"constrained-{output.name}": Fact(any(self._is_constrained(place, s) for s in self.allowed)),
+            f"determined-{output.name}": Fact(
                 all(len({case.at[place] for case in situation.good}) < 2 for situation in self.allowed)
             ),
         }
@@ -184,9 +184,9 @@ class Survey:
         firm = self.all_inputs or not name.startswith(LIMIT)
         excluded = [situation for situation in self.situations if situation.failed == {name}]
         return {
-            f"tautology-{name}": Fact(any(name in s.failed for s in self.situations), self.all_inputs),
-            f"redundant-{name}": Fact(bool(excluded), firm),
-            f"unneeded-{name}": Fact(any(not situation.good for situation in excluded), firm),
+            f"not-tautological-{name}": Fact(any(name in s.failed for s in self.situations), self.all_inputs),
+            f"not-redundant-{name}": Fact(bool(excluded), firm),
+            f"needed-{name}": Fact(any(not situation.good for situation in excluded), firm),
         }
 
 

@@ -207,22 +207,22 @@ def unrealizable(shape: Shape, r: Random) -> tuple[Shape, set[str]]:
 
 def vacuous(shape: Shape, r: Random) -> tuple[Shape, set[str]]:
     _, output = r.choice(shape.forced)
-    return _more(shape, f"({shape.never}) -> ({output})"), {f"tautology-G{len(shape.guarantees) + 1}"}
+    return _more(shape, f"({shape.never}) -> ({output})"), {f"not-tautological-G{len(shape.guarantees) + 1}"}
 
 
 def redundant(shape: Shape, r: Random) -> tuple[Shape, set[str]]:
     condition, output = r.choice(shape.forced)
-    return _more(shape, f"({condition}) -> ({output})"), {f"redundant-G{len(shape.guarantees) + 1}"}
+    return _more(shape, f"({condition}) -> ({output})"), {f"not-redundant-G{len(shape.guarantees) + 1}"}
 
 
 def doubled(shape: Shape, r: Random) -> tuple[Shape, set[str]]:
     k = r.randrange(len(shape.guarantees))
-    return _more(shape, shape.guarantees[k]), {f"redundant-G{k + 1}", f"redundant-G{len(shape.guarantees) + 1}"}
+    return _more(shape, shape.guarantees[k]), {f"not-redundant-G{k + 1}", f"not-redundant-G{len(shape.guarantees) + 1}"}
 
 
 def empty(shape: Shape, r: Random) -> tuple[Shape, set[str]]:
     _, output = r.choice(shape.forced)
-    return _more(shape, f"({output}) or not ({output})"), {f"tautology-G{len(shape.guarantees) + 1}"}
+    return _more(shape, f"({output}) or not ({output})"), {f"not-tautological-G{len(shape.guarantees) + 1}"}
 
 
 def impossible(shape: Shape, r: Random) -> tuple[Shape, set[str]]:
@@ -230,7 +230,7 @@ def impossible(shape: Shape, r: Random) -> tuple[Shape, set[str]]:
 
 
 def forgotten(shape: Shape, r: Random) -> tuple[Shape, set[str]]:
-    return replace(shape, outputs=f"{shape.outputs}, z : REAL"), {"unconstrained-z"}
+    return replace(shape, outputs=f"{shape.outputs}, z : REAL"), {"constrained-z"}
 
 
 FAULTS = (good, contradictory, unrealizable, vacuous, redundant, doubled, empty, impossible, forgotten)

@@ -28,7 +28,7 @@ QUICK = (1, 3, 7, 8, 22, 24, 25, 28)
 COUNT = int(os.environ.get("AVOW_ORACLE_CONTRACTS", "8"))
 FIRST = int(os.environ.get("AVOW_ORACLE_FIRST", "100"))
 
-ONE_SIDED = {Property.TAUTOLOGY, Property.VACUOUS, Property.REDUNDANT, Property.UNNEEDED}
+ONE_SIDED = {Property.NOT_TAUTOLOGICAL, Property.NOT_VACUOUS, Property.NOT_REDUNDANT, Property.NEEDED}
 """Where types are infinite, the oracle knows of these only that they hold."""
 
 OPPOSITE = {Verdict.PROVED: Verdict.REFUTED, Verdict.REFUTED: Verdict.PROVED}
@@ -108,7 +108,7 @@ def test_a_flipped_verdict_is_caught() -> None:
         judgement = judge(asked, flipped.values())
         caught |= {flipped[name].about for name in judgement.wrong}
         missed |= {flipped[name].about for name in judgement.right}
-    assert caught == set(Property) - {Property.UNMEETABLE}
+    assert caught == set(Property) - {Property.MEETABLE}
     assert missed <= ONE_SIDED
 
 
@@ -117,8 +117,8 @@ def test_the_verdicts_of_another_contract_are_caught() -> None:
     asked = node(f"{ports} guarantee( in.j -> out.o ) guarantee( out.p )")
     assert not judge(asked, analyse(asked)).wrong
     other = node(f"{ports} guarantee( in.j -> out.o ) guarantee( out.p or out.o )")
-    assert set(judge(asked, analyse(other)).wrong) == {"undetermined-p"}
-    assert set(judge(other, analyse(asked)).wrong) == {"undetermined-p"}
+    assert set(judge(asked, analyse(other)).wrong) == {"determined-p"}
+    assert set(judge(other, analyse(asked)).wrong) == {"determined-p"}
 
 
 def test_the_facts_of_a_contract_that_is_bad_in_every_way() -> None:
@@ -129,7 +129,7 @@ def test_the_facts_of_a_contract_that_is_bad_in_every_way() -> None:
     )
     facts = Survey(bad, Enumeration()).facts()
     assert {name for name, fact in facts.items() if not fact.holds} == {
-        *("realizable", "tautology-NEVER", "vacuous-NEVER", "redundant-NEVER", "unconstrained-free"),
-        *("undetermined-free", "tautology-TRUISM", "redundant-TRUISM", "unneeded-TRUISM"),
-        *("redundant-A3", "unneeded-A3", "redundant-limit_n", "unneeded-limit_n"),
+        *("realizable", "not-tautological-NEVER", "not-vacuous-NEVER", "not-redundant-NEVER", "constrained-free"),
+        *("determined-free", "not-tautological-TRUISM", "not-redundant-TRUISM", "needed-TRUISM"),
+        *("not-redundant-A3", "needed-A3", "not-redundant-limit_n", "needed-limit_n"),
     }

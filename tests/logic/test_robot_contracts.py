@@ -20,7 +20,7 @@ CONTRACTS = {
         guarantee( forall(x, y in REAL |
           (in.wish == (x, y) and -50 <= x <= 50 and -50 <= y <= 50) -> out.goal == in.wish) )""",
         "",
-        "undetermined-goal",
+        "determined-goal",
     ),
     "an arm at a fixed distance": (
         "",
@@ -58,7 +58,7 @@ CONTRACTS = {
         """assume( 9 <= in.v ) guarantee( in.v <= 10.5 -> out.level == low )
         guarantee( 10.5 <= in.v < 12.5 -> out.level == ok ) guarantee( in.v >= 12.5 -> out.level == full )""",
         "realizable",
-        "unneeded-A1",
+        "needed-A1",
     ),
     "a counter below zero": (
         "",
@@ -80,7 +80,7 @@ CONTRACTS = {
         "inputs( q : <NATURAL> ) outputs( x : NATURAL )",
         "guarantee( out.x in in.q )",
         "realizable",
-        "undetermined-x",
+        "determined-x",
     ),
     "a queue that grows": (
         "",
@@ -104,7 +104,7 @@ CONTRACTS = {
         guarantee( length(out.path) >= 2 and out.path(0) == in.a and out.path(length(out.path) - 1) == in.b )
         guarantee( forall(i in NATURAL | i + 1 < length(out.path) -> in.edge(out.path(i), out.path(i + 1))) )""",
         "",
-        "undetermined-path",
+        "determined-path",
     ),
     "a map kept within bounds": (
         "",
@@ -112,21 +112,21 @@ CONTRACTS = {
         """guarantee( forall(x, y in NATURAL | in.a(x, y) -> out.m(x, y)) )
         guarantee( forall(x, y in NATURAL | out.m(x, y) -> x < 10 and y < 10) )""",
         "realizable",
-        "undetermined-m",
+        "determined-m",
     ),
     "the assumption that matters, and the one that does not": (
         "",
         "inputs( a : REAL, b : REAL ) outputs( o : REAL )",
         "assume( in.a > 0 ) assume( in.b > 0 ) guarantee( out.o * out.o == in.b ) guarantee( out.o > 0 )",
         "",
-        "unneeded-A1",
+        "needed-A1",
     ),
     "an assumption true by typing, in a contract that nobody can meet": (
         "",
         "inputs( n : NATURAL ) outputs( o : NATURAL )",
         "assume( in.n >= 0 ) guarantee( out.o + 1 == in.n )",
         "realizable",
-        "tautology-A1",
+        "not-tautological-A1",
     ),
 }
 

@@ -22,7 +22,7 @@ def refuted(of: Node) -> set[str]:
     """The names of the refuted claims that are no mere consequence of another; no claim may stay open, but whether an
     assumption is needed where the contract is not realizable."""
     found = results(of)
-    unknown = {r.name for r in found.values() if r.verdict is Verdict.UNKNOWN and r.about is not Property.UNNEEDED}
+    unknown = {r.name for r in found.values() if r.verdict is Verdict.UNKNOWN and r.about is not Property.NEEDED}
     assert not unknown
     return {r.name for r in found.values() if r.verdict is Verdict.REFUTED and not r.because}
 
@@ -44,7 +44,7 @@ def bands(a: str, b: str, *more: str) -> Node:
     )
 
 
-GOOD = {"unneeded-A1"}
+GOOD = {"needed-A1"}
 """A reading below 0 would do no harm to `bands`."""
 
 
@@ -53,7 +53,7 @@ def test_a_good_contract_is_good(a: str, b: str) -> None:
     assert refuted(bands(a, b)) == GOOD
     found = results(bands(a, b))
     assert found["realizable"].verdict is Verdict.PROVED
-    assert found["undetermined-v"].verdict is Verdict.PROVED
+    assert found["determined-v"].verdict is Verdict.PROVED
 
 
 @pytest.mark.slow
@@ -69,25 +69,25 @@ def test_a_good_contract_is_good(a: str, b: str) -> None:
             ("guarantee( in.r == 120.5 -> out.v != mid )", {"realizable"}),
             ("guarantee( in.r != 7 )", {"realizable"}),
             # vacuous
-            ("guarantee( in.r < -1 -> out.v == high )", {"tautology-G4"}),
-            ("guarantee( (in.r < 100 and in.r > 130) -> out.v == high )", {"tautology-G4"}),
+            ("guarantee( in.r < -1 -> out.v == high )", {"not-tautological-G4"}),
+            ("guarantee( (in.r < 100 and in.r > 130) -> out.v == high )", {"not-tautological-G4"}),
             # redundant
-            ("guarantee( in.r == 3 -> out.v == low )", {"redundant-G4"}),
-            ("guarantee( out.v == low or in.r >= 120 )", {"redundant-G4", "redundant-G1"}),
-            ("guarantee( in.r < 120 -> out.v == low )", {"redundant-G4", "redundant-G1"}),
+            ("guarantee( in.r == 3 -> out.v == low )", {"not-redundant-G4"}),
+            ("guarantee( out.v == low or in.r >= 120 )", {"not-redundant-G4", "not-redundant-G1"}),
+            ("guarantee( in.r < 120 -> out.v == low )", {"not-redundant-G4", "not-redundant-G1"}),
             # a tautology
-            ("guarantee( out.v == low -> out.v in {low, mid} )", {"tautology-G4"}),
+            ("guarantee( out.v == low -> out.v in {low, mid} )", {"not-tautological-G4"}),
             # assumptions
             ("assume( in.r < 0 )", {"assumptions-satisfiable"}),
-            ("assume( in.r >= -5 )", {"redundant-A2"}),
-            ("assume( in.r == in.r )", {"tautology-A2"}),
+            ("assume( in.r >= -5 )", {"not-redundant-A2"}),
+            ("assume( in.r == in.r )", {"not-tautological-A2"}),
         ],
         7,
     ),
 )
 def test_a_seeded_fault_is_found(clause: str, faults: set[str]) -> None:
     found = refuted(bands("120", "250", clause))
-    assert {name for name in found if not name.startswith(("unneeded-A1",))} == faults
+    assert {name for name in found if not name.startswith(("needed-A1",))} == faults
 
 
 def test_unconstrained_and_undetermined_outputs() -> None:
@@ -97,12 +97,12 @@ def test_unconstrained_and_undetermined_outputs() -> None:
         LEVELS,
     )
     found = refuted(two)
-    assert {"unconstrained-w", "unconstrained-u", "undetermined-v", "tautology-G2"} >= found
-    assert {"undetermined-v", "tautology-G2"} <= found
+    assert {"constrained-w", "constrained-u", "determined-v", "not-tautological-G2"} >= found
+    assert {"determined-v", "not-tautological-G2"} <= found
     answers = results(two)
-    assert answers["unconstrained-v"].verdict is Verdict.PROVED
-    assert answers["unconstrained-w"].verdict is Verdict.REFUTED
-    assert answers["undetermined-w"].because == "unconstrained-w"
+    assert answers["constrained-v"].verdict is Verdict.PROVED
+    assert answers["constrained-w"].verdict is Verdict.REFUTED
+    assert answers["determined-w"].because == "constrained-w"
 
 
 COMMANDS = {
@@ -141,7 +141,7 @@ COMMANDS = {
 def test_commands(name: str) -> None:
     clauses, faults = COMMANDS[name]
     text = f"inputs( r : REAL, n : NATURAL, done : NATURAL --> BOOL ) outputs( c : Command )| {clauses}"
-    assert {f for f in refuted(node(text, LEVELS)) if "undetermined" not in f} == faults
+    assert {f for f in refuted(node(text, LEVELS)) if "determined" not in f} == faults
 
 
 FUNCTIONS = {
@@ -170,7 +170,7 @@ def test_functions(name: str) -> None:
     clauses, faults = FUNCTIONS[name]
     functions = "f : NATURAL --> BOOL, g : REAL --> NATURAL"
     text = f"inputs( n : NATURAL, {functions} ) outputs( {functions} )| {clauses}"
-    found = {f for f in refuted(node(text)) if "undetermined" not in f and "unconstrained" not in f}
+    found = {f for f in refuted(node(text)) if "determined" not in f and "constrained" not in f}
     assert found == faults
 
 
@@ -220,11 +220,11 @@ def test_the_published_agent_is_not_realizable(published: dict[str, dict[str, Sa
 
 def test_the_published_radiation_sensor_says_nothing(published: dict[str, dict[str, SanityResult]]) -> None:
     found = published["radiationSensor"]
-    assert found["tautology-G1"].verdict is Verdict.REFUTED
-    for name in ("vacuous-G1", "unconstrained-radiationStatus", "unconstrained-inspected"):
+    assert found["not-tautological-G1"].verdict is Verdict.REFUTED
+    for name in ("not-vacuous-G1", "constrained-radiationStatus", "constrained-inspected"):
         assert found[name].verdict is Verdict.REFUTED
-        assert found[name].because == "tautology-G1"
-    assert published["agent"]["tautology-A1"].verdict is Verdict.REFUTED, "an assumption that is true by typing"
+        assert found[name].because == "not-tautological-G1"
+    assert published["agent"]["not-tautological-A1"].verdict is Verdict.REFUTED, "an assumption that is true by typing"
 
 
 def test_the_other_published_nodes_are_sound(published: dict[str, dict[str, SanityResult]]) -> None:

@@ -21,14 +21,14 @@ CONTRACTS = {
         guarantee( forall(j in Joint | low(j) <= angle(j) <= high(j)) )
         guarantee( forall(j in Joint | (low(j) <= wanted(j) <= high(j)) -> angle(j) == wanted(j)) )""",
         "",
-        "undetermined-angle",
+        "determined-angle",
     ),
     "a height between two, for each of infinitely many": (
         "",
         "inputs( f : NATURAL --> REAL, g : NATURAL --> REAL ) outputs( h : NATURAL --> REAL )",
         "assume( forall(i in NATURAL | f(i) < g(i)) ) guarantee( forall(i in NATURAL | f(i) < h(i) and h(i) < g(i)) )",
         "",
-        "undetermined-h",
+        "determined-h",
     ),
     "the greater of two functions": (
         "",
@@ -44,21 +44,21 @@ CONTRACTS = {
         """assume( forall(t in Task | exists(m in Machine | can(m, t))) )
         guarantee( forall(t in Task | can(on(t), t)) )""",
         "",
-        "undetermined-on",
+        "determined-on",
     ),
     "a function that must grow without bound": (
         "",
         "inputs( x : REAL ) outputs( f : REAL --> REAL )",
         "guarantee( forall(t in REAL | f(t) > t) )",
         "",
-        "undetermined-f",
+        "determined-f",
     ),
     "a height of its own for each of a swarm": (
         "",
         "inputs( n : NATURAL ) outputs( height : NATURAL --> REAL )",
         "guarantee( forall(a, b in NATURAL | a != b -> height(a) != height(b)) )",
         "",
-        "undetermined-height",
+        "determined-height",
     ),
     "a constant function": (
         "",
@@ -73,7 +73,7 @@ CONTRACTS = {
         """assume( -1 <= v <= 1 ) assume( -1 <= turn <= 1 )
         guarantee( exists(l, r in REAL | w == (l, r) and l + r == 2 * v and r - l == turn) )""",
         "",
-        "unneeded-A1 unneeded-A2",
+        "needed-A1 needed-A2",
     ),
     "wheel speeds out of range in a corner": (
         "Wheels : (REAL, REAL);",
@@ -103,7 +103,7 @@ CONTRACTS = {
         "inputs( p : BOOL, q : BOOL ) outputs( a : Pos, b : Pos )",
         "guarantee( p -> a != b ) guarantee( q -> a == normal ) guarantee( q -> b == normal )",
         "realizable",
-        "undetermined-a undetermined-b",
+        "determined-a determined-b",
     ),
     "routes of which one is asked for at most": (
         "Route : {r1, r2, r3};",
@@ -112,7 +112,7 @@ CONTRACTS = {
         guarantee( forall(r in Route | wanted(r) -> set(r)) )
         guarantee( forall(r in Route, s in Route | (set(r) and set(s)) -> r == s) )""",
         "",
-        "undetermined-set",
+        "determined-set",
     ),
     "a report of a place that may be lost": (
         "Pose : {at(REAL, REAL), lost}; Msg : {report(Pose), ask(NATURAL), none};",
@@ -120,7 +120,7 @@ CONTRACTS = {
         """guarantee( asked -> msg == report(pose) ) guarantee( not asked -> msg in {none, ask(0), ask(1)} )
         guarantee( pose == lost -> msg != report(lost) )""",
         "realizable",
-        "undetermined-msg",
+        "determined-msg",
     ),
     "a bolus at one point": (
         "",
@@ -129,7 +129,7 @@ CONTRACTS = {
         guarantee( rate <= limit -> motor == rate ) guarantee( rate >= limit -> motor == limit )
         guarantee( motor < 999.99 or rate < limit )""",
         "realizable",
-        "unneeded-A1 unneeded-A2",
+        "needed-A1 needed-A2",
     ),
     "the strictly cheapest neighbour": (
         "Place : {a, b, c, d};",
@@ -144,7 +144,7 @@ CONTRACTS = {
         "inputs( a : Id, b : Id ) outputs( c : Id )",
         "guarantee( c != a ) guarantee( c != b )",
         "consistent",
-        "undetermined-c",
+        "determined-c",
     ),
     "a chain of ten": (
         "",
@@ -158,7 +158,7 @@ CONTRACTS = {
         "",
         "inputs( a : BOOL, b : BOOL, c : BOOL, d : BOOL ) outputs( x : BOOL )",
         "guarantee( a <=> b <=> c <=> d <=> x <=> d <=> c <=> b <=> a <=> x )",
-        "tautology-G1",
+        "not-tautological-G1",
         "",
     ),
     "a chain of quantifiers": (
@@ -173,7 +173,7 @@ CONTRACTS = {
         "",
         "inputs( a : REAL, b : REAL ) outputs( q : REAL )",
         """guarantee( b != 0 -> q == a / b ) guarantee( b == 0 -> q == 0 ) guarantee( q * b == a or b == 0 )""",
-        "redundant-G1 redundant-G3",
+        "not-redundant-G1 not-redundant-G3",
         "",
     ),
     "assumptions of which types make each true": (
@@ -181,7 +181,7 @@ CONTRACTS = {
         "inputs( n : NATURAL, s : S ) outputs( o : BOOL )",
         "assume( n >= 0 ) assume( s in {s1, s2} ) assume( s == s1 or s != s1 ) guarantee( o <=> n > 3 )",
         "",
-        "tautology-A1 tautology-A2 tautology-A3",
+        "not-tautological-A1 not-tautological-A2 not-tautological-A3",
     ),
     "a queue the other way round": (
         "",
@@ -196,7 +196,7 @@ CONTRACTS = {
         "inputs( table : <(STRING, REAL)>, key : STRING ) outputs( v : REAL )",
         "guarantee( (key, v) in table )",
         "realizable",
-        "undetermined-v",
+        "determined-v",
     ),
 }
 

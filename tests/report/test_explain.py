@@ -30,12 +30,12 @@ PAGES = ("index.html", "claims.html", "traceability.html")
 
 
 def shown(name: str) -> str:
-    advice = obligation("node", Kind.SANITY, "redundant-a", "a is not implied", "x " + "∧ y = 1 " * 30)
+    advice = obligation("node", Kind.SANITY, "not-redundant-a", "a is not implied", "x " + "∧ y = 1 " * 30)
     target = guarantee("node", "a")
     records = [evidence(advice, Verdict.REFUTED, "hoare"), evidence(target, Verdict.REFUTED, "hoare")]
     subject = system(
         {"node": ["a"]},
-        expected=[Finding("node/sanity/redundant-a", "refuted", "said [twice] in the paper")],
+        expected=[Finding("node/sanity/not-redundant-a", "refuted", "said [twice] in the paper")],
         accepted=[Finding("node/guarantee/a", "refuted", "one run of 47", "R. Assessor", "2026-10-01", "2027-10-01")],
     )
     found = case(subject, (advice, target), records)
@@ -46,7 +46,7 @@ def shown(name: str) -> str:
 
 
 def test_advice_that_the_plan_expects_says_why() -> None:
-    assert "expected by the plan: said [twice] in the paper" in shown("redundant")
+    assert "expected by the plan: said [twice] in the paper" in shown("not-redundant")
 
 
 def test_an_accepted_refutation_says_who_and_until_when() -> None:
@@ -54,7 +54,7 @@ def test_an_accepted_refutation_says_who_and_until_when() -> None:
 
 
 def test_a_long_formula_is_in_lines() -> None:
-    assert max(len(line) for line in shown("redundant").splitlines()) <= 100
+    assert max(len(line) for line in shown("not-redundant").splitlines()) <= 100
 
 
 def run_of_an_agent(width: int) -> str:
