@@ -25,6 +25,10 @@ _NEEDS = {
     "needs_dot": lambda: shutil.which("dot") is not None,
     "needs_latex": lambda: shutil.which("pdflatex") is not None,
     "needs_pacti": lambda: importlib.util.find_spec("pacti") is not None,
+    "needs_ros1": lambda: (
+        Path("/usr/lib/python3/dist-packages/rospy").is_dir() and shutil.which("rosmaster") is not None
+    ),
+    "needs_roscpp": lambda: Path("/usr/include/ros/ros.h").is_file() and shutil.which("g++") is not None,
     "needs_spin": lambda: shutil.which("spin") is not None and shutil.which("gcc") is not None,
 }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -17,7 +17,7 @@ from .coverage import coverage
 from .tuning import VIOLATIONS_SHOWN
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from avow.system.plan import System
 
@@ -146,7 +146,7 @@ def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
 
 
 def _live(
-    system: System, nodes: tuple[str, ...], graph: str,
+    system: System, nodes: tuple[str, ...], live: str,
     how: tuple[float | None, str, Path | None, str | None], telling: _Telling,
 ) -> int:  # fmt: skip
     from .live import follow, graph_of
@@ -154,17 +154,31 @@ def _live(
 
     seconds, host, record, verdicts = how
     running = session(system, nodes, make=telling.monitor)
-    found = follow(running, graph_of(graph, running.topics, host), seconds, record, verdicts, _warn)
+    graph = graph_of(live, running.topics, host)
+    with _until(seconds) as over:
+        found = ((0, violation) for violation in follow(running, graph, over, record, verdicts, _warn))
+        return _told(running, found, str(record or ""), telling)
 
-    def until_interrupted() -> Iterator[tuple[int, Violation]]:
-        try:
-            for violation in found:
-                yield 0, violation
-        except KeyboardInterrupt:
-            for violation in running.finish():
-                yield 0, violation
 
-    return _told(running, until_interrupted(), str(record or ""), telling)
+@contextmanager
+def _until(seconds: float | None) -> Iterator[Callable[[], bool]]:
+    """Whether so many seconds have passed, or Ctrl-C was pressed; a second one interrupts at once."""
+    import signal
+    import threading
+    import time
+
+    interrupted = threading.Event()
+    end = None if seconds is None else time.monotonic() + seconds
+
+    def interrupt(*_: object) -> None:
+        interrupted.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield lambda: interrupted.is_set() or (end is not None and time.monotonic() >= end)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _warn(text: str) -> None:

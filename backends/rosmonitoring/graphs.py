@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import queue
+import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol
 
 from .bags import Event
+from .tuning import QUEUED_MESSAGES
 
 OK, WARN, ERROR, STALE = range(4)
 """Levels of a `diagnostic_msgs/DiagnosticStatus`."""
@@ -16,11 +19,45 @@ OK, WARN, ERROR, STALE = range(4)
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """One message, or (`event` None) what is wrong with who said it."""
+    """One message, when it came, and what reads it (which raises ValueError); or (`read` None) what is wrong with who
+    said it."""
 
     topic: str
-    event: Event | None
+    time: float
+    read: Callable[[], Event] | None
     trouble: str = ""
+
+
+class Inbox:
+    """What waits to be judged, in the order of the times at which it came, whichever thread hears it."""
+
+    def __init__(self) -> None:
+        self._queue: queue.Queue[Heard] = queue.Queue(QUEUED_MESSAGES)
+        self._lock = threading.Lock()
+        self.dropped = 0
+
+    def message(self, topic: str, read: Callable[[float], Event]) -> None:
+        """A message has come just now; it is read, as an event of that time, when it is judged."""
+        with self._lock:
+            now = time.time()
+            self._put(Heard(topic, now, lambda: read(now)))
+
+    def trouble(self, topic: str, text: str) -> None:
+        with self._lock:
+            self._put(Heard(topic, time.time(), None, text))
+
+    def _put(self, heard: Heard) -> None:
+        try:
+            self._queue.put_nowait(heard)
+        except queue.Full:
+            self.dropped += 1
+
+    def get(self, seconds: float) -> Heard | None:
+        """The next one, or None if none comes for so long."""
+        try:
+            return self._queue.get(timeout=seconds)
+        except queue.Empty:
+            return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +73,7 @@ class Status:
 class Graph(Protocol):
     """Used as a context: it listens until that is left."""
 
-    heard: queue.Queue[Heard]
-    dropped: int
+    inbox: Inbox
 
     def __enter__(self) -> Graph: ...
 

@@ -6,7 +6,6 @@ Evidence is the record, judged again by `avow verify`: a live verdict stays what
 from __future__ import annotations
 
 import json
-import queue
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
@@ -14,21 +13,22 @@ from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected
 
+from .bags import Event
 from .coverage import coverage
-from .graphs import ERROR, OK, STALE, WARN, Graph, Status
+from .graphs import ERROR, OK, STALE, WARN, Graph, Heard, Status
 from .ros1 import Ros1, master_of
 from .rosbridge import Rosbridge
 from .session import Session
-from .tuning import LIVE_PAUSE, VERDICTS_EVERY
+from .tuning import LIVE_PAUSE, TOPICS_KEPT, VERDICTS_EVERY
 from .watched import Violation
 
 
 def follow(
-    running: Session, graph: Graph, seconds: float | None, record: Path | None, verdicts: str | None,
+    running: Session, graph: Graph, over: Callable[[], bool], record: Path | None, verdicts: str | None,
     warn: Callable[[str], None],
 ) -> Iterator[Violation]:  # fmt: skip
-    """Judge what a graph says, for some time (None: until interrupted). Deadlines pass by this machine's clock. Raises
-    Rejected where the record cannot be written."""
+    """Judge what a graph says until it is `over`. Deadlines pass by this machine's clock. Raises Rejected where the
+    record cannot be written."""
     with ExitStack() as stack:
         try:
             file = stack.enter_context(record.open("w", encoding="utf-8")) if record is not None else None
@@ -37,28 +37,55 @@ def follow(
             raise Rejected(Diagnostic("MON304", text)) from None
         stack.enter_context(graph)
         board = Board(running, graph, verdicts) if verdicts is not None else None
-        end = None if seconds is None else time.monotonic() + seconds
-        while end is None or time.monotonic() < end:
-            try:
-                heard = graph.heard.get(timeout=LIVE_PAUSE)
-            except queue.Empty:
-                if running.events:  # the run begins with its first message
-                    yield from running.tick({"time": time.time()})
-            else:
-                if heard.event is None:
-                    warn(heard.trouble)
-                    continue
+        trouble = Troubles(warn)
+        ended: float | None = None
+        while True:
+            if ended is None and over():
+                ended = time.time()  # what came until then is judged yet
+            heard = graph.inbox.get(LIVE_PAUSE if ended is None else 0)
+            if ended is not None and (heard is None or heard.time > ended):
+                break
+            event = None if heard is None else trouble.event(heard)
+            if event is not None:
                 if file is not None:
-                    file.write(json.dumps(heard.event) + "\n")
-                found = list(running.step(heard.event))
+                    file.write(json.dumps(event) + "\n")
+                found = list(running.step(event))
                 if board is not None and found:
                     board.broken(found)
                 yield from found
+            elif heard is None and running.events:  # the run begins with its first message
+                yield from running.tick({"time": time.time()})
             if board is not None:
                 board.refresh()
         yield from running.finish()
-        if graph.dropped:
-            warn(f"{graph.dropped} messages came faster than they were judged, and are lost")
+        if board is not None:
+            board.say()
+        if graph.inbox.dropped:
+            warn(f"{graph.inbox.dropped} messages came faster than they were judged, and are lost")
+
+
+class Troubles:
+    """What could not be read, or who could not be heard; each is told once."""
+
+    def __init__(self, warn: Callable[[str], None]) -> None:
+        self._warn = warn
+        self._told: set[str] = set()
+
+    def event(self, heard: Heard) -> Event | None:
+        """What a message says; one that cannot be read says nothing of its fields, so that they are unknown."""
+        if heard.read is None:
+            self.tell(heard.trouble)
+            return None
+        try:
+            return heard.read()
+        except ValueError as error:
+            self.tell(str(error))
+            return {"topic": heard.topic, "time": heard.time}
+
+    def tell(self, text: str) -> None:
+        if text not in self._told and len(self._told) < TOPICS_KEPT:
+            self._told.add(text)
+            self._warn(text)
 
 
 class Board:
@@ -77,8 +104,11 @@ class Board:
     def refresh(self) -> None:
         """Say how it stands, if it is time to."""
         if time.monotonic() >= self._next:
-            self._next = time.monotonic() + VERDICTS_EVERY
-            self._say(list(self.standing()))
+            self.say()
+
+    def say(self) -> None:
+        self._next = time.monotonic() + VERDICTS_EVERY
+        self._say(list(self.standing()))
 
     def standing(self) -> Iterator[Status]:
         """Each clause, and each other thing that was told."""

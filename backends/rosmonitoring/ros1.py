@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import os
-import queue
 import socket
 import struct
 import threading
@@ -16,16 +15,17 @@ import time
 import xmlrpc.client
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from socketserver import ThreadingMixIn
 from typing import Any
 from urllib.parse import urlparse
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.ros.bags import enveloped, plainer
+from avow.ros.bags import Event, enveloped, plainer
 
-from .graphs import Heard, Status
-from .tuning import FRAME_BYTES, HEADER_BYTES, QUEUED_MESSAGES
+from .graphs import Inbox, Status
+from .tuning import FRAME_BYTES, HEADER_BYTES
 
 CALLER = "/avow_monitor"
 HOST = "127.0.0.1"
@@ -46,8 +46,7 @@ class Ros1:
         """`host`: the name or address at which the graph's nodes find this one."""
         self.host = host
         self.topics = tuple(topic if topic.startswith("/") else f"/{topic}" for topic in topics)
-        self.heard: queue.Queue[Heard] = queue.Queue(QUEUED_MESSAGES)
-        self.dropped = 0
+        self.inbox = Inbox()
         self._uri = master
         self._master = xmlrpc.client.ServerProxy(master, allow_none=True)
         self._known: set[tuple[str, str]] = set()
@@ -151,7 +150,7 @@ class Ros1:
             other: Any = xmlrpc.client.ServerProxy(uri)
             code, text, protocol = other.requestTopic(CALLER, topic, [["TCPROS"]])
             if code != 1 or not isinstance(protocol, list) or len(protocol) != 3:
-                self._put(Heard(topic, None, f"{uri} does not speak TCPROS: {text}"))
+                self.inbox.trouble(topic, f"{uri} does not speak TCPROS: {text}")
                 return
             with socket.create_connection((str(protocol[1]), int(protocol[2])), timeout=5) as line:
                 line.settimeout(None)
@@ -161,20 +160,17 @@ class Ros1:
                 read = reader(topic, fields)
                 while not self._over.is_set():
                     raw = frame(line, FRAME_BYTES)
-                    now = time.time()
-                    self._put(Heard(topic, enveloped(read(raw), topic, now)))
+                    self.inbox.message(topic, partial(_event, topic, read, raw))
         except (OSError, ValueError, xmlrpc.client.Error) as error:
             if not self._over.is_set() and not isinstance(error, EOFError):
-                self._put(Heard(topic, None, f"{topic} from {uri}: {error}"))
+                self.inbox.trouble(topic, f"{topic} from {uri}: {error}")
         finally:
             with self._lock:
                 self._known.discard((topic, uri))
 
-    def _put(self, heard: Heard) -> None:
-        try:
-            self.heard.put_nowait(heard)
-        except queue.Full:
-            self.dropped += 1
+
+def _event(topic: str, read: Callable[[bytes], dict[str, Any]], raw: bytes, now: float) -> Event:
+    return enveloped(read(raw), topic, now)
 
 
 class Spoken:

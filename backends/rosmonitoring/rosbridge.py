@@ -7,7 +7,6 @@ null where a number is NaN or infinite: unreadable, never a value.
 from __future__ import annotations
 
 import json
-import queue
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -17,8 +16,8 @@ from typing import Any
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import enveloped
 
-from .graphs import Heard, Status
-from .tuning import FRAME_BYTES, QUEUED_MESSAGES
+from .graphs import Inbox, Status
+from .tuning import FRAME_BYTES
 
 
 class Rosbridge:
@@ -27,8 +26,7 @@ class Rosbridge:
     def __init__(self, address: str, topics: Iterable[str]) -> None:
         self.address = address
         self.topics = tuple(topic if topic.startswith("/") else f"/{topic}" for topic in topics)
-        self.heard: queue.Queue[Heard] = queue.Queue(QUEUED_MESSAGES)
-        self.dropped = 0
+        self.inbox = Inbox()
         self._stack = ExitStack()
 
     def __enter__(self) -> Rosbridge:
@@ -55,35 +53,40 @@ class Rosbridge:
     def _send(self, message: dict[str, Any]) -> None:
         self._line.send(json.dumps(message))
 
+    def _say(self, message: dict[str, Any]) -> None:
+        """As `_send`; that there is nobody any more is told, not raised."""
+        from websockets.exceptions import WebSocketException
+
+        try:
+            self._send(message)
+        except (OSError, WebSocketException) as error:
+            self.inbox.trouble("", f"rosbridge: {error}")
+
     def _listen(self) -> None:
         from websockets.exceptions import WebSocketException
 
         try:
             for frame in self._line:
-                self._put(self._read(frame, time.time()))
+                self._hear(frame)
         except (OSError, WebSocketException) as error:
-            self._put(Heard("", None, f"rosbridge: {error}"))
+            self.inbox.trouble("", f"rosbridge: {error}")
         else:
-            self._put(Heard("", None, "rosbridge has closed the connection"))
+            self.inbox.trouble("", "rosbridge has closed the connection")
 
-    def _read(self, frame: str | bytes, now: float) -> Heard:
+    def _hear(self, frame: str | bytes) -> None:
         try:
             found = json.loads(frame)
             if found["op"] == "publish" and found["topic"] in self.topics and isinstance(found["msg"], dict):
-                return Heard(found["topic"], enveloped(found["msg"], found["topic"], now))
-            return Heard("", None, f"rosbridge: {str(found.get('msg', found))[:200]}")
+                topic, message = found["topic"], found["msg"]
+                self.inbox.message(topic, lambda now: enveloped(message, topic, now))
+            else:
+                self.inbox.trouble("", f"rosbridge: {str(found.get('msg', found))[:200]}")
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-            return Heard("", None, "rosbridge said what is no message")
-
-    def _put(self, heard: Heard) -> None:
-        try:
-            self.heard.put_nowait(heard)
-        except queue.Full:
-            self.dropped += 1
+            self.inbox.trouble("", "rosbridge said what is no message")
 
     def diagnostics(self, topic: str, system: str) -> Callable[[Sequence[Status]], None]:
         """What says verdicts on a topic."""
-        self._send({"op": "advertise", "topic": topic, "type": "diagnostic_msgs/DiagnosticArray"})
+        self._say({"op": "advertise", "topic": topic, "type": "diagnostic_msgs/DiagnosticArray"})
 
         def say(statuses: Sequence[Status]) -> None:
             now = time.time_ns()
@@ -98,6 +101,6 @@ class Rosbridge:
                 for status in statuses
             ]
             stamp = {"secs": now // 10**9, "nsecs": now % 10**9}
-            self._send({"op": "publish", "topic": topic, "msg": {"header": {"stamp": stamp}, "status": made}})
+            self._say({"op": "publish", "topic": topic, "msg": {"header": {"stamp": stamp}, "status": made}})
 
         return say

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from avow.backends.rosmonitoring.session import session
+from avow.system.load import load_system
+
+from .processes import a_free_port, answers, running, wait_for
 
 ROOT = Path(__file__).parents[2]
 CASE = ROOT / "contracts/remote_inspection"
@@ -47,6 +55,36 @@ def test_a_fault_is_found_and_laid_at_the_right_door(fault: str, told: list[str]
     at = int(lines[0].split("event ")[1].split(" ")[0].rstrip(":"))
     if fault in ("mislabel", "jump"):  # the first message that is other than it should be
         assert next(k for k, (a, b) in enumerate(zip(good, bad, strict=False), start=1) if a != b) == at
+
+
+@pytest.mark.slow
+@pytest.mark.needs_ros1
+@pytest.mark.needs_roscpp
+def test_on_ros_1_with_a_node_in_cpp_among_those_in_python(tmp_path: Path) -> None:
+    """A real master, the nodes as processes of their own, the sensor in C++, which takes orange for green: this is
+    found on the running graph, and in its record."""
+    sensor = tmp_path / "radiation_sensor"
+    flags = subprocess.check_output(["pkg-config", "--cflags", "--libs", "roscpp"], text=True).split()
+    subprocess.run(["g++", ROBOT / "nodes/radiation_sensor.cpp", "-o", sensor, *flags], check=True, timeout=300)
+    port = a_free_port()
+    robot = [sys.executable, ROBOT / "ros1.py", "--port", port, "--sensor", sensor]
+    robot += ["--fault", "mislabel", "--source=4,-15.3,106560"]  # orange from the first waypoint on
+    monitor = [sys.executable, "-m", "avow", "monitor", ROBOT, "--live", f"ros1:http://127.0.0.1:{port}"]
+    monitor += ["--record", tmp_path / "run.jsonl", "--node", "radiationSensor"]
+    with running(robot, env={**os.environ, "ROS_HOME": str(tmp_path / "ros")}):
+        wait_for(lambda: answers(port))
+        with running(monitor, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as watching:
+            assert watching.stdout is not None
+            first = next((line for line in watching.stdout if "radiationSensor.medium" in line), "")
+            watching.send_signal(signal.SIGINT)
+            rest, wrong = watching.communicate()
+    assert watching.returncode == 1, rest + wrong
+    assert "guarantee broken: this node: radiationSensor.medium: Medium radiation is orange" in first
+    low = re.search(r"radiationSensor\.low \(guarantee\): published \d+ times: held (\d+)", rest)
+    assert low is not None, rest
+    assert int(low[1]) >= 1
+    again = [v.clause for _, v in session(load_system(ROBOT), ["radiationSensor"]).run(tmp_path / "run.jsonl")]
+    assert "medium" in again
 
 
 def test_what_the_robot_shares_with_the_case_study_is_the_same() -> None:

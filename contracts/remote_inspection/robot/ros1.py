@@ -1,8 +1,13 @@
 """The same nodes on ROS 1: a master, the world, and each node as a process of its own, until Ctrl-C.
 
-    python contracts/remote_inspection/robot/ros1.py [--port 11311] [--seconds N]
+    python contracts/remote_inspection/robot/ros1.py [--port 11311] [--seconds N] [--fault NAME] [--source X,Y,STRENGTH]
+                                                     [--sensor FILE]
 
 Needs Debian's python3-rospy and python3-rosmaster. To watch: avow monitor contracts/remote_inspection/robot --live ros1
+
+`--sensor`: the radiation sensor in C++, built by (Debian: libroscpp-dev)
+
+    g++ contracts/remote_inspection/robot/nodes/radiation_sensor.cpp -o FILE $(pkg-config --cflags --libs roscpp)
 """
 
 import argparse
@@ -18,16 +23,18 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 sys.path.append("/usr/lib/python3/dist-packages")  # where Debian has rospy; last, so that nothing else is taken there
 
+import faults  # noqa: E402
 from bus import TICK  # noqa: E402
+from drive import parameters  # noqa: E402
 from wiring import FIELDS, NODES, TYPE, Simulation  # noqa: E402
 
 DEFINITION = (HERE / "msg/rover/msg/Snapshot.msg").read_text(encoding="utf-8")
 
 
 class Bus:
-    """The calls of `bus.Bus`, by rospy; every topic is latched, as the plan supposes."""
+    """The calls of `bus.Bus`, by rospy; every topic is latched, as the plan supposes. `change`: a fault of `faults`."""
 
-    def __init__(self, name):
+    def __init__(self, name, change=None):
         import genpy.dynamic
         import rospy
 
@@ -35,6 +42,8 @@ class Bus:
         self.kind = genpy.dynamic.generate_dynamic(TYPE, DEFINITION)[TYPE]
         self.lock = threading.Lock()
         self.spoken = {}
+        self.change = change
+        self.started = time.monotonic()
         rospy.init_node(name)
 
     def announce(self, topic):
@@ -48,17 +57,21 @@ class Bus:
         self.rospy.Subscriber(f"/{topic}", self.kind, heard, queue_size=100)
 
     def say(self, topic, message):
-        self.spoken[topic].publish(self.kind(**message))
+        if self.change is not None:
+            message = self.change(topic, message, time.monotonic() - self.started)
+        if message is not None:
+            self.spoken[topic].publish(self.kind(**message))
 
 
-def one(name):
+def one(name, fault=None, sources=None):
     """Be one node, or the world."""
-    bus = Bus(name)
+    bus = Bus(name, faults.SAID.get(fault))
+    chosen = parameters(fault, sources)
     if name != "world":
-        NODES[name](bus)
+        NODES[name](bus, chosen)
         bus.rospy.spin()
         return
-    world = Simulation(bus, TICK)
+    world = Simulation(bus, TICK, chosen)
     rate = bus.rospy.Rate(1 / TICK)
     while not bus.rospy.is_shutdown():
         world.tick()
@@ -70,15 +83,27 @@ def answers(port):
         return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
-def everything(port, seconds):
-    environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1"}
-    started = [subprocess.Popen(["rosmaster", "--core", "-p", str(port)], env=environment)]
+def command(name, given):
+    """What starts a node, or the world."""
+    if name == "radiationSensor" and given.sensor is not None:
+        values = parameters(given.fault)[name]
+        if given.fault == "mislabel":  # what is said is not changed on its way: the node is wrong itself
+            values["orange"] = values["red"]
+        return [str(given.sensor.resolve()), *(f"_{key}:={value}" for key, value in values.items())]
+    found = [sys.executable, __file__, "--node", name]
+    found += ["--fault", given.fault] if given.fault is not None else []
+    return found + [f"--source={','.join(map(str, source))}" for source in given.source or ()]
+
+
+def everything(given):
+    environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{given.port}", "ROS_IP": "127.0.0.1"}
+    started = [subprocess.Popen(["rosmaster", "--core", "-p", str(given.port)], env=environment)]
     try:
-        while not answers(port):
+        while not answers(given.port):
             time.sleep(0.05)
         for name in (*NODES, "world"):
-            started.append(subprocess.Popen([sys.executable, __file__, "--node", name], env=environment))
-        time.sleep(seconds if seconds is not None else 10**8)
+            started.append(subprocess.Popen(command(name, given), env=environment))
+        time.sleep(given.seconds if given.seconds is not None else 10**8)
     except KeyboardInterrupt:
         pass
     finally:
@@ -88,16 +113,25 @@ def everything(port, seconds):
             process.wait(timeout=20)
 
 
+def place(text):
+    """X,Y,STRENGTH of a source of radiation."""
+    x, y, strength = map(float, text.split(","))
+    return x, y, strength
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--port", type=int, default=11311)
     parser.add_argument("--seconds", type=float)
+    parser.add_argument("--fault", choices=faults.NAMES)
+    parser.add_argument("--source", type=place, action="append", help="radiation there, instead of at waypoint 7")
+    parser.add_argument("--sensor", type=Path, help="the radiation sensor that was built from C++")
     parser.add_argument("--node", choices=(*NODES, "world"), help="be this one, and start nothing else")
     given = parser.parse_args()
     if given.node is not None:
-        one(given.node)
+        one(given.node, given.fault, given.source)
     else:
-        everything(given.port, given.seconds)
+        everything(given)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,46 @@
+"""Processes that talk to one another over this machine's loopback; nothing here goes by how fast it is."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+LONGEST = 120.0
+"""Seconds after which something has gone wrong."""
+
+
+def a_free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        return int(free.getsockname()[1])
+
+
+def answers(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+def wait_for(done: Callable[[], bool]) -> None:
+    end = time.monotonic() + LONGEST
+    while not done():
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.02)
+
+
+@contextmanager
+def running(command: Sequence[object], **more: Any) -> Iterator[subprocess.Popen[str]]:
+    """A process that is over when this is left."""
+    process = subprocess.Popen([str(word) for word in command], text=True, **more)
+    watchdog = threading.Timer(LONGEST, process.kill)
+    watchdog.start()
+    try:
+        yield process
+    finally:
+        watchdog.cancel()
+        if process.poll() is None:
+            process.terminate()
+        process.wait(timeout=30)
