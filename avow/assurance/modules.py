@@ -63,15 +63,11 @@ def requirement_modules(case: Case) -> tuple[RequirementModule, ...]:
 
 
 def node_modules(case: Case) -> tuple[NodeModule, ...]:
-    return tuple(
-        NodeModule(
-            node,
-            tuple(
-                v for v in case.obligations if v.obligation.kind is Kind.GUARANTEE and v.obligation.node == node.name
-            ),
-        )
-        for node in case.nodes
-    )
+    guarantees: dict[str, list[ObligationView]] = {}
+    for view in case.obligations:
+        if view.obligation.kind is Kind.GUARANTEE:
+            guarantees.setdefault(view.obligation.node, []).append(view)
+    return tuple(NodeModule(node, tuple(guarantees.get(node.name, ()))) for node in case.nodes)
 
 
 def _standings(views: Sequence[ObligationView]) -> str:

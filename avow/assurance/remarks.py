@@ -10,13 +10,12 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from avow.assurance.model import ObligationView, OpenItem, SourceView
-from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.diagnostics import Diagnostic, Rejected, Span
 from avow.evidence.obligation import Kind
 from avow.evidence.record import REMARKS
 from avow.language.contract import Contract
-from avow.language.load import check_sources
+from avow.language.load import warnings_of
 from avow.language.sentences import elements_of
-from avow.language.source import Source
 from avow.system.sentences import said_otherwise
 from avow.system.strict_yaml import Piece, read_yaml
 
@@ -35,9 +34,10 @@ def remarks(sources: Sequence[SourceView], views: Sequence[ObligationView]) -> t
     plans = [root for source in sources if (root := _plan(source)) is not None]
     off = _switched_off(plans)
     weighty, rest = list[OpenItem](), list[OpenItem]()
+    guarantees = [v for v in views if v.obligation.kind is Kind.GUARANTEE]
     for lint in sorted(found, key=lambda d: _FIRST.index(d.code) if d.code in _FIRST else len(_FIRST)):
         if lint.span and lint.code not in off:
-            (weighty if lint.code in _FIRST else rest).append(_item(lint, lint.span, _clause(lint.span, views)))
+            (weighty if lint.code in _FIRST else rest).append(_item(lint, lint.span, _clause(lint.span, guarantees)))
     if contract is not None:
         weighty += [item for plan in plans for item in _of_requirements(plan, contract, views, off)]
     return (*weighty, *_of_methods(views, off), *rest)
@@ -80,10 +80,7 @@ def _of_methods(views: Sequence[ObligationView], off: frozenset[str]) -> Iterato
 
 @lru_cache(maxsize=64)
 def _checked(contracts: tuple[tuple[str, str], ...]) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
-    if not contracts:
-        return None, ()
-    contract, found = check_sources([Source(path, text) for path, text in contracts])
-    return contract, tuple(d for d in found if d.severity is Severity.WARNING)
+    return warnings_of(contracts) if contracts else (None, ())
 
 
 def _plan(source: SourceView) -> Piece | None:
@@ -107,9 +104,9 @@ def _item(found: Diagnostic, span: Span, claim: str) -> OpenItem:
     return OpenItem(REMARK, claim or place, f"{found.code}, {place}{hint}", advice=True, title=found.message)
 
 
-def _clause(span: Span, views: Sequence[ObligationView]) -> str:
+def _clause(span: Span, guarantees: Sequence[ObligationView]) -> str:
     """The guarantee in which the place is, if there is one."""
-    return next((v.id for v in views if v.obligation.kind is Kind.GUARANTEE and _within(span, v.obligation.span)), "")
+    return next((v.id for v in guarantees if _within(span, v.obligation.span)), "")
 
 
 def _within(inner: Span, outer: Span | None) -> bool:

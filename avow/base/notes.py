@@ -40,10 +40,30 @@ def read_note(path: Path) -> dict[str, Any] | None:
     return data if good else None
 
 
+def sealed(path: Path, data: bytes) -> bytes:
+    """The data as they may be kept at that place."""
+    return _seal(path, data) + data
+
+
+def unsealed(path: Path) -> bytes | None:
+    """What this user's Avow sealed for that place, and nothing else."""
+    try:
+        kept = read_regular(path)
+    except OSError:
+        return None
+    mark, data = kept[: hashlib.sha256().digest_size], kept[hashlib.sha256().digest_size :]
+    return data if hmac.compare_digest(mark, _seal(path, data)) else None
+
+
 def cache_folder() -> Path:
     """Where this user's caches lie."""
     base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(base) / "avow"
+
+
+def _seal(path: Path, data: bytes) -> bytes:
+    text = str(path.absolute()).encode("utf-8", "surrogateescape")
+    return hmac.new(_key(str(cache_folder())), b"%d %b %b" % (len(text), text, data), hashlib.sha256).digest()
 
 
 def _mark(path: Path, body: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import reduce
+from functools import cache, reduce
 
 from avow.base.verdict import Hypothesis, Link, Verdict, said
 from avow.evidence.record import Evidence
@@ -120,22 +120,31 @@ OUTDATED = Weight(idle=Status.STALE)
 def effective(evidence: Evidence) -> Verdict:
     """The verdict that counts. What a record says beyond the strength of its method is cut down to that strength, so
     that no bounded method gives a proof, whatever its record claims; support from a method of no strength is none."""
-    if not evidence.verdict.supports:
-        return evidence.verdict
-    if not evidence.strength.supports:
-        return Verdict.UNKNOWN
-    stronger = Status(evidence.verdict).rank > Status(evidence.strength).rank
-    return evidence.strength if stronger else evidence.verdict
+    return _effective(evidence.verdict, evidence.strength)
 
 
 def weigh(evidence: Evidence) -> Weight:
     """One current record."""
-    verdict = effective(evidence)
+    return _weight(evidence.verdict, evidence.strength, evidence.vacuous)
+
+
+@cache
+def _effective(verdict: Verdict, strength: Verdict) -> Verdict:
+    if not verdict.supports:
+        return verdict
+    if not strength.supports:
+        return Verdict.UNKNOWN
+    return strength if Status(verdict).rank > Status(strength).rank else verdict
+
+
+@cache
+def _weight(told: Verdict, strength: Verdict, vacuous: bool) -> Weight:
+    verdict = _effective(told, strength)
     if verdict is Verdict.REFUTED:
         return Weight(refuted=True)
     if not verdict.supports:
         return Weight(idle=Status(verdict))
-    if evidence.vacuous:
+    if vacuous:
         return Weight(idle=Status.VACUOUS)
     return Weight(support=Status(verdict))
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import stat
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
@@ -24,7 +25,7 @@ from avow.language.scope import BOTH_ROLES, Scope
 from avow.language.sorts import Sort
 from avow.language.source import Reports, Source
 from avow.language.terms import Role, Term, Variable
-from avow.tuning.sizes import CONTRACT_BYTES
+from avow.tuning.sizes import CONTRACT_BYTES, CONTRACTS_KEPT
 
 _NOTHING = Contract((), (), (), ())
 
@@ -149,9 +150,35 @@ def _as_read(source: Source) -> _Text:
     return source.file, source.text, source.line, source.column
 
 
-@functools.lru_cache(maxsize=8)
+def warnings_of(texts: tuple[tuple[str, str], ...]) -> tuple[Contract | None, tuple[Diagnostic, ...]]:
+    """As `check_sources` of (file, text) pairs, warnings only, for what a report quotes. Where the same texts were
+    checked already under other names, the places in the contract have those."""
+    given = tuple(text for _, text in texts)
+    known = _under.get(given, tuple(file for file, _ in texts))
+    contract, found = check_sources([Source(file, text) for file, text in zip(known, given, strict=True)])
+    names = dict(zip(known, (file for file, _ in texts), strict=True))
+
+    def named(span: Span | None) -> Span | None:
+        return span and replace(span, file=names.get(span.file, span.file))
+
+    told = (d for d in found if d.severity is Severity.WARNING)
+    return contract, tuple(
+        replace(d, span=named(d.span), notes=tuple((text, named(span)) for text, span in d.notes)) for d in told
+    )
+
+
+_under: dict[tuple[str, ...], tuple[str, ...]] = {}
+"""Texts checked lately → the names that they had, each its own."""
+
+
+@functools.lru_cache(maxsize=CONTRACTS_KEPT)
 def _checked(texts: tuple[_Text, ...], off: frozenset[str], partial: bool) -> tuple[Contract, tuple[Diagnostic, ...]]:
     """Kept for a while: a run loads a contract, and then asks what there is to say of it."""
+    names = tuple(text[0] for text in texts)
+    if not off and not partial and len(set(names)) == len(names):
+        if len(_under) >= CONTRACTS_KEPT:
+            _under.clear()
+        _under[tuple(text[1] for text in texts)] = names
     sources = [Source(*text) for text in texts]
     parsed: list[tuple[FileSyntax, Reports]] = []
     linted: list[LintedFile] = []

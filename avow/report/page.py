@@ -24,6 +24,7 @@ from avow.base.verdict import said
 from avow.evidence.obligation import Kind
 from avow.evidence.status import Status, weigh
 from avow.report import example, source, wording
+from avow.report.compiled import Compiled
 from avow.report.gsn import cae_rows
 from avow.report.maps import draw_map
 from avow.report.support_counts import resting
@@ -41,6 +42,7 @@ def environment() -> Environment:
     """Strict: a name that a template does not get is an error; every text is escaped."""
     found = Environment(
         loader=PackageLoader("avow.report"),
+        bytecode_cache=Compiled(),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

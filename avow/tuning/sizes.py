@@ -106,3 +106,6 @@ ANSWERS_KEPT = 20_000
 
 ANSWERED_BY_ONE = 500
 """Questions to one process of a solver: what it keeps to itself does not grow without end."""
+
+CONTRACTS_KEPT = 8
+"""Contracts that stay checked in memory: a run loads one, and then asks what there is to say of it."""

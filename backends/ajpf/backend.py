@@ -37,9 +37,9 @@ class AjpfBackend(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        from . import ajpf_tool, spin
+        from . import ajpf_tool, spin_tool
 
-        return (ajpf_tool.tool(), spin.tool())
+        return (ajpf_tool.tool(), spin_tool.tool())
 
     def suits(self, node: Node) -> bool:
         from .suits import looks_like_an_agent

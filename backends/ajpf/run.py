@@ -14,7 +14,7 @@ from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.verdict import Counterexample, Verdict
 
-from . import ajpf_tool, spin
+from . import ajpf_tool, spin, spin_tool
 from .ajpf_tool import Installation, Said
 from .asking import ask
 from .automaton import TooLarge
@@ -234,7 +234,7 @@ class _Run:
     # Others
 
     def ask_spin(self, checkers: Sequence[Checker]) -> None:
-        name = f"Spin {spin.version()}"
+        name = f"Spin {spin_tool.version()}"
         answers: dict[str, bool] = {}
         seconds = min(self.left() * SPIN_SHARE, SPIN_SECONDS) if self.setup.engine == "auto" else self.left()
         deadline = time.monotonic() + seconds
@@ -246,8 +246,8 @@ class _Run:
             except spin.NoOpinion as error:
                 self.bound["spin"] = f"no second opinion: {error.reason}"
                 if self.setup.engine == "spin":
-                    verdict = Verdict.NOT_RUN if spin.version() is None else Verdict.UNKNOWN
-                    reason = f"the plan wants Spin's opinion: {error.reason} ({spin.tool().install})"
+                    verdict = Verdict.NOT_RUN if spin_tool.version() is None else Verdict.UNKNOWN
+                    reason = f"the plan wants Spin's opinion: {error.reason} ({spin_tool.tool().install})"
                     self.results = {key: replace(r, verdict=verdict, reason=reason) for key, r in self.results.items()}
                 return
             self.logs["spin.pml"] = (Path(temporary) / "agent.pml").read_text()

@@ -3,10 +3,8 @@ our interpreter (`promela`)."""
 
 from __future__ import annotations
 
-import functools
 import os
 import re
-import shutil
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -14,11 +12,10 @@ from pathlib import Path
 
 from avow.base.files import write
 from avow.base.process import ToolMissing, run
-from avow.base.tools import Tool
-from avow.tuning.running import VERSION_SECONDS
 
 from . import promela, psl
 from .checker import Checker, Property
+from .spin_tool import version
 from .tuning import SPIN_DEPTH
 
 _ERRORS = re.compile(r"errors: (\d+)")
@@ -30,22 +27,6 @@ class NoOpinion(Exception):  # noqa: N818 - it names a state, not a fault
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
         self.reason = reason
-
-
-@functools.cache
-def version() -> str | None:
-    if shutil.which("gcc") is None:
-        return None
-    try:
-        said = run(["spin", "-V"], seconds=VERSION_SECONDS)
-    except ToolMissing:
-        return None
-    found = re.search(r"Spin Version (\S+)", said.stdout + said.stderr)
-    return found[1] if found else None
-
-
-def tool() -> Tool:
-    return Tool("spin", version(), shutil.which("spin"), "apt-get install spin gcc")
 
 
 def opinions(checker: Checker, properties: Sequence[Property], folder: Path, seconds: float) -> dict[str, bool]:

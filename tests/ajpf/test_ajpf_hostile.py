@@ -102,13 +102,13 @@ def test_a_machine_without_java_or_spin_gives_the_same_verdicts(lift, tmp_path, 
     with_tools = BACKEND.discharge(lift(), tmp_path, Limits(seconds=120))
     monkeypatch.delenv("AJPF_HOME", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path / "empty"))
-    from avow.backends.ajpf import spin
+    from avow.backends.ajpf import spin_tool
 
-    spin.version.cache_clear()
+    spin_tool.version.cache_clear()
     try:
         without = BACKEND.discharge(lift(), tmp_path, Limits(seconds=120))
     finally:
-        spin.version.cache_clear()
+        spin_tool.version.cache_clear()
     assert {o.obligation: o.verdict for o in without.outcomes} == {o.obligation: o.verdict for o in with_tools.outcomes}
     assert {o.verdict for o in without.outcomes} == {Verdict.CHECKED}
     assert "Spin" not in without.tool

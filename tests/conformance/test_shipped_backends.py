@@ -10,7 +10,7 @@ import yaml
 
 from avow.backend_kit.registry import installed
 from avow.backends.ajpf import BACKEND as AJPF
-from avow.backends.ajpf import spin
+from avow.backends.ajpf import spin_tool
 from avow.backends.dafny import BACKEND as DAFNY
 from avow.backends.experiment import BACKEND as EXPERIMENT
 from avow.backends.hoare import BACKEND as HOARE
@@ -273,7 +273,7 @@ class TestAjpf(Conformance):
 
     def forget_tools(self) -> None:
         super().forget_tools()
-        spin.version.cache_clear()
+        spin_tool.version.cache_clear()
 
 
 def test_none_is_left_out() -> None:
