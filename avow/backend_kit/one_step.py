@@ -1,5 +1,6 @@
 """How a backend is asked. What speaks of other steps reaches only a backend that says that it understands that
-(`Backend.remembers`): of the others, the guarantee is refused by name, and they see a contract without it.
+(`Backend.remembers`), and of that only what it can say (`Backend.unsaid`): of the others, the guarantee is refused by
+name, and they see a contract without it.
 
 An assumption that speaks of other steps holds for the whole node: none of its guarantees can be asked about then.
 """
@@ -55,7 +56,7 @@ def translate(tool: Backend, notation: str, system: System, node: Node) -> Trans
     )
     if missing and len(missing) == len(node.guarantees):
         return Translated({}, missing)
-    system = _one_step(system) if missing else system
+    system = _one_step(system) if missing and not tool.remembers else system
     made = tool.translate(notation, system, system.contract.node(node.name) if missing else node)
     return replace(made, missing=(*made.missing, *missing))
 
@@ -64,10 +65,10 @@ def _sayable(tool: Backend, job: Job) -> tuple[Job, Mapping[str, str]]:
     """The job without what the backend cannot say, and why not, by obligation."""
     told = {o.id: _refusal(tool, job.node, job.clause(o)) for o in job.obligations}
     refused = {name: why for name, why in told.items() if why is not None}
-    if tool.remembers or not any(histories(c.formula) for node in job.contract.nodes for c in node.clauses):
-        return job, refused
-    system = _one_step(job.system)
     left = tuple(o for o in job.obligations if o.id not in refused)
+    if tool.remembers or not any(histories(c.formula) for node in job.contract.nodes for c in node.clauses):
+        return (replace(job, obligations=left) if refused else job), refused
+    system = _one_step(job.system)
     return replace(job, system=system, node=_without(job.node), obligations=left), refused
 
 
@@ -82,7 +83,7 @@ def refusal(judge: str, node: Node, clause: Clause) -> str | None:
 
 
 def _refusal(tool: Backend, node: Node, clause: Clause) -> str | None:
-    return None if tool.remembers else refusal(tool.name, node, clause)
+    return tool.unsaid(node, clause) if tool.remembers else refusal(tool.name, node, clause)
 
 
 def _shown(record: History) -> str:

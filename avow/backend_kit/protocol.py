@@ -176,6 +176,11 @@ class Backend(ABC):
         guess is good enough."""
         return True
 
+    def unsaid(self, node: Node, clause: Clause) -> str | None:
+        """Why a backend that `remembers` cannot be asked about a guarantee that speaks of other steps, or whose node
+        assumes something that does; None where it can. See `avow.backend_kit.runs`."""
+        return None
+
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         """What is wrong with the plan's options: missing files, unknown names, models that do not parse."""
         return ()

@@ -354,6 +354,36 @@ def pending(formula: Term) -> Term | None:
             return None
 
 
+@dataclass(frozen=True, slots=True)
+class Due:
+    """``T -> next(R)`` and its like: `triggers` together are T, `outer` the quantified variables around it."""
+
+    outer: tuple[Variable, ...]
+    triggers: tuple[Term, ...]
+    full: Term
+    """That all of what a trigger demands has come due, of some trigger, as a formula of the past."""
+
+
+def due(formula: Term) -> Due | None:
+    """When a clause that is a response demands something; None of other clauses."""
+    outer, inner = list[Variable](), formula
+    while isinstance(inner, Quantified) and inner.quantifier is Quantifier.FORALL:
+        outer.extend(inner.variables)
+        inner = inner.body
+    if (found := _response(inner)) is None:
+        return None
+    full, response = conjunction(found[0]), found[1]
+    match response.operator:
+        case Past.NEXT:
+            full = History(Past.PREVIOUS, (full, FALSE), BOOL)
+        case Past.WITHIN | Past.FOR:
+            assert response.limit is not None
+            full = History(Past.SINCE, (TRUE, full), BOOL, replace(response.limit, relation=">="))
+        case _:  # with the trigger
+            pass
+    return Due(tuple(outer), tuple(found[0]), full)
+
+
 def fulfilled(formula: Term) -> Term | None:
     """When a clause ``T -> within[…](R)`` is met, as a formula of the past; None of other clauses."""
     found = _response(_unquantified(formula))

@@ -7,15 +7,17 @@ from importlib import metadata
 from pathlib import Path
 
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.backend_kit.runs import unsaid
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
+from avow.language.contract import Clause, Node
 
 from .codes import CODES
 
 _SUBJECT = {
     "type": "string",
     "pattern": "^.+:[^:]+$",
-    "description": "file.py:function, relative to the system's folder",
+    "description": "file.py:function, or file.py:Class with a method `step`, relative to the system's folder",
 }
 _CASES = {"type": "integer", "minimum": 1, "maximum": 1_000_000, "default": 500, "description": "how many cases"}
 _NUMBERS = {
@@ -30,10 +32,11 @@ class HypothesisBackend(Backend):
 
     name = "hypothesis"
     title = "Property-based tests of a Python function, or of the node's own class, generated from the contract"
-    version = "7"
+    version = "8"
     strength = Verdict.TESTED
     uses_steps = False
     uses_wiring = False
+    remembers = True
     uses_source = True
     link = Link.GENERATED
     options_schema = {
@@ -51,6 +54,9 @@ class HypothesisBackend(Backend):
     def tools(self) -> tuple[Tool, ...]:
         version = metadata.version("hypothesis")
         return (Tool("hypothesis", version, None, "pip install hypothesis", optional=False),)
+
+    def unsaid(self, node: Node, clause: Clause) -> str | None:
+        return unsaid(self.name, node, clause)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .backend import problems

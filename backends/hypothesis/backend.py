@@ -161,10 +161,12 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refut
     if unmet:
         why = f"in none of {valid + answer['edges']} cases was its condition met: {unmet[0]}"
         return replace(outcome, summary=why, vacuous=True)
-    least = min((n for n in own["hits"]), default=valid)
+    # steps of one run hang together where the contract remembers: then runs are what is counted
+    drawn, hits = (answer["runs"], own["run_hits"]) if "runs" in answer else (valid, own["hits"])
+    least = min(hits, default=drawn)
     bound["confidence"] = CONFIDENCE
-    bound["failure_probability_below"] = round(failure_bound(valid), 6)
-    if own["hits"]:
+    bound["failure_probability_below"] = round(failure_bound(drawn), 6)
+    if hits:
         bound["triggered"] = least
         bound["failure_probability_when_triggered_below"] = round(failure_bound(least), 6)
     details["meaning"] = (
@@ -175,8 +177,12 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refut
     if answer["replayed"]:
         bound["replayed"] = answer["replayed"]
         edges += f", {answer['replayed']} that refuted it or a neighbour before"
-    chance = f"95 %: below {failure_bound(least):.2g} of such cases fail"
-    summary = f"{valid} drawn cases{edges}, none breaks it (seed {seed}; {chance})"
+    chance = f"95 %: below {failure_bound(least):.2g} of such {'runs' if 'runs' in answer else 'cases'} fail"
+    cases = f"{valid} drawn cases"
+    if "runs" in answer:
+        bound["runs"] = drawn
+        cases = f"{drawn} drawn run{'s'[: drawn != 1]} of {valid} steps"
+    summary = f"{cases}{edges}, none breaks it (seed {seed}; {chance})"
     if valid < wanted:
         summary += f"; the generator has no more than these, of {wanted} wanted"
     return replace(outcome, verdict=Verdict.TESTED, summary=summary)

@@ -24,20 +24,24 @@ from hypothesis.errors import FailedHealthCheck, Flaky, Unsatisfiable
 from hypothesis.internal.conjecture import providers
 
 from avow.base.process import adopt_orphans
+from avow.evaluation.running import Keeper
 from avow.formulas.values import Value, show
 from avow.isolation import judge
 from avow.isolation.observed import to_json
 from avow.isolation.subject import Subject, SubjectFailed
-from avow.language.sorts import BoolSort, FunctionSort, RealSort, Sort
+from avow.language.sorts import RealSort, Sort
+from avow.language.terms import Term
+from avow.temporal.cells import Records
 from avow.tuning.running import SUBJECT_PATIENCE
 
 from . import wire
-from .convention import Malformed, outputs, received, sent
+from .beside import kept_inputs, system_root, table_rows, text_of
+from .convention import Malformed, outputs, sent
 from .export import KEPT
 from .generate import Failing, Generator, Impossible, Inputs, Source
 from .judging import Trigger, blamed, guarantee, judged
 from .machine import EXACT, SPECIAL, as_double, rounded
-from .pools import constants, parse_cell, pools
+from .pools import constants, pools
 from .tuning import APART, ASKED_AGAIN, BATCH, CASE_BYTES, SHRINKING_SECONDS
 
 # Hypothesis looks for constants in the source of all modules that it takes for the user's. Here these are Avow's own,
@@ -66,15 +70,20 @@ class Bench:
         self.doubles = data["numbers"] != EXACT
         self.inputs_sorts: dict[str, Sort] = {p["name"]: wire.decode(p["sort"]) for p in data["inputs"]}
         self.output_sorts: dict[str, Sort] = {p["name"]: wire.decode(p["sort"]) for p in data["outputs"]}
-        self.assumptions = tuple(judged(c) for c in data["assumptions"])
-        self.guarantees = {c["name"]: guarantee(judged(c)) for c in data["guarantees"]}
-        formulas = [j.formula for j in (*self.assumptions, *(g.judged for g in self.guarantees.values()))]
-        root = _root(data, folder)
-        written = constants(_text(root / data["subject"]["file"]))
-        self.generator = Generator(self.inputs_sorts, pools(formulas, self._rows(), written))
+        records = Records()
+        self.assumptions = tuple(judged(*_clause(c), records) for c in data["assumptions"])
+        self.guarantees = {c["name"]: guarantee(*_clause(c), records) for c in data["guarantees"]}
+        self.keeper = Keeper(records.cells)
+        self.remembers = bool(records.cells)
+        formulas = [wire.decode(c["formula"]) for c in (*data["assumptions"], *data["guarantees"])]
+        root = system_root(data, folder)
+        written = constants(text_of(root / data["subject"]["file"]))
+        self.generator = Generator(
+            self.inputs_sorts, pools(formulas, table_rows(data["scenario"], self.inputs_sorts), written)
+        )
         self.subject = Subject(root / data["subject"]["file"], data["subject"]["function"], SUBJECT_PATIENCE, root)
-        self._aims = tuple(_aim(t) for g in self.guarantees.values() for t in g.triggers)
-        self._kept = _kept(folder / KEPT, self.inputs_sorts)
+        self._aims = tuple(self._aim(t) for g in self.guarantees.values() for t in g.triggers)
+        self._kept = kept_inputs(folder / KEPT, self.inputs_sorts)
         self.replayed = 0
         self.valid = self.edges = self.rejected = self.undecided = 0
         self.crash: tuple[Inputs, str] | None = None
@@ -111,7 +120,7 @@ class Bench:
         """The guarantee holds of what the subject makes of the inputs. Raises AssertionError, in contract words."""
         assume(self._assumed(inputs))
         found = self.run(inputs)
-        held = self.guarantees[name].judged.holds(valuation(inputs, found))
+        held = self.guarantees[name].judged.holds(self._values(inputs, found))
         if held is None:
             raise AssertionError(f"{name} cannot be judged of {told(inputs, found)}")
         if not held:
@@ -145,11 +154,12 @@ class Bench:
         self.subject.patience = min(SUBJECT_PATIENCE, max(1.0, seconds / 4))
         try:
             stopped = self._sweep()
-            smaller = {name: self._shrunk(name) for name, g in self.guarantees.items() if g.failure is not None}
+            failed = {name: self._shrunk(name) for name, g in self.guarantees.items() if g.failure is not None}
+            smaller = {name: case for name, case in failed.items() if case is not None}
             if self.crash is not None and not self.subject.fault:
                 self.crash = self._shrunk_crash()
             elif not self.subject.fault:
-                self.unsteady = self._asked_again()
+                self.unsteady = self.unsteady or self._asked_again()
                 self.apart = self._asked_apart() if self.doubles else []
         finally:
             fault = self.subject.close()
@@ -285,7 +295,7 @@ class Bench:
     def _wrong_apart(self, twin: Subject, asked: Inputs, name: str, text: str) -> str:
         """Of an input that has no value no guarantee that speaks of it can be judged; the negative zero is zero."""
         try:
-            values = valuation(asked, self._outputs(twin.ask({**self._sent(asked), name: {"r": text}})))
+            values = self._values(asked, self._outputs(twin.ask({**self._sent(asked), name: {"r": text}})))
         except SubjectFailed as error:
             return str(error)
         zero = text == SPECIAL["-0"]
@@ -303,7 +313,7 @@ class Bench:
             raise OutOfTime
 
     def _judge(self, inputs: Inputs, found: dict[str, Value], edge: bool) -> None:
-        values = valuation(inputs, found)
+        values = self._values(inputs, found)
         for each in self.guarantees.values():
             hits = each.edge_hits if edge else each.hits
             for k, trigger in enumerate(each.triggers):
@@ -316,8 +326,9 @@ class Bench:
             elif not held:
                 each.failure = (inputs, found)
 
-    def _shrunk(self, name: str) -> Case:
-        """The simplest case that breaks a guarantee, as far as Hypothesis finds it in time."""
+    def _shrunk(self, name: str) -> Case | None:
+        """The simplest case that breaks a guarantee, as far as Hypothesis finds it in time; None where it is none in
+        another process."""
         each = self.guarantees[name]
         assert each.failure is not None
 
@@ -326,7 +337,7 @@ class Bench:
                 found = self.run(inputs)
             except SubjectFailed:
                 return None
-            return (inputs, found) if each.judged.holds(valuation(inputs, found)) is False else None
+            return (inputs, found) if each.judged.holds(self._values(inputs, found)) is False else None
 
         return self._smallest(each.failure, broken)
 
@@ -397,7 +408,7 @@ class Bench:
     # -- assumptions ---------------------------------------------------------------------------------------------------
 
     def _assumed(self, inputs: Inputs) -> bool:
-        values = valuation(inputs, {})
+        values = self._values(inputs, {})
         unknown = False
         for assumption in self.assumptions:
             held = assumption.holds(values)
@@ -408,7 +419,19 @@ class Bench:
         return not unknown
 
     def _blamed(self, inputs: Inputs) -> tuple[str, ...] | None:
-        return blamed(self.assumptions, valuation(inputs, {}))
+        return blamed(self.assumptions, self._values(inputs, {}))
+
+    def _values(self, inputs: Inputs, found: Mapping[str, Value]) -> dict[str, Value]:
+        """What a step's formulas are judged of."""
+        return self.keeper.at(valuation(inputs, found))
+
+    def _aim(self, trigger: Trigger) -> Failing:
+        """What to draw again for a trigger to be met; parts that speak of outputs cannot be aimed at."""
+
+        def failing(inputs: Inputs) -> tuple[str, ...] | None:
+            return blamed(trigger.parts, self._values(inputs, {}))
+
+        return failing
 
     def _configuration(self, phases: tuple[Phase, ...]) -> settings:
         return settings(
@@ -422,18 +445,6 @@ class Bench:
             suppress_health_check=list(HealthCheck),
         )
 
-    def _rows(self) -> dict[str, tuple[tuple[Value, ...], ...]]:
-        """The scenario's rows for the ports that it interprets, as values; a row that does not fit is left out."""
-        found: dict[str, tuple[tuple[Value, ...], ...]] = {}
-        for name, table in self.data["scenario"].items():
-            sort = self.inputs_sorts.get(name)
-            if isinstance(sort, FunctionSort):
-                columns = sort.parameters if isinstance(sort.result, BoolSort) else (*sort.parameters, sort.result)
-                read = [tuple(parse_cell(cell, s) for cell, s in zip(row, columns, strict=False)) for row in table]
-                fitting = [row for row in read if len(row) == len(columns) and None not in row]
-                found[name] = tuple(tuple(v for v in row if v is not None) for row in fitting)
-        return found
-
 
 class _Enough(BaseException):
     """Nothing more can be learnt."""
@@ -443,13 +454,8 @@ class _Broken(Exception):  # noqa: N818 - it is what Hypothesis shrinks
     """The guarantee that is looked at fails."""
 
 
-def _aim(trigger: Trigger) -> Failing:
-    """What to draw again for a trigger to be met; parts that speak of outputs cannot be aimed at."""
-
-    def failing(inputs: Inputs) -> tuple[str, ...] | None:
-        return blamed(trigger.parts, valuation(inputs, {}))
-
-    return failing
+def _clause(data: Mapping[str, Any]) -> tuple[str, Term, str]:
+    return data["name"], wire.decode(data["formula"]), data["text"]
 
 
 def valuation(inputs: Inputs, found: Mapping[str, Value]) -> dict[str, Value]:
@@ -467,33 +473,3 @@ def _pairs(inputs: Inputs, found: Mapping[str, Value]) -> list[tuple[str, str]]:
 
 def _sent(inputs: Inputs) -> dict[str, Any]:
     return {name: sent(value) for name, value in inputs.items()}
-
-
-def _kept(path: Path, sorts: Mapping[str, Sort]) -> tuple[Inputs, ...]:
-    """The kept cases that are inputs of the contract as it is now."""
-    found: list[Inputs] = []
-    if path.is_file():
-        for case in json.loads(path.read_text(encoding="utf-8")):
-            with contextlib.suppress(Malformed, KeyError, ValueError, TypeError, AttributeError):
-                found.append({name: received(case[name], sort, name) for name, sort in sorts.items()})
-    return tuple(found)
-
-
-def _text(path: Path) -> str:
-    """The subject's text, which is only looked at for its constants; empty where there is none to be read."""
-    try:
-        return path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
-
-
-def _root(data: Mapping[str, Any], folder: Path) -> Path:
-    """The system's folder: known from the environment, or beside the artifacts."""
-    root = os.environ.get("AVOW_SYSTEM_ROOT")
-    if root:
-        return Path(root)
-    for parent in folder.resolve().parents:
-        candidate: Path = parent / "contracts" / str(data["folder"])
-        if (candidate / str(data["subject"]["file"])).is_file():
-            return candidate
-    return folder

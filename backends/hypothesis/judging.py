@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.evaluation.truth import judge
@@ -12,10 +11,10 @@ from avow.formulas.conditions import conditions
 from avow.formulas.formula import conjunction, free_variables
 from avow.formulas.values import Value
 from avow.language.printer import show_term
-from avow.language.terms import And, Quantified, Quantifier, Role, Term, Variable
+from avow.language.terms import TRUE, And, Quantified, Quantifier, Role, Term, Variable, histories
+from avow.temporal.cells import CELL, Records, due
 from avow.tuning.effort import JUDGE_EFFORT
 
-from . import wire
 from .generate import Inputs
 
 
@@ -53,16 +52,19 @@ class Guarantee:
 
     judged: Judged
     triggers: tuple[Trigger, ...]
-    hits: list[int] = field(default_factory=list)
+    hits: list[int]
     """How often each trigger was met by a drawn case."""
-    edge_hits: list[int] = field(default_factory=list)
+    edge_hits: list[int]
     """How often by a case at a threshold, which was not drawn."""
+    run_hits: list[int]
+    """In how many runs each was met."""
     undecided: int = 0
     failure: tuple[Inputs, dict[str, Value]] | None = None
 
 
-def judged(clause: Mapping[str, Any]) -> Judged:
-    return _ready(clause["name"], wire.decode(clause["formula"]), clause["text"])
+def judged(name: str, formula: Term, text: str, records: Records) -> Judged:
+    """A clause; what it remembers of other steps is among the records."""
+    return _ready(name, records.clause(formula) if histories(formula) else formula, text)
 
 
 def _ready(name: str, formula: Term, text: str) -> Judged:
@@ -70,14 +72,23 @@ def _ready(name: str, formula: Term, text: str) -> Judged:
         evaluator: Evaluator | None = compile_term(formula)
     except NotEvaluable:
         evaluator = None
-    ports = sorted(v.name for v in free_variables(formula) if v.role is Role.INPUT)
+    ports = sorted(v.name for v in free_variables(formula) if v.role is Role.INPUT and CELL not in v.name)
     return Judged(name, formula, text, evaluator, tuple(ports))
 
 
-def guarantee(clause: Judged) -> Guarantee:
-    """The guarantee with its triggers."""
-    found = tuple(_trigger(clause.name, c.outer, c.parts) for c in conditions(clause.formula))
-    return Guarantee(clause, found, [0] * len(found), [0] * len(found))
+def guarantee(name: str, formula: Term, text: str, records: Records) -> Guarantee:
+    """The guarantee with its triggers; of a response, that all of what it demands came due."""
+    response = due(formula)
+    if response is None:
+        found = tuple(_trigger(name, c.outer, c.parts, records) for c in conditions(formula))
+    elif response.full == TRUE:
+        found = ()
+    else:
+        aim = _trigger(name, response.outer, response.triggers, records)
+        full = judged(name, _bound(response.outer, response.full), f"{aim.whole.text}, and what it demands", records)
+        found = (Trigger(full, aim.parts),)
+    none = [0] * len(found)
+    return Guarantee(judged(name, formula, text, records), found, list(none), list(none), list(none))
 
 
 def blamed(parts: Iterable[Judged], values: Mapping[str, Value]) -> tuple[str, ...] | None:
@@ -93,15 +104,15 @@ def blamed(parts: Iterable[Judged], values: Mapping[str, Value]) -> tuple[str, .
     return None
 
 
-def _trigger(name: str, outer: tuple[Variable, ...], given: tuple[Term, ...]) -> Trigger:
+def _trigger(name: str, outer: tuple[Variable, ...], given: tuple[Term, ...], records: Records) -> Trigger:
     joined = conjunction(given)
     items = joined.items if isinstance(joined, And) else (joined,)
     bound = frozenset(outer)
     alone = [item for item in items if not free_variables(item) & bound]
     together = conjunction(item for item in items if free_variables(item) & bound)
     whole = _bound(outer, joined)
-    parts = [_ready(name, part, "") for part in (*alone, _bound(outer, together)) if _of_inputs(part)]
-    return Trigger(_ready(name, whole, show_term(whole, "unicode").replace("\n", " ")), tuple(parts))
+    parts = [judged(name, part, "", records) for part in (*alone, _bound(outer, together)) if _of_inputs(part)]
+    return Trigger(judged(name, whole, show_term(whole, "unicode").replace("\n", " "), records), tuple(parts))
 
 
 def _bound(outer: tuple[Variable, ...], formula: Term) -> Term:

@@ -11,7 +11,7 @@ import json
 import math
 import random
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,13 @@ from typing import Any
 from avow.formulas.values import Element, Value
 from avow.formulas.values import Sequence as SequenceValue
 from avow.isolation.subject import Subject, SubjectFailed
-from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort
+from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
+from avow.language.terms import Term, histories
+from avow.temporal.cells import written
 
+from . import wire
 from .bench import Apart, Bench, Case, OutOfTime, _Enough, _pairs, told, valuation
+from .beside import kept_runs
 from .convention import Malformed, outputs, received
 from .export import KEPT
 from .generate import Impossible, Inputs, Source
@@ -30,6 +34,8 @@ from .tuning import (
     ASKED_AGAIN,
     CASE_BYTES,
     HELD_STEPS,
+    LONG_HELD_STEPS,
+    LONGEST_RUN,
     REJECTED_CASES,
     SHRINKING_SECONDS,
     SHRINKING_TRIES,
@@ -52,14 +58,19 @@ class SequenceBench(Bench):
         self.others = {n: s for n, s in self.output_sorts.items() if n not in self.memory}
         self.traces: dict[str, Trace] = {}
         self._first: list[list[Inputs]] = []
-        self._kept_runs = _kept_runs(folder / KEPT)
+        self._runs_kept = kept_runs(folder / KEPT)
         self._edges_left: Iterator[Inputs] = iter(())
         self._swept = False
+        self.runs = 0
+        written = data["assumptions"] + data["guarantees"]
+        limits = longest_limits(wire.decode(clause["formula"]) for clause in written)
+        self._steps = STEPS + min(2 * limits, LONGEST_RUN)
 
     # -- the class ---------------------------------------------------------------------------------------
 
     def begin(self, subject: Subject) -> dict[str, Value]:
-        """A new object; its memory."""
+        """A new run of a new object; its memory."""
+        self.keeper.restart()
         reply = self._asked(subject, {"steps": []})
         return self._held(reply["held"])
 
@@ -108,13 +119,19 @@ class SequenceBench(Bench):
                 return {"l": [self.coded(item) for item in items]}
         raise Impossible(f"a step class is not given {value}")
 
+    def decoded(self, data: Any, sort: Sort, name: str) -> Value:
+        """What `coded` made data of. Raises Malformed."""
+        return received(_as_host(data), sort, name)
+
     # -- runs --------------------------------------------------------------------------------------------
 
     def _sweep(self) -> str:
         chance = random.Random(self.seed)
         try:
-            for steps in self._kept_runs:
+            for steps in self._runs_kept:
                 self._replayed_run(steps)
+            for each in self.guarantees.values():
+                each.edge_hits = [0] * len(each.triggers)
             self._edges_left = iter([*map(self._given, self.generator.edges(self._blamed))])
             while self.valid < self.cases:
                 self._run(chance)
@@ -130,23 +147,31 @@ class SequenceBench(Bench):
 
     def _run(self, chance: random.Random) -> None:
         trace: Trace = []
-        sticky = chance.random() < 0.4
+        held = HELD_STEPS if chance.random() < 0.4 else 0.0
+        if held and self.remembers:
+            held = chance.choice((HELD_STEPS, *LONG_HELD_STEPS))
+        before = {name: list(g.hits) for name, g in self.guarantees.items()}
         try:
             memory = self.begin(self.subject)
         except SubjectFailed as error:
             self.crash = ({}, str(error))
             raise _Enough from error
-        for _ in range(STEPS):
+        for _ in range(self._steps):
             self._in_time()
-            inputs = self._drawn(chance, memory, trace[-1][0] if trace else None, sticky)
+            inputs = self._drawn(chance, memory, trace[-1][0] if trace else None, held)
             if inputs is None or self.valid >= self.cases:
                 break
             memory = self._one(inputs, trace)
-        if len(self._first) * STEPS < ASKED_AGAIN:
+        self.runs += bool(trace)
+        for name, each in self.guarantees.items():
+            each.run_hits = [
+                n + (now > was) for n, now, was in zip(each.run_hits, each.hits, before[name], strict=True)
+            ]
+        if len(self._first) * self._steps < ASKED_AGAIN:
             self._first.append([inputs for inputs, _ in trace])
 
-    def _one(self, inputs: Inputs, trace: Trace) -> dict[str, Value]:
-        """One step of a run, judged; the memory after it."""
+    def _one(self, inputs: Inputs, trace: Trace, *, drawn: bool = True) -> dict[str, Value]:
+        """One step of a run, judged; the memory after it. Of one that is tried again nothing is counted."""
         try:
             found = self.advance(self.subject, inputs)
         except SubjectFailed as error:
@@ -154,27 +179,30 @@ class SequenceBench(Bench):
             self.traces["crash"] = [*trace, (inputs, {})]
             raise _Enough from error
         trace.append((inputs, found))
-        self.valid += 1
+        self.valid += drawn
         failed = {name for name, g in self.guarantees.items() if g.failure is not None}
-        self._judge(inputs, found, False)
+        self._judge(inputs, found, not drawn)
         for name, each in self.guarantees.items():
             if each.failure is not None and name not in failed:
                 self.traces[name] = list(trace)
+        self.keeper.advance(valuation(inputs, found))
         if all(g.failure is not None for g in self.guarantees.values()):
             raise _Enough
         unheld = [n for n in self.memory if n not in found]
-        return {n: found[n] for n in self.memory if n in found} | (self._looked(unheld) if unheld else {})
+        return {n: found[n] for n in self.memory if n in found} | self._looked(unheld, self.subject)
 
-    def _looked(self, names: list[str]) -> dict[str, Value]:
-        held = self._held(self._asked(self.subject, {"on": True, "steps": []})["held"])
+    def _looked(self, names: list[str], subject: Subject) -> dict[str, Value]:
+        if not names:
+            return {}
+        held = self._held(self._asked(subject, {"on": True, "steps": []})["held"])
         return {n: held[n] for n in names}
 
     def _drawn(
-        self, chance: random.Random, memory: dict[str, Value], last: Inputs | None, sticky: bool
+        self, chance: random.Random, memory: dict[str, Value], last: Inputs | None, held: float
     ) -> Inputs | None:
         """Inputs that the assumptions allow beside this memory; None where none are found."""
         for attempt in range(STEP_TRIES):
-            if last is not None and sticky and chance.random() < HELD_STEPS:
+            if last is not None and held and chance.random() < held:
                 inputs = {**last, **memory}
             else:
                 edge = next(self._edges_left, None) if chance.random() < 0.5 else None
@@ -236,49 +264,91 @@ class SequenceBench(Bench):
         memory = self.begin(self.subject)
         for step in steps:
             try:
-                given = {n: received(_as_host(step[n]), s, n) for n, s in self.inputs_sorts.items() if n in step}
-            except (Malformed, KeyError, ValueError, TypeError):
+                given = {n: self.decoded(step[n], s, n) for n, s in self.inputs_sorts.items() if n in step}
+            except (Malformed, KeyError, ValueError, TypeError, AttributeError):
                 return
             inputs = {**self._given(given), **memory}
             if set(inputs) != set(self.inputs_sorts) or not self._assumed(inputs):
                 return
-            memory = self._one(inputs, trace)
+            memory = self._one(inputs, trace, drawn=False)
         self.replayed += 1
 
-    def _shrunk(self, name: str) -> Case:
+    def _shrunk(self, name: str) -> Case | None:
         each = self.guarantees[name]
         assert each.failure is not None
         end = min(self.end or math.inf, time.monotonic() + SHRINKING_SECONDS)
         best = self.traces[name]
-        tries = 0
-        at = len(best) - 2
         alone = self._again([best[-1][0]], name)
-        if alone is not None:
-            best, at = alone, -1
+        best = alone if alone is not None else self._shorter(best, name, end)
+        while self.remembers and time.monotonic() < end:  # plainer steps may make others needless
+            plainer = self._plainer(best, name, end)
+            if plainer == best:
+                break
+            best = self._shorter(plainer, name, end)
+        for trace in (best, self.traces[name]):
+            again = self._afresh(trace, name)
+            if again is not None:
+                self.traces[name] = again
+                return again[-1]
+        self.unsteady = self.traces.pop(name)[-1][0]
+        return None
+
+    def _afresh(self, trace: Trace, name: str) -> Trace | None:
+        """The run in a process that had no other before, if it breaks the guarantee there as well."""
+        twin = Subject(self.subject.path, self.subject.function, self.subject.patience, self.subject.root)
+        try:
+            return self._again([inputs for inputs, _ in trace], name, twin)
+        finally:
+            twin.close()
+
+    def _shorter(self, best: Trace, name: str, end: float) -> Trace:
+        """The run without the steps that it does not take, as far as they are found one by one from its end."""
+        tries, at = 0, len(best) - 2
         while at >= 0 and tries < SHRINKING_TRIES and time.monotonic() < end:
             tries += 1
             shorter = self._again([i for k, (i, _) in enumerate(best) if k != at], name)
             best = shorter if shorter is not None else best
-            at -= 1
-        self.traces[name] = best
-        return best[-1]
+            at = min(at, len(best) - 1) - 1
+        return best
 
-    def _again(self, steps: list[Inputs], name: str) -> Trace | None:
-        """The run of these steps, if its last breaks the guarantee and all are allowed."""
+    def _plainer(self, best: Trace, name: str, end: float) -> Trace:
+        """The run with simpler inputs, one after the other, the last step first: the simplest of all, those of the step
+        before, whole numbers."""
+        plain = self._given(self.generator.case(Source(b""), lambda _: None))
+        for port in (p for p in plain if p not in self.memory):
+            for at in reversed(range(len(best))):
+                tried = [plain[port], best[at - 1][0][port]] if 0 < at < len(best) else [plain[port]]
+                now = best[at][0][port] if at < len(best) else plain[port]
+                tried += [Fraction(round(now))] if isinstance(now, Fraction) else []
+                for value in tried[: tried.index(now)] if now in tried else tried:
+                    if time.monotonic() > end:
+                        return best
+                    steps = [{**i, port: value} if k == at else i for k, (i, _) in enumerate(best)]
+                    simpler = self._again(steps, name)
+                    if simpler is not None:
+                        best = simpler
+                        break
+        return best
+
+    def _again(self, steps: list[Inputs], name: str, subject: Subject | None = None) -> Trace | None:
+        """The run of these steps up to one that breaks the guarantee, if one does and all before it are allowed."""
         trace: Trace = []
+        subject = subject or self.subject
         try:
-            memory = self.begin(self.subject)
+            memory = self.begin(subject)
             for step in steps:
                 inputs = {**step, **memory}
                 if not self._assumed(inputs):
                     return None
-                found = self.advance(self.subject, inputs)
+                found = self.advance(subject, inputs)
                 trace.append((inputs, found))
-                memory = self._held(self._asked(self.subject, {"on": True, "steps": []})["held"])
+                if self.guarantees[name].judged.holds(self._values(inputs, found)) is False:
+                    return trace
+                self.keeper.advance(valuation(inputs, found))
+                memory = self._looked([*self.memory], subject)
         except SubjectFailed:
             return None
-        broken = self.guarantees[name].judged.holds(valuation(*trace[-1])) is False
-        return trace if broken else None
+        return None
 
     def _shrunk_crash(self) -> tuple[Inputs, str]:
         assert self.crash is not None
@@ -337,8 +407,21 @@ class SequenceBench(Bench):
                 trace = self.traces[name]
                 own["trace"] = [_pairs(*step) for step in trace] if len(trace) > 1 else []
                 own["case"] = [{n: self.coded(v) for n, v in inputs.items()} for inputs, _ in trace]
-        report["crash_trace"] = [_pairs(*step) for step in self.traces.get("crash", [])]
+            own["run_hits"] = self.guarantees[name].run_hits
+        if self.remembers:
+            report["runs"] = self.runs
+        if self.data["source"]:
+            report["crash_trace"] = [_pairs(*step) for step in self.traces.get("crash", [])]
         return report
+
+
+def longest_limits(formulas: Iterable[Term]) -> int:
+    """The most steps that the limits in one formula come to together, of those that are written down."""
+    totals = (
+        sum(max(0, written(h.limit.amount) or 0) for h in histories(formula) if h.limit is not None)
+        for formula in formulas
+    )
+    return max(totals, default=0)
 
 
 def _as_host(data: Any) -> Any:
@@ -357,9 +440,3 @@ def _as_host(data: Any) -> Any:
             return {"m": [[key, _as_host(value)] for key, value in pairs]}
         case _:  # its own JSON
             return data
-
-
-def _kept_runs(path: Path) -> list[list[dict[str, Any]]]:
-    if not path.is_file():
-        return []
-    return [case for case in json.loads(path.read_text(encoding="utf-8")) if isinstance(case, list)]

@@ -28,6 +28,8 @@ class SubjectFile:
     """The function; of a class that is driven, how, as JSON (`avow.drive.steps`)."""
     memory: tuple[str, ...] = ()
     driven: bool = False
+    source: bool = False
+    """Whether it is the node's own class."""
 
 
 def subject(job: Job) -> SubjectFile:
@@ -60,7 +62,36 @@ def subject(job: Job) -> SubjectFile:
         problems = _arguments(definition, found, job)
         if problems:
             raise Rejected(*problems)
+    if isinstance(definition, ast.ClassDef) and (step := _method(definition, "step")) is not None:
+        return _step_class(found, definition, step, job)
     return found
+
+
+def _step_class(found: SubjectFile, definition: ast.ClassDef, step: ast.FunctionDef, job: Job) -> SubjectFile:
+    """A class with a method `step` that the option names: made without arguments, once for each run. Raises
+    Rejected."""
+    begun = _method(definition, "__init__")
+    problems = _arguments(step, found, job, method=True)
+    if begun is not None and len(begun.args.args) - len(begun.args.defaults) > 1:
+        message = f"`{definition.name}` is made without arguments"
+        problems.append(Diagnostic("HYPO104", message, _span(begun, str(found.path))))
+    taken = {a.arg for a in (*step.args.args, *step.args.kwonlyargs)}
+    for port in job.node.inputs:
+        if port.name not in taken and step.args.kwarg is None:
+            message = f"`step` does not take the input `{port.name}`"
+            problems.append(Diagnostic("HYPO104", message, _span(step, str(found.path))))
+    wrong = unfit({p.name: p.sort for p in (*job.node.inputs, *job.node.outputs)})
+    if wrong:
+        place = job.method.options.at("subject")
+        problems.append(Diagnostic("HYPO106", f"a step class is not given what {wrong} is", place))
+    if problems:
+        raise Rejected(*problems)
+    spec = {"class": definition.name, "params": coded({}), "memory": {}, "attributes": []}
+    return SubjectFile(found.name, found.path, json.dumps(spec), (), True)
+
+
+def _method(definition: ast.ClassDef, name: str) -> ast.FunctionDef | None:
+    return next((s for s in definition.body if isinstance(s, ast.FunctionDef) and s.name == name), None)
 
 
 def locate(job: Job) -> SubjectFile:
@@ -101,7 +132,7 @@ def _declared(job: Job, source: Source) -> SubjectFile:
     if faults:
         raise Rejected(*faults)
     spec = {"class": source.class_name, "params": coded(dict(params)), "memory": dict(source.memory), "attributes": []}
-    return SubjectFile(source.python, path, json.dumps(spec), tuple(sorted(source.memory)), True)
+    return SubjectFile(source.python, path, json.dumps(spec), tuple(sorted(source.memory)), True, True)
 
 
 def parameter_files(job: Job) -> tuple[Path, ...]:
@@ -162,7 +193,9 @@ def _top_level(tree: ast.Module) -> dict[str, ast.stmt]:
     return found
 
 
-def _arguments(definition: ast.FunctionDef | ast.AsyncFunctionDef, found: SubjectFile, job: Job) -> list[Diagnostic]:
+def _arguments(
+    definition: ast.FunctionDef | ast.AsyncFunctionDef, found: SubjectFile, job: Job, *, method: bool = False
+) -> list[Diagnostic]:
     """Arguments that no input fills; an async function. Inputs that it does not take are simply not given."""
     problems: list[Diagnostic] = []
     file = str(found.path)
@@ -173,7 +206,7 @@ def _arguments(definition: ast.FunctionDef | ast.AsyncFunctionDef, found: Subjec
     arguments = definition.args
     optional = len(arguments.defaults)
     positional = [*arguments.posonlyargs, *arguments.args]
-    required = positional[: len(positional) - optional] if optional else positional
+    required = (positional[: len(positional) - optional] if optional else positional)[method:]
     required += [a for a, default in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True) if default is None]
     for argument in required:
         if argument in arguments.posonlyargs:

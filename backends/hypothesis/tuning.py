@@ -62,6 +62,13 @@ STEP_TRIES = 12
 HELD_STEPS = 0.8
 """In runs that hold their inputs, how often a step has those of the step before: what counts has to count on."""
 
+LONG_HELD_STEPS = (0.95, 0.99)
+"""Likewise, in some runs of a contract with memory: a condition that has to last has to last beyond its limit."""
+
+LONGEST_RUN = 400
+"""Steps by which a run is longer at most, however long the contract's limits are: twice their sum, so that what a
+response demands comes due, would be too many."""
+
 SHRINKING_TRIES = 60
 """Steps that are left out one by one of a run that breaks a guarantee: more than a run has."""
 

@@ -10,7 +10,7 @@ from typing import Any
 from avow.base.diagnostics import Span
 from avow.language import sorts, terms
 from avow.language.sorts import Sort
-from avow.language.terms import Quantifier, Role, Term
+from avow.language.terms import Past, Quantifier, Role, Term
 
 from .tuning import WIRE_DEPTH
 
@@ -66,6 +66,8 @@ def decode(data: Any) -> Any:
                 parts["role"] = Role(parts["role"])
             if "quantifier" in parts:
                 parts["quantifier"] = Quantifier(parts["quantifier"])
+            if name == "History":
+                parts["operator"] = Past(parts["operator"])
             return _CLASSES[name](**parts)
         case _:  # a value that is its own JSON
             return data

@@ -23,6 +23,7 @@ from avow.language.sorts import BOOL, REAL, DataSort, EnumSort, FunctionSort
 from avow.language.terms import Variable
 from avow.solving.questions import replay
 from avow.system.plan import System
+from avow.temporal.cells import Records
 
 __all__ = ["make_system"]
 
@@ -71,7 +72,7 @@ def test_three_judges_agree(seed: int, make_system: Callable[..., System]) -> No
         system = make_system(RCL.format(formula=formula(rng, rng.choice((1, 2, 3)))), MAPPING)
         clause = system.contract.node("n").guarantees[0]
         sent = json.loads(json.dumps(wire.encode(clause.formula)))
-        judge = judged({"name": clause.name, "formula": sent, "text": clause.text})
+        judge = judged(clause.name, wire.decode(sent), clause.text, Records())
         assert wire.decode(sent) == clause.formula
         for _ in range(4):
             values = {v: value(rng, v) for v in sorted(free_variables(clause.formula), key=lambda v: v.qualified)}
