@@ -97,6 +97,8 @@ class Supposition:
     """All of it, as the plan or the method has it."""
     because: str
     who: str
+    date: str
+    """The day on which it was supposed (the latest, where it was said more than once); empty: no day is named."""
     until: str
     expired: bool
     needed_by: tuple[str, ...]
@@ -108,6 +110,13 @@ class Supposition:
     def owned(self) -> bool:
         """Whether somebody keeps it true, and until when."""
         return bool(self.who and self.until)
+
+    @property
+    def term(self) -> str:
+        """``A. Person, 2026-11-21, until 2030-12-31``: who keeps it true, since when, until when."""
+        ended = "expired" if self.expired else "until"
+        parts = (self.who or "no owner", self.date, f"{ended} {self.until}" if self.until else "no last day")
+        return ", ".join(part for part in parts if part)
 
     @property
     def words(self) -> str:

@@ -261,7 +261,7 @@ def _lines(suppositions: Sequence[Supposition]) -> Iterable[SupposedLine]:
 
 
 def _owners(suppositions: Sequence[Supposition]) -> str:
-    """``A. Person (3), B. Person (1); the first date is 2027-01-31``."""
+    """``A. Person (3), B. Person (1), supposed 2026-11-21; the first ends 2027-01-31``."""
     owned = [s for s in suppositions if s.owned]
     number = Counter(s.who for s in owned).most_common()
     if not number:
@@ -269,8 +269,10 @@ def _owners(suppositions: Sequence[Supposition]) -> str:
     ends = sorted({s.until for s in owned})
     named = ", ".join(f"{who} ({many})" if len(number) > 1 else who for who, many in number[:OWNERS])
     more = f" and {len(number) - OWNERS} more" if len(number) > OWNERS else ""
-    until = f", until {ends[0]}" if len(ends) == 1 else f"; the first date is {ends[0]}"
-    return f"{named}{more}{until}"
+    made = sorted({s.date for s in owned})
+    since = f", supposed {' to '.join(dict.fromkeys((made[0], made[-1])))}" if all(made) else ""
+    until = f", until {ends[0]}" if len(ends) == 1 else f"; the first ends {ends[0]}"
+    return f"{named}{more}{since}{until}"
 
 
 def _changed(changes: Changes) -> tuple[tuple[str, str], ...]:

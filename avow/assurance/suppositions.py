@@ -111,6 +111,7 @@ def suppositions(
 def _one(items: Sequence[_Raw], requirements: Sequence[str], statements: Statements) -> Supposition:
     said = next((i.statement for i in items if i.statement.says), items[0].statement)
     ends = sorted({i.statement.until for i in items if i.statement.until})
+    made = sorted({i.statement.date for i in items if i.statement.date})
     owned = all(i.statement.who for i in items)
     dated = all(i.statement.until for i in items)
     return Supposition(
@@ -122,6 +123,7 @@ def _one(items: Sequence[_Raw], requirements: Sequence[str], statements: Stateme
         because=said.because,
         who=", ".join(dict.fromkeys(i.statement.who for i in items)) if owned else "",
         until=ends[0] if dated and ends else "",
+        date=made[-1] if made and all(i.statement.date for i in items) else "",
         expired=any(statements.is_past(end) for end in ends),
         needed_by=tuple(r for r in requirements if any(item.needed(r) for item in items)),
         where=tuple(dict.fromkeys(item.where for item in items)),
@@ -198,7 +200,8 @@ def _accepted(facts: Facts, views: Sequence[ObligationView], closed: Mapping[str
         holders = {name for name, found in closed.items() if claim in found.accepted}
         said = Statement(hypothesis.name)
         if given is not None:
-            said = Statement(hypothesis.name, "", given.reason or "", given.who or "", given.expires or "")
+            reason, who, until, made = (s or "" for s in (given.reason, given.who, given.expires, given.date))
+            said = Statement(hypothesis.name, "", reason, who, until, made)
         text = hypothesis.text or hypothesis.name
         yield _Raw(Sort.MODELS, hypothesis.name, text, said, claim, holders.__contains__)
 

@@ -195,8 +195,7 @@ def _weakest(case: Case) -> str:
 def _supposition(supposition: Supposition) -> list[str]:
     s = supposition
     reason = full_reason(s)
-    owner = f"expired {s.until}" if s.expired else f"{s.who}, {s.until}" if s.owned else "no owner or no date"
-    return [s.number, f"{s.words}. {reason}".strip(), str(s.sort), some(s.needed_by), owner]
+    return [s.number, f"{s.words}. {reason}".strip(), str(s.sort), some(s.needed_by), s.term]
 
 
 def _module(module: RequirementModule) -> dict[str, Any]:

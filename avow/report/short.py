@@ -88,9 +88,7 @@ def markdown_head(case: Case) -> Iterator[str]:
     owners = f": {_md(a.owners)}" if a.owners else ""
     owned = f"{a.owned} with owner and date{owners}.\n\n" if a.owned else ""
     yield owned + (
-        "\n".join(
-            f"- {s.number} ({ABOUT[s.sort]}) {_md(s.words)}; {_md(_owner(s.who, s.until))}" for s in case.suppositions
-        )
+        "\n".join(f"- {s.number} ({ABOUT[s.sort]}) {_md(s.words)}; {_md(s.term)}" for s in case.suppositions)
         or "Nothing."
     )
     yield "## 5 What changed since the last signed report?"
@@ -99,10 +97,6 @@ def markdown_head(case: Case) -> Iterator[str]:
     yield "\n".join(f"- {mark} {_md(words)}" if mark else _md(words) for mark, words in a.changed)
     yield "## Weakenings"
     yield "\n".join(f"- {w.count} {_md(w.words)}. {_md(w.why)}" for w in case.weakenings) or "None."
-
-
-def _owner(who: str, until: str) -> str:
-    return f"{who or 'no owner'}, {f'until {until}' if until else 'no date'}"
 
 
 def _weakest(r: RequirementView) -> str:

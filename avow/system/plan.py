@@ -95,6 +95,8 @@ class Statement:
     """Who keeps it true; empty: nobody is named."""
     until: str = ""
     """The last day (ISO 8601) on which it may be relied upon; empty: no day is named."""
+    date: str = ""
+    """The day (ISO 8601) on which it was supposed; empty: no day is named."""
     span: Span | None = field(default=None, compare=False, repr=False)
 
 

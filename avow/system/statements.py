@@ -82,7 +82,7 @@ def _is_true(piece: Piece | None) -> bool:
 
 def _statement(place: str, piece: Piece, faults: list[Diagnostic]) -> Statement:
     texts = {key: " ".join(part.text.split()) for key, part in (piece.entries or {}).items() if part.items is None}
-    says, until = piece.at("says"), piece.at("until")
+    says = piece.at("says")
     if says is not None:
         number = len(texts["says"].split())
         if number > STATEMENT_WORDS:
@@ -92,8 +92,9 @@ def _statement(place: str, piece: Piece, faults: list[Diagnostic]) -> Statement:
         if names:
             message = f"{place}: says is for readers who do not know the contract, but names {', '.join(names)}"
             faults.append(Diagnostic("PLAN115", message, says.span, hint="say it in words"))
-    wrong = wrong_day(texts["until"], past=False) if until is not None else ""
-    if until is not None and wrong:
-        faults.append(Diagnostic("PLAN105", f"{place}: {wrong}", until.span))
-    words = {key: texts.get(key, "") for key in ("says", "because", "who", "until")}
+    for key, past in (("date", True), ("until", False)):
+        day = piece.at(key)
+        if day is not None and (wrong := wrong_day(texts[key], past=past)):
+            faults.append(Diagnostic("PLAN105", f"{place}: {wrong}", day.span))
+    words = {key: texts.get(key, "") for key in ("says", "because", "who", "until", "date")}
     return Statement(place, span=piece.span, **words)

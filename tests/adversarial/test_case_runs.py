@@ -31,7 +31,7 @@ from avow.pipeline.derivations import derivation_views, discharging
 from avow.pipeline.work import COMPOSE, catalogue, compose_work
 from avow.system.load import load_system
 
-from .test_certified_runs import System, formula
+from .drawn import Formula, System, formula
 
 REASONS = "persistence: {because: latched}, one_output: {because: one each}"
 
@@ -39,15 +39,15 @@ REASONS = "persistence: {because: latched}, one_output: {because: one each}"
 class Judged(System):
     """A random system, some of whose guarantees are refuted; what the plan accepts of them; and names for people."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, *, rich: bool = False) -> None:
         self.chance = Random(seed)
-        super().__init__(seed)
+        super().__init__(seed, rich=rich)
         for n in self.nodes:  # most of what is random is broken: some of it is made likelier
             if self.chance.random() < 0.6:
                 self.promised[n][0] = formula(self.chance, [f"out.o{n}"], 0)
         outputs = [f"{n}.o{n}" for n in self.nodes]
         pairs = [(formula(self.chance, outputs, 1), formula(self.chance, outputs, 1)) for _ in self.required]
-        self.required = [(f"(({a}) or ({b}))", lambda v, f=f, g=g: f(v) or g(v)) for (a, f), (b, g) in pairs]  # type: ignore[misc]
+        self.required = [Formula("or", pair) for pair in pairs]
         self.text, self.plan = self.written(), self.planned(self.chance)
         self.refuted = {(n, k) for n in self.nodes for k in range(len(self.promised[n])) if self.chance.random() < 0.15}
         self.told()
@@ -127,9 +127,9 @@ def concluded(root: Path, made: Judged, kept: Sequence[Evidence]) -> tuple[Case,
     return case, [*calculus, *(r for r in kept if r not in good)]
 
 
-def told(folder: Path, seed: int, edits: int = 3) -> int:
+def told(folder: Path, seed: int, edits: int = 3, *, rich: bool = False) -> int:
     """How many requirements are supported, over all edits."""
-    made, count = Judged(seed), 0
+    made, count = Judged(seed, rich=rich), 0
     kept: list[Evidence] = []
     for edit in range(edits):
         try:
@@ -141,8 +141,8 @@ def told(folder: Path, seed: int, edits: int = 3) -> int:
         assert good <= {r.id for r in fresh.requirements if r.status.supports}, (seed, edit)
         count += len(good)
         if good:
-            for _, now, _ in made.kept_word().steps():
-                for k, (_, holds) in enumerate(made.required):
+            for now, _, _ in made.kept_word().steps():
+                for k, holds in enumerate(made.required):
                     values = {f"{n}.o{n}": value for n, value in now.items()}
                     assert f"R{k}" not in good or holds(values), (seed, edit, k, now)
         made.edited(made.chance)
@@ -150,10 +150,12 @@ def told(folder: Path, seed: int, edits: int = 3) -> int:
 
 
 @pytest.mark.slow
-def test_no_case_says_what_some_run_breaks(tmp_path: Path) -> None:
-    assert sum(told(tmp_path, seed) for seed in range(5)) > 0
+@pytest.mark.parametrize("rich", [False, True])
+def test_no_case_says_what_some_run_breaks(tmp_path: Path, rich: bool) -> None:
+    assert sum(told(tmp_path, seed, rich=rich) for seed in range(5)) > 0
 
 
 @pytest.mark.nightly
-def test_no_case_says_what_some_run_breaks_at_length(tmp_path: Path) -> None:
-    assert sum(told(tmp_path, seed) for seed in range(100, 250)) > 20
+@pytest.mark.parametrize("rich", [False, True])
+def test_no_case_says_what_some_run_breaks_at_length(tmp_path: Path, rich: bool) -> None:
+    assert sum(told(tmp_path, seed, rich=rich) for seed in range(100, 250)) > 20

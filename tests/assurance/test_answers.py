@@ -175,8 +175,8 @@ def test_without_owner_or_date_a_supposition_weakens() -> None:
 
 def test_a_supposition_stands_once_whoever_needs_it() -> None:
     said = [
-        Statement("environment.in.a", "The map is right", "surveyed", "x", "2030-01-01"),
-        Statement("environment.in.b", "The map is right", "surveyed", "x", "2029-01-01"),
+        Statement("environment.in.a", "The map is right", "surveyed", "x", "2030-01-01", "2026-11-20"),
+        Statement("environment.in.b", "The map is right", "surveyed", "x", "2029-01-01", "2026-11-21"),
     ]
     claims = [obligation(SYSTEM_LEVEL, Kind.COMPOSITION, f"environment.in.{p}") for p in "ab"]
     reasons = [evidence(c, Verdict.JUSTIFIED, "compose", link=Link.GUIDED, summary="surveyed") for c in claims]
@@ -186,6 +186,8 @@ def test_a_supposition_stands_once_whoever_needs_it() -> None:
     found = case(made, [*GUARANTEES, *claims], [*proofs, *reasons])
     (world,) = [s for s in found.suppositions if s.sort is Sort.WORLD]
     assert (world.key, world.until, world.needed_by) == ("environment.in.a", "2029-01-01", ("R",))
+    assert world.date == "2026-11-21"
+    assert "2026-11-21" in found.answers.owners
 
 
 def test_a_side_condition_brings_what_its_proof_used_and_a_guarantee_what_its_node_assumes() -> None:
@@ -284,15 +286,21 @@ def test_the_first_screen_of_a_full_case_is_in_plain_words() -> None:
 def test_which_suppositions_there_are_and_who_answers_for_them_is_said_in_a_line() -> None:
     def supposed(at: int, who: str, until: str) -> Supposition:
         key = f"environment.n.{at}"
-        return Supposition(f"S{at}", key, Sort.WORLD, f"It is {at}", "", "", who, until, False, ("R",), ())
+        return Supposition(f"S{at}", key, Sort.WORLD, f"It is {at}", "", "", who, "", until, False, ("R",), ())
 
     said = [supposed(at, "A. Person" if at < 5 else "B", f"2027-01-0{at}") for at in range(1, 7)]
     most = replace(said[2], needed_by=("R", "Q"))
     (line,) = _lines([*said[:2], most, *said[3:]])
     assert (line.number, line.about, line.more) == ("S3", "6 about the world", "also S1, S2, S4 to S6")
-    assert _owners(said) == "A. Person (4), B (2); the first date is 2027-01-01"
+    assert _owners(said) == "A. Person (4), B (2); the first ends 2027-01-01"
     assert _owners(said[:1]) == "A. Person, until 2027-01-01"
     assert _owners([replace(said[0], who="")]) == ""
+    made = [replace(one, date=f"2026-11-{20 + at}") for at, one in enumerate(said[:2])]
+    assert _owners(made[:1]) == "A. Person, supposed 2026-11-20, until 2027-01-01"
+    assert _owners(made) == "A. Person, supposed 2026-11-20 to 2026-11-21; the first ends 2027-01-01"
+    assert made[0].term == "A. Person, 2026-11-20, until 2027-01-01"
+    assert replace(made[0], expired=True, date="").term == "A. Person, expired 2027-01-01"
+    assert replace(made[0], who="", until="").term == "no owner, 2026-11-20, no last day"
     assert set(ABOUT) == set(Sort)
 
 

@@ -250,6 +250,8 @@ SAYS = "environment:\n  in.a: {{assume: 'TRUE', because: b, {0}}}\n"
         ("says: what wayP gives", "PLAN115", "wayP"),
         ("until: 2026-02-30", "PLAN105", "calendar"),
         ("until: tomorrow", "PLAN105", "right form"),
+        ("date: 2026-02-30", "PLAN105", "calendar"),
+        ("date: 2999-01-01", "PLAN105", "still to come"),
         ("who: ''", "PLAN105", "empty"),
     ],
 )
@@ -262,7 +264,7 @@ def test_plain_words_owners_and_dates_are_checked(tmp_path: Path, entry: str, co
 
 def test_statements_of_a_plan(tmp_path: Path) -> None:
     text = (
-        "compose: {D: {persistence: {because: b, says: It stays, who: W, until: 2030-01-01}, entered: {because: e}}}\n"
+        "compose: {D: {persistence: {because: b, says: It stays, who: W, date: 2026-11-20, until: 2030-01-01}, entered: {because: e}}}\n"
         "suppositions: {hoare.map: {says: The map fits}}\n"
         "requirements: {R: {text: t, amounts: {because: it does}}}\n"
         "nodes: {a: {title: the first, methods: [hoare: {}]}}\n"
@@ -271,10 +273,10 @@ def test_statements_of_a_plan(tmp_path: Path) -> None:
     (tmp_path / "a.rcl").write_text("node a { inputs() outputs() topics() guarantee(TRUE) }")
     plan, _, faults_ = read_plan(tmp_path / "plan.yaml")
     assert faults_ == ()
-    assert [(s.place, s.says, s.because, s.who, s.until) for s in plan.statements] == [
-        ("D.persistence", "It stays", "b", "W", "2030-01-01"),
-        ("D.entered", "", "e", "", ""),
-        ("suppositions.hoare.map", "The map fits", "", "", ""),
-        ("requirements.R.amounts", "", "it does", "", ""),
+    assert [(s.place, s.says, s.because, s.who, s.until, s.date) for s in plan.statements] == [
+        ("D.persistence", "It stays", "b", "W", "2030-01-01", "2026-11-20"),
+        ("D.entered", "", "e", "", "", ""),
+        ("suppositions.hoare.map", "The map fits", "", "", "", ""),
+        ("requirements.R.amounts", "", "it does", "", "", ""),
     ]
     assert plan.node("a").title == "the first"

@@ -1,0 +1,372 @@
+"""Random systems over truth values, and all of their runs: a finite graph, found by trying everything.
+
+A system has delays, circles, constants and other inputs from the environment with and without assumptions about them,
+topics with several publishers, clauses that speak of other steps, subsystems and derivations with named rules. A node
+keeps its guarantees as long as its assumptions have held; else it may put out anything. What follows here is a reading
+of its own of what all that means: nothing of Avow is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from random import Random
+
+Values = dict[str, bool]
+Memory = tuple[bool, ...]
+MOST_STATES = 4000
+ENVIRONMENT = ("e0", "e1", "c0")
+CONSTANT = "c0"
+TOPIC = "bus"
+
+
+@dataclass(frozen=True)
+class Formula:
+    """`head` with its parts; a leaf says that a value (`name`) is `wanted`."""
+
+    head: str
+    parts: tuple[Formula, ...] = ()
+    name: str = ""
+    wanted: bool = True
+
+    @property
+    def text(self) -> str:
+        said = [part.text for part in self.parts]
+        match self.head:
+            case "is":
+                return f"({self.name} == {str(self.wanted).upper()})"
+            case "and" | "or" | "->" | "<=>" | "since":
+                return f"(({said[0]}) {self.head} ({said[1]}))"
+            case "previous":
+                return f"previous({said[0]}, {str(self.wanted).upper()})"
+            case "once" | "historically" | "rose" | "fell" | "changed":
+                return f"{self.head}({said[0]})"
+            case "next":
+                return f"({said[0]}) -> next({said[1]})"
+            case "within":
+                return f"({said[0]}) -> within[2 steps]({said[1]})"
+            case "until":
+                return f"({said[0]}) -> (({said[1]}) until ({said[2]}))"
+        raise AssertionError(self.head)
+
+    @property
+    def begins(self) -> Memory:
+        """What it remembers before the first step."""
+        own: Memory = ()
+        match self.head:
+            case "previous":
+                own = (self.wanted,)
+            case "once" | "since" | "rose" | "fell" | "next" | "until":
+                own = (False,)
+            case "historically":
+                own = (True,)
+            case "changed" | "within":
+                own = (False, False)
+        return own + tuple(bit for part in self.parts for bit in part.begins)
+
+    def at(self, values: Mapping[str, bool], memory: Iterator[bool], after: list[bool]) -> bool:
+        """Whether it holds at a step; what it remembers then goes to `after`."""
+        match self.head:
+            case "is":
+                return values[self.name] == self.wanted
+        size = {"changed": 2, "within": 2, "and": 0, "or": 0, "->": 0, "<=>": 0}.get(self.head, 1)
+        was = [next(memory) for _ in range(size)]
+        place = len(after)
+        after += was
+        now = [part.at(values, memory, after) for part in self.parts]
+        kept: list[bool] = []
+        match self.head:
+            case "and":
+                found = now[0] and now[1]
+            case "or":
+                found = now[0] or now[1]
+            case "->":
+                found = not now[0] or now[1]
+            case "<=>":
+                found = now[0] == now[1]
+            case "previous":
+                found, kept = was[0], [now[0]]
+            case "once":
+                found = was[0] or now[0]
+                kept = [found]
+            case "historically":
+                found = was[0] and now[0]
+                kept = [found]
+            case "since":
+                found = now[1] or (now[0] and was[0])
+                kept = [found]
+            case "rose":
+                found, kept = now[0] and not was[0], [now[0]]
+            case "fell":
+                found, kept = not now[0] and was[0], [now[0]]
+            case "changed":  # whether there was a step, and what it was then
+                found, kept = was[0] and was[1] != now[0], [True, now[0]]
+            case "next":
+                found, kept = not was[0] or now[1], [now[0]]
+            case "within":  # asked for one step ago and not answered since; two steps ago or more
+                one, more = was
+                found = not (more and not now[1])
+                kept = [now[0] and not now[1], (one or more) and not now[1]]
+            case "until":  # waiting
+                waiting = (was[0] or now[0]) and not now[2]
+                found, kept = not waiting or now[1], [waiting]
+            case _:
+                raise AssertionError(self.head)
+        after[place : place + size] = kept
+        return found
+
+    def __call__(self, values: Mapping[str, bool]) -> bool:
+        """Of one that speaks of this step alone."""
+        assert not self.begins
+        return self.at(values, iter(()), [])
+
+    @property
+    def names(self) -> frozenset[str]:
+        return frozenset({self.name} if self.name else ()).union(*(part.names for part in self.parts))
+
+
+def formula(random: Random, names: Sequence[str], depth: int = 2, *, remembers: float = 0.0) -> Formula:
+    """A formula over some names; with that chance, a part of it speaks of other steps."""
+    if depth > 0 and random.random() < remembers:
+        head = random.choice(["previous", "once", "historically", "since", "rose", "fell", "changed"])
+        parts = tuple(formula(random, names, depth - 1) for _ in range(2 if head == "since" else 1))
+        return Formula(head, parts, wanted=random.random() < 0.5)
+    if depth == 0 or random.random() < 0.25:
+        return Formula("is", name=random.choice(list(names)), wanted=random.random() < 0.6)
+    return Formula(
+        random.choice(["and", "or", "->", "<=>"]),
+        tuple(formula(random, names, depth - 1, remembers=remembers) for _ in range(2)),
+    )
+
+
+def response(random: Random, names: Sequence[str]) -> Formula:
+    """A clause that demands something of later steps."""
+    head = random.choice(["next", "within", "until"])
+    return Formula(head, tuple(formula(random, names, 1) for _ in range(3 if head == "until" else 2)))
+
+
+@dataclass(frozen=True)
+class Wire:
+    """Where an input's value comes from: a node's output (`delayed`: of the step before), the environment, a topic."""
+
+    node: str = ""
+    delayed: bool = False
+    outside: str = ""
+    topic: bool = False
+
+
+class System:
+    """Nodes n0, n1, …, each with an output and some inputs. `rich`: with all that a system may have."""
+
+    def __init__(self, seed: int, *, rich: bool = False) -> None:
+        random = Random(seed)
+        self.rich = rich
+        self.nodes = [f"n{k}" for k in range(random.randint(2, 4 if rich else 3))]
+        self.initial: dict[str, bool | str | None] = {n: random.choice([True, False, None]) for n in self.nodes}
+        self.remembers = random.choice([0.0, 0.3]) if rich else 0.0
+        several = rich and len(self.nodes) > 2 and random.random() < 0.3
+        self.publishers = random.sample(self.nodes, 2) if several else []
+        self.wires: dict[tuple[str, str], Wire] = {}
+        self.assumed: dict[str, list[Formula]] = {}
+        self.promised: dict[str, list[Formula]] = {}
+        for name in self.nodes:
+            ports = [self.port(random, name, k) for k in range(random.randint(1, 2))]
+            for port, wire in dict(ports).items():
+                self.wires[name, port] = wire
+            ins = [f"in.{port}" for port in dict(ports)]
+            number = random.randint(0, 2)
+            self.assumed[name] = [formula(random, ins, 1, remembers=self.remembers) for _ in range(number)]
+            self.promised[name] = [self.promise(random, name) for _ in range(random.randint(1, 2))]
+        for name in self.nodes:
+            if (name, CONSTANT) in self.wires and random.random() < 0.4:
+                self.initial[name] = CONSTANT
+        self.outside: dict[str, tuple[Formula | None, bool]] = {}
+        for name in sorted({wire.outside for wire in self.wires.values() if rich} & set(ENVIRONMENT)):
+            assume = Formula("is", name=f"in.{name}", wanted=random.random() < 0.5) if random.random() < 0.4 else None
+            if assume is not None or name == CONSTANT:
+                self.outside[name] = assume, name == CONSTANT
+        self.required = [formula(random, [f"{n}.o{n}" for n in self.nodes]) for _ in range(2)]
+        self.names = ["g0", "g1"]
+        self.text, self.plan = self.written(), self.planned(random)
+
+    def port(self, random: Random, name: str, k: int) -> tuple[str, Wire]:
+        """An input's name, and where its value comes from."""
+        if self.publishers and name not in self.publishers and random.random() < 0.5:
+            return "heard", Wire(topic=True)
+        source = random.choice([*(n for n in self.nodes if n not in self.publishers), None])
+        if source is not None:
+            return f"i{k}{name}", Wire(source, source == name or random.random() < 0.4)
+        port = random.choice(ENVIRONMENT) if self.rich else f"i{k}{name}"
+        return port, Wire(outside=port)
+
+    def promise(self, random: Random, name: str) -> Formula:
+        names = [f"in.{port}" for node, port in self.wires if node == name] + [f"out.o{name}"]
+        if random.random() < self.remembers / 2:
+            return response(random, names)
+        return formula(random, names, remembers=self.remembers)
+
+    def written(self) -> str:
+        text = ""
+        for name in self.nodes:
+            clauses = [f"  assume a{k} ( {each.text} )\n" for k, each in enumerate(self.assumed[name])]
+            clauses += [
+                f"  guarantee {called} ( {each.text} )\n"
+                for called, each in zip(self.names, self.promised[name], strict=False)
+            ]
+            mine = [port for node, port in self.wires if node == name]
+            ports = ", ".join(f"{port} : BOOL" for port in mine)
+            topics = [f"bool {TOPIC} matches(out.o{name})"] if name in self.publishers else []
+            topics += [f"bool {TOPIC} matches(in.{port})" for port in mine if self.wires[name, port].topic]
+            outputs = f"outputs( o{name} : BOOL ) topics( {', '.join(topics)} )"
+            text += f"node {name} {{ inputs( {ports} ) {outputs}\n{''.join(clauses)}}}\n"
+        return text
+
+    def edited(self, random: Random) -> None:
+        """Another system, which has much of this one."""
+        for _ in range(random.randint(1, 2)):
+            name = random.choice(self.nodes)
+            ins = [f"in.{port}" for node, port in self.wires if node == name]
+            match random.randrange(7):
+                case 0:
+                    self.promised[name][0] = self.promise(random, name)
+                case 1:
+                    self.assumed[name] = [formula(random, ins, 1, remembers=self.remembers)]
+                case 2:
+                    self.initial[name] = random.choice([True, False, None])
+                case 3:
+                    inner = [at for at, wire in self.wires.items() if wire.node]
+                    if inner:
+                        node = random.choice([n for n in self.nodes if n not in self.publishers])
+                        at = random.choice(inner)
+                        self.wires[at] = Wire(node, node == at[0] or random.random() < 0.5)
+                case 4:
+                    self.names.reverse()
+                case 5:
+                    self.required.reverse()
+                case 6:
+                    for port in list(self.outside):
+                        if port != CONSTANT and random.random() < 0.7:
+                            del self.outside[port]
+        self.text, self.plan = self.written(), self.planned(random)
+
+    def first(self, name: str) -> str | None:
+        """What the plan says of an output's first value."""
+        match self.initial[name]:
+            case None:
+                return None
+            case str() as port:
+                return f"out.o{name} <=> in.{port}"
+            case value:
+                return str(value).upper()
+
+    def planned(self, random: Random) -> str:
+        plan = "connections:\n"
+        for (name, port), wire in self.wires.items():
+            if wire.node:
+                first = self.first(wire.node)
+                more = f", delayed: true{'' if first is None else f', initial: {first!r}'}" if wire.delayed else ""
+                plan += f"  - {{from: {wire.node}.o{wire.node}, to: {name}.{port}{more}}}\n"
+        plan = plan if plan.count("\n") > 1 else ""
+        if self.outside:
+            plan += "environment:\n"
+        for port, (assume, constant) in self.outside.items():
+            said = [f"assume: {assume.text!r}"] if assume is not None else []
+            said += ["constant: true"] if constant else []
+            plan += f"  in.{port}: {{{', '.join([*said, 'because: it is'])}}}\n"
+        if random.random() < 0.5:
+            rule = random.choice(["R1", "R2", "R3", "R4"])
+            plan += f"compose: {{D: {{select: [{', '.join(random.sample(self.nodes, 2))}], rule: {rule}}}}}\n"
+        if len(self.nodes) > 2 and not self.remembers and random.random() < 0.4:
+            rule = f", rule: {random.choice(['R1', 'R2', 'R3', 'R4'])}" if self.rich and random.random() < 0.3 else ""
+            plan += f"subsystems: {{s: {{nodes: [{', '.join(random.sample(self.nodes, 2))}]{rule}}}}}\n"
+        plan += "requirements:\n"
+        return plan + "".join(
+            f"  R{k}: {{text: t, formula: '{each.text}', supported_by: [{', '.join(self.nodes)}]}}\n"
+            for k, each in enumerate(self.required)
+        )
+
+    def inputs(self, name: str, before: Values, now: Values, outside: Values, heard: bool) -> Values:
+        found = {}
+        for (node, port), wire in self.wires.items():
+            if node != name:
+                continue
+            if wire.topic:
+                found[f"in.{port}"] = heard
+            elif wire.outside:
+                found[f"in.{port}"] = outside[wire.outside]
+            else:
+                found[f"in.{port}"] = (before if wire.delayed else now)[wire.node]
+        return found
+
+    def kept_of(self, name: str) -> list[Formula]:
+        """A node's clauses, assumptions first."""
+        return [*self.assumed[name], *self.promised[name]]
+
+    def begins(self, free: Sequence[str]) -> Iterator[tuple[Values, Values]]:
+        """Constants, and what the outputs are before the first step."""
+        constants = [port for port in free if self.outside.get(port, (None, False))[1]]
+        for chosen in product([False, True], repeat=len(constants)):
+            fixed = dict(zip(constants, chosen, strict=True))
+            choices = [
+                [True, False] if value is None else [fixed[value] if isinstance(value, str) else value]
+                for value in (self.initial[n] for n in self.nodes)
+            ]
+            for last in product(*choices):
+                yield fixed, dict(zip(self.nodes, last, strict=True))
+
+    def steps(self, *, granted: bool = False) -> Iterator[tuple[Values, Values, Values]]:
+        """Every step that some run takes: the outputs at it, what each node reads (``node.in.port``), and what the
+        environment gives. What the plan assumes of the environment holds. `granted`: and what nodes assume of the
+        environment alone, up to that step. Raises OverflowError where there are too many."""
+        free = sorted({wire.outside for wire in self.wires.values() if wire.outside})
+        clauses = [(n, each) for n in self.nodes for each in self.kept_of(n)]
+        memory = tuple(bit for _, each in clauses for bit in each.begins)
+        first = [
+            (tuple(fixed.items()), tuple(last[n] for n in self.nodes), memory, (True,) * len(self.nodes))
+            for fixed, last in self.begins(free)
+        ]
+        seen, todo = set(first), list(first)
+        while todo:
+            constants, last, kept_bits, kept = todo.pop()
+            fixed, before = dict(constants), dict(zip(self.nodes, last, strict=True))
+            changing = [port for port in free if port not in fixed]
+            hears = [False, True] if self.publishers else [False]
+            for chosen in product([True, False], repeat=len(self.nodes)):
+                now = dict(zip(self.nodes, chosen, strict=True))
+                for given, heard in product(product([True, False], repeat=len(changing)), hears):
+                    if self.publishers and heard not in {now[n] for n in self.publishers}:
+                        continue
+                    outside = {**fixed, **dict(zip(changing, given, strict=True))}
+                    if not all(f is None or f({f"in.{p}": outside[p]}) for p, (f, _) in self.outside.items()):
+                        continue
+                    read = {n: self.inputs(n, before, now, outside, heard) for n in self.nodes}
+                    bits, after = iter(kept_bits), list[bool]()
+                    held = {
+                        n: [each.at({**read[n], f"out.o{n}": now[n]}, bits, after) for each in self.kept_of(n)]
+                        for n in self.nodes
+                    }
+                    met = {n: held[n][: len(self.assumed[n])] for n in self.nodes}
+                    if granted and any(
+                        self.outer(n, each) and not good
+                        for n in self.nodes
+                        for each, good in zip(self.assumed[n], met[n], strict=True)
+                    ):
+                        continue
+                    still = tuple(was and all(met[n]) for n, was in zip(self.nodes, kept, strict=True))
+                    if all(
+                        not good or all(held[n][len(self.assumed[n]) :])
+                        for n, good in zip(self.nodes, still, strict=True)
+                    ):
+                        truths = {f"{n}.a{k}": good for n in self.nodes for k, good in enumerate(met[n])}
+                        yield now, truths, outside
+                        state = (constants, chosen, tuple(after), still)
+                        if state not in seen:
+                            seen.add(state)
+                            todo.append(state)
+                            if len(seen) > MOST_STATES:
+                                raise OverflowError
+
+    def outer(self, name: str, clause: Formula) -> bool:
+        """Whether a clause speaks of the environment alone."""
+        return all(self.wires[name, each.removeprefix("in.")].outside for each in clause.names)
