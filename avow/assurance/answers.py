@@ -97,14 +97,14 @@ class Supposition:
     """All of it, as the plan or the method has it."""
     because: str
     who: str
-    date: str
-    """The day on which it was supposed (the latest, where it was said more than once); empty: no day is named."""
     until: str
     expired: bool
     needed_by: tuple[str, ...]
     """Requirements."""
     where: tuple[str, ...]
     """Places of the plan, or claims whose evidence says it."""
+    date: str = field(default="", metadata=LATER)
+    """The day on which it was supposed (the latest, where it was said more than once); empty: no day is named."""
 
     @property
     def owned(self) -> bool:

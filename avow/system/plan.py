@@ -12,6 +12,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+from avow.base import codec
 from avow.base.diagnostics import Span
 from avow.base.files import digest
 from avow.language.contract import Contract
@@ -95,7 +96,7 @@ class Statement:
     """Who keeps it true; empty: nobody is named."""
     until: str = ""
     """The last day (ISO 8601) on which it may be relied upon; empty: no day is named."""
-    date: str = ""
+    date: str = field(default="", metadata=codec.LATER)
     """The day (ISO 8601) on which it was supposed; empty: no day is named."""
     span: Span | None = field(default=None, compare=False, repr=False)
 

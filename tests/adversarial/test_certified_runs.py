@@ -40,7 +40,8 @@ def judged(folder: Path, seed: int, *, rich: bool = False) -> int:
     for certificate in certificates.made.values():
         kernel = Kernel(certificates.known, certificate, certificates.solvers)
         for k, entry in enumerate(certificate.entries):
-            claims = [s for s in certificates.known.by_digest.get(entry.digest, ()) if s.node == entry.node]
+            same = certificates.known.by_digest.get(entry.digest, ())
+            claims = [s for s in same if s.node == entry.node and s.kind in (Kind.ASSUMPTION, Kind.REQUIREMENT)]
             if entry.how is not How.SHOWN or not claims or k not in kernel.checked[0] or k in kernel.checked[1]:
                 continue
             needs = {need.kind for need in kernel.establish(k).hypotheses}
@@ -94,6 +95,7 @@ def test_no_certificate_of_what_was_shows_what_is_false_now_at_length(tmp_path: 
     assert sum(kept(tmp_path, seed) for seed in range(100, 400)) > 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rich", [False, True])
 def test_nothing_proved_is_false(tmp_path: Path, rich: bool) -> None:
     assert sum(judged(tmp_path, seed, rich=rich) for seed in range(5)) > 0

@@ -286,7 +286,7 @@ def test_the_first_screen_of_a_full_case_is_in_plain_words() -> None:
 def test_which_suppositions_there_are_and_who_answers_for_them_is_said_in_a_line() -> None:
     def supposed(at: int, who: str, until: str) -> Supposition:
         key = f"environment.n.{at}"
-        return Supposition(f"S{at}", key, Sort.WORLD, f"It is {at}", "", "", who, "", until, False, ("R",), ())
+        return Supposition(f"S{at}", key, Sort.WORLD, f"It is {at}", "", "", who, until, False, ("R",), ())
 
     said = [supposed(at, "A. Person" if at < 5 else "B", f"2027-01-0{at}") for at in range(1, 7)]
     most = replace(said[2], needed_by=("R", "Q"))
