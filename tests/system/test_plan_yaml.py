@@ -264,7 +264,8 @@ def test_plain_words_owners_and_dates_are_checked(tmp_path: Path, entry: str, co
 
 def test_statements_of_a_plan(tmp_path: Path) -> None:
     text = (
-        "compose: {D: {persistence: {because: b, says: It stays, who: W, date: 2026-11-20, until: 2030-01-01}, entered: {because: e}}}\n"
+        "compose: {D: {persistence: {because: b, says: It stays, who: W, date: 2026-11-20, until: 2030-01-01},"
+        " entered: {because: e}}}\n"
         "suppositions: {hoare.map: {says: The map fits}}\n"
         "requirements: {R: {text: t, amounts: {because: it does}}}\n"
         "nodes: {a: {title: the first, methods: [hoare: {}]}}\n"
