@@ -242,6 +242,12 @@ WORKSPACE_CODES = register(
         "Start one with `avow worker --on …`.",
     ),
     declare(
+        "CLUSTER005",
+        "certificate not accepted",
+        "A certificate has expired, is not of the authority that AVOW_TLS_CA names, or cannot be read: whose, it says.",
+        "Have the authority issue a new one.",
+    ),
+    declare(
         "CLI006",
         "cannot be run",
         "The system cannot be simulated: the message says what is missing, such as an interpretation or a domain.",

@@ -14,6 +14,8 @@ import ipaddress
 import json
 import os
 import queue
+import socket
+import ssl
 import tempfile
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -66,6 +68,30 @@ class Address:
         parts = {f"tls_{side}_{part}": paths[part] for side in ("client", "worker") for part in ("cert", "key")}
         return Security(require_encryption=True, tls_ca_file=paths["ca"], **parts)
 
+    def greet(self) -> None:
+        """Raises Rejected (``CLUSTER005``) where a certificate, of either side, is not accepted: Dask would only try
+        again and again, and not say why. That nobody is there yet is no matter of certificates."""
+        if not self.secure:
+            return
+        paths = {name: os.environ.get(variable, "") for name, variable in _TLS.items()}
+        host, _, port = self.url.partition("://")[2].rpartition(":")
+        try:
+            context = ssl.create_default_context(ssl.Purpose.SERVER_AUTH, cafile=paths["ca"])
+            context.check_hostname = False  # as Dask has it: who has a certificate of the authority belongs to it
+            context.load_cert_chain(paths["cert"], paths["key"])
+            with (
+                socket.create_connection((host.strip("[]"), int(port)), timeout=CLUSTER_CONNECT) as plain,
+                context.wrap_socket(plain) as secure,
+            ):
+                secure.recv(1)  # with TLS 1.3 the other side says only now that it does not accept us
+        except ssl.SSLError as error:
+            why = getattr(error, "verify_message", "") or error.reason or str(error)
+            whose = "the cluster's" if isinstance(error, ssl.SSLCertVerificationError) else "this side's"
+            told = f"{whose} certificate is not accepted at {self.url}: {why.replace('_', ' ').lower()}"
+            raise Rejected(Diagnostic("CLUSTER005", told)) from error
+        except OSError:
+            return
+
 
 def _is_loopback(host: str) -> bool:
     try:
@@ -107,10 +133,12 @@ class Cluster:
         except ImportError as error:
             message = "other machines are reached by Dask, which is not installed"
             raise Rejected(Diagnostic("CLUSTER003", message, hint="pip install 'avow[cluster]'")) from error
+        security = address.security()
+        address.greet()
         try:
             self._client = Client(
                 address.url,
-                security=address.security(),
+                security=security,
                 deserializers=["msgpack"],
                 set_as_default=False,
                 timeout=CLUSTER_CONNECT,
@@ -204,11 +232,14 @@ def serve(address: Address, slots: int, tools: Tools) -> None:
         message = "other machines are reached by Dask, which is not installed"
         raise Rejected(Diagnostic("CLUSTER003", message, hint="pip install 'avow[cluster]'")) from error
 
+    security = address.security()
+    address.greet()
+
     async def work() -> None:
         worker = Worker(
             address.url,
             nthreads=slots,
-            security=address.security(),
+            security=security,
             resources={resource(tool): slots for tool in tools if tool[1]},
             host="127.0.0.1" if not address.secure else None,
             dashboard=False,

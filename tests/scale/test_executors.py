@@ -24,6 +24,7 @@ from helpers import some
 
 from avow.backend_kit.protocol import Limits
 from avow.backend_kit.registry import backend
+from avow.base.tools import find_tool
 from avow.base.verdict import Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import Ledger, ledger_of
@@ -38,6 +39,7 @@ from avow.pipeline.worker import answer
 from avow.system.load import load_system
 
 from .made import programs
+from .test_certificates import Authority
 
 
 @pytest.fixture
@@ -338,6 +340,69 @@ def test_workers_killed_at_any_time_lose_nothing_and_leave_nothing(
     until(lambda: not machines.left(), 5)
 
 
+HANGS = """#!/bin/sh
+case "$*" in *version*) echo 4.9.1;; *) exec sleep 1000;; esac
+"""
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("how", ["cancelled", "out of time", "its worker is killed"])
+def test_a_tool_that_hangs_ends_when_nobody_waits_for_it_any_more(
+    place: Workspace, machines: Machines, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    from avow.pipeline.cluster import Address, Cluster
+
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    (tools / "dafny").write_text(HANGS)
+    (tools / "dafny").chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tools}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    find_tool.cache_clear()
+    folder = place.contracts / "made"
+    (folder / "models" / "n0.dfy").write_text("method step(x0: int) returns (y0: int) { y0 := x0; }\n")
+    plan = (folder / "plan.yaml").read_text()
+    seconds = ", seconds: 3" if how == "out of time" else ""
+    named = plan.replace("hoare: {program: models/n0.imp}", f"dafny: {{implementation: models/n0.dfy{seconds}}}")
+    assert named != plan
+    (folder / "plan.yaml").write_text(named)
+    worker = machines.worker()
+    cluster = Cluster(Address.read(machines.url))
+
+    def hanging() -> bool:
+        return any(b"sleep" in _command(pid) for pid in machines.left())
+
+    try:
+        until(cluster.offers)
+        asking.use(cluster)
+        work = next(w for w in works(place) if w.engine == "dafny")
+        request = asking.request_of(place, work, work.obligations, place.root / "artifacts")
+        assert request.wanted
+        asked = Asked.of(request)
+        cluster.submit(asked)
+        until(hanging)
+        match how:
+            case "cancelled":
+                cluster.cancel([asked.key])
+            case "out of time":
+                came = next(cluster.results())
+                verdicts = asking.judged(work, work.obligations, asked.data, came.data, {}).outcomes
+                assert not any(o.verdict.supports for o in verdicts)
+            case _:  # the worker is killed
+                worker.send_signal(signal.SIGKILL)
+        until(lambda: not hanging())
+    finally:
+        cluster.close()
+        find_tool.cache_clear()
+
+
+def _command(pid: str) -> bytes:
+    try:
+        return (Path("/proc") / pid / "cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
 @pytest.mark.nightly
 def test_what_a_worker_pickles_is_not_read(machines: Machines, tmp_path: Path) -> None:
     from avow.pipeline.cluster import Address, Cluster, _fetched
@@ -397,3 +462,40 @@ def test_without_certificates_there_is_no_tls(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.delenv("AVOW_TLS_CA", raising=False)
     with pytest.raises(Rejected, match="CLUSTER002"):
         Address.read("dask+tls://a.example:8786").security()
+
+
+@pytest.mark.nightly
+def test_by_tls_the_same_and_no_word_with_whom_the_authority_does_not_know(
+    place: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed")
+    from avow.base.diagnostics import Rejected
+    from avow.pipeline.cluster import Address, Cluster
+
+    ours = Authority(tmp_path, "ours")
+    cert, key = ours.issue("all")
+    for name, value in (("CA", str(ours.file)), ("CERT", cert), ("KEY", key)):
+        monkeypatch.setenv(f"AVOW_TLS_{name}", value)
+    here = settle(place)
+    machines = Machines("--tls-ca-file", str(ours.file), "--tls-cert", cert, "--tls-key", key)
+    try:
+        machines.worker()
+        cluster = Cluster(Address.read(machines.url))
+        try:
+            until(cluster.offers)
+            asking.use(cluster)
+            assert settle(place) == here
+        finally:
+            cluster.close()
+        before = Ledger(place.ledger("made")).head
+        for name, (cert, key) in {
+            "expired": ours.issue("late", expired=True),
+            "": Authority(tmp_path, "other").issue("stranger"),
+        }.items():
+            monkeypatch.setenv("AVOW_TLS_CERT", cert)
+            monkeypatch.setenv("AVOW_TLS_KEY", key)
+            with pytest.raises(Rejected, match=f"certificate is not accepted.*{name}"):
+                Cluster(Address.read(machines.url))
+        assert Ledger(place.ledger("made")).head == before
+    finally:
+        machines.close()
