@@ -150,6 +150,9 @@ class Backend(ABC):
     """Whether an answer may depend on the scenario's `steps`; likewise."""
     uses_wiring: bool = True
     """Whether an answer may depend on topics, connections or other nodes; likewise."""
+    uses_upstream: bool = False
+    """Whether an answer may depend on the contracts of the nodes from which data reaches the node, over however many
+    others, and on what the same backend is told of them. Where it is False the job has no clause of another node."""
     remembers: bool = False
     """Whether it judges clauses that speak of other steps (`avow.temporal`), or does not read formulas at all. The
     others are never shown such a clause: what the plan asks of them is refused by name."""
@@ -217,6 +220,7 @@ _REQUIRED: Mapping[str, type | tuple[type, ...]] = {
     "uses_scenario": bool,
     "uses_steps": bool,
     "uses_wiring": bool,
+    "uses_upstream": bool,
     "remembers": bool,
     "uses_source": bool,
     "of": Object,

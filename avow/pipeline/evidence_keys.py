@@ -4,9 +4,10 @@ A claim's digest covers its clause and the node's assumptions. A method may see 
 on (it settles them together), the types of *all* the node's ports (a program is run on
 inputs that the clause does not mention), the values of the contract's constants (an option or a program may name one),
 the scenario, and what the node is wired to. What is left out here would make evidence look current that is not; so a
-backend is taken to see all of it unless it says that it does not (`uses_scenario`, `uses_steps`, `uses_wiring`), and a
-constant, or another guarantee of the node, counts as soon as its name occurs anywhere in the options or files. Of such
-a guarantee a method sees the name only.
+backend is taken to see all of it unless it says that it does not (`uses_scenario`, `uses_steps`, `uses_wiring`). The
+contracts of the nodes from which its data comes count where it says that it looks there (`uses_upstream`), a constant
+or another guarantee of the node as soon as its name occurs anywhere in the options or files. Of such a guarantee a
+method sees the name only.
 """
 
 from __future__ import annotations
@@ -88,6 +89,7 @@ def surroundings(tool: Backend, job: Job, options: str) -> str:
         parts.append(scenario.digest if tool.uses_steps else scenario.content)
     if tool.uses_wiring:
         parts.append(_wiring(job.system, job.node, tool.name))
+    parts += [_upstream_node(job, name, tool.name) for name in sorted(upstream(tool, job))]
     if tool.uses_source and job.source is not None:
         declared = job.source
         texts = (declared.python, declared.class_name, declared.cpp, declared.parameters, declared.numbers.value)
@@ -131,6 +133,25 @@ def _wiring(system: System, node: Node, backend: str) -> list[Any]:
             ]
         )
     return found
+
+
+def upstream(tool: Backend, job: Job) -> frozenset[str]:
+    """The nodes whose contracts the method may look at, since their data reaches its node: none where that assumes
+    nothing."""
+    if not tool.uses_upstream or not job.node.assumptions:
+        return frozenset()
+    try:
+        return dataflow(job.system).upstream(job.node.name)
+    except Rejected:  # told elsewhere
+        return frozenset()
+
+
+def _upstream_node(job: Job, name: str, backend: str) -> list[Any]:
+    """A node's clauses, what feeds it, and what the same backend is told."""
+    node, plan = job.contract.node(name), job.system.plan.node(name)
+    clauses = sorted([c.kind.value, c.name, digest(c.formula)] for c in node.clauses)
+    told = [method_options(m) for m in plan.methods if m.backend == backend and name != job.node.name]
+    return [name, clauses, _ports(node), _wiring(job.system, node, backend), told]
 
 
 def _topics(node: Node) -> list[list[str]]:

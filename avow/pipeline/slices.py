@@ -6,7 +6,7 @@ slice: whoever receives one computes the keys from it again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from avow.backend_kit.protocol import Backend, Job
@@ -19,6 +19,7 @@ from avow.formulas.values import Value
 from avow.language.contract import Clause, Contract, Node
 from avow.language.terms import TRUE, Variable
 from avow.pipeline.evidence_keys import Named, method_options
+from avow.pipeline.evidence_keys import upstream as upstream_of
 from avow.pipeline.work import is_portable
 from avow.system.graph import Edge, dataflow
 from avow.system.plan import Connection, Located, Method, NodePlan, Plan, Ros, System
@@ -89,13 +90,16 @@ def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodS
     """`sentences`: with those of the clauses, which no answer may depend on; generated files show them."""
     plan = job.system.plan
     named = Named.of(method_options(job.method), tool.files(job))
-    edges = dataflow(job.system).feeding(job.node.name) if tool.uses_wiring else ()
-    sources = {edge.source.node for edge in edges} - {job.node.name}
+    graph, own = dataflow(job.system), job.node.name
+    upstream = upstream_of(tool, job)
+    edges = graph.feeding(own) if tool.uses_wiring else ()
+    edges += tuple(edge for name in sorted(upstream - {own}) for edge in graph.feeding(name))
+    sources = {edge.source.node for edge in edges} - {own}
     contract = job.contract
     nodes = tuple(
-        _own(job, named, sentences) if n.name == job.node.name else replace(n, assumptions=(), guarantees=())
+        _own(job, named, upstream, sentences) if n.name == own else _other(n, upstream)
         for n in contract.nodes
-        if n.name == job.node.name or n.name in sources
+        if n.name == own or n.name in sources
     )
     cut = replace(
         _bare(plan),
@@ -113,18 +117,31 @@ def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodS
     return MethodSlice(System(cut, cut_contract), job.node.name, job.method.id)
 
 
-def _own(job: Job, named: Named, sentences: bool) -> Node:
-    """The node with the guarantees that the method takes on; of others that it names there is the name only."""
-    taken, others = {o.name for o in job.obligations}, named.others(job)
+def _own(job: Job, named: Named, upstream: Collection[str], sentences: bool) -> Node:
+    """The node with the guarantees that the method takes on; of others that it names there is the name only. A node
+    that is upstream of itself has all of them."""
+    node, taken, others = job.node, {o.name for o in job.obligations}, named.others(job)
+    if node.name in upstream:
+        taken, others = {c.name for c in node.guarantees}, frozenset()
 
     def seen(clause: Clause) -> Clause:
-        """Without how it is written and where it stands."""
-        formula = TRUE if clause.name in others else clause.formula
-        return replace(clause, formula=formula, position=0, text="", sentence=clause.sentence if sentences else None)
+        clause = replace(clause, formula=TRUE) if clause.name in others else clause
+        return replace(_bare_clause(clause), sentence=clause.sentence if sentences else None)
 
-    assumed = map(seen, job.node.assumptions)
-    promised = (seen(c) for c in job.node.guarantees if c.name in taken | others)
-    return replace(job.node, assumptions=tuple(assumed), guarantees=tuple(promised))
+    promised = (seen(c) for c in node.guarantees if c.name in taken | others)
+    return replace(node, assumptions=tuple(map(seen, node.assumptions)), guarantees=tuple(promised))
+
+
+def _other(node: Node, upstream: Collection[str]) -> Node:
+    """Another node, with its clauses where data reaches the method's own node from there."""
+    clauses = node if node.name in upstream else replace(node, assumptions=(), guarantees=())
+    assumed, promised = (tuple(map(_bare_clause, part)) for part in (clauses.assumptions, clauses.guarantees))
+    return replace(node, assumptions=assumed, guarantees=promised)
+
+
+def _bare_clause(clause: Clause) -> Clause:
+    """Without how it is written and where it stands."""
+    return replace(clause, position=0, text="", sentence=None)
 
 
 def _planned(tool: Backend, node: NodePlan, method: Method) -> NodePlan:

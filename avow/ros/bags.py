@@ -18,6 +18,9 @@ Event = Mapping[str, Any]
 ENVELOPE = ("topic", "time")
 """What an event says beside its message's fields."""
 
+PUBLISHER = "_publisher"
+"""Where an event has the whole name of the node that published it, if it is known."""
+
 WHOLE = "_message"
 """Where an event has its whole message, if that has fields of those names."""
 
@@ -57,10 +60,21 @@ class Carried:
     ros2: bool = False
 
 
-def enveloped(message: Mapping[str, Any], topic: str, time: float) -> Event:
-    """A message as an event: its fields, its topic and when it came. Fields that bear those two names are not lost."""
-    whole = {WHOLE: message} if any(name in message for name in ENVELOPE) else {}
-    return {**message, **whole, "topic": topic, "time": time}
+def enveloped(message: Mapping[str, Any], topic: str, time: float, by: str = "") -> Event:
+    """A message as an event: its fields, its topic, when it came, and, if it is known, who published it. Fields that
+    bear those two names are not lost."""
+    event = {**message, "topic": topic, "time": time}
+    if any(name in message for name in ENVELOPE):
+        event[WHOLE] = message
+    if by:
+        event[PUBLISHER] = by
+    return event
+
+
+def publisher(event: Event) -> str:
+    """Who published an event's message; empty where that is not known."""
+    said = event.get(PUBLISHER, "")
+    return said if isinstance(said, str) else ""
 
 
 def message_of(event: Event, field: str) -> Any:
@@ -117,7 +131,7 @@ def messages(
                 event = found
             elif wanted(topic):
                 event = plain(reader.deserialize(raw, kind(connection.msgtype)))
-            yield enveloped(event, topic, time / 1e9)
+            yield enveloped(event, topic, time / 1e9, getattr(connection.ext, "callerid", None) or "")
 
 
 @contextmanager

@@ -63,6 +63,16 @@ class Graph:
         """The edges out of a node."""
         return self.by_provider.get(node, ())
 
+    def upstream(self, node: str) -> frozenset[str]:
+        """The nodes from which data reaches a node, at once or with delay: itself only where it is on a cycle."""
+        found: set[str] = set()
+        stack = [node]
+        while stack:
+            more = {edge.source.node for edge in self.feeding(stack.pop())} - found
+            found |= more
+            stack += more
+        return frozenset(found)
+
     def providers(self, node: str, *, delayed: bool | None = None) -> tuple[str, ...]:
         """The nodes that feed a node (with or without itself, as the edges have it), each once."""
         found = (e.source.node for e in self.feeding(node) if delayed is None or e.delayed is delayed)

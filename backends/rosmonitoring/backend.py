@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,11 +37,12 @@ class RosMonitoringBackend(Backend):
 
     name = "rosmonitoring"
     title = "runtime monitors, and recorded traces judged by them"
-    version = "5"
+    version = "6"
     strength = Verdict.MONITORED
     link = Link.MAPPED
     of = Object.RECORDING
     uses_steps = False
+    uses_upstream = True
     remembers = True
     options_schema = SCHEMA
     codes = CODES
@@ -145,12 +146,17 @@ class RosMonitoringBackend(Backend):
             outcomes = tuple(_without_trace(job, found, refused, o) for o in job.obligations)
             return Report(outcomes, "avow monitor", __version__)
         from .engine import Monitor
+        from .watched import Fault
 
         deadline = time.monotonic() + limits.seconds
         runs: list[_Run] = []
         for name in _traces(job):
-            monitor = Monitor(found, [o.name for o in job.obligations])
-            runs.append(_judge(job, name, monitor, deadline))
+            run = _judge(job, name, [Monitor(found, [o.name for o in job.obligations])], deadline)
+            if any(v.fault is Fault.PROVIDER for v in run.first.values()):
+                followed = _judge(job, name, _with_upstream(job, found), deadline)
+                run = run if followed.unknown or followed.trouble else followed
+            _draw(job, run)
+            runs.append(run)
         logs = {f"trace-{k}.log": run.log() for k, run in enumerate(runs, start=1)}
         outcomes = tuple(_outcome(o.id, o.name, runs, _spoken(job, o), _excuse(job, runs)) for o in job.obligations)
         for obligation, outcome in zip(job.obligations, outcomes, strict=True):
@@ -200,6 +206,8 @@ class _Run:
         from .watched import Fault
 
         for violation in violations:
+            if violation.node != self.monitor.setup.node.name:
+                continue
             self.marks.note(violation)
             self.mapping_faults += violation.fault is Fault.MAPPING
             self.first.setdefault(f"{violation.fault.name}/{violation.clause}", violation)
@@ -216,12 +224,31 @@ class _Run:
         return "\n".join(lines) + "\n"
 
 
-def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
-    from .lanes import signals
+def _with_upstream(job: Job, found: Setup) -> list[Monitor]:
+    """The node's own monitor, and those of the nodes from which its data comes: as far as they can be watched."""
+    from avow.system.graph import dataflow
+
+    from .engine import Monitor
+    from .options import NAME, setup
+
+    system, names = job.system, dataflow(job.system).upstream(job.node.name)
+    monitors = [Monitor(found, None if job.node.name in names else [o.name for o in job.obligations])]
+    for name in sorted(names - {job.node.name}):
+        node = system.contract.node(name)
+        options = next((m.options for m in system.plan.node(name).methods if m.backend == NAME), None)
+        other, faults = setup(system, node, options, found.known)
+        if not node.relay and not faults:
+            monitors.append(Monitor(other))
+    return monitors
+
+
+def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) -> _Run:
+    """What a trace shows of the first monitor's node."""
     from .options import origin, readable
-    from .session import judge
+    from .session import Session, judge
     from .traces import digest_trace
 
+    monitor, whole = monitors[0], Session(job.system, tuple(monitors))
     run = _Run(name, monitor)
     path = inside(job.root, name)
     if path is None:
@@ -232,14 +259,12 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
         where = origin(job.system)
         if wrong := readable(monitor.setup, path, where):
             raise Rejected(*wrong)
-        for _, found in judge([monitor], path, where):
+        for _, found in judge(monitors, path, where, whole.told):
             run.note(found)
             if time.monotonic() > deadline:
                 run.unknown = f"{name}: time was up after {monitor.events} events"
                 break
-        run.note(monitor.finish())
-        if monitor.events:
-            run.heard = signals([monitor.setup], path, where, monitor.events, run.marks, monitor.listens)
+        run.note(whole.finish())
     except Rejected as error:
         # by the plan's name for it: where the folder lies on this machine is no part of what was found
         told = ((f"{name}, line {d.span.line}" if d.span else name, d.message) for d in error.diagnostics)
@@ -247,6 +272,16 @@ def _judge(job: Job, name: str, monitor: Monitor, deadline: float) -> _Run:
     except OSError as error:
         run.trouble = f"{name}: {error.strerror or error}"
     return run
+
+
+def _draw(job: Job, run: _Run) -> None:
+    """Read once more what the picture of a run shows."""
+    from .lanes import signals
+    from .options import origin
+
+    monitor, path = run.monitor, inside(job.root, run.name)
+    if monitor.events and path is not None and not run.trouble:
+        run.heard = signals([monitor.setup], path, origin(job.system), monitor.events, run.marks, monitor.listens)
 
 
 def _timelines(job: Job, found: Setup, runs: list[_Run], obligation: Obligation) -> list[dict[str, Any]]:
@@ -266,13 +301,14 @@ def _timelines(job: Job, found: Setup, runs: list[_Run], obligation: Obligation)
 
 
 def _excuse(job: Job, runs: list[_Run]) -> str:
-    """The first assumption that was broken, and who provides what it speaks of: whose evidence says more."""
+    """The first assumption that was broken, by whom, and where that began."""
     from avow.system.formulas import ports_of
     from avow.system.graph import dataflow
 
     from .watched import Fault
 
-    found = ((run.name, v) for run in runs for v in run.first.values() if v.fault is Fault.ASSUMPTION)
+    wrong = (Fault.ASSUMPTION, Fault.PROVIDER)
+    found = ((run.name, v) for run in runs for v in run.first.values() if v.fault in wrong)
     first = min(found, key=lambda one: (one[0], one[1].index), default=None)
     if first is None:
         return "an assumption was broken"
@@ -281,9 +317,10 @@ def _excuse(job: Job, runs: list[_Run]) -> str:
     feeding = [e for e in dataflow(job.system).feeding(job.node.name) if e.target.port in spoken]
     late = " one step before" if any(e.delayed for e in feeding) else ""
     who = " and ".join(dict.fromkeys(str(e.source) for e in feeding))
-    told = f"by what {who} said{late}" if feeding else "by the environment"
+    told = f"by what {who} said{late}" if broken.fault is Fault.PROVIDER else "by the environment"
     about = ", ".join(f"{n} = {v}" for n, v in broken.values)
-    return f"the assumption {broken.clause} was broken {told}, first at event {broken.index} of {trace} ({about})"
+    why = f"({about}): {broken.cause}" if broken.cause else f"({about})"
+    return f"the assumption {broken.clause} was broken {told}, first at event {broken.index} of {trace} {why}"
 
 
 def _outcome(obligation: str, name: str, runs: list[_Run], names: frozenset[str], excuse: str) -> Outcome:

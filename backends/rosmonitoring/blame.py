@@ -1,11 +1,13 @@
 """Whose fault was it? A breach is followed along the graph, across delays, to the first clause that broke.
 
 A node whose assumption fails on what another node says is not to blame, and nor is the environment: the other node is,
-where one of its guarantees about that output was broken; else it was broken in turn by what came before it.
+where one of its guarantees was broken by that very message; else it was broken in turn by what came before it. Which
+message it was is known from both ends: the guarantee's outputs and the assumption's inputs were read from it.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -15,17 +17,17 @@ from avow.system.formulas import ports_of
 from avow.system.graph import Edge, dataflow
 from avow.system.plan import System
 
-from .coverage import Tally
 from .engine import Monitor
+from .tuning import BREACHES_KEPT, BREACHES_OPEN
 from .watched import Fault, Violation
 
 
-@dataclass(frozen=True, slots=True)
-class _Broken:
-    """A guarantee that failed: where it all began, and how often it had held until then."""
+@dataclass(slots=True)
+class _Origin:
+    """Where a breach began, in words; empty as long as that is open. `event`: the first one's."""
 
-    origin: str
-    held: int
+    text: str = ""
+    event: int = 0
 
 
 @dataclass(slots=True)
@@ -33,78 +35,145 @@ class Blame:
     """Follows breaches; `told` takes the violations of one event, of all nodes together."""
 
     system: System
+    monitors: Mapping[str, Monitor]
+    """By their nodes."""
     _feeding: dict[str, dict[str, Edge]] = field(default_factory=dict)
-    _broken: dict[tuple[str, str], _Broken] = field(default_factory=dict)
-    _assumed: dict[str, str] = field(default_factory=dict)
-    """Node → where its latest broken assumption began."""
+    _broken: dict[tuple[str, str], dict[int, _Origin]] = field(default_factory=dict)
+    """(node, output) → the messages of it with which a guarantee was broken."""
+    _assumed: dict[str, deque[tuple[Violation, _Origin]]] = field(default_factory=dict)
+    """Node → its latest broken assumptions, and where each began."""
+    _open: deque[tuple[Violation, _Origin]] = field(default_factory=deque)
+    """Broken assumptions on what a node said that is not judged yet."""
 
     def __post_init__(self) -> None:
         for edge in dataflow(self.system).edges:
             self._feeding.setdefault(edge.target.node, {})[edge.target.port] = edge
 
-    def told(self, violations: Sequence[Violation], monitors: Mapping[str, Monitor]) -> Iterator[Violation]:
-        """The same, with who is to blame: guarantees first, since an assumption may fail by them at the same event."""
+    def told(self, violations: Sequence[Violation], *, over: bool = False) -> Iterator[Violation]:
+        """The same, with who is to blame. What has to wait until a node's answer is judged is told later, at the latest
+        once the run is `over`."""
+        origins: list[tuple[Violation, _Origin]] = []
         for violation in violations:
-            if violation.fault is Fault.GUARANTEE:
-                origin = f"{violation.node}.{violation.clause} at event {violation.index}"
-                self._note(violation, origin, monitors)
+            if violation.fault is Fault.ASSUMPTION:
+                origins.append((violation, _Origin()))
+                known = self._assumed.setdefault(violation.node, deque(maxlen=BREACHES_KEPT))
+                known.append(origins[-1])
         for violation in violations:
             match violation.fault:
-                case Fault.ASSUMPTION:
-                    yield self._assumption(violation, monitors)
-                case Fault.EXCUSED:
-                    self._note(violation, self._assumed.get(violation.node, ""), monitors)
-                    yield violation
-                case _:  # the node itself, or a message
-                    yield violation
+                case Fault.GUARANTEE:
+                    self._note(violation, _Origin(f"{_place(violation)}{self._doubt(violation)}", violation.index))
+                case Fault.EXCUSED if origin := self._since(violation.node, violation.index):
+                    self._note(violation, origin)
+                case _:  # no output of the node is wrong by it
+                    pass
+        self._open += origins
+        yield from (v for v in violations if v.fault is not Fault.ASSUMPTION)
+        yield from self._settle(late=False)
+        if over or len(self._open) > BREACHES_OPEN:
+            yield from self._settle(late=True)
 
-    def _note(self, violation: Violation, origin: str, monitors: Mapping[str, Monitor]) -> None:
-        if origin:
-            tally = monitors[violation.node].tallies[violation.clause]
-            self._broken[violation.node, violation.clause] = _Broken(origin, _held(tally))
+    def _settle(self, *, late: bool) -> Iterator[Violation]:
+        """Those whose cause is known; `late`: also those of which it will not be."""
+        waiting = 0
+        while self._open and waiting < len(self._open):
+            violation, origin = self._open.popleft()
+            followed = self._followed(violation, origin, late=late)
+            if followed is None:
+                self._open.append((violation, origin))
+                waiting += 1
+            else:
+                waiting = 0  # others may wait for it
+                yield followed
 
-    def _assumption(self, violation: Violation, monitors: Mapping[str, Monitor]) -> Violation:
+    def _note(self, violation: Violation, origin: _Origin) -> None:
+        for name, (message, _) in violation.heard.items():
+            role, _, port = name.partition(".")
+            if role == Role.OUTPUT:
+                known = self._broken.setdefault((violation.node, port), {})
+                known.setdefault(message, origin)
+                if len(known) > BREACHES_KEPT:
+                    del known[next(iter(known))]
+
+    def _doubt(self, violation: Violation) -> str:
+        monitor = self.monitors[violation.node]
+        unsure = monitor.tallies[violation.clause].unpaired or monitor.backwards
+        return " (if the order of arrival is that of cause)" if unsure else ""
+
+    def _since(self, node: str, event: int) -> _Origin | None:
+        """Where the assumption began to fail that was broken last before an event."""
+        return next((origin for one, origin in reversed(self._assumed.get(node, ())) if one.index <= event), None)
+
+    def _by(self, node: str, given: Mapping[str, tuple[int, ...]]) -> _Origin | None:
+        """Where the assumption began to fail that was broken by one of some messages."""
+        for one, origin in reversed(self._assumed.get(node, ())):
+            if any(message in given.get(name, ()) for name, (message, _) in one.heard.items()):
+                return origin
+        return None
+
+    def _followed(self, violation: Violation, origin: _Origin, *, late: bool) -> Violation | None:
+        """A broken assumption, with its cause; None as long as that may still be judged, unless it is late."""
         node = self.system.contract.node(violation.node)
-        edges = [edge for port in _inputs(node, violation.clause) for edge in self._edges(node.name, port)]
-        if not edges:
-            self._assumed[node.name] = f"{node.name}.{violation.clause} at event {violation.index} (environment)"
+        edges = {port: self._edges(violation, port) for port in _inputs(node, violation.clause)}
+        here = _place(violation)
+        if not any(edges.values()):
+            origin.text, origin.event = f"{here} (environment)", violation.index
             return violation
-        here = f"{node.name}.{violation.clause} at event {violation.index}"
-        causes = [cause for edge in edges if (cause := self._cause(edge, monitors))]
-        self._assumed[node.name] = causes[0] if causes else here
-        providers = ", ".join(dict.fromkeys(str(edge.source) for edge in edges))
+        causes: list[_Origin] = []
+        for port, feeding in edges.items():
+            for edge in feeding:
+                cause = self._cause(edge, violation, port)
+                if cause is not None and not cause.text and not late:
+                    return None
+                causes += [cause] if cause is not None and cause.text else []
         if causes:
-            why = f"{causes[0]} caused {here}"
+            first = min(causes, key=lambda cause: cause.event)
+            origin.text, origin.event, why = first.text, first.event, f"{first.text} caused {here}"
         else:
-            why = f"it came from {providers}, of which no guarantee was seen broken"
-        return replace(violation, fault=Fault.PROVIDER, explanation=f"{violation.explanation}; {why}")
+            origin.text, origin.event = here, violation.index
+            sources = list(dict.fromkeys(edge.source for feeding in edges.values() for edge in feeding))
+            unseen = [str(source) for source in sources if source.node not in self.monitors]
+            why = f"it came from {', '.join(map(str, sources))}, of which no guarantee was seen broken"
+            why += f" ({', '.join(unseen)} is not monitored)" if unseen else ""
+            given = [f"in.{port}" for port, feeding in edges.items() if not feeding]
+            why += f"; {', '.join(given)} came from the environment" if given else ""
+        return replace(violation, fault=Fault.PROVIDER, cause=why)
 
-    def _edges(self, node: str, port: str) -> list[Edge]:
-        """What feeds an input; of a topic of several publishers, all of them."""
-        edge = self._feeding.get(node, {}).get(port)
+    def _edges(self, violation: Violation, port: str) -> list[Edge]:
+        """What feeds an input; of a topic of several publishers, the one that published the message, else all."""
+        edge = self._feeding.get(violation.node, {}).get(port)
         if edge is None:
             return []
-        if self.system.contract.node(edge.source.node).relay:
-            return list(self._feeding.get(edge.source.node, {}).values())
-        return [edge]
+        if not self.system.contract.node(edge.source.node).relay:
+            return [edge]
+        several = list(self._feeding.get(edge.source.node, {}).values())
+        _, by = violation.heard.get(f"{Role.INPUT}.{port}", (0, ""))
+        names = self.system.plan.ros.names
+        return [e for e in several if by and names.placed(e.source.node).name == by] or several
 
-    def _cause(self, edge: Edge, monitors: Mapping[str, Monitor]) -> str:
-        """Where a breach of the source began that the edge still delivers; empty where there is none."""
-        source = self.system.contract.node(edge.source.node)
-        monitor = monitors.get(source.name)
-        if monitor is None:
-            return ""
-        for clause in source.guarantees:
-            broken = self._broken.get((source.name, clause.name))
-            speaks = any(v.role is Role.OUTPUT and v.name == edge.source.port for v in ports_of(clause.formula))
-            # a delayed edge still delivers what was said before the latest answer
-            if broken and speaks and _held(monitor.tallies[clause.name]) <= broken.held + edge.delayed:
-                return broken.origin
-        return ""
+    def _cause(self, edge: Edge, violation: Violation, port: str) -> _Origin | None:
+        """Where a breach of the source began that the message was part of (open, while that is not judged); None where
+        there is none."""
+        monitor = self.monitors.get(edge.source.node)
+        message, _ = violation.heard.get(f"{Role.INPUT}.{port}", (0, ""))
+        if monitor is None or not message:
+            return None
+        known = self._broken.get((edge.source.node, edge.source.port), {}).get(message)
+        if known is not None:
+            return known
+        if monitor.waits(violation.index):
+            return _Origin()
+        # a node that promised nothing, since what it was told was wrong, passes that on with this message
+        given = monitor.answered(message)
+        if given is not None:
+            return self._by(edge.source.node, given)
+        latest = all(message >= other for other, _ in violation.heard.values())
+        if latest and violation.heard and monitor.failing():
+            return self._since(edge.source.node, violation.index)
+        return None
 
 
-def _held(tally: Tally) -> int:
-    return tally.decided - tally.broken
+def _place(violation: Violation) -> str:
+    return f"{violation.node}.{violation.clause} at event {violation.index}"
 
 
 def _inputs(node: Node, clause: str) -> list[str]:

@@ -15,67 +15,27 @@ import math
 import re
 from bisect import bisect
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path as File
 from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.formulas.values import Value
-from avow.ros.bags import WHOLE
 
-from .coverage import Tally
 from .engine import Monitor
 from .numbers import Decimal
 from .options import same_topic
 from .pace import SEQUENCE
-from .regions import regions
-from .rules import Choice, Fields, Hold, Lookup, Path, Previous
+from .plans import Plan, Token, Watch, counts_of, is_seen, leads, plan_of, remember, texts_of, watch_of
+from .rules import Path, Previous
 from .shapes import Shape, scanner, shape
 from .timed import Timed
 from .traces import event_of, not_text
 from .tuning import CHUNK, EVENT_CHARACTERS, REMEMBERED, SHAPES_KEPT
-from .watched import Fault, Violation, Watched, time_text
-
-Token = int
-"""Stands for a variable's value: equal tokens of a variable, equal truth of every clause."""
+from .watched import Fault, Violation, time_text
 
 Match = re.Match[bytes]
 Handler = Callable[[Match], Any]
 """False: the engine has to judge the event; True: all is well; else what is to be told, by monitors."""
-
-
-@dataclass(slots=True)
-class _Plan:
-    """What one topic's messages do to one monitor, where nothing but their values matters."""
-
-    monitor: Monitor
-    names: tuple[str, ...]
-    """The variables that the topic carries."""
-    due: tuple[Watched, ...]
-    key: tuple[int, ...]
-    """The slots of the variables that the due clauses speak of."""
-    excuse: tuple[int, ...]
-    """The slots of all that may matter where one of them is broken: the assumptions' too."""
-    quiet: set[tuple[Token | None, ...]] = field(default_factory=set)
-    """Where all of them held."""
-    loud: dict[tuple[Token | None, ...], tuple[Violation, ...]] = field(default_factory=dict)
-    """Where some were broken: what is told then."""
-    ages: dict[str, float] = field(default_factory=dict)
-    """The greatest age of each input when an answer came."""
-
-
-@dataclass(slots=True)
-class _Watch:
-    """One monitor, and the tokens of its variables."""
-
-    monitor: Monitor
-    slots: dict[str, int]
-    tokens: list[Token | None]
-    values: list[Value | None]
-    """What the tokens stand for, as far as it was looked at."""
-    regional: dict[str, list[float]]
-    plans: dict[str, _Plan | None] = field(default_factory=dict)
-    """By topic; None: the engine judges all its events."""
 
 
 @dataclass(slots=True)
@@ -101,7 +61,7 @@ class Compiled:
     ) -> None:
         self._told = told
         self._heard = heard
-        self._watches = [_watch(monitor) for monitor in monitors]
+        self._watches = [watch_of(monitor) for monitor in monitors]
         self._fresh = itertools.count(1 << 40)
         self._shapes: list[Shape] = []
         self._known: dict[tuple[int, int, str], dict[Any, Token]] = {}
@@ -112,6 +72,10 @@ class Compiled:
         self._last = [b""]
         """The text of the latest event's time, where that was later than any before it."""
         self._scan, self._handlers = self._compile()
+        self._counted = (b"", 0, 0)
+        """What is being read, and how many lines of the trace end before a place in it."""
+        for monitor in monitors:
+            monitor.catch_up = self._flush
 
     # -- reading ---------------------------------------------------------------------------------------------------
 
@@ -123,6 +87,7 @@ class Compiled:
             with path.open("rb") as stream:
                 for chunk in _chunks(stream, str(path)):
                     at = 0
+                    self._counted = (chunk, 0, line)
                     while at < len(chunk):
                         before, handlers = len(self._shapes), self._handlers
                         done = line
@@ -130,7 +95,7 @@ class Compiled:
                             known = handlers[match.lastindex](match)
                             if known is True:
                                 continue
-                            found = self._again(known) if known else self._slow(match, str(path), line)
+                            found = self._again(known, line) if known else self._slow(match, str(path), line)
                             if found:
                                 yield line, found
                             if len(self._shapes) != before:
@@ -156,9 +121,9 @@ class Compiled:
         topic = raw if isinstance(raw, str) else ""
         before = [[*watch.tokens] for watch in self._watches]
         plans = [self._plan(watch, topic) for watch in self._watches]
-        tallies = [[_state(watched.tally) for watched in plan.due] if plan else [] for plan in plans]
+        tallies = [[counts_of(watched.tally) for watched in plan.due] if plan else [] for plan in plans]
         self._heard(topic, 1)
-        found = [violation for watch in self._watches for violation in watch.monitor.step(event)]
+        found = [violation for watch in self._watches for violation in watch.monitor.step(event, line)]
         which, groups = self._shaped(text, topic) if raw is topic else (-1, None)
         for watch, plan, old, tally in zip(self._watches, plans, before, tallies, strict=True):
             unreadable = {
@@ -166,13 +131,13 @@ class Compiled:
             }
             self._look(watch, set(plan.names) - unreadable if plan else set(), which, groups)
             if plan is not None:
-                _remember(watch, plan, old, tally, found)
+                remember(watch, plan, old, tally, found)
         self._last[0] = b""
         self._clock[0] = max((watch.monitor.timing.newest for watch in self._watches), default=-math.inf)
         self._clock[1] = min((watch.monitor.timing.deadline for watch in self._watches), default=math.inf)
         return list(self._told(found)) if found else []
 
-    def _again(self, known: list[tuple[Violation, ...]]) -> list[Violation]:
+    def _again(self, known: list[tuple[Violation, ...]], line: int) -> list[Violation]:
         """What was told before of an event like the latest."""
         self._count()
         found: list[Violation] = []
@@ -183,7 +148,8 @@ class Compiled:
             monitor = monitors[violation.node]
             monitor.tallies[violation.clause].broken += 1
             monitor.tallies[violation.clause].excused += violation.fault is Fault.EXCUSED
-            found.append(replace(violation, index=monitor.events, time=time))
+            heard = {name: (line, by) for name, (_, by) in violation.heard.items()}
+            found.append(replace(violation, index=monitor.events, time=time, heard=heard))
         return list(self._told(found))
 
     # -- the engine's state ------------------------------------------------------------------------------------------
@@ -216,18 +182,25 @@ class Compiled:
         waiting = [topic for _, topic, _ in last]
         if not waiting:
             return
-        events = [event_of(match.group(0)[:-1].decode(), "", 0) for _, _, match in last]
+        events = [(event_of(m.group(0)[:-1].decode(), "", 0), self._line(m.start())) for _, _, m in last]
         for watch in self._watches:
-            for topic, event in zip(waiting, events, strict=True):
+            for topic, (event, line) in zip(waiting, events, strict=True):
                 if event is not None and watch.plans.get(same_topic(topic.name)) is not None:
-                    watch.monitor.caught_up(event)
+                    watch.monitor.caught_up(event, line)
             watch.monitor.settle_previous()
             for name, at in watch.slots.items():
                 watch.values[at] = watch.monitor.values.get(name)
         for topic in waiting:
             topic.last = None
 
-    def _look(self, watch: _Watch, read: set[str], which: int, groups: tuple[bytes, ...] | None) -> None:
+    def _line(self, place: int) -> int:
+        """The line that begins at a place of what is being read, which is none before those asked for."""
+        chunk, known, lines = self._counted
+        lines += chunk.count(b"\n", known, place)
+        self._counted = (chunk, place, lines)
+        return lines + 1
+
+    def _look(self, watch: Watch, read: set[str], which: int, groups: tuple[bytes, ...] | None) -> None:
         """Set the tokens by what the engine now knows; `read`: the variables of this event's message."""
         values = watch.monitor.values
         for name, at in watch.slots.items():
@@ -243,11 +216,11 @@ class Compiled:
             if isinstance(rule, Previous) and values.get(name) is values.get(rule.source):
                 watch.tokens[watch.slots[name]] = watch.tokens[watch.slots[rule.source]]
 
-    def _token(self, watch: _Watch, name: str, which: int, groups: tuple[bytes, ...]) -> Token | None:
+    def _token(self, watch: Watch, name: str, which: int, groups: tuple[bytes, ...]) -> Token | None:
         at = watch.slots[name]
-        texts = _texts(self._shapes[which], watch.monitor.setup.rules[name])
+        texts = texts_of(self._shapes[which], watch.monitor.setup.rules[name])
         found = tuple(groups[k - 1] for k in texts)
-        if _seen(watch.monitor.setup.rules[name]):
+        if is_seen(watch.monitor.setup.rules[name]):
             same = watch.monitor.values[name] is watch.values[at]
             self._tokens(which, watch, name)[found if len(found) > 1 else found[0]] = 0
             return watch.tokens[at] if same else next(self._fresh)
@@ -264,15 +237,15 @@ class Compiled:
             known[key] = next(self._fresh)
         return known[key]
 
-    def _tokens(self, which: int, watch: _Watch, name: str) -> dict[Any, Token]:
+    def _tokens(self, which: int, watch: Watch, name: str) -> dict[Any, Token]:
         return self._known.setdefault((which, self._watches.index(watch), name), {})
 
     # -- plans and shapes --------------------------------------------------------------------------------------------
 
-    def _plan(self, watch: _Watch, topic: str) -> _Plan | None:
+    def _plan(self, watch: Watch, topic: str) -> Plan | None:
         key = same_topic(topic)
         if key not in watch.plans:
-            watch.plans[key] = _plan(watch, key)
+            watch.plans[key] = plan_of(watch, key)
         return watch.plans[key]
 
     def _shaped(self, text: bytes, topic: str) -> tuple[int, tuple[bytes, ...] | None]:
@@ -281,8 +254,8 @@ class Compiled:
                 return which, match.groups()
         if len(self._shapes) >= SHAPES_KEPT or any(self._refused(watch, topic) for watch in self._watches):
             return -1, None
-        leads = [leads for watch in self._watches for leads in self._leads(watch, topic)]
-        new = shape(text, topic, lambda path: path == SEQUENCE or any(lead(path) for lead in leads))
+        wanted = [lead for watch in self._watches for lead in self._leads(watch, topic)]
+        new = shape(text, topic, lambda path: path == SEQUENCE or any(lead(path) for lead in wanted))
         if new is None:
             return -1, None
         self._shapes.append(new)
@@ -290,14 +263,14 @@ class Compiled:
         match = re.fullmatch(new.pattern, text)
         return (len(self._shapes) - 1, match.groups()) if match else (-1, None)
 
-    def _refused(self, watch: _Watch, topic: str) -> bool:
+    def _refused(self, watch: Watch, topic: str) -> bool:
         """Whether the engine has to see every event of the topic."""
         return watch.monitor.listens(topic) and self._plan(watch, topic) is None
 
-    def _leads(self, watch: _Watch, topic: str) -> Iterator[Callable[[Path], bool]]:
+    def _leads(self, watch: Watch, topic: str) -> Iterator[Callable[[Path], bool]]:
         plan = self._plan(watch, topic)
         for name in plan.names if plan else ():
-            yield _leads(watch.monitor.setup.rules[name])
+            yield leads(watch.monitor.setup.rules[name])
 
     def _compile(self) -> tuple[re.Pattern[bytes], dict[int | None, Handler]]:
         scan, offsets = scanner(self._shapes)
@@ -323,7 +296,7 @@ class Compiled:
             for name in plan.names:
                 at = watch.slots[name]
                 rule = watch.monitor.setup.rules[name]
-                texts = _texts(made, rule)
+                texts = texts_of(made, rule)
                 if not texts:
                     return lambda match: False
                 used.update(texts)
@@ -335,7 +308,7 @@ class Compiled:
                     fresh[at] = variable
                     continue
                 scope[f"k{number}_{at}"] = self._tokens(which, watch, name)
-                if _seen(rule):
+                if is_seen(rule):
                     checks.append(f"if {key} not in k{number}_{at}: return False")
                     continue
                 checks += [f"{variable} = k{number}_{at}.get({key})", f"if {variable} is None: return False"]
@@ -380,102 +353,6 @@ class Compiled:
         exec("def handle(match):\n" + "".join(f"    {each}\n" for each in code), scope)
         handle: Handler = scope["handle"]
         return handle
-
-
-def _watch(monitor: Monitor) -> _Watch:
-    rules = monitor.setup.rules
-    formulas = [clause.formula for clause in monitor.setup.node.clauses]
-    found = {name: regions(rule, formulas) for name, rule in rules.items()}
-    # the step before is the source's value: alike only where both are only compared, with the same numbers
-    found |= {rule.source: None for rule in rules.values() if isinstance(rule, Previous)}
-    slots = {name: at for at, name in enumerate(rules)}
-    regional = {name: bounds for name, bounds in found.items() if bounds is not None}
-    return _Watch(monitor, slots, [None] * len(slots), [None] * len(slots), regional)
-
-
-def _plan(watch: _Watch, topic: str) -> _Plan | None:
-    """What the topic does; None where more than the latest values matters."""
-    monitor = watch.monitor
-    names = monitor.carried(topic)
-    if not names or not monitor.by_values:
-        return None
-    due: dict[int, Watched] = {id(w): w for name in names for w in monitor.triggered_by(name)}
-    for watched in due.values():
-        if watched.held or watched.paired or not watched.outputs <= set(names):
-            return None
-    spoken = dict.fromkeys(name for watched in due.values() for name in watched.names)
-    more = dict.fromkeys((*spoken, *monitor.assumed))
-    return _Plan(
-        monitor, names, tuple(due.values()), tuple(map(watch.slots.__getitem__, spoken)),
-        tuple(map(watch.slots.__getitem__, more)),
-    )  # fmt: skip
-
-
-def _remember(
-    watch: _Watch, plan: _Plan, old: list[Token | None], tallies: list[tuple[int, ...]], found: list[Violation]
-) -> None:
-    """Keep what an event has shown, if it was nothing but that clauses held or were broken."""
-    own = {watch.slots[name] for name in plan.names}
-    broken: set[str] = set()
-    for watched, then in zip(plan.due, tallies, strict=True):
-        now = _state(watched.tally)
-        if now[:2] != (then[0] + 1, then[1] + 1) or now[3:] != then[3:]:
-            return
-        if now[2] != then[2]:
-            broken.add(watched.clause.name)
-            if any(name in watch.regional for name in watched.names):
-                return  # what is told has the reading itself
-    told = tuple(v for v in found if v.node == watch.monitor.setup.node.name)
-    if {v.clause for v in told} != broken:
-        return
-
-    def key(slots: tuple[int, ...]) -> tuple[Token | None, ...]:
-        return tuple(watch.tokens[at] if at in own else old[at] for at in slots)
-
-    if None in key(plan.key):
-        return
-    if len(plan.quiet) + len(plan.loud) >= REMEMBERED:
-        plan.quiet.clear()
-        plan.loud.clear()
-    if told:
-        plan.loud[key(plan.excuse)] = told
-    else:
-        plan.quiet.add(key(plan.key))
-
-
-def _state(tally: Tally) -> tuple[int, ...]:
-    return (
-        tally.published, tally.judged, tally.broken, tally.undecided, tally.order, tally.early, tally.unreadable,
-        tally.partial, tally.supposed, tally.forgotten,
-    )  # fmt: skip
-
-
-def _seen(rule: object) -> bool:
-    return isinstance(rule, Fields) and rule.hold is Hold.SEEN
-
-
-def _leads(rule: object) -> Callable[[Path], bool]:
-    """Whether what lies at a path is read by a rule."""
-    wanted: list[Path] = []
-    match rule:
-        case Fields(each=None, paths=paths):
-            wanted += paths
-        case Fields(each=each):
-            wanted += [each] if each is not None else []
-        case Choice(tag=tag, arguments=arguments):
-            wanted.append(tag)
-            for places in arguments.values():
-                wanted += [place.key if isinstance(place, Lookup) else place for place in places]
-        case _:  # no message carries it
-            pass
-    # which item `ranges[-1]` is depends on how many there are: all of them count
-    wanted = [tuple(itertools.takewhile(lambda step: isinstance(step, str) or step >= 0, path)) for path in wanted]
-    wanted += [(place, *path) for path in wanted for place in ("data", WHOLE)]
-    return lambda path: any(path[: len(way)] == way for way in wanted)
-
-
-def _texts(made: Shape, rule: object) -> tuple[int, ...]:
-    return made.groups(_leads(rule))
 
 
 def _chunks(stream: Any, name: str) -> Iterator[bytes]:

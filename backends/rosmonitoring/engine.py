@@ -8,30 +8,29 @@ environment's door, not the node's.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
-from avow.evaluation.evaluate import NotEvaluable
 from avow.evaluation.truth import judge_open
 from avow.formulas.formula import free_variables
-from avow.formulas.values import Value, show
+from avow.formulas.values import Value
 from avow.language.contract import Clause, ClauseKind
 from avow.language.printer import show_term
-from avow.language.terms import Role
+from avow.ros.bags import publisher
 from avow.temporal.cells import remembers
 from avow.tuning.effort import JUDGE_EFFORT
 
 from .coverage import Tally
-from .memory import UNSURE, SoFar, blamed, triggers_of, unmonitored, watch
+from .memory import UNSURE, SoFar, blamed, watching
 from .options import Setup, same_topic
 from .pace import Passage, Timing
-from .pairing import EARLY, Asked, Pairing, time_of
+from .pairing import EARLY, Asked, Pairing, backwards, time_of
 from .reading import Reader, reader
 from .rules import Choice, Constant, Fields, Hold, Previous, heard_through
 from .tuning import OPEN_QUESTIONS, TOPICS_KEPT
-from .watched import Fault, Violation, Watched, shown, time_text
+from .watched import Fault, Heard, Violation, Watched, shown, time_text
 from .wires import MappingError
 
 
@@ -49,6 +48,10 @@ class Monitor:
     values: dict[str, Value] = field(default_factory=dict)
     heard: set[str] = field(default_factory=set)
     """The topics of the messages so far."""
+    at: dict[str, tuple[int, str]] = field(default_factory=dict)
+    """Which message each variable's value is of: as `Heard`."""
+    catch_up: Callable[[], object] = field(default=lambda: None, repr=False)
+    """Brings it up to date where events were passed over."""
     _seen: set[str] = field(default_factory=set)
     _versions: dict[str, int] = field(default_factory=dict)
     _readers: dict[str, list[tuple[str, Reader]]] = field(default_factory=dict)
@@ -77,9 +80,8 @@ class Monitor:
     def __post_init__(self) -> None:
         self.timing = Timing(self.setup.fresh, self.setup.rates)
         self._observe()
-        answers, rules = self.setup.answers, self.setup.rules.items()
-        observed = (n for n, rule in rules if isinstance(rule, Fields | Choice))
-        self._paired = frozenset(n for n in observed if n.startswith(f"{Role.INPUT}."))
+        answers = self.setup.answers
+        self._paired = self.setup.heard
         if answers is not None and answers.by != "arrival":
             self._pairing = Pairing(answers)
             spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
@@ -100,10 +102,10 @@ class Monitor:
                     self.values[name] = value
                 case Previous(source=source, initial=initial):
                     self._previous.append((name, source))
-                    self._start(name, initial)
+                    self.values |= {} if initial is None else {name: initial}
                 case Fields() | Choice():
                     self._readers.setdefault(same_topic(rule.topic), []).append((name, reader(rule)))
-                    self._start(name, rule.initial)
+                    self.values |= {} if rule.initial is None else {name: rule.initial}
                     if rule.initial is not None and getattr(rule, "hold", Hold.LATEST) is Hold.LATEST:
                         self._supposed.add(name)  # of tuples seen so far, none is what was seen
         for name, source in self._previous:
@@ -119,8 +121,9 @@ class Monitor:
         """Whether a topic's messages say anything of the node."""
         return same_topic(topic) in self._readers
 
-    def step(self, event: Mapping[str, Any]) -> list[Violation]:
-        """Judge one event. Never raises for what the event holds."""
+    def step(self, event: Mapping[str, Any], place: int = 0) -> list[Violation]:
+        """Judge one event, which stands at a place of the trace (by default, its number). Never raises for what the
+        event holds."""
         self.events += 1
         topic = event.get("topic")
         readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
@@ -133,10 +136,14 @@ class Monitor:
         self.relevant += 1
         if self.timing.hear(event, same_topic(topic), names):
             self._miss(set(names))
-        self._watch_order(event)
+        answers = self.setup.answers
+        if answers is not None and answers.by == "arrival" and not self.backwards and "time" in event:
+            now, before = time_of(event), self._latest
+            self.backwards, self._latest = backwards(now, before, self.events), now
         pairing = self._pairing
         if pairing is not None and pairing.waiting:
             self._settle(pairing.ready(time_of(event)), found)
+        self.at.update(dict.fromkeys(names, (place or self.events, publisher(event))))
         updated: list[str] = []
         unreadable: dict[int, Watched] = {}
         for name, read in readers:
@@ -151,13 +158,13 @@ class Monitor:
                 if getattr(self.setup.rules[name], "hold", Hold.LATEST) is Hold.LATEST:
                     self._forget(name)
                     if pairing is not None and name in self._paired:
-                        pairing.saw(name, event, None)
+                        pairing.saw(name, event, None, self.at[name][0])
                 unreadable |= {id(watched): watched for watched in self._clauses.get(name, ())}
                 continue
             self._supposed.discard(name)
             updated.append(name)
             if pairing is not None and name in self._paired:
-                pairing.saw(name, event, new)
+                pairing.saw(name, event, new, self.at[name][0])
             if old is None or new != old:
                 self.values[name] = new
                 self._versions[name] += 1
@@ -188,6 +195,8 @@ class Monitor:
         """An answer is over: what it said is now what the step before said."""
         for name, source in self._previous:
             value = self.values.get(source)
+            if source in self.at:
+                self.at[name] = self.at[source]
             if value is None:
                 if source in self._seen and name in self.values:
                     self._forget(name)
@@ -223,9 +232,10 @@ class Monitor:
         """What the assumptions speak of."""
         return tuple(dict.fromkeys(name for watched in self._assumptions for name in watched.names))
 
-    def caught_up(self, event: Mapping[str, Any]) -> None:
+    def caught_up(self, event: Mapping[str, Any], place: int) -> None:
         """Take over the latest of some events of one topic that could all be read."""
         topic = same_topic(str(event["topic"]))
+        self.at.update(dict.fromkeys(self.carried(topic), (place, publisher(event))))
         self.timing.caught_up(event, topic, self.carried(topic))
         for name, read in self._readers[topic]:
             old = self.values.get(name)
@@ -236,19 +246,6 @@ class Monitor:
         if self._latest is not None:
             self._latest = max(self._latest, time_of(event))
 
-    def _watch_order(self, event: Mapping[str, Any]) -> None:
-        """By arrival, the order of the events is that of cause: times that run backwards say otherwise."""
-        answers = self.setup.answers
-        if answers is None or answers.by != "arrival" or self.backwards or "time" not in event:
-            return
-        now = time_of(event)
-        if self._latest is not None and now < self._latest:
-            self.backwards = (
-                f"event {self.events} has the time {show(now)} and an earlier one {show(self._latest)}: this is not "
-                "the order of cause (`answers: {by: arrival}`)"
-            )
-        self._latest = now
-
     def finish(self) -> list[Violation]:
         """Judge what still waits, once the run is over."""
         found: list[Violation] = []
@@ -257,9 +254,11 @@ class Monitor:
             self.backwards = self.backwards or self._pairing.uneven()
         for watched in {id(w): w for all_ in self._clauses.values() for w in all_}.values():
             if watched.fresh:
-                values = {n: v for part in watched.fresh.values() for n, v in part.items()}
+                parts = list(watched.fresh.values())
                 watched.fresh.clear()
-                self._judge_part(watched, values, {}, found)
+                values = {n: v for part, _ in parts for n, v in part.items()}
+                heard = {n: at for _, of in parts for n, at in of.items()}
+                self._judge_part(watched, (values, heard), {}, found)
             watched.tally.open += watched.steps is not None and watched.steps.open
             if any(of not in self._seen for name in watched.names if (of := heard_through(self.setup.rules[name]))):
                 watched.only_supposed()
@@ -275,11 +274,12 @@ class Monitor:
         known = {n: values[n] for n in own if n in values}
         inputs = tuple(dict.fromkeys((*watched.paired, *(n for n in self._assumed if n in self._paired))))
         inputs = tuple(n for n in inputs if n in watched.paired or n in self._pairing.seen)
-        self._pairing.ask(watched, event, self.events, known, inputs, waits=not early)
+        about = (watched, self._heard(watched.outputs))
+        self._pairing.ask(about, event, self.events, known, inputs, waits=not early)
 
     def _settle(self, ready: Iterable[tuple[Asked, list[dict[str, Value]] | str]], found: list[Violation]) -> None:
         for asked, cases in ready:
-            watched: Watched = asked.about
+            watched, heard = asked.about
             tally = watched.tally
             if isinstance(cases, str):
                 if cases == EARLY:
@@ -306,7 +306,8 @@ class Monitor:
                 if verdict is Fault.EXCUSED:
                     said += "; but an assumption does not hold"
                 name = watched.clause.name
-                found.append(self._violation(verdict, name, asked.event, said, watched, cases[0], asked.index))
+                wrong = self._violation(verdict, name, asked.event, said, watched, cases[0])
+                found.append(replace(wrong, index=asked.index, heard=heard))
 
     def _verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
         truth = watched.truth_of(values, self.solver)
@@ -337,7 +338,8 @@ class Monitor:
                 if name in watched.fresh:
                     watched.tally.published += 1
                     self._judge_part(watched, watched.fresh[name], event, found)
-                watched.fresh[name] = self._part(watched, name) if len(watched.outputs) > 1 else {}
+                part = self._part(watched, name) if len(watched.outputs) > 1 else {}
+                watched.fresh[name] = part, self._heard((name,))
             if watched.outputs <= watched.fresh.keys():
                 watched.fresh.clear()
                 due.append(watched)
@@ -362,10 +364,10 @@ class Monitor:
         }
 
     def _judge_part(
-        self, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any], found: list[Violation]
+        self, watched: Watched, part: tuple[dict[str, Value], Heard], event: Mapping[str, Any], found: list[Violation]
     ) -> None:
         """Judge what is known of an answer that never was whole: it is decided where the rest does not matter."""
-        tally = watched.tally
+        tally, (values, heard) = watched.tally, part
         self._lose(watched)
         if self._so_far is not None or (truth := self._open(watched, values)) is None:
             tally.partial += 1
@@ -375,7 +377,8 @@ class Monitor:
             tally.broken += 1
             said = watched.clause.sentence or watched.clause.text or show_term(watched.clause.formula, "unicode")
             said += ", whatever the rest of the answer was"
-            found.append(self._violation(Fault.GUARANTEE, watched.clause.name, event, said, watched, values))
+            wrong = self._violation(Fault.GUARANTEE, watched.clause.name, event, said, watched, values)
+            found.append(replace(wrong, heard=heard))
 
     def _open(self, watched: Watched, values: Mapping[str, Value]) -> bool | None:
         """Whether a guarantee holds whatever is not known; None where that matters, or nobody can tell. Broken it is
@@ -394,38 +397,13 @@ class Monitor:
         self._versions[name] += 1
         self.values.pop(name, None)
 
-    def _start(self, name: str, initial: Value | None) -> None:
-        if initial is not None:
-            self.values[name] = initial
-
     def _watch(self, clause: Clause) -> None:
         tally = self.tallies[clause.name] = Tally()
-        try:
-            if reason := unmonitored(self.setup, clause):
-                raise NotEvaluable(reason)
-            watched = watch(clause, tally)
-        except NotEvaluable as error:
-            tally.reason = error.reason
+        found = watching(self.setup, clause, tally, self._previous, self.values, self._pairing is not None)
+        if found is None:
             return
-        names = watched.names
-        if hidden := [self.setup.hidden[n] for n in names if n in self.setup.hidden]:
-            tally.reason, tally.hidden = hidden[0], True
-            return
-        tally.triggered = watched.trigger is None
-        triggers = triggers_of(self.setup, names)
-        if self.setup.when == "outputs" and any(n.startswith(f"{Role.OUTPUT}.") for n in triggers):
-            watched.outputs = frozenset(triggers)
-            if len(triggers) > 1:
-                watched.held = tuple((n, s) for n, s in self._previous if n in names and s in triggers)
-                # before the first answer: the initial values
-                watched.memory = {n: self.values[n] for n, _ in watched.held if n in self.values}
-        if any(n.startswith(f"{Role.OUTPUT}.") for n in triggers):
-            paired = tuple(n for n in names if n in self._paired)
-            tally.unpaired = bool(paired) and self.setup.answers is None
-            watched.paired = paired if self._pairing is not None else ()
-            watched.inputs = tuple(n for n in names if n in self._paired)
+        watched, triggers = found
         if watched.steps is not None:
-            watched.steps.answers = any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)
             self._remembering.append(watched)
         for name in triggers:
             self._clauses.setdefault(name, []).append(watched)
@@ -491,8 +469,29 @@ class Monitor:
 
     def _violation(
         self, fault: Fault, clause: str, event: Mapping[str, Any], explanation: str, watched: Watched | None = None,
-        snapshot: Mapping[str, Value] | None = None, index: int | None = None,
+        snapshot: Mapping[str, Value] | None = None,
     ) -> Violation:  # fmt: skip
         values, pairs = shown(watched, snapshot) if watched is not None and snapshot is not None else ((), ())
-        time = time_text(event.get("time"))
-        return Violation(fault, self.setup.node.name, clause, index or self.events, time, values, pairs, explanation)
+        heard = self._heard(watched.names) if watched is not None else {}
+        name, time = self.setup.node.name, time_text(event.get("time"))
+        return Violation(fault, name, clause, self.events, time, values, pairs, explanation, heard)
+
+    def _heard(self, names: Iterable[str]) -> Heard:
+        return {name: self.at[name] for name in names if name in self.at}
+
+    # -- for `blame` ---------------------------------------------------------------------------------------------------
+
+    def waits(self, event: int) -> bool:
+        """Whether an answer of this event or an earlier one is not judged yet."""
+        return self._pairing is not None and any(asked.index <= event for asked in self._pairing.waiting)
+
+    def answered(self, message: int) -> Mapping[str, tuple[int, ...]] | None:
+        """The messages of the inputs that an answer was held against, by one of its own; None where they are not
+        paired: it is held against the latest."""
+        return self._pairing.answered.get(message, {}) if self._pairing is not None else None
+
+    def failing(self) -> bool:
+        """Whether an assumption does not hold of the values that are known now."""
+        self.catch_up()
+        known = (a for a in self._assumptions if a.steps is None and all(name in self.values for name in a.names))
+        return any(assumed.truth_of(self.values, self.solver) is False for assumed in known)

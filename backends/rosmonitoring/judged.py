@@ -15,7 +15,7 @@ from avow.language.terms import And, Compare, Term
 from .coverage import Tally
 from .engine import Monitor
 from .pairing import Asked, time_of
-from .watched import Fault, Violation, Watched
+from .watched import Fault, Heard, Violation, Watched
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +45,9 @@ class Telling(Monitor):
         self._now = Fraction(0)
         Monitor.__post_init__(self)
 
-    def step(self, event: Mapping[str, Any]) -> list[Violation]:
+    def step(self, event: Mapping[str, Any], place: int = 0) -> list[Violation]:
         self._now = time_of(event)
-        return Monitor.step(self, event)
+        return Monitor.step(self, event, place)
 
     def _judge(self, watched: Watched, event: Mapping[str, Any], found: list[Violation]) -> None:
         held = {n for n, _ in watched.held}
@@ -57,10 +57,10 @@ class Telling(Monitor):
         self._tell(watched, before, self.events, self._now, self._margin(watched, values))
 
     def _judge_part(
-        self, watched: Watched, values: Mapping[str, Value], event: Mapping[str, Any], found: list[Violation]
+        self, watched: Watched, part: tuple[dict[str, Value], Heard], event: Mapping[str, Any], found: list[Violation]
     ) -> None:
         before = replace(watched.tally)
-        Monitor._judge_part(self, watched, values, event, found)
+        Monitor._judge_part(self, watched, part, event, found)
         self._tell(watched, before, self.events, self._now, None)
 
     def _verdict(self, watched: Watched, values: Mapping[str, Value]) -> Fault | str | None:
@@ -71,7 +71,7 @@ class Telling(Monitor):
     def _settle(self, ready: Iterable[tuple[Asked, list[dict[str, Value]] | str]], found: list[Violation]) -> None:
         for one in ready:
             asked, cases = one
-            watched: Watched = asked.about
+            watched, _ = asked.about
             before, self._cases = replace(watched.tally), []
             Monitor._settle(self, [one], found)
             whole = not isinstance(cases, str) and len(self._cases) == len(cases)

@@ -199,6 +199,42 @@ def triggers_of(setup: Setup, names: tuple[str, ...]) -> tuple[str, ...]:
     return direct or sources
 
 
+def watching(
+    setup: Setup, clause: Clause, tally: Tally, previous: Sequence[tuple[str, str]], values: Mapping[str, Value],
+    pairs: bool,
+) -> tuple[Watched, tuple[str, ...]] | None:  # fmt: skip
+    """A node's clause under watch, and the variables whose publication makes it judged; None, with the reason in the
+    tally, where nothing can judge it. `previous`: (variable, its source) of what is a step before; `pairs`: answers are
+    paired with their inputs."""
+    try:
+        if reason := unmonitored(setup, clause):
+            raise NotEvaluable(reason)
+        watched = watch(clause, tally)
+    except NotEvaluable as error:
+        tally.reason = error.reason
+        return None
+    names = watched.names
+    if hidden := [setup.hidden[n] for n in names if n in setup.hidden]:
+        tally.reason, tally.hidden = hidden[0], True
+        return None
+    tally.triggered = watched.trigger is None
+    triggers = triggers_of(setup, names)
+    answers = any(n.startswith(f"{Role.OUTPUT}.") for n in triggers)
+    if setup.when == "outputs" and answers:
+        watched.outputs = frozenset(triggers)
+        if len(triggers) > 1:
+            watched.held = tuple((n, s) for n, s in previous if n in names and s in triggers)
+            # before the first answer: the initial values
+            watched.memory = {n: values[n] for n, _ in watched.held if n in values}
+    if answers:
+        watched.inputs = tuple(n for n in names if n in setup.heard)
+        tally.unpaired = bool(watched.inputs) and setup.answers is None
+        watched.paired = watched.inputs if pairs else ()
+    if watched.steps is not None:
+        watched.steps.answers = answers
+    return watched, triggers
+
+
 def unmonitored(setup: Setup, clause: Clause) -> str:
     """Why a clause that speaks of other steps, or one whose node's assumptions do, is not monitored; empty where it
     is."""

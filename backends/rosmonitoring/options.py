@@ -73,6 +73,12 @@ class Setup:
         return {same_topic(rule.topic): rule.kind for rule in rules if rule.kind}
 
     @property
+    def heard(self) -> frozenset[str]:
+        """The inputs that messages carry."""
+        rules = self.rules.items()
+        return frozenset(n for n, r in rules if isinstance(r, Fields | Choice) and n.startswith(f"{Role.INPUT}."))
+
+    @property
     def topics(self) -> tuple[str, ...]:
         """The names of the topics that are listened to, each once, in the order of the variables."""
         names = (rule.topic for rule in self.rules.values() if isinstance(rule, Fields | Choice))

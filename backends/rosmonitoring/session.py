@@ -73,19 +73,19 @@ class Session:
         for violation in self.finish():
             yield line, violation
 
-    def told(self, violations: list[Violation]) -> Iterator[Violation]:
+    def told(self, violations: list[Violation], *, over: bool = False) -> Iterator[Violation]:
         """What was found at one event, with who is to blame."""
-        if not violations:
+        if not violations and not over:
             return
         if self._blame is None:
-            self._blame = Blame(self.system)
-        for violation in self._blame.told(violations, {m.setup.node.name: m for m in self.monitors}):
+            self._blame = Blame(self.system, {m.setup.node.name: m for m in self.monitors})
+        for violation in self._blame.told(violations, over=over):
             self.counts[violation.fault] = self.counts.get(violation.fault, 0) + 1
             yield violation
 
     def finish(self) -> Iterator[Violation]:
         """What is judged only once the run is over."""
-        yield from self.told([v for monitor in self.monitors for v in monitor.finish()])
+        yield from self.told([v for monitor in self.monitors for v in monitor.finish()], over=True)
 
     def unmonitored(self) -> list[str]:
         """The clauses, of the nodes that are to be monitored, of whose publications too few were decided."""
@@ -224,4 +224,5 @@ def violation_json(violation: Violation) -> dict[str, Any]:
         "bindings": dict(violation.bindings),
         "values": dict(violation.values),
         "explanation": violation.explanation,
+        "cause": violation.cause,
     }

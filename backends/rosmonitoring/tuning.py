@@ -24,6 +24,12 @@ TRACKED_TUPLES = 48
 EVENT_CHARACTERS = 8_000_000
 """Characters of one event; a longer line is not an event."""
 
+BREACHES_KEPT = 1_000
+"""Breaches of one output, or assumption, that later ones may be followed to: as many as answers that wait."""
+
+BREACHES_OPEN = 100
+"""Broken assumptions that wait for a verdict on who said it: all are looked at whenever something is told."""
+
 CANDIDATES_SHOWN = 12
 """Fields that an error names as what may be meant; a message with more is looked up anyway."""
 

@@ -33,6 +33,10 @@ class Fault(StrEnum):
     MAPPING = "message outside its mapping"
 
 
+Heard = Mapping[str, tuple[int, str]]
+"""Variable → the place in the trace of the latest message that carried it, and who published that, where it says so."""
+
+
 @dataclass(frozen=True, slots=True)
 class Violation:
     """One judgement against the trace. `index` counts events from 1; `time` is the event's own, as text."""
@@ -45,11 +49,17 @@ class Violation:
     values: tuple[tuple[str, str], ...]
     bindings: tuple[tuple[str, str], ...]
     explanation: str
+    heard: Heard = field(default_factory=dict, compare=False)
+    """Of a clause that was broken: which message each variable's value was of."""
+    cause: str = ""
+    """Of an assumption that was broken by what a node said: ``sensor.nonneg at event 7 caused guard.nonneg at event
+    8``, or why no first breach is known."""
 
     def text(self) -> str:
         about = ", ".join(f"{n} = {v}" for n, v in (*self.bindings, *self.values))
         at = f"event {self.index}" + (f" (t = {self.time})" if self.time else "")
-        return f"{at}: {self.fault}: {self.node}.{self.clause}: {self.explanation}" + (f" [{about}]" if about else "")
+        said = f"{self.explanation}; {self.cause}" if self.cause else self.explanation
+        return f"{at}: {self.fault}: {self.node}.{self.clause}: {said}" + (f" [{about}]" if about else "")
 
 
 @dataclass(slots=True)
@@ -62,8 +72,8 @@ class Watched:
     tally: Tally
     outputs: frozenset[str] = frozenset()
     """Those that must all be published anew before it is judged: they are the parts of one answer."""
-    fresh: dict[str, dict[str, Value]] = field(default_factory=dict)
-    """Those that have been, since it was last judged: the part, and what it was published for."""
+    fresh: dict[str, tuple[dict[str, Value], Heard]] = field(default_factory=dict)
+    """Those that have been, since it was last judged: the part, and what it was published for; and its message."""
     held: tuple[tuple[str, str], ...] = ()
     """(previous value, its source): of one of several outputs, it is the value that the answer before had, whichever
     of the outputs comes first in this one."""

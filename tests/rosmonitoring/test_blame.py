@@ -68,21 +68,21 @@ def test_a_breach_is_followed_to_its_origin(tmp_path: Path) -> None:
         ("guard", "nonneg", Fault.PROVIDER),
         ("motor", "nonneg", Fault.PROVIDER),
     ]
-    assert "sensor.nonneg at event 6 caused guard.nonneg at event 6" in found[1].explanation
-    # the guard did what it had promised: it gave twice what it was given, which was wrong
-    assert "came from guard.t, of which no guarantee was seen broken" in found[2].explanation
+    assert found[1].cause == "sensor.nonneg at event 6 caused guard.nonneg at event 6"
+    # the guard had promised nothing of what it was given, and passed it on
+    assert found[2].cause == "sensor.nonneg at event 6 caused motor.nonneg at event 7"
 
 
 def test_what_was_mended_is_no_cause_any_more(tmp_path: Path) -> None:
     found = judge(chain(tmp_path), ("s", -1), ("s", 1), ("t", -5))
     assert [(v.clause, v.index) for v in found if v.fault is Fault.PROVIDER] == [("nonneg", 1), ("nonneg", 3)]
-    assert "guard.twice at event 3 caused motor.nonneg at event 3" in found[-1].explanation
+    assert "guard.twice at event 3 caused motor.nonneg at event 3" in found[-1].cause
 
 
 def test_the_environment_is_blamed_only_where_it_provides(tmp_path: Path) -> None:
     found = judge(chain(tmp_path), ("r", -20), ("s", -1))
     assert [v.fault for v in found] == [Fault.ASSUMPTION, Fault.EXCUSED, Fault.PROVIDER]
-    assert "sensor.real at event 1 (environment) caused guard.nonneg at event 2" in found[2].explanation
+    assert "sensor.real at event 1 (environment) caused guard.nonneg at event 2" in found[2].cause
 
 
 SENSOR = """

@@ -30,9 +30,9 @@ class Counting(Monitor):
 
     steps = 0
 
-    def step(self, event: Any) -> list[Violation]:
+    def step(self, event: Any, place: int = 0) -> list[Violation]:
         Counting.steps += 1
-        return Monitor.step(self, event)
+        return Monitor.step(self, event, place)
 
 
 def both(found: Setup, path: Path) -> tuple[int, int]:

@@ -1,0 +1,158 @@
+"""What the events of one topic do to one monitor, as far as nothing but their values matters, for `compiled`."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from avow.formulas.values import Value
+from avow.language.contract import ClauseKind
+from avow.ros.bags import WHOLE
+
+from .coverage import Tally
+from .engine import Monitor
+from .regions import regions
+from .rules import Choice, Fields, Hold, Lookup, Path, Previous
+from .shapes import Shape
+from .tuning import REMEMBERED
+from .watched import Violation, Watched
+
+Token = int
+"""Stands for a variable's value: equal tokens of a variable, equal truth of every clause."""
+
+
+@dataclass(slots=True)
+class Plan:
+    """What one topic's messages do to one monitor, where nothing but their values matters."""
+
+    monitor: Monitor
+    names: tuple[str, ...]
+    """The variables that the topic carries."""
+    due: tuple[Watched, ...]
+    key: tuple[int, ...]
+    """The slots of the variables that the due clauses speak of."""
+    excuse: tuple[int, ...]
+    """The slots of all that may matter where one of them is broken: the assumptions' too."""
+    quiet: set[tuple[Token | None, ...]] = field(default_factory=set)
+    """Where all of them held."""
+    loud: dict[tuple[Token | None, ...], tuple[Violation, ...]] = field(default_factory=dict)
+    """Where some were broken: what is told then."""
+    ages: dict[str, float] = field(default_factory=dict)
+    """The greatest age of each input when an answer came."""
+
+
+@dataclass(slots=True)
+class Watch:
+    """One monitor, and the tokens of its variables."""
+
+    monitor: Monitor
+    slots: dict[str, int]
+    tokens: list[Token | None]
+    values: list[Value | None]
+    """What the tokens stand for, as far as it was looked at."""
+    regional: dict[str, list[float]]
+    plans: dict[str, Plan | None] = field(default_factory=dict)
+    """By topic; None: the engine judges all its events."""
+
+
+def watch_of(monitor: Monitor) -> Watch:
+    rules = monitor.setup.rules
+    formulas = [clause.formula for clause in monitor.setup.node.clauses]
+    found = {name: regions(rule, formulas) for name, rule in rules.items()}
+    # the step before is the source's value: alike only where both are only compared, with the same numbers
+    found |= {rule.source: None for rule in rules.values() if isinstance(rule, Previous)}
+    slots = {name: at for at, name in enumerate(rules)}
+    regional = {name: bounds for name, bounds in found.items() if bounds is not None}
+    return Watch(monitor, slots, [None] * len(slots), [None] * len(slots), regional)
+
+
+def plan_of(watch: Watch, topic: str) -> Plan | None:
+    """What the topic does; None where more than the latest values matters."""
+    monitor = watch.monitor
+    names = monitor.carried(topic)
+    if not names or not monitor.by_values:
+        return None
+    due: dict[int, Watched] = {id(w): w for name in names for w in monitor.triggered_by(name)}
+    for watched in due.values():
+        if watched.held or watched.paired or not watched.outputs <= set(names):
+            return None
+    spoken = dict.fromkeys(name for watched in due.values() for name in watched.names)
+    more = dict.fromkeys((*spoken, *monitor.assumed))
+    return Plan(
+        monitor, names, tuple(due.values()), tuple(map(watch.slots.__getitem__, spoken)),
+        tuple(map(watch.slots.__getitem__, more)),
+    )  # fmt: skip
+
+
+def remember(
+    watch: Watch, plan: Plan, old: list[Token | None], tallies: list[tuple[int, ...]], found: list[Violation]
+) -> None:
+    """Keep what an event has shown, if it was nothing but that clauses held or were broken."""
+    own = {watch.slots[name] for name in plan.names}
+    broken: set[str] = set()
+    for watched, then in zip(plan.due, tallies, strict=True):
+        now = counts_of(watched.tally)
+        if now[:2] != (then[0] + 1, then[1] + 1) or now[3:] != then[3:]:
+            return
+        if now[2] != then[2]:
+            broken.add(watched.clause.name)
+            if any(name in watch.regional for name in watched.names):
+                return  # what is told has the reading itself
+            if watched.clause.kind is ClauseKind.ASSUMPTION and not set(watched.names) <= set(plan.names):
+                return  # whose message it was is told by the engine
+    told = tuple(
+        replace(v, heard={name: at for name, at in v.heard.items() if name in plan.names})
+        for v in found
+        if v.node == watch.monitor.setup.node.name
+    )
+    if {v.clause for v in told} != broken:
+        return
+
+    def key(slots: tuple[int, ...]) -> tuple[Token | None, ...]:
+        return tuple(watch.tokens[at] if at in own else old[at] for at in slots)
+
+    if None in key(plan.key):
+        return
+    if len(plan.quiet) + len(plan.loud) >= REMEMBERED:
+        plan.quiet.clear()
+        plan.loud.clear()
+    if told:
+        plan.loud[key(plan.excuse)] = told
+    else:
+        plan.quiet.add(key(plan.key))
+
+
+def counts_of(tally: Tally) -> tuple[int, ...]:
+    return (
+        tally.published, tally.judged, tally.broken, tally.undecided, tally.order, tally.early, tally.unreadable,
+        tally.partial, tally.supposed, tally.forgotten,
+    )  # fmt: skip
+
+
+def is_seen(rule: object) -> bool:
+    return isinstance(rule, Fields) and rule.hold is Hold.SEEN
+
+
+def leads(rule: object) -> Callable[[Path], bool]:
+    """Whether what lies at a path is read by a rule."""
+    wanted: list[Path] = []
+    match rule:
+        case Fields(each=None, paths=paths):
+            wanted += paths
+        case Fields(each=each):
+            wanted += [each] if each is not None else []
+        case Choice(tag=tag, arguments=arguments):
+            wanted.append(tag)
+            for places in arguments.values():
+                wanted += [place.key if isinstance(place, Lookup) else place for place in places]
+        case _:  # no message carries it
+            pass
+    # which item `ranges[-1]` is depends on how many there are: all of them count
+    wanted = [tuple(itertools.takewhile(lambda step: isinstance(step, str) or step >= 0, path)) for path in wanted]
+    wanted += [(place, *path) for path in wanted for place in ("data", WHOLE)]
+    return lambda path: any(path[: len(way)] == way for way in wanted)
+
+
+def texts_of(made: Shape, rule: object) -> tuple[int, ...]:
+    return made.groups(leads(rule))
