@@ -41,6 +41,8 @@ class Subject:
         self.root = (root or path.parent).resolve()
         self.isolation: Isolation = available()
         self.fault = ""
+        self.silent = ""
+        """Why there is no answer that says nothing of the subject: time on the wall, or a kill from outside."""
         self.process: subprocess.Popen[bytes] | None = None
         self._events: dict[tuple[str, str], None] = {}
         self._trace: Trace | None = None
@@ -123,6 +125,8 @@ class Subject:
     def _end(self, why: str) -> SubjectFailed:
         """Stop it, and say why: what it did before that no subject may do, or else `why`."""
         self._stop()
+        if process.ended_by_others():
+            self.silent = "the subject's process was killed from outside"
         return SubjectFailed(self.fault or why)
 
     def _stop(self) -> None:
@@ -216,7 +220,8 @@ class Subject:
         while b"\n" not in self._buffer:
             left = end - time.monotonic()
             if left <= 0 or not select.select([self._from], [], [], left)[0]:
-                raise self._end(f"the subject does not answer within {self.patience:g} s")
+                self.silent = f"the subject does not answer within {self.patience:g} s"
+                raise self._end(self.silent)
             part = os.read(self._from, 1 << 16)
             if not part:
                 with contextlib.suppress(subprocess.TimeoutExpired):

@@ -21,7 +21,7 @@ from avow.base.plain import ALLOWS_MORE
 from avow.base.process import Completed, ToolMissing
 from avow.base.verdict import Counterexample, Object, Outcome, Verdict, bound
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import CASE
+from avow.evidence.record import CASE, RETRY
 from avow.isolation import judge
 from avow.isolation.level import Isolation, Unavailable, available
 from avow.isolation.observed import from_json
@@ -137,6 +137,9 @@ def _outcome(obligation: Obligation, answer: Mapping[str, Any], seed: int, refut
         shown = Counterexample(values, told, tuple(trace))
         details[CASE] = own["case"]
         return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
+    if answer["silent"]:  # whatever else was found: it is of a subject that might have answered
+        why = f"{answer['silent']}: that says nothing of what it would answer, and the next run asks again"
+        return replace(outcome, verdict=Verdict.ERROR, summary=why, details={**details, RETRY: True})
     if answer["crash"] is not None:
         pairs, why = answer["crash"]
         shown = Counterexample(tuple((str(n), str(v)) for n, v in pairs), str(why))

@@ -87,6 +87,8 @@ class Bench:
         self.replayed = 0
         self.valid = self.edges = self.rejected = self.undecided = 0
         self.crash: tuple[Inputs, str] | None = None
+        self.silent = ""
+        """Why a second process of the subject's gave no answer, where that says nothing of the subject."""
         self.end: float | None = None
         self._said: list[tuple[Inputs, Any]] = []
         self.unsteady: Inputs | None = None
@@ -273,8 +275,12 @@ class Bench:
                 if len(again) < len(before):
                     return before[len(again)][0]
         finally:
-            twin.close()
+            self._end(twin)
         return None
+
+    def _end(self, twin: Subject) -> None:
+        twin.close()
+        self.silent = self.silent or twin.silent
 
     def _asked_apart(self) -> list[Apart]:
         """Each REAL input in its turn is what no REAL is, or the negative zero, beside a few cases' other inputs."""
@@ -289,7 +295,7 @@ class Bench:
                         case = [(n, word if n == f"in.{name}" else value) for n, value in _pairs(asked, {})]
                         found.setdefault(why, (case, why))
         finally:
-            twin.close()
+            self._end(twin)
         return [one for why, one in found.items() if why]
 
     def _wrong_apart(self, twin: Subject, asked: Inputs, name: str, text: str) -> str:
@@ -353,7 +359,7 @@ class Bench:
                 return (inputs, {})
             return None
 
-        if "within" in said[0]:  # each further try would cost the whole patience
+        if self.subject.silent:  # each further try would cost the whole patience
             return self.crash
         inputs, _ = self._smallest((self.crash[0], {}), broken)
         return inputs, said[0]
@@ -391,6 +397,7 @@ class Bench:
             "isolation": self.subject.isolation.value,
             "apart": self.apart,
             "unsteady": _pairs(self.unsteady, {}) if self.unsteady is not None else None,
+            "silent": self.silent or self.subject.silent,
             "crash": [_pairs(self.crash[0], {}), self.crash[1]] if self.crash else None,
             "guarantees": {
                 name: {

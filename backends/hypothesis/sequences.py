@@ -299,7 +299,7 @@ class SequenceBench(Bench):
         try:
             return self._again([inputs for inputs, _ in trace], name, twin)
         finally:
-            twin.close()
+            self._end(twin)
 
     def _shorter(self, best: Trace, name: str, end: float) -> Trace:
         """The run without the steps that it does not take, as far as they are found one by one from its end."""
@@ -367,7 +367,7 @@ class SequenceBench(Bench):
                     if self._said_by(self.subject, inputs) != self._said_by(twin, inputs):
                         return inputs
         finally:
-            twin.close()
+            self._end(twin)
         return None
 
     def _said_by(self, subject: Subject, inputs: Inputs) -> Any:

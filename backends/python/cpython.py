@@ -51,6 +51,8 @@ class Told:
     fault: str
     observed: tuple[Observed, ...]
     isolation: Isolation
+    silent: bool = False
+    """The fault is the machine's: time on the wall, or a kill from outside. It says nothing of the class."""
 
 
 def case_of(inputs: Mapping[str, Any], memory: Mapping[str, Any]) -> str:
@@ -89,9 +91,11 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
     if answer is None:
         why = "took too long" if done.timed_out else f"ended without an answer (code {done.code})"
         last = done.stderr.strip().splitlines()[-1:]
-        return Told((), f"running the class {why}{': ' + last[0][:200] if last else ''}", (), Isolation.NONE)
+        fault = f"running the class {why}{': ' + last[0][:200] if last else ''}"
+        return Told((), fault, (), Isolation.NONE, done.timed_out)
     replies = tuple(json.loads(r) if isinstance(r, str) else r for r in answer["replies"])
-    return Told(replies, str(answer["fault"]), from_json(answer["observed"]), Isolation(answer["isolation"]))
+    observed, isolation = from_json(answer["observed"]), Isolation(answer["isolation"])
+    return Told(replies, str(answer["fault"]), observed, isolation, bool(answer["silent"]))
 
 
 def main() -> None:
@@ -126,7 +130,13 @@ def main() -> None:
     observed = to_json(process.observed())
     judge.say(
         channel,
-        {"replies": replies, "fault": fault, "observed": observed, "isolation": process.isolation.value},
+        {
+            "replies": replies,
+            "fault": fault,
+            "silent": bool(process.silent),
+            "observed": observed,
+            "isolation": process.isolation.value,
+        },
     )
 
 

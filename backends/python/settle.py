@@ -18,7 +18,7 @@ from avow.base.process import ToolMissing
 from avow.base.verdict import Counterexample, Object, Outcome, Verdict
 from avow.drive.steps import coded
 from avow.evidence.obligation import Obligation
-from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT
+from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT, RETRY
 from avow.formulas.formula import free_variables
 from avow.formulas.values import Element
 from avow.formulas.values import Sequence as SequenceValue
@@ -75,6 +75,8 @@ class Work:
     limits: Limits
     observed: dict[Observed, None] = field(default_factory=dict)
     isolation: Isolation = Isolation.SEALED
+    silent: bool = False
+    """A run had no answer for a reason that says nothing of the class: the next run asks again."""
     logs: dict[str, str] = field(default_factory=dict)
     said: dict[str, object] = field(default_factory=dict)
     ran: int = 0
@@ -130,7 +132,8 @@ class Work:
         return tuple(self.refuted(o) or self.settled(o, found[o.id]) for o in job.obligations)
 
     def alike(self, verdict: Verdict, summary: str) -> tuple[Outcome, ...]:
-        return tuple(Outcome(o.id, verdict, summary) for o in self.job.obligations)
+        details: dict[str, object] = {RETRY: True} if self.silent else {}
+        return tuple(Outcome(o.id, verdict, summary, details=dict(details)) for o in self.job.obligations)
 
     def refusals(self) -> str:
         name = self.reading.file.name
@@ -201,6 +204,7 @@ class Work:
     def keep(self, found: Told) -> None:
         self.observed.update(dict.fromkeys(found.observed))
         self.isolation = min(self.isolation, found.isolation, key=lambda level: level.rank)
+        self.silent |= found.silent
 
     def differs(self, case: Mapping[str, Any], reply: Mapping[str, Any]) -> str:
         """How class and translation differ on a case, bit for bit."""

@@ -11,6 +11,7 @@ from avow.backend_kit.protocol import Job, Limits
 from avow.backends.hypothesis import BACKEND
 from avow.base.verdict import Object, Outcome, Verdict
 from avow.conformance.seeded import settle
+from avow.evidence.record import RETRY
 from avow.pipeline.work import method_job
 from avow.system.load import load_system
 
@@ -120,3 +121,26 @@ def test_no_class_of_that_name(tmp_path: Path) -> None:
     (tmp_path / "node.py").write_text("class Other: pass\n")
     assert [d.code for d in BACKEND.check(work)] == ["HYPO102"]
     assert {tmp_path / "node.py", tmp_path / "p.yaml"} <= set(BACKEND.files(work))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "step",
+    [
+        "r):\n        import time\n        while r > 250:\n            time.sleep(0.05)\n        return r\n",
+        pytest.param(
+            "r):\n        import time\n        while r != r:\n            time.sleep(0.05)\n        return r\n",
+            marks=pytest.mark.nightly,
+        ),
+    ],
+    ids=["a reading", "no number"],
+)
+def test_a_class_that_takes_its_time_is_not_refuted_for_it_and_asked_again(step: str, tmp_path: Path) -> None:
+    """On a slow machine any class might: what the wall's clock says is kept neither for it nor against it."""
+    work = job(tmp_path, REAL, SAME, step)
+    (found,) = settle(BACKEND, work, tmp_path / "made", Limits(seconds=16)).outcomes
+    assert found.verdict is Verdict.ERROR, found.summary
+    assert "does not answer within" in found.summary
+    assert "asks again" in found.summary
+    assert found.details[RETRY] is True
+    assert found.counterexample is None

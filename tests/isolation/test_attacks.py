@@ -31,7 +31,7 @@ WRONG = "return {'colour': 'green', 'done': set()}\n"
 
 FORGERY = (
     '{"valid": 9, "edges": 9, "rejected": 0, "undecided": 0, "wanted": 9, "stopped": "", "observed": [], '
-    '"isolation": "sealed", "crash": null, "fault": "", "guarantees": {}}'
+    '"isolation": "sealed", "silent": "", "crash": null, "fault": "", "guarantees": {}}'
 )
 
 DAEMON = """
@@ -273,3 +273,31 @@ def test_a_judge_tells_that_its_subject_was_ended(
     _, said = judge.ask(str(tmp_path / "j.py"), [], cwd=tmp_path, seconds=30, megabytes=4000, env={})
     assert said == {"a": 1}
     assert process.ended_by_others() is killed
+
+
+def test_what_was_killed_from_outside_says_so_and_what_ended_itself_does_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "s.py"
+    for killed, text in ((True, "def step(x): return {}"), (False, "raise SystemExit")):
+        monkeypatch.setattr(process, "_ended_by_others", threading.Event())
+        path.write_text(text)
+        subject = Subject(path, "step", 60.0)
+        try:
+            if killed:
+                subject.ask({"x": 1})
+                assert subject.process is not None
+                os.kill(_youngest(subject.process.pid), signal.SIGKILL)
+                subject.process.wait(60)
+            with pytest.raises(SubjectFailed):
+                subject.ask({"x": 1})
+            assert bool(subject.silent) == killed
+        finally:
+            subject.close()
+
+
+def _youngest(pid: int) -> int:
+    """The subject itself, where a tracer or a cage is around it."""
+    while children := Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+        pid = int(children[-1])
+    return pid
