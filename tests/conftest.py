@@ -22,6 +22,7 @@ _NEEDS = {
     "needs_chromium": lambda: any(map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
     "needs_cvc5": lambda: importlib.util.find_spec("cvc5") is not None,
     "needs_dafny": lambda: shutil.which("dafny") is not None,
+    "needs_dds": lambda: all(map(importlib.util.find_spec, ("cyclonedds", "rosbags"))),
     "needs_dot": lambda: shutil.which("dot") is not None,
     "needs_latex": lambda: shutil.which("pdflatex") is not None,
     "needs_pacti": lambda: importlib.util.find_spec("pacti") is not None,

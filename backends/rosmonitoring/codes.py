@@ -87,7 +87,7 @@ CODES = register(
     declare(
         "MON303",
         "no graph",
-        "No master of ROS 1 and no rosbridge answers, or it refuses.",
+        "No master of ROS 1 and no rosbridge answers, or it refuses; or a DDS domain cannot be joined.",
         "Start one (`roscore`), or name it: `--live ros1:http://host:11311`, `--live rosbridge:ws://host:9090`.",
     ),
     declare(
@@ -95,6 +95,18 @@ CODES = register(
         "cannot be written",
         "A file that was to be written cannot be.",
         "Correct the path of `--record`, `--timeline`, `--mcap` or `--configuration`.",
+    ),
+    declare(
+        "MON305",
+        "DDS not installed",
+        "Listening over DDS needs packages that are not installed.",
+        "`pip install 'avow[dds]'`.",
+    ),
+    declare(
+        "MON306",
+        "unknown type on DDS",
+        "DDS says what a topic's type is called, not what its messages are made of, and nothing else does.",
+        "Name its `.msg` files under `messages`, or the distribution: `ros: {distro: humble}`.",
     ),
     declare("MON302", "cannot listen", "The port is taken or not allowed.", "Choose another with `--serve`."),
 )

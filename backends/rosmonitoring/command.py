@@ -35,7 +35,9 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="For machines: one JSON object.")
 @click.option("--all", "show_all", is_flag=True, help=f"Show every violation, not only the first {VIOLATIONS_SHOWN}.")
 @click.option(
-    "--live", metavar="GRAPH", help="Judge a running graph: ros1[:http://host:11311], rosbridge:ws://host:9090."
+    "--live",
+    metavar="GRAPH",
+    help="Judge a running graph: ros1[:http://host:11311], dds[:DOMAIN], rosbridge:ws://host:9090.",
 )
 @click.option(
     "--for", "seconds", type=click.FloatRange(min=0), help="With --live: for so many seconds (else until Ctrl-C)."
@@ -154,7 +156,7 @@ def _live(
 
     seconds, host, record, verdicts = how
     running = session(system, nodes, make=telling.monitor)
-    graph = graph_of(live, running.topics, host)
+    graph = graph_of(live, running, host)
     with _until(seconds) as over:
         found = ((0, violation) for violation in follow(running, graph, over, record, verdicts, _warn))
         return _told(running, found, str(record or ""), telling)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 
 from .bags import Event
 from .coverage import coverage
+from .dds import Dds, domain_of
 from .graphs import ERROR, OK, STALE, WARN, Graph, Heard, Status
 from .ros1 import Ros1, master_of
 from .rosbridge import Rosbridge
@@ -129,14 +130,14 @@ class Board:
             yield Status(name, ERROR, violation.text())
 
 
-def graph_of(text: str, topics: Iterable[str], host: str) -> Graph:
-    """``ros1``, ``ros1:http://host:11311``, ``rosbridge:ws://host:9090``. Raises Rejected."""
+def graph_of(text: str, running: Session, host: str) -> Graph:
+    """``ros1``, ``ros1:http://host:11311``, ``dds``, ``dds:42``, ``rosbridge:ws://host:9090``. Raises Rejected."""
     kind, _, address = text.partition(":")
     if kind == "ros1":
-        return Ros1(master_of(text), topics, host)
-    if kind == "rosbridge" and address.startswith(("ws://", "wss://")):
-        return Rosbridge(address, topics)
-    hint = "ros1, ros1:http://host:11311, or rosbridge:ws://host:9090"
+        return Ros1(master_of(text), running.topics, host)
     if kind == "dds":
-        hint += "; a graph of ROS 2 can be heard through its rosbridge_server"
+        return Dds(domain_of(text), running.topics, running.kinds, running.known, host)
+    if kind == "rosbridge" and address.startswith(("ws://", "wss://")):
+        return Rosbridge(address, running.topics)
+    hint = "ros1, ros1:http://host:11311, dds, dds:42, or rosbridge:ws://host:9090"
     raise Rejected(Diagnostic("MON303", f"{text!r} is no graph that can be listened to", hint=hint))

@@ -9,6 +9,7 @@ from typing import Any
 
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.contract import ClauseKind
+from avow.ros.definitions import Definitions
 from avow.system.plan import System
 from avow.system.schema import suggest
 
@@ -18,6 +19,7 @@ from .compiled import Compiled
 from .coverage import Tally
 from .engine import Monitor
 from .options import NAME, Setup, known_types, origin, readable, same_topic, setup
+from .rules import NOTHING_KNOWN
 from .traces import read_trace
 from .watched import Fault, Violation
 
@@ -105,6 +107,16 @@ class Session:
             for topic in monitor.setup.topics:
                 found.setdefault(same_topic(topic), topic)
         return tuple(found.values())
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """The types of these topics (without their leading slash), as far as they are said."""
+        return {topic: kind for monitor in self.monitors for topic, kind in monitor.setup.kinds.items()}
+
+    @property
+    def known(self) -> Definitions:
+        """The message types that the plan defines."""
+        return self.monitors[0].setup.known if self.monitors else NOTHING_KNOWN
 
     @property
     def clean(self) -> bool:

@@ -85,3 +85,18 @@ TIMELINE_EVENTS = 100_000
 
 WORD_LENGTH = 60
 """Characters of a value in that picture: more have no room in it."""
+
+DDS_SETTLE = 0.005
+"""Seconds that DDS is given after a message, so that what was said with it is there and can be put into order."""
+
+DDS_TAKEN = 1_000
+"""Samples, and writers, that are taken from DDS at a time."""
+
+DDS_HISTORY = 10_000
+"""Samples that DDS keeps for a reader until they are taken, every few milliseconds."""
+
+DDS_MATCH = 1.0
+"""Seconds after which a writer that was found and is not matched is told."""
+
+LAST_DOMAIN = 232
+"""The greatest DDS domain: its ports are computed from it, and end at 65535."""

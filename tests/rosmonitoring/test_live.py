@@ -19,6 +19,7 @@ import pytest
 
 from avow.backends.rosmonitoring.live import follow, graph_of
 from avow.backends.rosmonitoring.ros1 import Ros1, frame, header, master_of, read_header, reader
+from avow.backends.rosmonitoring.rosbridge import Rosbridge
 from avow.backends.rosmonitoring.session import Session, session
 from avow.backends.rosmonitoring.watched import Fault, Violation
 from avow.base.diagnostics import Rejected
@@ -188,7 +189,7 @@ def test_a_graph_behind_rosbridge(make_system: Callable[..., System]) -> None:
         address = f"rosbridge:ws://127.0.0.1:{listening.socket.getsockname()[1]}"
         running = session(make_system(RCL, MAPPING))
         warned: list[str] = []
-        graph = graph_of(address, running.topics, "127.0.0.1")
+        graph = graph_of(address, running, "127.0.0.1")
         over = until(lambda: running.events == 4 and len(warned) == 2)
         found = list(follow(running, graph, over, None, "/verdicts", warned.append))
         listening.shutdown()
@@ -200,7 +201,7 @@ def test_a_graph_behind_rosbridge(make_system: Callable[..., System]) -> None:
     assert published[-1]["msg"]["status"][0]["values"][0] == {"key": "published", "value": "4"}
 
 
-@pytest.mark.parametrize("text", ["ros2", "rosbridge:http://x", "rosbridge", "dds:0"])
+@pytest.mark.parametrize("text", ["ros2", "rosbridge:http://x", "rosbridge", "zenoh"])
 def test_other_graphs_are_refused(text: str) -> None:
     with pytest.raises(Rejected, match="no graph that can be listened to"):
         graph_of(text, (), "127.0.0.1")
@@ -208,7 +209,7 @@ def test_other_graphs_are_refused(text: str) -> None:
 
 def test_no_rosbridge_is_told() -> None:
     pytest.importorskip("websockets")
-    with pytest.raises(Rejected, match="no rosbridge answers"), graph_of("rosbridge:ws://127.0.0.1:1", ("s",), ""):
+    with pytest.raises(Rejected, match="no rosbridge answers"), Rosbridge("ws://127.0.0.1:1", ("s",)):
         pass
 
 

@@ -1,0 +1,266 @@
+"""A participant of a running ROS 2 graph, over DDS by the package cyclonedds: it needs no ROS package.
+
+A topic's writers are found by DDS's discovery. Each is heard by a reader with the quality of service that it offers, so
+that nothing is missed that it keeps or repeats. What comes together is put into the order of its writers' clocks.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.ros.bags import Event, enveloped
+from avow.ros.calls import is_part
+from avow.ros.definitions import Definitions
+
+from .dds_types import DIAGNOSTICS, NO_DDS, Types, dds_topic, dds_type, filled
+from .graphs import Inbox, Status
+from .tuning import DDS_HISTORY, DDS_MATCH, DDS_SETTLE, DDS_TAKEN, LAST_DOMAIN, LIVE_PAUSE
+
+LOOPBACK = ("127.0.0.1", "localhost")
+
+
+@dataclass(slots=True)
+class _Heard:
+    """A topic that is listened to: its type, what reads its samples."""
+
+    topic: str
+    kind: str
+    read: Callable[[bytes], dict[str, Any]]
+    entity: Any = None
+
+
+@dataclass(slots=True)
+class _Reader:
+    """One for all writers of a topic that offer the same quality of service."""
+
+    heard: _Heard
+    entity: Any
+    lost: int = 0
+
+
+@dataclass(slots=True)
+class _Writer:
+    """One who writes a topic, and the reader that hears it: others may too, and are not listened to."""
+
+    reader: _Reader
+    since: float = field(default_factory=time.monotonic)
+    settled: bool = False
+    """It is heard, or gone, or has been told of."""
+
+
+class Dds:
+    """Hears the topics of a domain; use it as a context."""
+
+    def __init__(
+        self, domain: int, topics: Iterable[str], kinds: Mapping[str, str], known: Definitions, host: str
+    ) -> None:
+        """`kinds`: the type of each topic, without its leading slash. `host`: an address of the network at which the
+        nodes are. Raises Rejected for a topic whose type is not known, and without the package cyclonedds."""
+        self.inbox = Inbox()
+        self._domain, self._host = domain, host
+        self._types = Types(known)
+        self._heard: dict[str, _Heard] = {}
+        wrong: list[Diagnostic] = []
+        for topic in topics:
+            if is_part(topic):
+                self.inbox.trouble(topic, f"{topic}: calls of services and actions are not heard on a running graph")
+                continue
+            kind = kinds.get(topic.lstrip("/"), "")
+            why = self._types.missing(kind) if kind else f"nothing says of which type {topic} is"
+            if why:
+                hint = "name its .msg files under `messages`, or the distribution, `ros: {distro: humble}`"
+                wrong.append(Diagnostic("MON306", f"{topic} cannot be heard over DDS: {why}", hint=hint))
+            else:
+                self._heard[dds_topic(topic)] = _Heard(topic, kind, self._types.reader(kind))
+        if wrong:
+            raise Rejected(*wrong)
+        self._over = threading.Event()
+        self._writers: dict[int, _Writer] = {}
+        self._readers: dict[tuple[Any, ...], _Reader] = {}
+        self._spoken: list[Any] = []
+
+    def __enter__(self) -> Dds:
+        """Raises Rejected where the domain cannot be joined."""
+        try:
+            from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
+            from cyclonedds.core import DDSException, WaitSet
+            from cyclonedds.domain import Domain, DomainParticipant
+            from cyclonedds.topic import Topic
+        except ImportError:
+            raise Rejected(NO_DDS) from None
+        try:
+            self._entity = None if "CYCLONEDDS_URI" in os.environ else Domain(self._domain, settings(self._host))
+            self._participant = DomainParticipant(self._domain)
+            for name, heard in self._heard.items():
+                heard.entity = Topic(self._participant, name, self._types.raw(heard.kind))
+            self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
+            self._wait = WaitSet(self._participant)
+            self._wait.attach(self._condition(self._publications))
+        except DDSException as error:
+            text = f"DDS domain {self._domain} cannot be joined at {self._host}: {error}"
+            raise Rejected(Diagnostic("MON303", text, hint="--live dds:0 --host ADDRESS")) from None
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def diagnostics(self, topic: str, system: str) -> Callable[[Sequence[Status]], None]:
+        """What says verdicts on a topic."""
+        from cyclonedds.core import DDSException, Qos
+        from cyclonedds.pub import DataWriter
+        from cyclonedds.qos import Policy
+        from cyclonedds.topic import Topic
+        from cyclonedds.util import duration
+
+        kind = "diagnostic_msgs/DiagnosticArray"
+        types = Types(Definitions(DIAGNOSTICS))
+        qos = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(DDS_TAKEN))
+        try:
+            entity = Topic(self._participant, dds_topic(topic), types.struct(kind))
+            writer = DataWriter(self._participant, entity, qos)
+        except DDSException as error:
+            raise Rejected(Diagnostic("MON303", f"{topic} cannot be written over DDS: {error}")) from None
+        self._spoken.append(writer)
+
+        def say(statuses: Sequence[Status]) -> None:
+            made = [
+                {
+                    "level": status.level,
+                    "name": status.name,
+                    "message": status.text,
+                    "hardware_id": system,
+                    "values": [{"key": key, "value": value} for key, value in status.values],
+                }
+                for status in statuses
+            ]
+            header = {"stamp": divmod(time.time_ns(), 10**9), "frame_id": ""}
+            writer.write(filled(types, DIAGNOSTICS, kind, {"header": header, "status": made}))
+
+        return say
+
+    def _condition(self, reader: Any) -> Any:
+        from cyclonedds.core import InstanceState, ReadCondition, SampleState, ViewState
+
+        return ReadCondition(reader, SampleState.NotRead | ViewState.Any | InstanceState.Any)
+
+    def _listen(self) -> None:
+        from cyclonedds.core import DDSException
+        from cyclonedds.util import duration
+
+        pause = duration(seconds=LIVE_PAUSE)
+        try:
+            while not self._over.is_set():
+                self._wait.wait(pause)
+                time.sleep(DDS_SETTLE)
+                self._discover()
+                self._take()
+                self._look()
+        except DDSException as error:
+            self.inbox.trouble("", f"DDS: {error}")
+
+    def _discover(self) -> None:
+        """Who writes what is listened to."""
+        for found in self._publications.take(DDS_TAKEN):
+            handle = found.sample_info.instance_handle
+            if not found.sample_info.valid_data:
+                if handle in self._writers:
+                    self._writers[handle].settled = True
+                continue
+            heard = self._heard.get(found.topic_name)
+            if heard is None or handle in self._writers:
+                continue
+            if found.type_name != dds_type(heard.kind):
+                said = found.type_name.replace("::msg::dds_::", "/").removesuffix("_")
+                self.inbox.trouble(heard.topic, f"{heard.topic} is written as {said}, and is to be {heard.kind}")
+                continue
+            self._writers[handle] = _Writer(self._reader(heard, found.qos))
+
+    def _reader(self, heard: _Heard, offered: Any) -> _Reader:
+        """One with the quality of service that a writer offers."""
+        from cyclonedds.core import Qos
+        from cyclonedds.qos import Policy
+        from cyclonedds.sub import DataReader, Subscriber
+
+        taken = [policy for policy in offered if policy.__scope__ in ("Reliability", "Durability", "Ownership")]
+        part = [policy for policy in offered if policy.__scope__ == "Partition"]
+        key = (heard.topic, *map(repr, (*taken, *part)))
+        if key not in self._readers:
+            more = Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True)
+            qos = Qos(*taken, Policy.History.KeepLast(DDS_HISTORY), more)
+            subscriber = Subscriber(self._participant, Qos(*part)) if part else self._participant
+            entity = DataReader(subscriber, heard.entity, qos)
+            self._wait.attach(self._condition(entity))
+            self._readers[key] = _Reader(heard, entity)
+        return self._readers[key]
+
+    def _take(self) -> None:
+        """What has come: of each writer by its own reader, in the order of their clocks."""
+        taken = [(reader, sample) for reader in self._readers.values() for sample in reader.entity.take(DDS_TAKEN)]
+        if any(sample.sample_info.publication_handle not in self._writers for _, sample in taken):
+            self._discover()  # one who has come in between
+        found: list[tuple[int, _Heard, bytes]] = []
+        for reader, sample in taken:
+            info = sample.sample_info
+            writer = self._writers.get(info.publication_handle)
+            if info.valid_data and writer is not None and writer.reader is reader:
+                found.append((info.source_timestamp, reader.heard, sample.data))
+        for _, heard, data in sorted(found, key=lambda one: one[0]):
+            self.inbox.message(heard.topic, partial(_event, heard, data))
+
+    def _look(self) -> None:
+        """Tell which writers cannot be heard, and what was lost."""
+        for handle, writer in self._writers.items():
+            if writer.settled:
+                continue
+            topic, kind = writer.reader.heard.topic, writer.reader.heard.kind
+            writer.settled = handle in writer.reader.entity.get_matched_publications()
+            if not writer.settled and time.monotonic() - writer.since > DDS_MATCH:
+                writer.settled = True
+                text = f"a writer of {topic} cannot be heard: its {kind} is made otherwise than known here"
+                self.inbox.trouble(topic, f"{text}, or its quality of service has no match")
+        for reader in self._readers.values():
+            lost = reader.entity.get_sample_lost_status().total_count
+            if lost != reader.lost:
+                reader.lost = lost
+                self.inbox.trouble(reader.heard.topic, f"{reader.heard.topic}: {lost} samples lost")
+
+
+def _event(heard: _Heard, data: bytes, now: float) -> Event:
+    try:
+        return enveloped(heard.read(data), heard.topic, now)
+    except ValueError as error:
+        raise ValueError(f"{heard.topic}: {error}") from None
+
+
+def settings(host: str) -> str:
+    """Cyclone DDS's configuration: this network alone; on loopback no multicast, and peers are asked one by one."""
+    interface = (
+        f"<Interfaces><NetworkInterface address={quoteattr(host.replace('localhost', LOOPBACK[0]))}/></Interfaces>"
+    )
+    if host not in LOOPBACK:
+        return f"<CycloneDDS><Domain><General>{interface}</General></Domain></CycloneDDS>"
+    return (
+        f"<CycloneDDS><Domain><General>{interface}<AllowMulticast>false</AllowMulticast></General><Discovery>"
+        f"<Peers><Peer Address={quoteattr(LOOPBACK[0])}/></Peers><ParticipantIndex>auto</ParticipantIndex>"
+        "<MaxAutoParticipantIndex>100</MaxAutoParticipantIndex></Discovery></Domain></CycloneDDS>"
+    )
+
+
+def domain_of(text: str) -> int:
+    """``dds`` (ROS_DOMAIN_ID, else 0) or ``dds:42``. Raises Rejected."""
+    said = text.removeprefix("dds").removeprefix(":") or os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if not (said.isascii() and said.isdigit() and len(said) <= 3 and int(said) <= LAST_DOMAIN):
+        what = f"{said!r} is no DDS domain: 0 to {LAST_DOMAIN}"
+        raise Rejected(Diagnostic("MON303", what, hint="--live dds:0"))
+    return int(said)

@@ -1,0 +1,147 @@
+"""A writer on DDS, as a process of its own: python dds_peer.py DOMAIN; commands come as JSON lines, each is answered.
+
+Its types are written out here, so that Avow's are held against others than its own.
+"""
+
+import json
+import sys
+import time
+from dataclasses import dataclass
+
+from cyclonedds.core import Qos
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import array, float32, float64, int32, int64, sequence, uint8, uint32
+from cyclonedds.pub import DataWriter, Publisher
+from cyclonedds.qos import Policy
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+
+@dataclass
+class Double(IdlStruct, typename="std_msgs::msg::dds_::Float64_"):
+    data: float64
+
+
+@dataclass
+class Wrong(IdlStruct, typename="std_msgs::msg::dds_::Float64_"):
+    """Another layout by the same name."""
+
+    data: int64
+    more: str = ""
+
+
+@dataclass
+class Short(IdlStruct, typename="std_msgs::msg::dds_::Float64_"):
+    data: float32
+
+
+@dataclass
+class Single(IdlStruct, typename="std_msgs::msg::dds_::Float32_"):
+    data: float32
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32
+    nanosec: uint32
+
+
+@dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time
+    frame_id: str
+
+
+@dataclass
+class Scan(IdlStruct, typename="pkg::msg::dds_::Scan_"):
+    header: Header
+    ok: bool
+    ranges: sequence[float32]
+    pair: array[float64, 2]
+    words: sequence[str]
+    level: uint8
+
+
+@dataclass
+class KeyValue(IdlStruct, typename="diagnostic_msgs::msg::dds_::KeyValue_"):
+    key: str
+    value: str
+
+
+@dataclass
+class DiagnosticStatus(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticStatus_"):
+    level: uint8
+    name: str
+    message: str
+    hardware_id: str
+    values: sequence[KeyValue]
+
+
+@dataclass
+class DiagnosticArray(IdlStruct, typename="diagnostic_msgs::msg::dds_::DiagnosticArray_"):
+    header: Header
+    status: sequence[DiagnosticStatus]
+
+
+KINDS = {kind.__name__: kind for kind in (Double, Wrong, Short, Single, Scan)}
+QOS = {
+    "reliable": Policy.Reliability.Reliable(duration(seconds=1)),
+    "best_effort": Policy.Reliability.BestEffort,
+    "transient_local": Policy.Durability.TransientLocal,
+    "volatile": Policy.Durability.Volatile,
+    "exclusive": Policy.Ownership.Exclusive,
+    "partition": Policy.Partition(["robot1"]),
+}
+KEPT = Policy.DurabilityService(0, Policy.History.KeepAll, -1, -1, -1)
+"""What a transient_local writer keeps for whoever comes later: all."""
+LOOPBACK = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>
+<AllowMulticast>false</AllowMulticast></General><Discovery><Peers><Peer Address="127.0.0.1"/></Peers>
+<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>100</MaxAutoParticipantIndex></Discovery></Domain></CycloneDDS>"""
+
+
+def value(kind, given):
+    if kind is Scan:
+        return Scan(Header(Time(*given["stamp"]), "map"), given["ok"], given["ranges"], given["pair"], ["a", "bc"], 2)
+    return kind(given)
+
+
+def main():
+    number = int(sys.argv[1])
+    domain = Domain(number, LOOPBACK)  # noqa: F841 - it is left when this is gone
+    participant = DomainParticipant(number)
+    writers = {}
+    board = None
+    for line in sys.stdin:
+        said = json.loads(line)
+        answer = None
+        match said["do"]:
+            case "write":  # a new writer: its name, topic, kind and quality of service
+                kind = KINDS[said["kind"]]
+                qos = [QOS[name] for name in said["qos"]]
+                part = [policy for policy in qos if isinstance(policy, Policy.Partition)]
+                qos = Qos(*(policy for policy in qos if policy not in part), Policy.History.KeepAll, KEPT)
+                topic = Topic(participant, said["topic"], kind)
+                owner = Publisher(participant, Qos(*part)) if part else participant
+                writers[said["name"]] = (kind, DataWriter(owner, topic, qos))
+            case "heard":  # how many hear it
+                answer = len(writers[said["name"]][1].get_matched_subscriptions())
+            case "say":
+                kind, writer = writers[said["name"]]
+                for given in said["values"]:
+                    writer.write(value(kind, given), *((said["time"],) if "time" in said else ()))
+                    time.sleep(said.get("pause", 0))
+            case "gone":
+                del writers[said["name"]]
+            case "verdicts":
+                board = DataReader(participant, Topic(participant, "rt/verdicts", DiagnosticArray))
+            case "told":
+                answer = [
+                    [s.name, s.level, {v.key: v.value for v in s.values}] for m in board.take(100) for s in m.status
+                ]
+        print(json.dumps(answer), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,258 @@
+"""A running ROS 2 graph over DDS: a writer in another process, heard, judged and recorded here."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from avow.backends.rosmonitoring.live import follow, graph_of
+from avow.backends.rosmonitoring.session import Session, session
+from avow.backends.rosmonitoring.watched import Fault, Violation
+from avow.base.diagnostics import Rejected
+from avow.system.plan import System
+
+from .processes import LONGEST, running, wait_for
+
+needs_dds = pytest.mark.needs_dds
+HERE = Path(__file__).parent
+RCL = """
+node n {
+  inputs( r : REAL )
+  outputs( s : REAL )
+  topics( std_msgs/Float64 r matches(in.r), std_msgs/Float64 s matches(out.s) )
+  guarantee low ( out.s <= 120 )
+}
+"""
+MAPPING = {"in.r": "data", "out.s": "data"}
+
+
+class Peer:
+    """The other process."""
+
+    def __init__(self, process: subprocess.Popen[str], domain: int) -> None:
+        self.process, self.domain = process, domain
+
+    def __call__(self, do: str, **more: Any) -> Any:
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(json.dumps({"do": do, **more}) + "\n")
+        self.process.stdin.flush()
+        return json.loads(self.process.stdout.readline())
+
+    def write(self, topic: str, kind: str = "Double", qos: tuple[str, ...] = ("reliable",), name: str = "") -> None:
+        self("write", name=name or topic, topic=f"rt/{topic}", kind=kind, qos=list(qos))
+
+    def say(self, topic: str, *values: Any, **more: Any) -> None:
+        self("say", name=topic, values=list(values), **more)
+
+    def heard(self, topic: str, readers: int = 1) -> None:
+        wait_for(lambda: self("heard", name=topic) == readers)
+
+
+@pytest.fixture
+def peer() -> Iterator[Peer]:
+    domain = 1 + os.getpid() % 200  # tests that run at once are in others
+    command = [sys.executable, HERE / "dds_peer.py", domain]
+    with running(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        yield Peer(process, domain)
+
+
+class Listening:
+    """A monitor in a thread of its own."""
+
+    def __init__(self, peer: Peer, system: System, record: Path | None = None, verdicts: str | None = None) -> None:
+        self.session = session(system)
+        self.found: list[Violation] = []
+        self.warned: list[str] = []
+        self._over = threading.Event()
+        graph = graph_of(f"dds:{peer.domain}", self.session, "127.0.0.1")
+        judged = follow(self.session, graph, self._over.is_set, record, verdicts, self.warned.append)
+        self._thread = threading.Thread(target=lambda: self.found.extend(judged))
+
+    def __enter__(self) -> Listening:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join(LONGEST)
+
+    def until(self, done: Callable[[Session], bool]) -> None:
+        wait_for(lambda: done(self.session))
+
+    def told(self, words: str) -> None:
+        wait_for(lambda: any(words in one for one in self.warned))
+
+
+@pytest.mark.slow
+@needs_dds
+def test_what_is_said_over_dds_is_judged_as_its_record_is(
+    peer: Peer, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    system, record = make_system(RCL, MAPPING), tmp_path / "run.jsonl"
+    peer.write("s")
+    with Listening(peer, system, record) as listening:
+        peer.heard("s")
+        peer.say("s", 1.5, 119.0, 120.5, 7.0)
+        listening.until(lambda s: s.events == 4)
+    assert listening.warned == []
+    assert [(v.clause, v.index) for v in listening.found] == [("low", 3)]
+    assert [json.loads(line)["data"] for line in record.read_text("utf-8").splitlines()] == [1.5, 119.0, 120.5, 7.0]
+    assert [(v.clause, v.index) for _, v in session(system).run(record)] == [("low", 3)]
+
+
+@pytest.mark.slow
+@needs_dds
+@pytest.mark.parametrize(
+    "qos",
+    [
+        ("reliable", "volatile"),
+        ("best_effort", "volatile"),
+        ("reliable", "transient_local"),
+        ("best_effort", "exclusive"),
+        ("reliable", "partition"),
+    ],
+    ids="-".join,
+)
+def test_every_quality_of_service_is_met(peer: Peer, make_system: Callable[..., System], qos: tuple[str, ...]) -> None:
+    peer.write("s", qos=qos)
+    with Listening(peer, make_system(RCL, MAPPING)) as listening:
+        if "transient_local" not in qos:  # what such a writer keeps, who comes later hears too
+            peer.heard("s")
+        peer.say("s", 1.0, 2.0, 300.0)
+        listening.until(lambda s: s.events == 3)
+    assert [v.index for v in listening.found] == [3]
+    assert listening.warned == []
+
+
+@pytest.mark.slow
+@needs_dds
+def test_two_writers_one_that_goes_and_one_that_comes_late(peer: Peer, make_system: Callable[..., System]) -> None:
+    """Each is heard once, also where their qualities of service differ."""
+    peer.write("s", name="a", qos=("reliable",))
+    peer.write("s", name="b", qos=("best_effort",))
+    with Listening(peer, make_system(RCL, MAPPING)) as listening:
+        peer.heard("a", 2), peer.heard("b")  # the reader for b's quality of service hears a too
+        peer.say("a", 1.0), peer.say("b", 2.0)
+        listening.until(lambda s: s.events == 2)
+        peer("gone", name="a")
+        peer.write("s", name="c")
+        peer.heard("c", 2)
+        peer.say("c", 200.0), peer.say("b", 3.0)
+        listening.until(lambda s: s.events == 4)
+    assert [v.clause for v in listening.found] == ["low"]
+
+
+@pytest.mark.slow
+@needs_dds
+def test_a_silent_topic_is_told_while_nothing_comes(peer: Peer, make_system: Callable[..., System]) -> None:
+    peer.write("s")
+    with Listening(peer, make_system(RCL, MAPPING, fresh={"out.s": "300 ms"})) as listening:
+        peer.heard("s")
+        peer.say("s", 1.0)
+        listening.until(lambda s: Fault.SILENT in s.counts)
+    assert listening.found[-1].clause == "out.s"
+
+
+@pytest.mark.slow
+@needs_dds
+def test_a_writer_whose_clock_jumps_is_no_false_alarm(peer: Peer, make_system: Callable[..., System]) -> None:
+    """Deadlines and records go by the times at which messages came."""
+    peer.write("s")
+    with Listening(peer, make_system(RCL, MAPPING, fresh={"out.s": "60 s"})) as listening:
+        peer.heard("s")
+        now = time.time_ns()
+        for k, jump in enumerate((0, 3600, -3600, 0)):
+            peer.say("s", float(k), time=now + jump * 10**9)
+            listening.until(lambda s, k=k: s.events == k + 1)  # type: ignore[misc]
+    assert listening.found == []
+
+
+@pytest.mark.slow
+@needs_dds
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [("Wrong", "is made otherwise"), ("Short", "is made otherwise"), ("Single", "is written as std_msgs/Float32")],
+)
+def test_another_layout_or_type_is_told_and_not_heard(
+    peer: Peer, make_system: Callable[..., System], kind: str, told: str
+) -> None:
+    peer.write("s", kind)
+    with Listening(peer, make_system(RCL, MAPPING)) as listening:
+        peer.say("s", 1)
+        listening.told(told)
+    assert listening.session.events == 0
+
+
+@pytest.mark.slow
+@needs_dds
+def test_a_message_of_messages_arrays_and_times(peer: Peer, make_system: Callable[..., System], tmp_path: Path) -> None:
+    system = make_system(
+        """
+node n {
+  inputs( near : REAL, ok : BOOL, y : REAL, at : REAL )
+  outputs( s : REAL )
+  topics( pkg/Scan scan matches(in.near), pkg/Scan scan matches(in.ok), pkg/Scan scan matches(in.y),
+          pkg/Scan scan matches(in.at), std_msgs/Float64 s matches(out.s) )
+  assume far ( in.near >= 0.1 )
+  assume fine ( in.ok and in.y == 2.5 and in.at == 7.25 )
+  guarantee low ( out.s <= 120 )
+}
+""",
+        {
+            "in.near": {"field": "ranges", "take": "min", "inf": "none", "nan": "none", "elsewhere": 30},
+            "in.ok": "ok",
+            "in.y": "pair[1]",
+            "in.at": "header.stamp",
+            "out.s": "data",
+        },
+        messages={
+            "pkg/Scan": "std_msgs/Header header\nbool ok\nfloat32[] ranges\nfloat64[2] pair\nstring[] words\nuint8 level",  # noqa: E501
+            "std_msgs/Header": "time stamp\nstring frame_id\n",
+        },
+    )
+    peer.write("scan", "Scan")
+    good = {"stamp": [7, 250_000_000], "ok": True, "ranges": [0.5, float("inf"), float("nan")], "pair": [1.5, 2.5]}
+    with Listening(peer, system) as listening:
+        peer.heard("scan")
+        peer.say("scan", good, {**good, "ranges": [0.05]}, {**good, "ranges": []}, {**good, "pair": [2.5, 1.5]})
+        listening.until(lambda s: s.events == 4)
+    assert [(v.clause, v.index) for v in listening.found] == [("far", 2), ("fine", 4)]
+
+
+@pytest.mark.slow
+@needs_dds
+def test_verdicts_are_heard_by_others(peer: Peer, make_system: Callable[..., System]) -> None:
+    peer.write("s")
+    peer("verdicts")
+    with Listening(peer, make_system(RCL, MAPPING), verdicts="/verdicts") as listening:
+        peer.heard("s")
+        peer.say("s", 1.0, 130.0)
+        listening.until(lambda s: s.events == 2)
+        said: list[Any] = []
+        wait_for(lambda: said.extend(peer("told")) or ["n.low", 2, {"published": "2", "broken": "1"}] in said)
+
+
+@needs_dds
+def test_what_cannot_be_heard_is_refused_before_anything_runs(make_system: Callable[..., System]) -> None:
+    running = session(make_system(RCL.replace("std_msgs/Float64 s", "other/Thing s"), MAPPING))
+    with pytest.raises(Rejected, match="nothing defines other/Thing"):
+        graph_of("dds", running, "127.0.0.1")
+    for text in ("dds:-1", "dds:233", "dds:x", "dds:0x1"):
+        with pytest.raises(Rejected, match="no DDS domain"):
+            graph_of(text, running, "127.0.0.1")
+
+
+def test_without_the_package_it_is_told(make_system: Callable[..., System], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cyclonedds.idl", None)
+    with pytest.raises(Rejected, match="cyclonedds"):
+        graph_of("dds", session(make_system(RCL, MAPPING)), "127.0.0.1")
