@@ -20,7 +20,7 @@ from avow.calculus.hierarchy import innermost
 from avow.calculus.wiring import wiring
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Established, Kernel, Refused
-from avow.kernel.solvers import Solvers
+from avow.kernel.solvers import Said, Solvers
 from avow.kernel.statements import Kind, Statement, Statements, statements
 
 if TYPE_CHECKING:
@@ -52,6 +52,11 @@ class Certificates:
         if self._known is None:
             self._known = statements(wiring(self.composition.frame))
         return self._known
+
+    @property
+    def late(self) -> bool:
+        """Whether the clock ended a question to Z3: on a quicker machine more might be established."""
+        return Said.LATE in self.solvers.known.values()
 
     def condition(self, goal: Goal, about: str, bounds: Bounds) -> Established | None:
         """The assumption of a node (``agent.low``, or ``robot.agent.low`` of a node in a subsystem) in a derivation."""

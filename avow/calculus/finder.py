@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 from avow.kernel.certificate import Certificate, Entry, How, Question, Use
 from avow.kernel.check import Kernel, Refused
-from avow.kernel.solvers import Solvers
+from avow.kernel.solvers import Said, Solvers
 from avow.kernel.statements import Kind, Statement, Statements
 from avow.kernel.text import Text, Untranslatable
 from avow.language.terms import And, Quantified, Quantifier
@@ -364,6 +364,8 @@ class Finder:
             solver.from_string("\n".join(lines))
             said = solver.check(*(z3.Bool(f"track{k}", context) for k in range(len(written))))
             if said != z3.unsat:
+                if said == z3.unknown and solver.reason_unknown() == "timeout":
+                    self.solvers.known["\n".join(lines), CERTIFICATE_STEPS] = Said.LATE
                 return None
             needed = {str(switch) for switch in solver.unsat_core()}
         except z3.Z3Exception:

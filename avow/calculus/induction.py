@@ -20,6 +20,7 @@ from avow.language.sorts import FunctionSort
 from avow.language.terms import Role, Term, Variable
 from avow.solving.limits import effort_left, until
 from avow.solving.questions import Entailment
+from avow.temporal.cells import CELL
 from avow.tuning.bounds import DEEPEST_INDUCTION, LONGEST_UNROLLING
 from avow.tuning.effort import QUICK_EFFORT
 from avow.tuning.shown import STEP_VARIABLES
@@ -132,6 +133,8 @@ def _run(values: Mapping[Variable, Value], length: int, claim: str) -> Counterex
     for earlier in range(length - 1, -1, -1):
         shown: dict[str, str] = {}
         for variable, value in sorted(values.items(), key=lambda item: item[0].qualified):
+            if CELL in variable.name:
+                continue  # what is remembered follows from the steps before, which are shown
             base, times = variable.name, 0
             while base.endswith(_BEFORE):
                 base, times = base.removesuffix(_BEFORE), times + 1

@@ -107,6 +107,6 @@ def ask_once(script: str, budget: int) -> Said:
     found = kept.find(mark)
     if not isinstance(found, Said):
         found = ask_z3(script, budget)
-        if found is not Said.UNKNOWN:
+        if found in (Said.SAT, Said.UNSAT):
             kept.now[mark] = found
     return found

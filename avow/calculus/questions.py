@@ -85,18 +85,17 @@ class SideQuestion:
             return side_answer(settled, would_hold(composition.frame_of(goal), goal, settled))
         answer = side_answer(settled)
         found = composition.certificates.condition(goal, str(self.condition.about), bounds)
-        return certified(answer, found)
+        return certified(answer, found, late=composition.certificates.late)
 
 
-def certified(answer: Answer, found: Established | None) -> Answer:
-    """A proof of the engine, as far as the kernel establishes it."""
+def certified(answer: Answer, found: Established | None, *, late: bool) -> Answer:
+    """A proof of the engine, as far as the kernel establishes it. Where it does not, and the clock ended a question to
+    Z3 (`late`), no answer is given: it would be another on a quicker machine."""
     if found is None:
-        return replace(
-            answer,
-            verdict=Verdict.UNKNOWN,
-            summary=f"the engine finds that it {answer.summary}; the kernel could not establish it",
-            vacuous=False,
-        )
+        told = f"the engine finds that it {answer.summary}; the kernel could not establish it"
+        if late:
+            told += ": the clock ended a question to Z3 before its own steps did, ask again"
+        return replace(answer, verdict=Verdict.ERROR if late else Verdict.UNKNOWN, summary=told, vacuous=False)
     details = answer.details | {"certificate": {"key": found.key, "solvers": found.solvers}}
     return replace(answer, established=found, details=details)
 
@@ -216,10 +215,10 @@ def common_key(found: Sequence[Established]) -> str:
     return sha256("".join(one.key for one in found))
 
 
-def made_up(answer: Answer, found: Sequence[Established] | None) -> Answer:
+def made_up(answer: Answer, found: Sequence[Established] | None, *, late: bool) -> Answer:
     """As `certified`, of a proof that several claims make up."""
     if found is None:
-        return certified(answer, None)
+        return certified(answer, None, late=late)
     told = {"key": common_key(found), "solvers": min((one.solvers for one in found), default=1)}
     return replace(answer, details=answer.details | {"certificate": told})
 
@@ -254,7 +253,8 @@ class LoopQuestion:
                 found = [composition.certificates.condition(goal, str(c.about), bounds) for c in conditions]
                 there = [one for one in found if one is not None]
                 complete = there if len(there) == len(found) else None
-                return made_up(Answer(Verdict.PROVED, loop.note, details=details), complete)
+                told = Answer(Verdict.PROVED, loop.note, details=details)
+                return made_up(told, complete, late=composition.certificates.late)
             case LoopForm.CIRCULAR:
                 return Answer(Verdict.REFUTED, loop.note, Counterexample(explanation=loop.note), details=details)
             case _ if self.entered:
@@ -293,7 +293,8 @@ class StartQuestion:
                     return _counted(counted)
                 told = Answer(Verdict.PROVED, f"delayed edges start it: {listed}", details={"initial": list(initials)})
                 found = composition.certificates.existence(start_name(self.members))
-                return replace(made_up(told, found), established=found[0] if found else None)
+                made = made_up(told, found, late=composition.certificates.late)
+                return replace(made, established=found[0] if found else None)
             case "unsat":
                 summary = f"no values are as the plan says: {', '.join(solution.core)}"
                 return Answer(Verdict.REFUTED, summary, Counterexample(explanation=summary))
@@ -371,7 +372,8 @@ class JointQuestion:
                 return _counted(counted)
             shown.append(answer.counterexample.text() if answer.counterexample else "")
         room = Answer(Verdict.PROVED, f"there is room: {'; '.join(shown)}")
-        return made_up(room, composition.certificates.existence(f"joint.{about}"))
+        found = composition.certificates.existence(f"joint.{about}")
+        return made_up(room, found, late=composition.certificates.late)
 
 
 # -- hypotheses --------------------------------------------------------------------------------------------------------

@@ -41,6 +41,7 @@ from avow.solving.limits import spent, until
 from avow.solving.quantifier_elimination import eliminable, remedy
 from avow.solving.questions import entails, solve
 from avow.system.plan import Endpoint
+from avow.temporal.cells import CELL
 from avow.tuning.bounds import OFFER_HYPOTHESES, OFFER_LENGTH, OFFER_PLACES, OFFER_REWRITINGS
 from avow.tuning.effort import OFFER_STEP_EFFORT, OFFERS_EFFORT
 
@@ -221,7 +222,7 @@ def environment(frame: Frame, nodes: Iterable[str], earlier: int = 0) -> Iterato
     ports: dict[Variable, tuple[str, Variable]] = {}
     for name in nodes:
         for port in frame.node(name).inputs:
-            if Endpoint(name, port.name) not in frame.graph.by_target:
+            if CELL not in port.name and Endpoint(name, port.name) not in frame.graph.by_target:
                 entry = frame.entry(name, port.name)
                 ports.setdefault(frame.input(name, port.name, earlier), (entry, port.variable))
     for variable, (entry, called) in ports.items():
@@ -253,9 +254,10 @@ def initial_values(frame: Frame, consumer: str) -> Iterator[Place]:
 
 
 def _called(frame: Frame, name: str, earlier: int) -> dict[Variable, Variable]:
-    """System-level variables as the node's own ports. Of two inputs that read one value, one is enough."""
+    """System-level variables as the node's own ports. Of two inputs that read one value, one is enough; what its
+    clauses remember is no port."""
     found: dict[Variable, Variable] = {}
     for variable, meant in frame.mapping(name, earlier).items():
-        if isinstance(meant, Variable):
+        if isinstance(meant, Variable) and CELL not in variable.name:
             found.setdefault(meant, variable)
     return found

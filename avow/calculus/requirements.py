@@ -190,7 +190,8 @@ class FormulaQuestion:
         )
         cases = [Case(phase, one.verdict, one.needed) for one in answers]
         hint = Hint(labels(needed)) if len(cases) == 1 else hint_of(cases[0], replace(cases[1], depth=before))
-        return certified(answer, composition.certificates.requirement(self.name, hint, bounds))
+        found = composition.certificates.requirement(self.name, hint, bounds)
+        return certified(answer, found, late=composition.certificates.late)
 
     def not_proved(self, answer: Entailment, when: str = "") -> Answer:
         details: dict[str, object] = {"genuine": True}

@@ -14,7 +14,7 @@ from avow.cli.progress import progress
 from avow.solving.limits import from_seconds
 
 if TYPE_CHECKING:
-    from avow.base.verdict import Outcome
+    from avow.base.verdict import Counterexample, Outcome
     from avow.calculus.composition import Composition
     from avow.calculus.derivation import Goal
     from avow.evidence.obligation import Obligation
@@ -72,7 +72,10 @@ def command(
         from avow.language.translate import to_rcl
 
         goal = chosen[-1] if goals else composition.whole
-        standing = composition.stands(goal, Bounds(from_seconds(seconds), seed))
+        parts = list(goal.inner_first())
+        with progress(sum(len(part.conditions) for part in parts)) as telling:
+            composition.told = lambda goal, found: telling.tell(f"{goal}.{found.condition.about}", str(found.verdict))
+            standing = composition.stands(goal, Bounds(from_seconds(seconds), seed))
         if standing is not Verdict.PROVED:
             click.echo(f"{goal.name} is {standing}: no contract follows from it (see `avow compose {path}`)", err=True)
             return 1
@@ -159,6 +162,7 @@ def to_json(
                 "vacuous": outcome.vacuous,
                 "hypotheses": list(in_words(outcome.rests_on, outcome.hypotheses)),
                 "counterexample": dict(outcome.counterexample.values) if outcome.counterexample else None,
+                "run": [dict(step) for step in outcome.counterexample.trace] if outcome.counterexample else [],
                 "details": outcome.details,
             }
             for obligation, outcome in zip(obligations, outcomes, strict=True)
@@ -167,6 +171,14 @@ def to_json(
 
 
 _COLOURS = {"proved": "green", "justified": "cyan", "unknown": "yellow", "refuted": "red"}
+
+
+def _shown(counterexample: Counterexample) -> str:
+    """A line for each step of a run, or the values alone."""
+    if not counterexample.trace:
+        return counterexample.text()
+    steps = (", ".join(f"{name} = {value}" for name, value in step) for step in counterexample.trace)
+    return "\n".join([f"{counterexample.explanation}:", *(f"{at:4}  {step}" for at, step in enumerate(steps, start=1))])
 
 
 def _listing(
@@ -200,7 +212,7 @@ def _listing(
             line.append(" (vacuous)", style="yellow")
         console.print(line)
         if outcome.counterexample is not None and outcome.counterexample.values:
-            console.print(Padding(Text(outcome.counterexample.text()), (0, 0, 0, 10)))
+            console.print(Padding(Text(_shown(outcome.counterexample)), (0, 0, 0, 10)))
     for goal in goals if composition.around else ():
         parts = tuple(f"{part.name}." for part in goal.inner_first())
         wrong = [

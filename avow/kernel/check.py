@@ -83,8 +83,7 @@ class Kernel:
             part |= new
             stack += () if alone else new
         given = [entries[i] for i in part if entries[i].how not in (How.SHOWN, How.POSSIBLE, How.DEFINED)]
-        conds = [tuple(sorted(entries[c].digest for c in each.conds)) for each in given]
-        needed = {Needed(e.how, e.node, e.digest, c) for e, c in zip(given, conds, strict=True)}
+        needed = {Needed(e.how, e.node, e.digest, tuple(sorted(entries[c].digest for c in e.conds))) for e in given}
         if self._claim(entries[goal]).kind is Kind.REQUIREMENT and any(need.kind is How.OPEN for need in needed):
             raise Refused("a requirement rests on what only a derived contract may assume")
         answered = [answer for i in ((goal,) if alone else part) for answer in answers[i]]
@@ -161,8 +160,9 @@ class Kernel:
             if re.search(r"\((forall|exists) \(", script):  # else what is so in one element is so in any number
                 raise Refused(f"{otherwise}, however many elements {' and '.join(types)} may have")
             script += "".join(f"(assert (forall ((x {name}) (y {name})) (= x y)))\n" for name in types)
-        if not (count := self.solvers.ask(script, wanted)):
-            raise Refused(otherwise)
+        said, count = self.solvers.ask(script, wanted)
+        if not count:
+            raise Refused(f"{otherwise}: {said}")
         return Answered(sha256(script), count)
 
     def answered(self, entry: Entry, question: Question, step: int) -> Answered:
@@ -197,8 +197,7 @@ class Kernel:
         return [(self._claim(self.certificate.entries[use.entry]), use.back) for use in uses]
 
     def _initial(self, mark: str) -> Statement:
-        found = self.known.find(mark, Kind.INITIAL)
-        if found is None or not found.unary:
+        if (found := self.known.find(mark, Kind.INITIAL)) is None or not found.unary:
             raise Refused("stale, or no initial condition: it speaks of more than the state before the first step")
         return found
 

@@ -20,6 +20,7 @@ class Said(StrEnum):
     UNSAT = "unsat"
     SAT = "sat"
     UNKNOWN = "unknown"
+    LATE = "stopped by the clock"  # and not by its steps: on another day it may be another answer
 
 
 def ask_z3(script: str, budget: int) -> Said:
@@ -31,7 +32,8 @@ def ask_z3(script: str, budget: int) -> Said:
         solver.set(rlimit=budget, timeout=NET_MS)
         solver.set("smt.arith.nl.grobner", False)  # of non-linear integer terms: they cannot be interrupted
         solver.from_string(script)
-        return Said(str(solver.check()))
+        said = Said(str(solver.check()))
+        return Said.LATE if said is Said.UNKNOWN and solver.reason_unknown() == "timeout" else said
     except z3.Z3Exception:
         return Said.UNKNOWN
 
@@ -45,11 +47,12 @@ class Solvers:
     second: Callable[[str], Said] | None = None
     known: dict[tuple[str, int], Said] = field(default_factory=dict)
 
-    def ask(self, script: str, wanted: Said) -> int:
-        """How many solvers answer as is wanted; 0 where Z3 does not."""
-        if self.first(script, self.budget) is not wanted:
-            return 0
-        return 2 if self.second is not None and self.second(script) is wanted else 1
+    def ask(self, script: str, wanted: Said) -> tuple[Said, int]:
+        """What is said; how many solvers say what is wanted: 0 where Z3 does not, or the second says the opposite."""
+        if (said := self.first(script, self.budget)) is not wanted or self.second is None:
+            return said, int(said is wanted)
+        second = self.second(script)
+        return (second, 0) if {wanted, second} == {Said.SAT, Said.UNSAT} else (said, 1 + (second is wanted))
 
     def first(self, script: str, budget: int) -> Said:
         """Z3's answer."""

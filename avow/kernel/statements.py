@@ -119,18 +119,17 @@ class Statements:
 def statements(wiring: Wiring) -> Statements:
     clauses = [(Kind.ASSUMPTION, n.name, clause.name, clause.formula) for n in wiring.nodes for clause in n.assumptions]
     clauses += [(Kind.GUARANTEE, n.name, clause.name, clause.formula) for n in wiring.nodes for clause in n.guarantees]
-    assumptions: dict[str, set[str] | None] = {node.name: set() for node in wiring.nodes}
-    found: list[Statement] = []
+    found, untold = list[Statement](), set[str]()
     for kind, node, name, term in (*clauses, *wiring.formulas):
         try:
-            claim = _stated(wiring, kind, node, name, term)
+            found.append(_stated(wiring, kind, node, name, term))
         except Untranslatable:
-            assumptions |= {node: None} if kind is Kind.ASSUMPTION else {}
-            continue
-        found.append(claim)
-        if kind is Kind.ASSUMPTION and (marks := assumptions[node]) is not None:
-            marks.add(claim.digest)
-    return Statements(tuple(found), {n: frozenset(marks) for n, marks in assumptions.items() if marks is not None})
+            untold |= {node} if kind is Kind.ASSUMPTION else set()
+    assumptions: dict[str, set[str]] = {node.name: set() for node in wiring.nodes}
+    for claim in found:
+        if claim.kind is Kind.ASSUMPTION:
+            assumptions[claim.node].add(claim.digest)
+    return Statements(tuple(found), {n: frozenset(marks) for n, marks in assumptions.items() if n not in untold})
 
 
 def _stated(wiring: Wiring, kind: Kind, node: str, name: str, term: Term) -> Statement:

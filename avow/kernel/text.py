@@ -80,8 +80,7 @@ class Text:
             case s.DataSort(name=own, constructors=made):
                 return self._datatype(self._named(own, sort), [(c.name, c.parameters) for c in made])
             case s.TupleSort(items=items):
-                name = f"|({','.join(self.sort(item) for item in items).replace('|', '')})|"
-                return self._datatype(name, [("of", items)])
+                return self._datatype(f"|({','.join(map(self.sort, items)).replace('|', '')})|", [("of", items)])
             case s.FunctionSort() | s.SetSort():
                 raise Untranslatable("a function or a set as part of another value")
 

@@ -38,7 +38,9 @@ class Apart:
         try:
             said, used = self._process.ask([self.solver, script, limit], NET_MS / 1000)
             return Said(said), int(used)
-        except (TimeoutError, NoAnswer, ValueError, TypeError):
+        except TimeoutError:
+            return Said.LATE, limit
+        except (NoAnswer, ValueError, TypeError):
             return Said.UNKNOWN, limit
 
     def close(self) -> None:

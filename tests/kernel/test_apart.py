@@ -61,6 +61,6 @@ def test_one_that_hangs_is_ended(solver: Apart, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("avow.solving.apart.NET_MS", 100)
     acting(solver, "read line; sleep 60")
     hanging = solver._process._process
-    assert solver(NEVER, BUDGET) is Said.UNKNOWN
+    assert solver(NEVER, BUDGET) is Said.LATE
     assert hanging is not None
     assert hanging.poll() is not None

@@ -10,9 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from calculus.make import make, node
+from calculus.make import make, node, outcomes
 
 from avow.base.codec import Unreadable, canonical
+from avow.base.verdict import Verdict
 from avow.calculus.certificate_json import from_json, to_json
 from avow.calculus.certificates import Certificates
 from avow.calculus.composition import compose
@@ -136,6 +137,28 @@ def test_an_edit_makes_stale_what_used_it_and_nothing_else(tmp_path: Path) -> No
     rewired = PLAN.replace("'1'", "'2'")
     with pytest.raises(Refused, match="stale"):
         established(compose(make(tmp_path / "initial", LOOP, rewired)).certificates, certificate)
+
+
+def test_where_the_second_solver_says_the_opposite_nothing_is_established(tmp_path: Path) -> None:
+    certificates, certificate = made(tmp_path)
+    certificates.solvers = Solvers(second=lambda script: ask_z3(script, BUDGET))
+    assert established(certificates, certificate).solvers == 2
+    for said in (Said.UNKNOWN, Said.LATE):
+        certificates.solvers = Solvers(second=lambda _, said=said: said)  # type: ignore[misc]
+        assert established(certificates, certificate).solvers == 1
+    certificates.solvers = Solvers(second=lambda _: Said.SAT)
+    with pytest.raises(Refused, match="does not follow: sat"):
+        established(certificates, certificate)
+
+
+def test_what_the_clock_has_ended_is_an_error_that_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not `unknown`, which would be another answer on a quicker machine."""
+    monkeypatch.setattr("avow.calculus.composition.ask_once", lambda *_: Said.LATE)
+    found = outcomes(make(tmp_path, LOOP, PLAN))
+    for name in ("whole.a.low", "R"):
+        assert found[name].verdict is Verdict.ERROR
+        assert "the clock ended a question" in found[name].summary
+    assert Verdict.PROVED not in {outcome.verdict for outcome in found.values()}
 
 
 def test_the_environment_is_what_no_node_provides(tmp_path: Path) -> None:

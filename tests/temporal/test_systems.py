@@ -17,6 +17,7 @@ from avow.base.verdict import Verdict
 from avow.calculus.composition import compose
 from avow.calculus.export import derived_contract
 from avow.calculus.obligations import all_obligations, settle_all
+from avow.cli.compose import command as compose_command
 from avow.cli.simulate import command as simulate
 from avow.evaluation.evaluate import compile_term
 from avow.evaluation.running import Keeper
@@ -27,7 +28,7 @@ from avow.language.printer import show_term
 from avow.language.sorts import NATURAL
 from avow.language.terms import Implies, Literal, Term
 from avow.system.load import load_system
-from avow.temporal.cells import Records
+from avow.temporal.cells import CELL, Records
 from temporal.test_cells import N, formula, response
 
 Step = Mapping[str, Value]
@@ -105,14 +106,15 @@ def drawn(seed: int) -> tuple[Term, Term, Term, str]:
     return clause(rng), clause(rng), clause(rng), required
 
 
+class BriefLimits:
+    seconds, seed = 5.0, 0
+
+
 def verdicts(folder: Path) -> dict[str, Verdict]:
     composition = compose(load_system(folder))
     obligations = all_obligations(composition)
 
-    class Limits:
-        seconds, seed = 5.0, 0
-
-    found = settle_all(composition, obligations, Limits())
+    found = settle_all(composition, obligations, BriefLimits())
     return {o.name: outcome.verdict for o, outcome in zip(obligations, found, strict=True)}
 
 
@@ -196,6 +198,30 @@ def test_no_contract_is_derived_of_clauses_with_memory(tmp_path: Path) -> None:
     composition = compose(load_system(tmp_path))
     with pytest.raises(Rejected, match="other steps"):
         derived_contract(composition, composition.whole)
+
+
+REFUTED = """node a {{ inputs( e : BOOL ) outputs( w : BOOL ) topics() guarantee g ( out.w -> previous(in.e, FALSE) ) }}
+node b {{ inputs( w : BOOL ) outputs( v : BOOL ) topics() assume m ( {} ) guarantee h ( out.v == in.w ) }}"""
+
+
+@pytest.mark.parametrize(("assumed", "length"), [("not in.w", 2), ("not held[2 steps](in.w)", 4)])
+def test_a_refutation_is_shown_as_a_run_and_says_nothing_of_cells(assumed: str, length: int, tmp_path: Path) -> None:
+    """In the answer, and in what would make it hold."""
+    (tmp_path / "system.rcl").write_text(REFUTED.format(assumed))
+    (tmp_path / "plan.yaml").write_text("requirements: {R: {text: r, formula: 'not b.v', supported_by: [a, b]}}")
+    composition = compose(load_system(tmp_path))
+    obligations = all_obligations(composition)
+    outcomes = settle_all(composition, obligations, BriefLimits())
+    found = {o.name: outcome for o, outcome in zip(obligations, outcomes, strict=True)}
+    shown = found["whole.b.m"]
+    assert shown.verdict is Verdict.REFUTED
+    assert shown.counterexample is not None
+    assert len(shown.counterexample.trace) == length
+    for outcome in (shown, found["R"]):
+        told = [outcome.summary, str(outcome.details.get("would_hold_if")), str(outcome.counterexample)]
+        assert not any(CELL in text for text in told), told
+    done = CliRunner().invoke(compose_command, [str(tmp_path)])
+    assert f"   {length}  a.w = TRUE" in done.output
 
 
 TRAP = """node n { inputs( a : BOOL ) outputs( b : BOOL ) topics()
