@@ -3,7 +3,9 @@ long as the program's file is the same."""
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import importlib.util
 import json
 import re
 import shutil
@@ -12,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from avow.base import process
-from avow.base.files import write
-from avow.base.notes import cache_folder
+from avow.base.files import digest, digest_file, write
+from avow.base.notes import cache_folder, read_note, write_note
 from avow.tuning.running import VERSION_SECONDS
 
 
@@ -27,6 +29,8 @@ class Tool:
     install: str
     optional: bool = True
     """Its absence leaves something unasked, but no method without an engine."""
+    package: str = ""
+    """The Python package that it is, where it is no program of its own."""
 
     @property
     def present(self) -> bool:
@@ -47,6 +51,31 @@ def find_tool(
     if path is None:
         return Tool(name, None, None, install, optional)
     return Tool(name, _version(path, tuple(arguments), pattern), path, install, optional)
+
+
+@functools.cache
+def package_digest(name: str) -> str:
+    """SHA-256 of all files of an installed top-level package, byte code aside; empty where there is none. Nothing is
+    imported. Kept, sealed, for as long as each file is the same by inode, size and times: libraries are large."""
+    spec = importlib.util.find_spec(name)
+    if spec is None or not spec.submodule_search_locations:
+        return ""
+    place = Path(spec.submodule_search_locations[0])
+    files = sorted(path for path in place.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    try:
+        told = [(str(file.relative_to(place)), file.stat()) for file in files]
+        marks = [[file, i.st_ino, i.st_size, i.st_mtime_ns, i.st_ctime_ns] for file, i in told]
+        note = cache_folder() / f"package-{name}.json"
+        mark = digest(json.dumps([str(place), marks]))
+        known = read_note(note) or {}
+        if known.get("of") != mark:
+            said = [[str(file.relative_to(place)), digest_file(file)] for file in files]
+            known = {"of": mark, "digest": digest(json.dumps(said))}
+            with contextlib.suppress(OSError):  # a read-only home costs that each time
+                write_note(note, known)
+        return str(known["digest"])
+    except OSError:
+        return "unreadable"
 
 
 def _version(path: str, arguments: tuple[str, ...], pattern: str) -> str:

@@ -20,6 +20,7 @@ from pathlib import Path
 import avow.backends
 from avow.base import codec
 from avow.base.notes import read_note, write_note
+from avow.base.tools import package_digest
 from avow.base.workspace import Workspace
 from avow.isolation.level import SANDBOX
 from avow.isolation.observed import Observed, Seen, from_json, look, to_json
@@ -29,6 +30,8 @@ from avow.pipeline.run_info import EXPLAIN, FRESH, KEY, ON, SECONDS, signing_key
 _ENVIRONMENT = ("PATH", "PYTHONPATH", "AJPF_HOME", "AVOW_AJPF_JAVA", "HOME", EXPLAIN, FRESH, SANDBOX, ON, SECONDS, KEY)
 _CODE = tuple(Path(place) for package in (avow, avow.backends) for place in package.__path__)
 """Avow's own code, wherever it is installed."""
+_PACKAGES = ("z3", "cvc5", "hypothesis")
+"""Tools that are packages: of other folders on the module path it is enough that nothing came or went."""
 
 
 class Shortcut:
@@ -118,6 +121,7 @@ def _sources(workspace: Workspace) -> str:
     digest.update(_mark(str(key)).encode() if key is not None else b"")
     signed = (workspace.signed,) if workspace.signed.is_dir() else ()  # most workspaces have none
     _add_files(digest, workspace.contracts, *signed, *_CODE)
+    digest.update(json.dumps([package_digest(name) for name in _PACKAGES]).encode())
     for name in dict.fromkeys([*os.environ.get("PATH", "").split(os.pathsep), *sys.path]):
         digest.update(f"{name} {_searched(name, workspace)}\n".encode("utf-8", "surrogateescape"))
     return digest.hexdigest()

@@ -19,6 +19,7 @@ from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest, digest_file
 from avow.base.remembered import by_identity
+from avow.base.tools import package_digest
 from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
 from avow.formulas.formula import node_digest, sort_digest
 from avow.language.contract import Contract, Node
@@ -205,7 +206,9 @@ def tool_identities(tool: Backend) -> tuple[tuple[str, str, str], ...]:
     """Name, version and program's digest of each outside tool that a backend can use; empty where it is missing."""
     if offered is not None and is_portable(tool):
         return tuple((t.name, *offered.get(t.name, ("", ""))) for t in tool.tools())
-    return tuple((t.name, t.version or "", _program(t.path)) for t in tool.tools())
+    return tuple(
+        (t.name, t.version or "", package_digest(t.package) if t.package else _program(t.path)) for t in tool.tools()
+    )
 
 
 offered: Mapping[str, tuple[str, str]] | None = None
@@ -351,4 +354,4 @@ def _scenario(system: System) -> str:
 def engine_identity() -> str:
     """The core's engines with their solver, in every key of theirs."""
     # importing z3 to ask it would cost more than all the rest of a run with nothing to do
-    return f"avow {engine_digest()}, z3 {metadata.version('z3-solver')}"
+    return f"avow {engine_digest()}, z3 {metadata.version('z3-solver')} {package_digest('z3')}"

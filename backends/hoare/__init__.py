@@ -59,7 +59,7 @@ class Hoare(Backend):
     )
 
     def tools(self) -> tuple[Tool, ...]:
-        return (Tool("z3", metadata.version("z3-solver"), None, "pip install z3-solver", optional=False),)
+        return (Tool("z3", metadata.version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3"),)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .backend import problems

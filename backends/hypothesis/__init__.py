@@ -53,7 +53,7 @@ class HypothesisBackend(Backend):
 
     def tools(self) -> tuple[Tool, ...]:
         version = metadata.version("hypothesis")
-        return (Tool("hypothesis", version, None, "pip install hypothesis", optional=False),)
+        return (Tool("hypothesis", version, None, "pip install hypothesis", optional=False, package="hypothesis"),)
 
     def unsaid(self, node: Node, clause: Clause) -> str | None:
         return unsaid(self.name, node, clause)
