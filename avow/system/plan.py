@@ -311,8 +311,9 @@ class Ros:
 
     distro: str | None = None
     names: Resolver = field(default_factory=Resolver)
-    shared: tuple[str, ...] = ()
-    """The topics that several nodes publish, by their whole names: a message does not say whose it is."""
+    shared: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    """The topics that several nodes publish, and those nodes, by their whole names: a message need not say whose it
+    is."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -171,8 +171,10 @@ def heard(plan: Plan, contract: Contract) -> tuple[Plan, Contract, tuple[Diagnos
     """The system with a node for each input whose topic several nodes publish; and who else publishes a topic without
     its being said what the input hears of it. None is left out: what it says would be heard all the same."""
     found = ends(contract.nodes, plan.ros.names)
-    several = (name for name, outputs in found.published.items() if len({at.node for at, _ in outputs}) > 1)
-    plan = replace(plan, ros=replace(plan.ros, shared=tuple(sorted(several))))
+    published = ((topic, sorted({at.node for at, _ in outputs})) for topic, outputs in sorted(found.published.items()))
+    called = plan.ros.names.placed
+    several = tuple((topic, tuple(called(n).name for n in who)) for topic, who in published if len(who) > 1)
+    plan = replace(plan, ros=replace(plan.ros, shared=several))
     connections = list(plan.connections)
     nodes: list[Node] = []
     taken = {node.name for node in contract.nodes}

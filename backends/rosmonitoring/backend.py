@@ -244,8 +244,9 @@ def _with_upstream(job: Job, found: Setup) -> list[Monitor]:
 
 def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) -> _Run:
     """What a trace shows of the first monitor's node."""
-    from .options import origin, readable
+    from .options import origin
     from .session import Session, judge
+    from .told import readable
     from .traces import digest_trace
 
     monitor, whole = monitors[0], Session(job.system, tuple(monitors))

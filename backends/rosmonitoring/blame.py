@@ -160,12 +160,11 @@ class Blame:
         known = self._broken.get((edge.source.node, edge.source.port), {}).get(message)
         if known is not None:
             return known
-        if monitor.waits(violation.index):
+        if monitor.pairing is not None and monitor.pairing.waits(violation.index):
             return _Origin()
         # a node that promised nothing, since what it was told was wrong, passes that on with this message
-        given = monitor.answered(message)
-        if given is not None:
-            return self._by(edge.source.node, given)
+        if monitor.pairing is not None:
+            return self._by(edge.source.node, monitor.pairing.answered.get(message, {}))
         latest = all(message >= other for other, _ in violation.heard.values())
         if latest and violation.heard and monitor.failing():
             return self._since(edge.source.node, violation.index)

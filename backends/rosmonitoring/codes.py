@@ -75,8 +75,8 @@ CODES = register(
     declare(
         "MON207",
         "unknown publisher",
-        "A bag has messages of several nodes on a topic that one node of the contract publishes.",
-        "Add the others to the contract, or record without them.",
+        "A bag has messages of others on a topic than the nodes of the contract that publish it.",
+        "Add the others to the contract, say how its nodes are called (`ros: {nodes: …}`), or record without them.",
     ),
     declare(
         "MON301",

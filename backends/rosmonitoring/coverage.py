@@ -24,6 +24,8 @@ class Tally:
     """Answers before everything that it speaks of had a value."""
     unreadable: int = 0
     """Messages with one of its outputs that could not be read."""
+    nameless: int = 0
+    """Messages of a topic that other nodes publish too, which do not say whose they are."""
     partial: int = 0
     """Answers that were never whole, and that their parts alone do not decide."""
     supposed: int = 0
@@ -65,6 +67,12 @@ class Tally:
         for name, then in heard.items():
             self.ages[name] = max(self.ages.get(name, 0.0), now - then)
 
+    def unnamed(self, topic: str) -> None:
+        """A message of a topic that other nodes publish too has come, which does not say whose it is."""
+        self.published += 1
+        self.nameless += 1
+        self.reason = self.reason or f"several nodes publish {topic}, and a message does not say whose it is"
+
     reason: str = ""
     """Why it is not judged at all, or the first reason why it was once undecided."""
 
@@ -79,6 +87,7 @@ def coverage(tally: Tally) -> str:
         (tally.order, "undecided which input was answered {}"),
         (tally.early, "before the first value {}"),
         (tally.unreadable, "unreadable {}"),
+        (tally.nameless, "whose it was is not told {}"),
         (tally.partial, "not part of a whole answer {}"),
         (tally.forgotten, "undecided, since steps before went by unseen {}"),
         (tally.supposed, "held by the plan's initial value, before any message {}"),

@@ -59,7 +59,8 @@ class Monitor:
     _clauses: dict[str, list[Watched]] = field(default_factory=dict)
     _assumptions: list[Watched] = field(default_factory=list)
     timing: Timing = field(init=False)
-    _pairing: Pairing | None = None
+    pairing: Pairing | None = None
+    """Answers and the inputs that they are held against; None: the latest."""
     _paired: frozenset[str] = frozenset()
     """The observed inputs."""
     _assumed: tuple[str, ...] = ()
@@ -83,7 +84,7 @@ class Monitor:
         answers = self.setup.answers
         self._paired = self.setup.heard
         if answers is not None and answers.by != "arrival":
-            self._pairing = Pairing(answers)
+            self.pairing = Pairing(answers)
             spoken = (v.qualified for a in self.setup.node.assumptions for v in free_variables(a.formula))
             self._assumed = tuple(dict.fromkeys(name for name in spoken if name in self.setup.rules))
         elif remembers(self.setup.node):
@@ -129,6 +130,8 @@ class Monitor:
         readers = self._readers.get(same_topic(topic)) if isinstance(topic, str) else None
         if isinstance(topic, str) and len(self.heard) < TOPICS_KEPT:
             self.heard.add(same_topic(topic))
+        if readers and self.setup.shared:
+            readers = self._own(readers, event)
         names = [name for name, _ in readers or ()]
         found = self.tick(event, set(names))
         if readers is None or not isinstance(topic, str):
@@ -140,7 +143,7 @@ class Monitor:
         if answers is not None and answers.by == "arrival" and not self.backwards and "time" in event:
             now, before = time_of(event), self._latest
             self.backwards, self._latest = backwards(now, before, self.events), now
-        pairing = self._pairing
+        pairing = self.pairing
         if pairing is not None and pairing.waiting:
             self._settle(pairing.ready(time_of(event)), found)
         self.at.update(dict.fromkeys(names, (place or self.events, publisher(event))))
@@ -186,6 +189,14 @@ class Monitor:
         self.settle_previous()
         return found
 
+    def _own(self, readers: list[tuple[str, Reader]], event: Mapping[str, Any]) -> list[tuple[str, Reader]]:
+        """Those of variables that a message carries, whoever else publishes its topic."""
+        unknown = [name for name, _ in readers if self.setup.whose(name, event) is None]
+        for watched in {id(w): w for name in unknown for w in self._clauses.get(name, ())}.values():
+            watched.tally.unnamed(str(event["topic"]))
+            self._lose(watched)
+        return [(name, read) for name, read in readers if self.setup.whose(name, event)]
+
     def tick(self, event: Mapping[str, Any], names: Set[str] = frozenset()) -> list[Violation]:
         """Time has passed, with or without a message of these variables: deadlines do not wait for one."""
         late = self.timing.passes(event, names)
@@ -217,7 +228,7 @@ class Monitor:
     @property
     def by_values(self) -> bool:
         """Whether a verdict depends on the latest values alone, and changes nothing for the next."""
-        return self._pairing is None and self._so_far is None
+        return self.pairing is None and self._so_far is None
 
     def carried(self, topic: str) -> tuple[str, ...]:
         """The variables that a topic's messages carry."""
@@ -249,9 +260,9 @@ class Monitor:
     def finish(self) -> list[Violation]:
         """Judge what still waits, once the run is over."""
         found: list[Violation] = []
-        if self._pairing is not None:
-            self._settle(self._pairing.ready(None), found)
-            self.backwards = self.backwards or self._pairing.uneven()
+        if self.pairing is not None:
+            self._settle(self.pairing.ready(None), found)
+            self.backwards = self.backwards or self.pairing.uneven()
         for watched in {id(w): w for all_ in self._clauses.values() for w in all_}.values():
             if watched.fresh:
                 parts = list(watched.fresh.values())
@@ -266,16 +277,16 @@ class Monitor:
 
     def _ask(self, watched: Watched, event: Mapping[str, Any]) -> None:
         """An answer, which will be judged once it is known what it may have answered."""
-        assert self._pairing is not None
+        assert self.pairing is not None
         values = {**self.values, **watched.memory} if watched.held else self.values
         own = [n for n in (*watched.names, *self._assumed) if n not in self._paired]
         early = any(n not in values or n in self._supposed for n in watched.names if n not in self._paired)
         watched.tally.early += early
         known = {n: values[n] for n in own if n in values}
         inputs = tuple(dict.fromkeys((*watched.paired, *(n for n in self._assumed if n in self._paired))))
-        inputs = tuple(n for n in inputs if n in watched.paired or n in self._pairing.seen)
+        inputs = tuple(n for n in inputs if n in watched.paired or n in self.pairing.seen)
         about = (watched, self._heard(watched.outputs))
-        self._pairing.ask(about, event, self.events, known, inputs, waits=not early)
+        self.pairing.ask(about, event, self.events, known, inputs, waits=not early)
 
     def _settle(self, ready: Iterable[tuple[Asked, list[dict[str, Value]] | str]], found: list[Violation]) -> None:
         for asked, cases in ready:
@@ -351,7 +362,7 @@ class Monitor:
         """One output, and all that is known but the other outputs of the answer."""
         values = {**self.values, **watched.memory}
         held = {n for n, _ in watched.held}
-        paired = self._paired if self._pairing is not None else frozenset()
+        paired = self._paired if self.pairing is not None else frozenset()
         spoken = (*watched.names, *(n for assumed in self._assumptions for n in assumed.names))
         return {
             n: values[n]
@@ -399,7 +410,7 @@ class Monitor:
 
     def _watch(self, clause: Clause) -> None:
         tally = self.tallies[clause.name] = Tally()
-        found = watching(self.setup, clause, tally, self._previous, self.values, self._pairing is not None)
+        found = watching(self.setup, clause, tally, self._previous, self.values, self.pairing is not None)
         if found is None:
             return
         watched, triggers = found
@@ -478,17 +489,6 @@ class Monitor:
 
     def _heard(self, names: Iterable[str]) -> Heard:
         return {name: self.at[name] for name in names if name in self.at}
-
-    # -- for `blame` ---------------------------------------------------------------------------------------------------
-
-    def waits(self, event: int) -> bool:
-        """Whether an answer of this event or an earlier one is not judged yet."""
-        return self._pairing is not None and any(asked.index <= event for asked in self._pairing.waiting)
-
-    def answered(self, message: int) -> Mapping[str, tuple[int, ...]] | None:
-        """The messages of the inputs that an answer was held against, by one of its own; None where they are not
-        paired: it is held against the latest."""
-        return self._pairing.answered.get(message, {}) if self._pairing is not None else None
 
     def failing(self) -> bool:
         """Whether an assumption does not hold of the values that are known now."""

@@ -80,11 +80,11 @@ def signals(
     """Read a trace of so many events once more, for its values; `listens` as when it was judged. Of a long one, about
     one event in so many is read, and those where the marks begin. Raises Rejected."""
     every = max(1, -(-events // TIMELINE_EVENTS))
-    readers: dict[str, list[tuple[tuple[str, str], Sort, Reader]]] = {}
+    readers: dict[str, list[tuple[Setup, str, Sort, Reader]]] = {}
     for setup in setups:
         for name, rule in setup.rules.items():
             if isinstance(rule, Fields | Choice):
-                one = ((setup.node.name, name), rule.variable.sort, reader(rule))
+                one = (setup, name, rule.variable.sort, reader(rule))
                 readers.setdefault(same_topic(rule.topic), []).append(one)
     found: dict[tuple[str, str], Columns[Stretch]] = {}
     start = end = ""
@@ -93,13 +93,16 @@ def signals(
             break
         end = time_text(recorded.event.get("time"))
         start = start or end
-        for key, sort, read in readers.get(same_topic(str(recorded.event.get("topic", ""))), ()):
+        for setup, name, sort, read in readers.get(same_topic(str(recorded.event.get("topic", ""))), ()):
+            if not setup.whose(name, recorded.event):
+                continue
             try:
                 said = _said(read(recorded.event, None), sort)
             except MappingError:
                 continue  # it has a mark
-            found.setdefault(key, Columns(joined_stretches)).put(index, Stretch(index, index, said))
-    return Signals({key: runs(columns.items()) for key, columns in found.items()}, start, end, every)
+            columns = found.setdefault((setup.node.name, name), Columns(joined_stretches))
+            columns.put(index, Stretch(index, index, said))
+    return Signals({key: runs(each.items()) for key, each in found.items()}, start, end, every)
 
 
 def timeline(

@@ -17,7 +17,8 @@ from avow.language.contract import Node, Port, Topic
 from avow.language.load import parse_term
 from avow.language.sorts import BOOL, BoolSort, FunctionSort, RealSort
 from avow.language.terms import Apply, Not, Quantified, Quantifier, Role, Term, Variable
-from avow.ros.calls import CALL, is_service_part, part_topic
+from avow.ros.bags import publisher
+from avow.ros.calls import CALL, part_topic
 from avow.ros.definitions import Definitions, Message, Wire
 from avow.ros.sources import definitions
 from avow.system.graph import Edge, dataflow
@@ -26,7 +27,7 @@ from avow.system.plan import Located, System
 from avow.system.schema import suggest
 
 from . import observing
-from .bags import Origin, carried, conflicts, is_bag
+from .bags import Event, Origin, carried, is_bag
 from .fitting import Undecided
 from .numbers import whole
 from .observing import Observed, Wrong, check_keys, literal, observe, table_of
@@ -65,6 +66,16 @@ class Setup:
     """How old the inputs of an answer may be, for it to be evidence."""
     losses: int | None = None
     """How many messages may have been lost; None: however many."""
+    shared: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
+    """Each output whose topic other nodes publish too: this node, and all of them, by their whole names."""
+
+    def whose(self, name: str, event: Event) -> bool | None:
+        """Whether an event's message is the node's own, where it carries a variable; None where that is not known."""
+        if name not in self.shared:
+            return True
+        own, known = self.shared[name]
+        by = publisher(event)
+        return by == own if by in known else None
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -114,6 +125,7 @@ def setup(
         work.rates(data.get("rate")),
         work.duration("max_age", data["max_age"]) if "max_age" in data else None,
         data.get("losses"),
+        work.shared,
     )
     return made, tuple(work.faults)
 
@@ -157,28 +169,6 @@ def traces_of(system: System, options: Located | None) -> tuple[File, ...]:
     return tuple(path for path in paths if path is not None and path.exists())
 
 
-def readable(setup: Setup, path: File, where: Origin) -> tuple[Diagnostic, ...]:
-    """Why a bag's messages are not what the rules take them for. Raises Rejected for what is no bag."""
-    if not is_bag(path):
-        return ()
-    found = carried(path, where)
-    kinds = setup.kinds
-    rules = (rule for name, rule in setup.rules.items() if name.startswith(f"{Role.OUTPUT}."))
-    said = {same_topic(rule.topic) for rule in rules if isinstance(rule, Fields | Choice)}
-    others = [(t, who) for t, who in found.publishers.items() if same_topic(t) in said and len(who) > 1]
-    if others:
-        topic, who = others[0]
-        text = f"{path.name}: {' and '.join(who)} publish {topic}, and in the contract {setup.node.name} alone does"
-        hint = "model the others too: whose message was wrong could not be told"
-        return (Diagnostic("MON207", text, hint=hint),)
-    calls = [topic for topic in setup.topics if is_service_part(topic)]
-    if calls and not found.ros2:
-        text = f"{path.name} is a ROS 1 bag, which cannot hold calls of services: {', '.join(calls)}"
-        return (Diagnostic("MON206", text, hint="publish what is called and answered, or write a JSON trace"),)
-    types = {topic: kinds[same_topic(topic)] for topic in found.types if same_topic(topic) in kinds}
-    return tuple(conflicts(path, found, setup.known, types))
-
-
 def resolved(system: System, node: Node, topic: str) -> str:
     """The topic's whole name when the robot runs; as it is written where only the first slash is missing."""
     whole = system.plan.ros.names.topic(node.name, topic)
@@ -203,6 +193,7 @@ class _Work:
     known: Definitions
     rules: dict[str, Rule] = field(default_factory=dict)
     hidden: dict[str, str] = field(default_factory=dict)
+    shared: dict[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
     faults: list[Diagnostic] = field(default_factory=list)
 
     def mapping(self) -> Mapping[str, Any]:
@@ -337,8 +328,9 @@ class _Work:
             topic = resolved(self.system, self.node, entry["topic"]) if "topic" in entry else topic
         if topic is None:
             return f"no topic of {self.node.name} matches {name}, and the plan does not map it"
-        if port.role is Role.OUTPUT and same_topic(topic) in map(same_topic, self.system.plan.ros.shared):
-            return f"several nodes publish {topic}, and a message does not say whose it is"
+        for several, who in self.system.plan.ros.shared:
+            if port.role is Role.OUTPUT and same_topic(topic) == same_topic(several):
+                self.shared[name] = self.system.plan.ros.names.placed(self.node.name).name, who
         return self.observed(port, topic, kind, entry)
 
     def observed(self, port: Port, topic: str, kind: str | None, entry: Any) -> Rule | str:

@@ -142,6 +142,10 @@ class Pairing:
         if waits:
             self.waiting.append(asked)
 
+    def waits(self, event: int) -> bool:
+        """Whether an answer of this event or an earlier one is not judged yet."""
+        return any(asked.index <= event for asked in self.waiting)
+
     def uneven(self) -> str:
         """Why the answers need not be paired rightly; empty where they are. By order, what came after the last answer
         need not have been answered yet."""

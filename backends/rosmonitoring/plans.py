@@ -71,7 +71,7 @@ def plan_of(watch: Watch, topic: str) -> Plan | None:
     """What the topic does; None where more than the latest values matters."""
     monitor = watch.monitor
     names = monitor.carried(topic)
-    if not names or not monitor.by_values:
+    if not names or not monitor.by_values or not monitor.setup.shared.keys().isdisjoint(names):
         return None
     due: dict[int, Watched] = {id(w): w for name in names for w in monitor.triggered_by(name)}
     for watched in due.values():

@@ -218,6 +218,8 @@ class _Machine:
         for name in wanted:
             if name in self.setup.hidden:
                 raise NotRml(self.setup.hidden[name])
+            if name in self.setup.shared:
+                raise NotRml(f"several nodes publish the topic of {name}, and an event does not say whose it is")
             rule = self.setup.rules[name]
             if isinstance(rule, Previous) and rule.source not in wanted:
                 if rule.source in self.setup.hidden:

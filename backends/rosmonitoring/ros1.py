@@ -160,7 +160,7 @@ class Ros1:
                 read = reader(topic, fields)
                 while not self._over.is_set():
                     raw = frame(line, FRAME_BYTES)
-                    self.inbox.message(topic, partial(_event, topic, read, raw))
+                    self.inbox.message(topic, partial(_event, topic, fields.get("callerid", ""), read, raw))
         except (OSError, ValueError, xmlrpc.client.Error) as error:
             if not self._over.is_set() and not isinstance(error, EOFError):
                 self.inbox.trouble(topic, f"{topic} from {uri}: {error}")
@@ -169,8 +169,8 @@ class Ros1:
                 self._known.discard((topic, uri))
 
 
-def _event(topic: str, read: Callable[[bytes], dict[str, Any]], raw: bytes, now: float) -> Event:
-    return enveloped(read(raw), topic, now)
+def _event(topic: str, by: str, read: Callable[[bytes], dict[str, Any]], raw: bytes, now: float) -> Event:
+    return enveloped(read(raw), topic, now, by)
 
 
 class Spoken:

@@ -18,8 +18,9 @@ from .blame import Blame
 from .compiled import Compiled
 from .coverage import Tally
 from .engine import Monitor
-from .options import NAME, Setup, known_types, origin, readable, same_topic, setup
+from .options import NAME, Setup, known_types, origin, same_topic, setup
 from .rules import NOTHING_KNOWN
+from .told import readable
 from .traces import read_trace
 from .watched import Fault, Violation
 
@@ -147,6 +148,7 @@ class Session:
                     "before_first": tally.early,
                     "unreadable": tally.unreadable,
                     "incomplete": tally.partial,
+                    "nameless": tally.nameless,
                     "by_initial_value": tally.supposed,
                     "after_unseen": tally.forgotten,
                     "open_at_end": tally.open,

@@ -1,22 +1,52 @@
-"""What `avow check` tells of a monitor: which field each variable is read from, and numbers that no message holds."""
+"""What is told of a monitor before it runs: which field each variable is read from, numbers that no message holds, and
+bags whose messages are other than they are taken for."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
+from pathlib import Path as File
 
 from avow.base.diagnostics import Diagnostic, Severity, Span
 from avow.formulas.formula import free_variables
 from avow.formulas.values import show
 from avow.language.contract import Clause
 from avow.language.sorts import RealSort
-from avow.language.terms import Compare, Literal, Negative, Term, Variable, Widen
+from avow.language.terms import Compare, Literal, Negative, Role, Term, Variable, Widen
+from avow.ros.calls import is_service_part
 from avow.ros.definitions import FLOATS, Scalar
 
-from .options import Setup
+from .bags import Origin, carried, conflicts, is_bag
+from .options import Setup, same_topic
 from .reading import shown
 from .rules import Choice, Fields, Rule
 from .wires import of_type
+
+
+def readable(setup: Setup, path: File, where: Origin) -> tuple[Diagnostic, ...]:
+    """Why a bag's messages are not what the rules take them for. Raises Rejected for what is no bag."""
+    if not is_bag(path):
+        return ()
+    found = carried(path, where)
+    kinds = setup.kinds
+    rules = (rule for name, rule in setup.rules.items() if name.startswith(f"{Role.OUTPUT}."))
+    said = {same_topic(rule.topic) for rule in rules if isinstance(rule, Fields | Choice)}
+    known = {same_topic(setup.rules[n].topic): who for n, (_, who) in setup.shared.items()}  # type: ignore[union-attr]
+    hint = "model the others too, or say under `ros: {nodes: …}` how they are called: whose message it was is not told"
+    for topic, who in found.publishers.items():
+        modelled = known.get(same_topic(topic))
+        if modelled is not None and (strange := [name for name in who if name not in modelled]):
+            text = f"{path.name}: {' and '.join(strange)} publish {topic}, and in the contract {', '.join(modelled)} do"
+            return (Diagnostic("MON207", text, hint=hint),)
+        if modelled is None and same_topic(topic) in said and len(who) > 1:
+            text = f"{path.name}: {' and '.join(who)} publish {topic}, and in the contract {setup.node.name} alone does"
+            return (Diagnostic("MON207", text, hint=hint),)
+    calls = [topic for topic in setup.topics if is_service_part(topic)]
+    if calls and not found.ros2:
+        text = f"{path.name} is a ROS 1 bag, which cannot hold calls of services: {', '.join(calls)}"
+        return (Diagnostic("MON206", text, hint="publish what is called and answered, or write a JSON trace"),)
+    types = {topic: kinds[same_topic(topic)] for topic in found.types if same_topic(topic) in kinds}
+    return tuple(conflicts(path, found, setup.known, types))
 
 
 def readings(setup: Setup, span: Span | None) -> Iterator[Diagnostic]:

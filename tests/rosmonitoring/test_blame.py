@@ -160,7 +160,7 @@ node wheels { inputs( u : REAL ) outputs( t : REAL ) topics( float64 cmd matches
 
 
 def test_nobody_is_blamed_for_what_several_publish(tmp_path: Path) -> None:
-    """A message does not say whose it is: neither of the two is called broken, nor is anything observed of them."""
+    """Where a message does not say whose it is, neither of the two is called broken, nor is anything judged of them."""
     (tmp_path / "system.rcl").write_text(TWO, encoding="utf-8")
     methods = {"methods": [{"rosmonitoring": {"traces": ["t.jsonl"]}}]}
     (tmp_path / "plan.yaml").write_text(json.dumps({"nodes": {"auto": methods}}), encoding="utf-8")
@@ -183,7 +183,68 @@ def test_a_slice_knows_that_others_publish_too(tmp_path: Path) -> None:
     (tmp_path / "plan.yaml").write_text(json.dumps({"nodes": {"auto": methods}}), encoding="utf-8")
     cut = method_slice(BACKEND, job_for(load_system(tmp_path), "auto")).system
     assert [node.name for node in cut.contract.nodes] == ["auto"]
-    assert cut.plan.ros.shared == ("/cmd",)
+    assert cut.plan.ros.shared == (("/cmd", ("/auto", "/joy")),)
+
+
+def shared(folder: Path, callers: list[tuple[str, float]]) -> Path:
+    """A ROS 1 bag in which several publish one topic."""
+    rosbags = pytest.importorskip("rosbags.rosbag1")
+    from rosbags.typesys import Stores, get_typestore
+
+    (folder / "system.rcl").write_text(TWO.replace("float64 cmd", "std_msgs/Float64 cmd"), encoding="utf-8")
+    methods = {"methods": [{"rosmonitoring": {"traces": ["run.bag"]}}]}
+    (folder / "plan.yaml").write_text(json.dumps({"nodes": dict.fromkeys(("joy", "auto"), methods)}), encoding="utf-8")
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with rosbags.Writer(folder / "run.bag") as writer:
+        open_ = {
+            who: writer.add_connection("/cmd", "std_msgs/msg/Float64", typestore=store, callerid=who)
+            for who in sorted({who for who, _ in callers})
+        }
+        for k, (who, value) in enumerate(callers, start=1):
+            message = store.types["std_msgs/msg/Float64"](data=value)
+            writer.write(open_[who], k * 10**9, store.serialize_ros1(message, "std_msgs/msg/Float64"))
+    return folder / "run.bag"
+
+
+def test_a_bag_says_whose_a_message_was(tmp_path: Path) -> None:
+    """What is wrong for one of two publishers is right for the other; the listener is told whose it was."""
+    bag = shared(
+        tmp_path, [("/joy", 1.0), ("/auto", 0.0), ("/joy", 0.5), ("/auto", 0.5), ("/joy", 7.0), ("/auto", -1.0)]
+    )
+    system = load_system(tmp_path)
+    found = [violation for _, violation in session(system, (), bag).run(bag)]
+    assert [(v.node, v.clause, v.index, v.fault) for v in found] == [
+        ("auto", "slow", 4, Fault.GUARANTEE),
+        ("joy", "slow", 5, Fault.GUARANTEE),
+        ("wheels", "slow", 5, Fault.PROVIDER),
+    ]
+    assert found[2].cause == "joy.slow at event 5 caused wheels.slow at event 5"
+    verdicts = [BACKEND.discharge(job_for(system, n), tmp_path, Limits()).outcomes[0] for n in ("joy", "auto")]
+    assert [v.verdict for v in verdicts] == [Verdict.REFUTED, Verdict.REFUTED]
+    assert [v.bound["published"] for v in verdicts] == [3, 3]
+
+
+def test_a_stranger_on_a_topic_of_several_is_refused(tmp_path: Path) -> None:
+    from avow.base.diagnostics import Rejected
+
+    bag = shared(tmp_path, [("/joy", 1.0), ("/auto", 0.0), ("/stranger", 0.0)])
+    with pytest.raises(Rejected, match="/stranger publish /cmd, and in the contract /auto, /joy do"):
+        session(load_system(tmp_path), (), bag)
+
+
+def test_a_trace_may_say_whose_a_message_was(tmp_path: Path) -> None:
+    shared(tmp_path, [("/joy", 1.0)])
+    running = session(load_system(tmp_path))
+    said = [("/auto", 0.5), ("/joy", 0.5), ("auto", 0.5), ("", 9)]
+    events = [{"topic": "cmd", "data": v, "time": k, "_publisher": who} for k, (who, v) in enumerate(said)]
+    found = [(v.node, v.clause, v.index) for event in events for v in running.step(event)]
+    assert found == [("auto", "slow", 1), ("wheels", "slow", 4)]
+    tallies = {m.setup.node.name: m.tallies["slow"] for m in running.monitors if m.setup.node.name != "wheels"}
+    assert {name: (t.published, t.judged, t.nameless) for name, t in tallies.items()} == {
+        "joy": (3, 1, 2),
+        "auto": (3, 1, 2),
+    }
+    assert running.unmonitored() == ["joy.slow", "auto.slow"]
 
 
 def test_a_bag_with_a_publisher_that_is_not_modelled_is_refused(tmp_path: Path) -> None:
