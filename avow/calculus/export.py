@@ -2,7 +2,7 @@
 
 Its inputs are what the selected nodes read from outside (and, for delayed edges, the values of the step before); its
 outputs are all that they put out; it assumes what the derivation assumes (and what it shows of the step before), and
-guarantees what its nodes guarantee.
+guarantees what its nodes guarantee. What it says is `Derived` in proofs/instances.dfy: what stays open is assumed.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ at that step may be used; it is carried outward as "if they do so, then".
 
 Why that is sound: outside, a subsystem's assumptions are shown at a step before its guarantees are used there (a loop
 that only closes outside is a loop of the larger derivation, and circular support in it is refused). Inside, its own
-derivation shows from them, step by step, every assumption that is not carried; then all its nodes' guarantees hold.
+derivation shows from them, step by step, every assumption that is not carried; then all its nodes' guarantees hold. It
+is `Derived` in proofs/instances.dfy; the kernel's certificates are of the nodes inside, without subsystems.
 """
 
 from __future__ import annotations

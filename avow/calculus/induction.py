@@ -3,6 +3,7 @@
 That a claim need not be kept by a step from *some* state says nothing yet: the state may never be reached. So the steps
 are unrolled from the initial values: a run that gets to a state in which the claim is false refutes it. And the claim
 may be kept by every step that comes after several at which it held (k-induction; Sheeran, Singh and Stålmarck 2000).
+It is the theorem itself (`Sound` in proofs/kernel.dfy), with as many base questions as steps.
 Where neither is found, the claim is unknown, and the state that induction stumbled on is shown as just that.
 """
 

@@ -3,6 +3,9 @@
 Strongly connected components are loops (R4); between them the graph has no circle and is walked from providers to
 consumers: one provider makes a sequence (R1), several make a union (R3), one provider of several consumers that have
 no other makes a branching (R2). Shared parts are shared in the tree, so that its size stays that of the graph.
+
+All four are one instance of the theorem, `Nodes` in proofs/instances.dfy: nodes in causal order (R1 to R3), a loop's
+also from the step before (R4). Persistence and one output are `Latched` there: what makes a wire an equation.
 """
 
 from __future__ import annotations

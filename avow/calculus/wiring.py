@@ -1,4 +1,8 @@
-"""A system as the kernel is told of it: its contracts, the wires of its dataflow graph, and the plan's formulas."""
+"""A system as the kernel is told of it: its contracts, the wires of its dataflow graph, and the plan's formulas.
+
+Cells, in which clauses remember, are outputs of their own (`SoundWithMemory` in proofs/kernel.dfy: what a step leaves
+there is a definition); several publishers of a topic are a node that puts out what one of them does.
+"""
 
 from __future__ import annotations
 

@@ -20,3 +20,24 @@ def test_dafny_verifies(name: str) -> None:
         pytest.skip("dafny is not installed")
     done = subprocess.run([dafny, "/compile:0", "/timeLimit:100", name], cwd=PROOFS, capture_output=True, text=True)
     assert ", 0 errors" in done.stdout, done.stdout + done.stderr
+
+
+INSTANCES = {
+    "rules.py": ("Nodes", "Latched"),
+    "induction.py": ("Sound",),
+    "hierarchy.py": ("Derived",),
+    "export.py": ("Derived",),
+    "refinement_certificate.py": ("Refined",),
+    "wiring.py": ("SoundWithMemory",),
+    "finder.py": ("Nodes", "Derived"),
+    "../kernel/check.py": ("SoundFromAnyBeginning", "Apart"),
+}
+
+
+@pytest.mark.parametrize("module", INSTANCES)
+def test_the_code_of_each_rule_names_its_instance(module: str) -> None:
+    proofs = "".join((PROOFS / name).read_text() for name in ("kernel.dfy", "instances.dfy"))
+    code = (PROOFS.parent / module).read_text()
+    for name in INSTANCES[module]:
+        assert f"`{name}`" in code
+        assert f"lemma {name}<" in proofs
