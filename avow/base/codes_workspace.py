@@ -82,8 +82,16 @@ WORKSPACE_CODES = register(
     declare(
         "BACKEND006",
         "single steps only",
-        "The method judges single steps, and the clause, or an assumption of its node, speaks of others.",
+        "The method judges single steps, or not all that can be said of others, and the clause, or an assumption of "
+        "its node, speaks of others.",
         "Give the guarantee a method that judges runs, or say it with a port that carries what is remembered.",
+    ),
+    declare(
+        "BACKEND007",
+        "memory and invariant",
+        "What a program keeps from step to step has the name of a port, or an invariant that links it to the steps "
+        "before speaks of the step that is to come.",
+        "Use another name; an invariant speaks of what the program keeps, and of the past (`previous(in.r, 0)`).",
     ),
     declare(
         "POLICY001",

@@ -252,16 +252,17 @@ def parse_formula(
     extra: Mapping[str, Sort] | None = None,
     *,
     roles: frozenset[Role] = BOTH_ROLES,
+    remembers: bool = False,
 ) -> Term:
     """A formula given as text (in a plan, say) as a term of sort BOOL.
 
     With `node`, names mean what they mean in that node: ``in.v``, ``out.v``, or bare. Without, ports are written
     ``agent.command`` (``agent.in.phase`` or ``agent.out.phase`` where the node has both) and become
     ``Variable(role, "agent.command", sort)``. `extra` are further names, which become bound variables. `roles` are the
-    roles that ports may have; a bare name then means the port of that role. `span` is where the text stands.
-    Raises `Rejected`, with every error.
+    roles that ports may have; a bare name then means the port of that role. With `remembers` it may speak of
+    other steps. `span` is where the text stands. Raises `Rejected`, with every error.
     """
-    return _parse(text, node, contract, span, extra, roles, formula=True)
+    return _parse(text, node, contract, span, extra, roles, formula=True, remembers=remembers)
 
 
 def parse_term(
@@ -288,6 +289,7 @@ def _parse(
     *,
     formula: bool,
     sort: Sort | None = None,
+    remembers: bool = False,
 ) -> Term:
     source = Source("<formula>", text) if span is None else Source(span.file, text, span.line, span.column)
     reports = Reports(source)
@@ -298,7 +300,7 @@ def _parse(
     term: Term | None = None
     if tree is not None:
         bound = {name: Variable(Role.BOUND, name, of) for name, of in (extra or {}).items()}
-        scope = Scope(of_contract(contract), bound=bound, roles=roles)
+        scope = Scope(of_contract(contract), bound=bound, roles=roles, remembers=remembers)
         if node is None:
             scope.nodes = {n.name: n for n in contract.nodes}
         else:

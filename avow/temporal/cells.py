@@ -407,6 +407,15 @@ def written(amount: Term) -> int | None:
     return value if isinstance(value, int) and not isinstance(value, bool) else None
 
 
+def longest_limits(formulas: Iterable[Term]) -> int:
+    """The most steps that the limits in one formula come to together, of those that are written down."""
+    totals = (
+        sum(max(0, written(h.limit.amount) or 0) for h in histories(formula) if h.limit is not None)
+        for formula in formulas
+    )
+    return max(totals, default=0)
+
+
 def some_value(sort: Sort) -> Term | None:
     """A value of a sort, written down; None of an unspecified type, which has no name for one, and of functions."""
     match sort:

@@ -188,3 +188,7 @@ VALUES_LOOKED_AT = 500
 GUARDS = 32
 """Guards of a partial operation that are tried, two at a time, to give its condition: more stand at no place that a
 person wrote; what is not found is asked of the claim itself."""
+
+COUNTS_GUESSED = 6
+"""Numbers below which a counter of a program and one that its contract has are guessed to agree, beside the limits that
+the contract writes down: programs that keep less than they count saturate early."""

@@ -7,8 +7,10 @@ from importlib import metadata
 from pathlib import Path
 
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.backend_kit.runs import unsaid
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
+from avow.language.contract import Clause, Node
 
 from .codes import CODES
 
@@ -20,6 +22,13 @@ _TABLE = {
     "additionalProperties": {"type": ["string", "number", "boolean"]},
 }
 
+
+_INVARIANTS = {
+    "type": ["string", "array"],
+    "items": {"type": "string"},
+    "description": "what links the program's MEMORY and the steps before, ahead of every step: high == "
+    "previous(counted(reading > 10 since reading <= 10), 0)",
+}
 
 _TERMINATION = {
     "type": "object",
@@ -39,15 +48,21 @@ class Hoare(Backend):
 
     name = "hoare"
     title = "Hoare triples from the guarantee, proved of an imperative program by weakest preconditions"
-    version = "4"
+    version = "5"
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False
+    remembers = True
     portable = True
     link = Link.GENERATED
     options_schema = {
         "type": "object",
-        "properties": {"program": _FILE, "variables": _TABLE, "termination": _TERMINATION},
+        "properties": {
+            "program": _FILE,
+            "variables": _TABLE,
+            "termination": _TERMINATION,
+            "invariants": _INVARIANTS,
+        },
         "required": ["program"],
         "additionalProperties": False,
     }
@@ -61,13 +76,16 @@ class Hoare(Backend):
     def tools(self) -> tuple[Tool, ...]:
         return (Tool("z3", metadata.version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3"),)
 
+    def unsaid(self, node: Node, clause: Clause) -> str | None:
+        return unsaid(self.name, node, clause, functions=True)
+
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .backend import problems
 
         return problems(job)
 
     def files(self, job: Job) -> tuple[Path, ...]:
-        from .backend import program_file
+        from .work import program_file
 
         try:
             return (program_file(job),)

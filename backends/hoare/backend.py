@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
-from functools import cached_property
 from pathlib import Path
 
-from avow.backend_kit.given import existing_file, told
+from avow.backend_kit.given import told
 from avow.backend_kit.protocol import Job, Limits, Report
-from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.backend_kit.stepping import Stepping
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Counterexample, Link, Outcome, Verdict
 from avow.evaluation.evaluate import NotEvaluable, evaluate
 from avow.evidence.obligation import Obligation
@@ -26,15 +26,15 @@ from avow.solving.settling import Settler
 from avow.solving.smtlib import export as smtlib
 from avow.solving.translation import Unsupported
 
-from .checker import Checked, check
 from .endless import endless_run
+from .memory import knowing, remembered
 from .numbers import other_numbers
 from .outline import outline, show
-from .parser import parse_program
-from .program import Program, While, has_loops, statements
-from .triples import Triple, every_run, triples
+from .program import While, has_loops, statements
+from .triples import Triple
 from .tuning import BRIEFLY_SECONDS, ENDLESS_EFFORT
 from .witness import Breach, breach
+from .work import Work, load, run_conditions
 from .wp import Condition, TooLarge, conditions
 
 GIVEN = frozenset({Verdict.PROVED, Verdict.PARTIAL, Verdict.JUSTIFIED})
@@ -42,69 +42,6 @@ GIVEN = frozenset({Verdict.PROVED, Verdict.PARTIAL, Verdict.JUSTIFIED})
 
 
 UNFAITHFUL = "Avow's simplified triple does not say what the contract's formulas say: a fault of Avow, please report it"
-
-
-@dataclass(frozen=True)
-class Work:
-    """A job, read: the program checked against node and table, and the triples of each obligation."""
-
-    job: Job
-    checked: Checked
-    text: str
-
-    @cached_property
-    def settler(self) -> Settler:
-        """The solver that this program's questions are put to."""
-        return Settler()
-
-    @cached_property
-    def triples(self) -> dict[str, tuple[Triple, ...]]:
-        """Obligation id → its triples. Raises Rejected."""
-        try:
-            return {o.id: triples(o, self.job.clause(o), self.job.node, self.checked) for o in self.job.obligations}
-        except RecursionError:
-            message = "a clause of this node is nested too deeply for this method"
-            raise Rejected(Diagnostic("HOARE100", message, self.job.node.span)) from None
-
-    @cached_property
-    def every_run(self) -> Triple:
-        """What any guarantee needs besides its own triples: that the program runs, whatever the input."""
-        return every_run(self.job.node, self.checked)
-
-
-def run_conditions(triple: Triple, program: Program) -> tuple[Condition, ...]:
-    """The conditions of a triple, without those that say nothing. Raises TooLarge."""
-    return tuple(c for c in conditions(triple, program.body) if c.goal != TRUE)
-
-
-def load(job: Job) -> Work:
-    """Read program and table. Raises Rejected with all that is wrong."""
-    path = program_file(job)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        message = f"{path.name} cannot be read: {error}"
-        raise Rejected(Diagnostic("HOARE400", message, job.method.options.at("program"))) from error
-    source = parse_program(text, str(path))
-    return Work(job, check(source, job.contract, job.node, _table(job)), text)
-
-
-def program_file(job: Job) -> Path:
-    """The plan's program. Raises Rejected (``HOARE400``) where there is none, or outside the system's folder."""
-    return existing_file(job, "program", job.options.get("program"), wrong="HOARE400", absent="HOARE400")
-
-
-def _table(job: Job) -> dict[str, tuple[str, Span]]:
-    options = job.method.options
-    given = job.options.get("variables") or {}
-    if not isinstance(given, Mapping):
-        message = "`variables` maps inputs and outputs to the program's expressions"
-        raise Rejected(Diagnostic("HOARE400", message, options.at("variables")))
-    words = {True: "TRUE", False: "FALSE"}
-    return {
-        str(key): (words[value] if isinstance(value, bool) else str(value), options.at("variables", key))
-        for key, value in given.items()
-    }
 
 
 def problems(job: Job) -> tuple[Diagnostic, ...]:
@@ -141,7 +78,9 @@ def files(job: Job) -> Mapping[str, str]:
     except Rejected:
         return {}
     made: dict[str, str] = {}
-    for found in all_triples.values():
+    for name, condition in work.firsts.items():
+        made[f"{name}.first.smt2"] = _script(work.every_run, condition)
+    for found in (*all_triples.values(), work.kept):
         for triple in found:
             made[f"{_stem(triple)}.hoare"] = _triple_text(triple, work)
             if triple.fidelity != TRUE:
@@ -194,7 +133,11 @@ def settle(job: Job, limits: Limits) -> Report:
     except Rejected as rejected:
         return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), "weakest preconditions", version)
     logs: dict[str, str] = {}
-    outcomes = tuple(_obligation(o, found[o.id], work, limits, logs) for o in job.obligations)
+    shown: Mapping[str, Outcome] = {}
+    if work.steps is not None:
+        work, shown = _remembered(work, work.steps, limits, logs)
+        found = work.triples
+    outcomes = tuple(shown.get(o.id) or _obligation(o, found[o.id], work, limits, logs) for o in job.obligations)
     open_ = {o.verdict for o in outcomes} & {*GIVEN, Verdict.UNKNOWN}
     if open_:
         # where nothing is proved that would rest on it, it is worth a look but not the time of another guarantee
@@ -209,6 +152,27 @@ def settle(job: Job, limits: Limits) -> Report:
     allowed = told_effort(from_seconds(limits.seconds))
     outcomes = tuple(replace(o, details={**o.details, **allowed}) for o in outcomes)
     return Report(outcomes, "weakest preconditions", version, logs=logs)
+
+
+def _remembered(
+    work: Work, steps: Stepping, limits: Limits, logs: dict[str, str]
+) -> tuple[Work, Mapping[str, Outcome]]:
+    """The work with all invariants that were found to hold, and the refutations that runs from the start have shown."""
+    deadline = until(from_seconds(limits.seconds))
+    clauses = [work.job.clause(o) for o in work.job.obligations]
+    seen, found = remembered(steps, work.checked, clauses, lambda c: _holds(c, work.settler, deadline))
+    told = [show(each.formula) for each in found.invariants]
+    logs["invariants.log"] = "\n".join((*(f"holds: {text}" for text in told), *found.lacking)) + "\n"
+    known = replace(work, job=knowing(work.job, steps, found.invariants), lacking=found.lacking)
+    link = Link.MAPPED if work.checked.reading.mapped else Link.GENERATED
+    refuted: dict[str, Outcome] = {}
+    for obligation in work.job.obligations:
+        run = seen.broken.get(obligation.name) or seen.fault
+        if run is not None:
+            trace = run.shown(steps.own)
+            values = Counterexample(trace[-1], run.why, tuple(trace) if len(trace) > 1 else ())
+            refuted[obligation.id] = Outcome(obligation.id, Verdict.REFUTED, values.text(), values, link=link)
+    return known, refuted
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,8 +254,8 @@ def _every_run(work: Work, limits: Limits) -> Settled:
     try:
         wanted = run_conditions(triple, program)
         failed = [c for c in wanted if not _holds(c, work.settler, deadline)]
-        shown = breach(triple, program, failed, max(1000, _left(deadline))) if failed else None
-        if shown is None and (_termination(work) or (failed and has_loops(program))):
+        shown = breach(triple, program, failed, max(1000, _left(deadline))) if failed and not work.steps else None
+        if shown is None and not work.steps and (_termination(work) or (failed and has_loops(program))):
             shown = endless_run(triple, program, max(1000, min(_left(deadline), ENDLESS_EFFORT)))
     except TooLarge as error:
         return Settled(triple, Verdict.UNKNOWN, str(error))
@@ -399,16 +363,19 @@ def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Sett
         if answer.verdict is not Verdict.PROVED:
             failed.append((condition, answer))
     if not failed:
-        vacuous, impossible = _vacuous(triple, work.settler, deadline)
+        vacuous, impossible = _vacuous(triple, work, deadline)
         if not vacuous and _endless(triple, work, deadline):
             why = "its loops never end where it applies, and a node that never answers guarantees nothing"
             return Settled(triple, Verdict.UNKNOWN, why)
         proved = Settled(triple, Verdict.PROVED, "proved", None, vacuous, len(wanted))
         return _proved(proved, wanted, deadline, impossible)
+    condition, answer = failed[0]
+    if work.steps is not None:  # what breaks it may be a memory to which no run comes
+        why = f"{condition.what}: not shown of every memory that is known to be possible; an invariant may be missing"
+        return Settled(triple, Verdict.UNKNOWN, "; ".join((why, *work.lacking)))
     shown = breach(triple, program, [c for c, _ in failed], max(1000, _left(deadline)))
     if shown is not None:
         return Settled(triple, Verdict.REFUTED, shown.why, shown)
-    condition, answer = failed[0]
     if answer.verdict is Verdict.REFUTED and condition.name != "pre":
         why = f"{condition.what}: not so; the invariant may be too weak, for no run was found that breaks the triple"
     elif answer.verdict is Verdict.REFUTED:
@@ -418,14 +385,17 @@ def _triple(triple: Triple, work: Work, limits: Limits, deadline: float) -> Sett
     return Settled(triple, Verdict.UNKNOWN, why)
 
 
-def _vacuous(triple: Triple, settler: Settler, deadline: float) -> tuple[str, Term]:
+def _vacuous(triple: Triple, work: Work, deadline: float) -> tuple[str, Term]:
     """A triple that every program meets says nothing of this one: why it is one (or nothing), and what was proved to
-    be impossible."""
+    be impossible. An invariant says something of the program."""
+    settler, alone = work.settler, work.alone.get(triple.name)
     if settler.settles([triple.pre], triple.post, effort=min(2000, _left(deadline))) == "sat":
         return "", FALSE  # and then some input meets the precondition too
     if settler.proves([triple.pre], FALSE, effort=min(2000, _left(deadline))):
         return f"no input meets the precondition {show(triple.pre)}", triple.pre
     denied = conjunction((triple.pre, negation(triple.post)))
+    if alone is not None and not settler.proves([alone.pre], alone.post, effort=min(2000, _left(deadline))):
+        return "", FALSE
     if settler.proves([triple.pre], triple.post, effort=min(2000, _left(deadline))):
         return "it holds whatever a program does: it says nothing of this one", denied
     return "", FALSE

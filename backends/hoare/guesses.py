@@ -67,7 +67,7 @@ def guesses(triple: Triple, program: Program, wanted: tuple[Variable, ...]) -> I
             yield {**bases[0], **dict(zip(finite, point, strict=True))}
         return
     rng = random.Random(0)
-    draw = _Draw(rng, sorted({*small, *beside}), sorted(_strings((pre, triple.post, *expressions(program)))))
+    draw = Draw(rng, sorted({*small, *beside}), sorted(strings((pre, triple.post, *expressions(program)))))
     for _ in range(INPUTS_TRIED):
         base = rng.choice(bases)
         yield {**base, **{v: draw.value(v.sort) for v in free if v not in base or rng.random() < 0.7}}
@@ -84,7 +84,7 @@ def _pool(sort: Sort, small: Iterable[Fraction]) -> list[Value] | None:
     return None
 
 
-class _Draw:
+class Draw:
     """Values of any sort, by chance."""
 
     def __init__(self, rng: random.Random, numbers: list[Fraction], strings: list[str]) -> None:
@@ -119,7 +119,7 @@ class _Draw:
         return default_value(sort)
 
 
-def _strings(terms: Iterable[Term]) -> set[str]:
+def strings(terms: Iterable[Term]) -> set[str]:
     found = {p.value for t in terms for p in subterms(t) if isinstance(p, Literal) and isinstance(p.value, str)}
     return {"", "a", *found}
 

@@ -28,6 +28,7 @@ from .syntax import (
     Inside,
     MatchStatement,
     Member,
+    Memory,
     Name,
     Number,
     Quantification,
@@ -113,7 +114,22 @@ def _explain(error: UnexpectedToken, file: str, before: Token | None) -> Diagnos
 
 
 _KEYWORDS = frozenset(
-    ("IF", "THEN", "ELSE", "ENDIF", "MATCH", "WITH", "WHILE", "INVARIANT", "VARIANT", "DO", "SKIP", "VAR", "GIVEN")
+    (
+        "IF",
+        "THEN",
+        "ELSE",
+        "ENDIF",
+        "MATCH",
+        "WITH",
+        "WHILE",
+        "INVARIANT",
+        "VARIANT",
+        "DO",
+        "SKIP",
+        "VAR",
+        "GIVEN",
+        "MEMORY",
+    )
 )
 
 
@@ -162,13 +178,18 @@ class _Build(Transformer_NonRecursive):  # type: ignore[misc]
 
     def program(self, meta: Any, items: list[Any]) -> Source:
         declarations = tuple(item for item in items if isinstance(item, Declaration))
-        return Source(declarations, items[-1], self._span(meta))
+        memory = tuple(item for item in items if isinstance(item, Memory))
+        return Source(declarations, memory, items[-1], self._span(meta))
 
     def body(self, meta: Any, items: list[Any]) -> tuple[Any, ...]:
         return tuple(item for item in items if item is not None)
 
     def block(self, meta: Any, items: list[Any]) -> tuple[Any, ...]:
         return items[0]  # type: ignore[no-any-return]
+
+    def memory(self, meta: Any, items: list[Any]) -> Memory:
+        _, name, sort, _, initial = items
+        return Memory(name, str(sort), initial, self._span(meta))
 
     def declaration(self, meta: Any, items: list[Any]) -> Declaration:
         names = tuple(item for item in items if isinstance(item, Name))

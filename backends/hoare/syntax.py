@@ -143,6 +143,16 @@ class Declaration:
 
 
 @dataclass(frozen=True, slots=True)
+class Memory:
+    """``MEMORY n : NATURAL := 0``: a variable that keeps its value from one step to the next."""
+
+    name: Name
+    sort: str
+    initial: Expression
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
 class SkipStatement:
     span: Span = field(compare=False, repr=False)
 
@@ -194,5 +204,6 @@ class Source:
     """A parsed program."""
 
     declarations: tuple[Declaration, ...]
+    memory: tuple[Memory, ...]
     body: tuple[Statement, ...]
     span: Span = field(compare=False, repr=False)

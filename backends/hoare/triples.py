@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from avow.base.diagnostics import Diagnostic, Rejected
-from avow.evidence.obligation import Obligation
 from avow.formulas.formula import conjunction, free_variables, negation, substitute
 from avow.formulas.renaming import rename_apart
 from avow.formulas.traversal import Steps, run
@@ -95,9 +94,9 @@ def equation(one: Term, other: Term) -> Term:
     return Compare("==", one, other)
 
 
-def triples(obligation: Obligation, clause: Clause, node: Node, checked: Checked) -> tuple[Triple, ...]:
-    """The triples whose validity is the obligation's. Raises Rejected (code ``HOARE400``) where the formula speaks
-    of an output that the program has nothing for."""
+def triples(obligation: str, clause: Clause, node: Node, checked: Checked) -> tuple[Triple, ...]:
+    """The triples whose validity is that of the obligation of this id. Raises Rejected (code ``HOARE400``) where the
+    formula speaks of an output that the program has nothing for."""
     names = set(checked.program.names)
     assumed = [translate(a, checked.reading, names) for a in node.assumptions]
     parts = tuple(_split(rename_apart(clause.formula, names)))
@@ -109,7 +108,7 @@ def triples(obligation: Obligation, clause: Clause, node: Node, checked: Checked
     ghosts = tuple(sorted(checked.program.ghosts.items(), key=lambda pair: pair[0].name))
     count = len(found)
     return tuple(
-        Triple(clause.name if count == 1 else f"{clause.name}.{k}", obligation.id, pre, post, ghosts, stated)
+        Triple(clause.name if count == 1 else f"{clause.name}.{k}", obligation, pre, post, ghosts, stated)
         for k, (pre, post, stated) in enumerate(found, start=1)
     )
 

@@ -43,3 +43,21 @@ FORMULA_NODES = 50_000
 
 GUESS_EFFORT = 1_000
 """For one input that meets the precondition: what is not found at once is left to the proof."""
+
+RUNS = 60
+"""Runs from the start of a program that keeps something from step to step, before a proof is tried: that costs more."""
+
+RUN_LENGTH = 12
+"""Steps of such a run; a third of them are longer by the contract's limits."""
+
+LONGEST_RUN = 60
+"""Steps by which they are longer at most."""
+
+DRAWS = 12
+"""Draws for the inputs of a step, before the run ends for want of an allowed one."""
+
+STICKY = (0.0, 0.5, 0.85)
+"""How often a step of a run has the inputs of the step before: what lasts has to last beyond its limit."""
+
+GUESSES = 200
+"""Invariants that are guessed, each in the first form that no run contradicts: a few questions each."""

@@ -11,7 +11,7 @@ import json
 import math
 import random
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,7 @@ from avow.formulas.values import Element, Value
 from avow.formulas.values import Sequence as SequenceValue
 from avow.isolation.subject import Subject, SubjectFailed
 from avow.language.sorts import REAL, IntegerSort, NaturalSort, RealSort, Sort
-from avow.language.terms import Term, histories
-from avow.temporal.cells import written
+from avow.temporal.cells import longest_limits
 
 from . import wire
 from .bench import Apart, Bench, Case, OutOfTime, _Enough, _pairs, told, valuation
@@ -413,15 +412,6 @@ class SequenceBench(Bench):
         if self.data["source"]:
             report["crash_trace"] = [_pairs(*step) for step in self.traces.get("crash", [])]
         return report
-
-
-def longest_limits(formulas: Iterable[Term]) -> int:
-    """The most steps that the limits in one formula come to together, of those that are written down."""
-    totals = (
-        sum(max(0, written(h.limit.amount) or 0) for h in histories(formula) if h.limit is not None)
-        for formula in formulas
-    )
-    return max(totals, default=0)
 
 
 def _as_host(data: Any) -> Any:

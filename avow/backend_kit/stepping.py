@@ -1,0 +1,262 @@
+"""A program that keeps something from step to step, and a contract that remembers: as one step of a larger node.
+
+What the program holds and what the contract remembers (its cells) are inputs of that node, as the step before has left
+them; what the program holds after the step is an output. An *invariant* links the two: it holds before the first step,
+and a step keeps it, so that it is an assumption of every step. Each guarantee is then one of a single step.
+
+Invariants are a person's, from the plan, or guesses, of which the largest part stays that is kept. A cell is a
+definition: that it is as the contract says needs no proof.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from avow.base.diagnostics import Diagnostic, Rejected, Span
+from avow.formulas.formula import free_variables, substitute
+from avow.formulas.traversal import transform
+from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
+from avow.language.definedness import with_value
+from avow.language.load import parse_formula
+from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, EnumSort, Sort
+from avow.language.terms import (
+    FALSE,
+    TRUE,
+    Apply,
+    Arithmetic,
+    Builtin,
+    Compare,
+    EnumValue,
+    Iff,
+    Implies,
+    Literal,
+    Not,
+    Operation,
+    Role,
+    Term,
+    Variable,
+)
+from avow.temporal.cells import Cell, Records, Unsaid, written
+from avow.tuning.bounds import COUNTS_GUESSED
+
+_NUMBERS: tuple[Sort, ...] = (NATURAL, INTEGER, REAL)
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """What a program keeps from one step to the next; `initial` is its value before the first, without variables."""
+
+    name: str
+    sort: Sort
+    initial: Term
+
+    @property
+    def before(self) -> Variable:
+        return Variable(Role.INPUT, self.name, self.sort)
+
+    @property
+    def after(self) -> Variable:
+        return Variable(Role.OUTPUT, self.name, self.sort)
+
+
+@dataclass(frozen=True, slots=True)
+class Invariant:
+    """What holds before every step, over cells and what the program holds."""
+
+    text: str
+    formula: Term
+    span: Span | None = None
+    guessed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Stepping:
+    """A node's steps, as those of a larger one."""
+
+    own: Node
+    """The contract's."""
+    node: Node
+    """Its clauses as formulas of one step; cells, and what the program holds, among its ports."""
+    cells: tuple[Cell, ...]
+    held: tuple[Held, ...]
+    invariants: tuple[Invariant, ...]
+
+    def first(self, formula: Term) -> Term:
+        """A formula over cells and what is held, before the first step."""
+        values = {h.before: h.initial for h in self.held}
+        return self._at(formula, values, {c: c.initial for c in self.cells if c.initial is not None})
+
+    def after(self, formula: Term) -> Term:
+        """The same after this step, over the node's ports."""
+        return self._at(formula, {h.before: h.after for h in self.held}, {c: c.now for c in self.cells})
+
+    def _at(self, formula: Term, held: Mapping[Variable, Term], cells: Mapping[Cell, Term]) -> Term:
+        """The formula with other terms for what is held and what the cells have, all at once."""
+        functions = {c: replace(c.before, name=f"{c.name}'") for c in cells if c.parameters}
+        plain = {c.before: term for c, term in cells.items() if not c.parameters}
+        made = substitute(formula, {**held, **plain, **{c.before: name for c, name in functions.items()}})
+        return _applied(made, {name: (c.parameters, cells[c]) for c, name in functions.items()})
+
+    def knowing(self, invariants: Iterable[Invariant]) -> Node:
+        """The larger node, with invariants among its assumptions."""
+        more = tuple(
+            Clause(ClauseKind.ASSUMPTION, f"invariant {k}", 0, i.formula, None, i.text, i.span or self.node.span)
+            for k, i in enumerate(invariants, start=1)
+        )
+        return replace(self.node, assumptions=(*self.node.assumptions, *more))
+
+
+def stepping(
+    contract: Contract, node: Node, names: Iterable[str], held: Sequence[Held], stated: Iterable[tuple[str, Span]]
+) -> Stepping:
+    """The steps of a node, of which the guarantees `names` are asked. `stated` are the plan's invariants, each with its
+    place: RCL about what is held, by name, and about the steps before (``previous(…)``, …). Raises Rejected (code
+    ``BACKEND007``)."""
+    records = Records()
+    wanted = frozenset(names)
+
+    def said(clause: Clause) -> Clause:
+        return replace(clause, formula=records.clause(clause.formula))
+
+    assumptions = tuple(map(said, node.assumptions))
+    guarantees = tuple(said(clause) if clause.name in wanted else clause for clause in node.guarantees)
+    taken = {port.name for port in (*node.inputs, *node.outputs)}
+    for each in held:
+        if each.name in taken:
+            message = f"`{each.name}` is a port of {node.name}: what the program keeps needs another name"
+            raise Rejected(Diagnostic("BACKEND007", message, node.span))
+    invariants = tuple(_stated(text, span, contract, node, held, records) for text, span in stated)
+    ports = [Port(v.role, v.name, v.sort, "", None) for h in held for v in (h.before, h.after)]
+    cells = [Port(Role.INPUT, c.name, c.sort, "", None) for c in records.cells]
+    larger = replace(
+        node,
+        inputs=(*node.inputs, *(p for p in ports if p.role is Role.INPUT), *cells),
+        outputs=(*node.outputs, *(p for p in ports if p.role is Role.OUTPUT)),
+        assumptions=assumptions,
+        guarantees=guarantees,
+    )
+    return Stepping(node, larger, tuple(records.cells), tuple(held), invariants)
+
+
+def _stated(text: str, span: Span, contract: Contract, node: Node, held: Sequence[Held], records: Records) -> Invariant:
+    extra = {each.name: each.sort for each in held}
+    formula = with_value(parse_formula(text, node, contract, span, extra, remembers=True))
+    try:
+        formula = records.term(formula)
+    except Unsaid as unsaid:
+        raise Rejected(Diagnostic("BACKEND007", f"the invariant speaks of {unsaid.reason}", span)) from unsaid
+    formula = substitute(formula, {Variable(Role.BOUND, h.name, h.sort): h.before for h in held})
+    known = {*(h.before for h in held), *(c.before for c in records.cells)}
+    foreign = sorted(free_variables(formula) - known, key=lambda v: v.qualified)
+    if foreign:
+        message = f"the invariant is about what was before a step, and speaks of {foreign[0].qualified} at that step"
+        hint = f"previous({foreign[0].qualified}, …) is its value before"
+        raise Rejected(Diagnostic("BACKEND007", message, span, hint=hint))
+    return Invariant(text, formula, span)
+
+
+def _applied(term: Term, functions: Mapping[Variable, tuple[tuple[Variable, ...], Term]]) -> Term:
+    """The term with functions that are given by terms applied."""
+
+    def applied(part: Term) -> Term:
+        if isinstance(part, Apply) and isinstance(part.function, Variable) and part.function in functions:
+            parameters, body = functions[part.function]
+            return substitute(body, dict(zip(parameters, part.arguments, strict=True)))
+        return part
+
+    return transform(term, applied) if functions else term
+
+
+# -- guesses ----------------------------------------------------------------------------------------------------------
+
+
+def guesses(steps: Stepping) -> Iterator[tuple[Invariant, ...]]:
+    """What often links a program's memory and a contract's: that cells begin as they do, ranges, that two counters or
+    conditions are one. Each in its forms, the strongest first; most are wrong."""
+    for forms in dict.fromkeys(_families(steps)):
+        yield tuple(Invariant("", formula, None, True) for formula in forms)
+
+
+def _families(steps: Stepping) -> Iterator[tuple[Term, ...]]:
+    first = next((c for c in steps.cells if c.initial == TRUE and c.now == FALSE), None)
+    if first is not None:
+        yield from ((Implies(first.before, c.begins()),) for c in steps.cells if c.initial is not None and c != first)
+        yield from ((Implies(first.before, _same(h.before, h.initial)),) for h in steps.held)
+    cells = [c for c in steps.cells if not c.parameters]
+    numbers = [c for c in cells if c.sort in _NUMBERS]
+    for cell in (c for c in numbers if c.sort == INTEGER):
+        yield (Compare("<=", _number(-1), cell.before),)
+        yield tuple(Compare("<=", cell.before, _number(n)) for n in sorted(_limits(cell)))
+    for each in (h for h in steps.held if h.sort in _NUMBERS):
+        yield from ((Compare(sign, each.before, each.initial),) for sign in (">=", "<="))
+        yield from (tuple(_counters(each.before, cell)) for cell in numbers)
+    for k, a in enumerate(cells):
+        yield from ((_same(a.before, b.before),) for b in cells[:k] if a.sort == b.sort)
+    for h in steps.held:
+        yield from ((_same(h.before, c.before),) for c in cells if c.sort == h.sort and c.sort not in _NUMBERS)
+    for held in steps.held:
+        for one in _conditions(held.before):
+            yield from _agreeing(one, (other for c in cells for other in _conditions(c.before)))
+    plain = [(c, next(_conditions(c.before), None)) for c in cells]
+    for k, (_, condition) in enumerate(plain):
+        if condition is not None:
+            yield from _agreeing(condition, (other for _, other in plain[:k] if other is not None))
+
+
+def _agreeing(one: Term, others: Iterable[Term]) -> Iterator[tuple[Term, ...]]:
+    """That two conditions are one, or that one follows from the other, or its opposite does."""
+    for other in others:
+        yield Iff(one, other), Implies(other, one), Implies(other, Not(one))
+        yield Iff(one, Not(other)), Implies(one, other), Implies(Not(one), other)
+
+
+def _counters(counter: Variable, cell: Cell) -> Iterator[Term]:
+    """A counter of the program and a number that the contract remembers, which starts at 0 or (an age) at -1."""
+    ages = cell.sort == INTEGER
+    value: Term = Arithmetic("+", cell.before, _number(1), INTEGER) if ages else cell.before
+    if (counter.sort == REAL) != (cell.sort == REAL):
+        return
+    yield Compare("==", counter, value)
+    yield Compare("==", counter, cell.before)
+    if counter.sort != REAL:
+        bounds = sorted({n + d for n in _limits(cell) for d in (0, 1, 2)} | set(range(1, COUNTS_GUESSED)), reverse=True)
+        yield from (Compare("==", counter, _least(value, most)) for most in bounds)
+        yield from (Compare("==", _least(counter, most), _least(value, most)) for most in bounds)
+
+
+def _limits(cell: Cell) -> tuple[int, ...]:
+    """The numbers that a cell's definition writes down."""
+    found: dict[int, None] = {}
+    stack = [cell.now]
+    while stack:
+        part = stack.pop()
+        number = written(part)
+        if number is not None and number > 0:
+            found[number] = None
+        stack.extend(part.children)
+    return tuple(found)
+
+
+def _conditions(variable: Variable) -> Iterator[Term]:
+    match variable.sort:
+        case EnumSort(members=members):
+            yield from (Compare("==", variable, EnumValue(m, variable.sort)) for m in members)
+        case sort if sort == BOOL:
+            yield variable
+        case sort if sort in (NATURAL, INTEGER):
+            yield from (Compare(">=", variable, _number(n)) for n in range(0 if sort == INTEGER else 1, 3))
+        case _:  # no condition is read off its values
+            pass
+
+
+def _least(term: Term, most: int) -> Term:
+    return Operation(Builtin.MIN, (term, _number(most)), term.sort)
+
+
+def _number(value: int) -> Term:
+    return Literal(value, INTEGER if value < 0 else NATURAL)
+
+
+def _same(one: Term, other: Term) -> Term:
+    return Iff(one, other) if one.sort == BOOL else Compare("==", one, other)

@@ -1,0 +1,190 @@
+"""Programs that keep something from step to step: proofs and refutations against the definitions over all steps of a
+run, and invariants that are not so are not believed."""
+
+from __future__ import annotations
+
+import random
+from itertools import product
+from pathlib import Path
+
+import pytest
+from helpers import some
+from temporal import positions
+from temporal.test_cells import A, B, N, formula
+from temporal.test_systems import clause as drawn_clause
+
+from avow.backend_kit import one_step
+from avow.backend_kit.protocol import Job, Limits
+from avow.backends.hoare import BACKEND
+from avow.base.verdict import Outcome, Verdict
+from avow.formulas.formula import substitute
+from avow.language.printer import show_term
+from avow.language.sorts import NATURAL
+from avow.language.terms import RESPONSES, History, Implies, Literal, Term
+
+from .systems import make_job
+
+GATE = """node gate {
+  inputs( request : BOOL, reading : REAL )
+  outputs( open : BOOL, alarm : BOOL, n : NATURAL )
+  topics()
+  assume smooth ( abs(reading - previous(reading, reading)) <= 2 )
+  guarantee still ( open and request -> open until not request )
+  guarantee alarm ( alarm <=> held[2 steps](reading > 10) )
+  guarantee count ( n == counted(reading > 10 since reading <= 10) )
+  guarantee later ( fell(request) -> next(not open) )
+}
+"""
+
+PROGRAM = """MEMORY high : NATURAL := 0;
+MEMORY waiting : NATURAL := 0;
+IF reading > 10 THEN
+  high := high + 1
+ELSE
+  high := 0
+IF request THEN
+  waiting := waiting + 1
+ELSE
+  waiting := 0
+open := request and waiting > 1
+alarm := high >= 3
+n := high
+"""
+
+
+def job(folder: Path, program: str = PROGRAM, rcl: str = GATE, **options: object) -> Job:
+    return make_job(folder, rcl, rcl.split()[1], {"program": "p.imp", **options}, {"p.imp": program}, "hoare")
+
+
+def settle(wanted: Job) -> dict[str, Outcome]:
+    report = one_step.discharge(BACKEND, wanted, wanted.root, Limits())
+    return {o.obligation.rpartition("/")[2]: o for o in report.outcomes}
+
+
+@pytest.mark.slow
+def test_a_right_program_is_proved(tmp_path: Path) -> None:
+    found = settle(job(tmp_path))
+    assert {o.verdict for o in found.values()} == {Verdict.PROVED}, {n: o.summary for n, o in found.items()}
+    assert not any(o.vacuous for o in found.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("old", "new", "broken"),
+    [
+        ("high >= 3", "high >= 2", {"alarm"}),
+        ("high >= 3", "high > 3", {"alarm"}),
+        ("MEMORY high : NATURAL := 0", "MEMORY high : NATURAL := 1", {"count", "alarm"}),
+        ("waiting > 1", "waiting > 0", {"later"}),
+        ("waiting > 1", "waiting > 1 and waiting < 5", {"still"}),
+        ("high := high + 1", "high := high - 1", {"still", "alarm", "count", "later"}),
+    ],
+)
+def test_seeded_faults_are_refuted_by_a_run(old: str, new: str, broken: set[str], tmp_path: Path) -> None:
+    assert old in PROGRAM
+    found = settle(job(tmp_path, PROGRAM.replace(old, new)))
+    refuted = {name for name, o in found.items() if o.verdict is Verdict.REFUTED}
+    assert broken == refuted, {name: (o.verdict, o.summary) for name, o in found.items()}
+    for name in broken:
+        assert found[name].counterexample is not None
+
+
+COUNTER = """node c { inputs( up : BOOL ) outputs( n : NATURAL ) topics()
+  guarantee g ( n == counted(up since not up) + counted(up since not up) ) }"""
+TWICE = "MEMORY m : NATURAL := 0;\nIF up THEN\n  m := m + 2\nELSE\n  m := 0\nn := m\n"
+
+
+@pytest.mark.parametrize(
+    ("invariants", "verdict", "told"),
+    [
+        ((), Verdict.UNKNOWN, "an invariant may be missing"),
+        (("m == 2 * previous(counted(up since not up), 0)",), Verdict.PROVED, "proved"),
+        (("m == 2 * previous(counted(up since not up), 0)", "m <= 4"), Verdict.PROVED, "proved"),
+        (("m == 3 * previous(counted(up since not up), 0)",), Verdict.UNKNOWN, "a run contradicts `m == 3 *"),
+        (("FALSE",), Verdict.UNKNOWN, "a run contradicts `FALSE`"),
+    ],
+)
+def test_an_invariant_of_the_plan(invariants: tuple[str, ...], verdict: Verdict, told: str, tmp_path: Path) -> None:
+    found = settle(job(tmp_path, TWICE, COUNTER, invariants=list(invariants)))["g"]
+    assert found.verdict is verdict, found.summary
+    assert told in found.summary
+
+
+def test_an_invariant_that_no_run_happens_to_contradict_is_not_believed(tmp_path: Path) -> None:
+    """It would take a thousand steps: a step does not keep it, and nothing rests on it."""
+    rcl = "node c { inputs( up : BOOL ) outputs( b : BOOL ) topics() guarantee g ( once(up) or b or up ) }"
+    program = "MEMORY m : NATURAL := 0;\nm := m + 1\nb := m <= 1000\n"
+    found = settle(job(tmp_path, program, rcl, invariants="m < 1000"))["g"]
+    assert found.verdict is Verdict.UNKNOWN
+    assert "not shown that a step keeps `m < 1000`" in found.summary
+
+
+@pytest.mark.parametrize(
+    ("program", "invariant", "code"),
+    [
+        ("MEMORY up : BOOL := TRUE;\nn := 0\n", "TRUE", "BACKEND007"),
+        ("MEMORY m : NATURAL := 0;\nn := 0\n", "m == counted(up since not up)", "BACKEND007"),
+        ("MEMORY m : NATURAL := 0;\nn := 0\n", "m == 0 -> next(up)", "RCL321"),
+        ("MEMORY m : NATURAL := 0;\nn := 0\n", "k == 0", "RCL201"),
+        ("MEMORY m : Nat := 0;\nn := 0\n", "TRUE", "HOARE200"),
+        ("MEMORY m : NATURAL := -1;\nn := 0\n", "TRUE", "HOARE300"),
+    ],
+)
+def test_faults_are_told(program: str, invariant: str, code: str, tmp_path: Path) -> None:
+    work = job(tmp_path, program, COUNTER, invariants=invariant)
+    assert code in [d.code for d in BACKEND.check(work)]
+    assert settle(work)["g"].verdict is Verdict.ERROR
+
+
+def test_what_is_exported_has_the_invariants_of_the_plan(tmp_path: Path) -> None:
+    work = job(tmp_path, TWICE, COUNTER, invariants="m == 2 * previous(counted(up since not up), 0)")
+    made = BACKEND.export(work)
+    assert {"g.hoare", "invariant-1.first.smt2", "invariant-1.hoare", "invariant-1.pre.smt2"} <= set(made)
+
+
+# -- generated contracts against every run ---------------------------------------------------------------------------
+
+
+def text_of(table: dict[tuple[int, bool], tuple[bool, int]]) -> str:
+    lines = ["MEMORY s : NATURAL := 0;"]
+    for k, ((state, a), (b, after)) in enumerate(table.items()):
+        lines.append(f"{'ELSE ' if k else ''}IF s == {state} and (a <=> {str(a).upper()}) THEN")
+        lines += [f"  b := {str(b).upper()}", f"  s := {after}"]
+    return "\n".join((*lines, "ELSE", "  b := FALSE", "ENDIF")) + "\n"
+
+
+def broken(clause: Term, run: list[dict[str, bool]]) -> bool:
+    if isinstance(clause, Implies) and isinstance(clause.right, History) and clause.right.operator in RESPONSES:
+        return positions.broken(clause.left, clause.right, run) is not None
+    return not all(positions.value(clause, run, k) for k in range(len(run)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", some(range(200), 4))
+def test_every_verdict_stands_by_the_definitions(seed: int, tmp_path: Path) -> None:
+    rng = random.Random(seed)
+    promised, assumed = drawn_clause(rng), substitute(formula(rng, 1), {B: A, N: Literal(1, NATURAL)})
+    states = range(rng.choice((1, 2, 2, 3)))
+    table = {(s, a): (rng.random() < 0.8, rng.choice(states)) for s in states for a in (False, True)}
+    said = [show_term(t, "rcl") for t in (assumed, promised)]
+    ports = "inputs( a : BOOL ) outputs( b : BOOL ) topics()"
+    work = job(tmp_path, text_of(table), f"node n {{ {ports} assume m ( {said[0]} ) guarantee g ( {said[1]} ) }}")
+    assumption, guarantee = (clause.formula for clause in work.node.clauses)
+    found = settle(work)["g"]
+    bad = False
+    for word in product((False, True), repeat=6):
+        run, state = list[dict[str, bool]](), 0
+        for a in word:
+            b, state = table[state, a]
+            run.append({"in.a": a, "out.b": b})
+            if not positions.value(assumption, run, len(run) - 1):
+                break
+            bad = bad or broken(guarantee, run)
+    assert found.verdict in (Verdict.PROVED, Verdict.REFUTED, Verdict.UNKNOWN), found.summary
+    assert found.verdict is not Verdict.PROVED or not bad, said
+    if found.verdict is Verdict.REFUTED:
+        assert found.counterexample is not None
+        steps = found.counterexample.trace or (found.counterexample.values,)
+        run = [{name: value == "TRUE" for name, value in step} for step in steps]
+        assert broken(guarantee, run), said
+        assert all(positions.value(assumption, run, k) for k in range(len(run)))
