@@ -17,7 +17,7 @@ from avow.base.codes import Code
 from avow.base.diagnostics import Diagnostic
 from avow.base.tools import Tool
 from avow.base.verdict import Link, Object, Outcome, Verdict
-from avow.evidence.obligation import Obligation
+from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.isolation.level import Isolation
 from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Contract, Node
@@ -40,9 +40,16 @@ class Job:
     method: Method
     obligations: tuple[Obligation, ...]
     """Kind GUARANTEE, one for each clause that the method takes on; `Obligation.name` is the clause's name."""
+    claims: tuple[Obligation, ...] = ()
+    """Kind PROGRAM, one for each of the backend's `claims`: they are answered beside the obligations."""
     kept: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """Obligation's id → cases that refuted it once, as this backend put them under `record.CASE` into an outcome's
     details. A backend that puts any there tries them first, whatever its options say."""
+
+    @property
+    def every(self) -> tuple[Obligation, ...]:
+        """All that is to be answered."""
+        return self.obligations + self.claims
 
     @property
     def contract(self) -> Contract:
@@ -108,8 +115,8 @@ class Report:
 
     @classmethod
     def alike(cls, job: Job, verdict: Verdict, summary: str, tool: str, tool_version: str) -> Report:
-        """The same answer for every obligation of the job: the tool is missing, an input is at fault, …"""
-        return cls(tuple(Outcome(o.id, verdict, summary) for o in job.obligations), tool, tool_version)
+        """The same answer for every obligation and claim of the job: the tool is missing, an input is at fault, …"""
+        return cls(tuple(Outcome(o.id, verdict, summary) for o in job.every), tool, tool_version)
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +166,8 @@ class Backend(ABC):
     uses_source: bool = False
     """Whether an answer may depend on the node's `source:`, `numbers:` and `memory:`. Where it is False they are not
     in the job at all."""
+    claims: tuple[ProgramClaim, ...] = ()
+    """What it says of the node's program besides its guarantees (`Job.claims`)."""
     of: Object = Object.MODEL
     """What is verified; an outcome may say otherwise for itself."""
     portable: bool = False
@@ -200,8 +209,8 @@ class Backend(ABC):
 
     @abstractmethod
     def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
-        """Settle `job.obligations`, one outcome for each. `folder` holds the exported files. Never raises for what
-        the contract, the plan or a tool may do: a crash, a time-out, a missing tool are outcomes."""
+        """Settle `job.obligations` and `job.claims`, one outcome for each. `folder` holds the exported files. Never
+        raises for what the contract, the plan or a tool may do: a crash, a time-out, a missing tool are outcomes."""
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:
         """The node in one of `translations`. Pure, like `export`. Raises Rejected where the input is at fault: what the
@@ -223,6 +232,7 @@ _REQUIRED: Mapping[str, type | tuple[type, ...]] = {
     "uses_upstream": bool,
     "remembers": bool,
     "uses_source": bool,
+    "claims": tuple,
     "of": Object,
     "portable": bool,
     "codes": Mapping,

@@ -102,7 +102,8 @@ def settle(backend: Backend, job: Job, folder: Path, limits: Limits) -> Report:
 
 def verdicts(job: Job, report: Report) -> dict[str, Verdict]:
     """Guarantee → verdict. Fails where an obligation has no outcome, or several."""
-    names = {o.id: o.name for o in job.obligations}
+    names = {o.id: o.name for o in job.every}
     answered = [outcome.obligation for outcome in report.outcomes]
     assert sorted(answered) == sorted(names), f"one outcome for each obligation, not {answered} for {sorted(names)}"
-    return {names[outcome.obligation]: outcome.verdict for outcome in report.outcomes}
+    own = {o.id for o in job.obligations}
+    return {names[o.obligation]: o.verdict for o in report.outcomes if o.obligation in own}

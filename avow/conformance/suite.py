@@ -145,7 +145,7 @@ class Conformance:
 
     def test_one_obligation_at_a_time(self, case: Seeded, job: Job, tmp_path: Path) -> None:
         """A part of the obligations gets the verdicts that it gets among all, and none is answered unasked."""
-        assert self.backend.discharge(replace(job, obligations=()), tmp_path, _ENOUGH).outcomes == ()
+        assert self.backend.discharge(replace(job, obligations=(), claims=()), tmp_path, _ENOUGH).outcomes == ()
         for k, obligation in enumerate(job.obligations):
             one = replace(job, obligations=(obligation,))
             found = verdicts(one, settle(self.backend, one, tmp_path / str(k), _ENOUGH))

@@ -14,6 +14,17 @@ class Kind(StrEnum):
     COMPOSITION = "composition"
     GUARANTEE = "guarantee"
     REQUIREMENT = "requirement"
+    PROGRAM = "program"
+    """Of a node's program, beside its contract: see `ProgramClaim`."""
+
+
+class ProgramClaim(StrEnum):
+    """What is claimed of the program that a node is, besides that it meets the contract; the claim's name."""
+
+    FAULTLESS = "runs-without-fault"
+    """No run within its assumptions ends by a signal or an exception, or does what its language gives no meaning to."""
+    LINKED = "agrees-with-model"
+    """The model that was verified in its place answers as it does."""
 
 
 SYSTEM_LEVEL = "system"

@@ -70,16 +70,19 @@ def seals() -> bool:
     return done.returncode == 0
 
 
-def sealed(command: Sequence[str], shown: Sequence[Path], scratch: str) -> list[str]:
+def sealed(command: Sequence[str], shown: Sequence[Path], scratch: str, writable: Sequence[Path] = ()) -> list[str]:
     """The command within a sandbox: nothing can be written but `scratch`, a folder of an otherwise empty ``/tmp``, in
-    which only the folders `shown` are seen; no network, no other processes."""
-    return [*_bubblewrap(shown, scratch), *command]
+    which only the folders `shown` are seen; no network, no other processes. `writable` are folders of which nothing is
+    believed that stands in them afterwards."""
+    return [*_bubblewrap(shown, scratch, writable), *command]
 
 
-def _bubblewrap(shown: Sequence[Path], scratch: str = "/tmp") -> list[str]:
+def _bubblewrap(shown: Sequence[Path], scratch: str = "/tmp", writable: Sequence[Path] = ()) -> list[str]:
     options = ["--unshare-all", "--die-with-parent", "--new-session", "--ro-bind", "/", "/", "--dev", "/dev"]
     options += ["--proc", "/proc", "--tmpfs", "/tmp", "--dir", scratch]
     for folder in dict.fromkeys(shown):
         if folder.is_relative_to("/tmp"):
             options += ["--ro-bind", str(folder), str(folder)]
+    for folder in writable:
+        options += ["--bind", str(folder), str(folder)]
     return [shutil.which("bwrap") or "bwrap", *options, "--"]

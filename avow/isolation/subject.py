@@ -43,6 +43,8 @@ class Subject:
         self.fault = ""
         self.silent = ""
         """Why there is no answer that says nothing of the subject: time on the wall, or a kill from outside."""
+        self.code: int | None = None
+        """How its process ended, where it ended by itself."""
         self.process: subprocess.Popen[bytes] | None = None
         self._events: dict[tuple[str, str], None] = {}
         self._trace: Trace | None = None
@@ -111,16 +113,33 @@ class Subject:
             self._start()
         if self._buffer:
             raise SubjectFailed("the subject's process answers out of turn")
-        request = json.dumps(list(cases)).encode() + b"\n"
+        request = self._written(cases)
         try:
             while request:
                 request = request[os.write(self._to, request) :]
         except OSError as error:
             raise self._end("the subject's process has ended") from error
-        replies = self._message().get("replies")
-        if not isinstance(replies, list) or len(replies) != len(cases):
+        message = self._message()
+        replies = message.get("replies")
+        if not isinstance(replies, list) or len(replies) != len(cases) or not self._in_turn(message):
             raise self._end("the subject's answer is no data")
         return replies
+
+    def _written(self, cases: Sequence[Mapping[str, Any]]) -> bytes:
+        """The cases as the process reads them: one line."""
+        return json.dumps(list(cases)).encode() + b"\n"
+
+    def _in_turn(self, message: Mapping[str, Any]) -> bool:
+        """Whether a message is the answer to what was asked last."""
+        return True
+
+    def _command(self, there: int, back: int, mark: str) -> tuple[list[str], tuple[Path, ...]]:
+        """What is run, and the folders that it has to see. It reads from descriptor `there`, writes to `back`, and
+        looks at ``<mark>-begin`` and ``<mark>-end``."""
+        host = Path(__file__).with_name("host.py").resolve()
+        command = [sys.executable, "-P", "-B", str(host), str(self.path), self.function, str(self.root)]
+        command += [self.isolation.value, str(there), str(back), mark]
+        return command, (host.parent, host.parent.parent / "drive", Path(sys.prefix), Path(sys.base_prefix))
 
     def _end(self, why: str) -> SubjectFailed:
         """Stop it, and say why: what it did before that no subject may do, or else `why`."""
@@ -131,7 +150,8 @@ class Subject:
 
     def _stop(self) -> None:
         if self.process is not None:
-            process.ended_with(self.process.poll())
+            self.code = self.process.poll()
+            process.ended_with(self.code)
             process.kill_tree(self.process.pid)
             self.process.wait()
             process.unwatch(self.process.pid)
@@ -159,11 +179,8 @@ class Subject:
     def _start(self) -> None:
         there, self._to = os.pipe()
         self._from, back = os.pipe()
-        host = Path(__file__).with_name("host.py").resolve()
-        command = [sys.executable, "-P", "-B", str(host), str(self.path), self.function, str(self.root)]
         self._trace = Trace() if traces() else None
-        mark = self._trace.mark if self._trace is not None else ""
-        command += [self.isolation.value, str(there), str(back), mark]
+        command, shown = self._command(there, back, self._trace.mark if self._trace is not None else "")
         environment = {
             **variables(),
             "PYTHONHASHSEED": "0",
@@ -172,8 +189,7 @@ class Subject:
         }
         if self.isolation is Isolation.SEALED:
             environment["TMPDIR"] = _SCRATCH
-            shown = (self.root, host.parent, host.parent.parent / "drive", Path(sys.prefix), Path(sys.base_prefix))
-            command = sealed(command, shown, _SCRATCH)
+            command = sealed(command, (self.root, *shown), _SCRATCH)
         else:
             self._scratch = tempfile.TemporaryDirectory(prefix="avow-subject-")
             environment["TMPDIR"] = os.path.realpath(self._scratch.name)
@@ -226,7 +242,7 @@ class Subject:
             if not part:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     assert self.process is not None
-                    self.process.wait(1.0)  # what it ended with says by whom
+                    self.process.wait(self.patience)  # what it ended with says by whom
                 raise self._end("the subject's process has ended")
             self._buffer += part
             if len(self._buffer) > 16_000_000:

@@ -144,13 +144,17 @@ def _read(lines: Iterable[tuple[int, bytes]], mark: str, folder: str, scratch: s
     host: int | None = None
     ended = False
     running: set[int] = set()
+    ours: set[int] = set()
+    """Processes of the sandbox itself: they were there before the subject."""
     for process, line in lines:
         if not line:
             running.discard(process)
         found = _CALL.match(line)
         if found is None:
             continue
-        if host is not None and not ended:
+        if host is None:
+            ours.add(process)
+        elif not ended and process not in ours:
             running.add(process)
         call, base, text, rest = found[1].decode(), found[2], found[3], found[4]
         if text is not None and _text(text) == f"{mark}-begin" and host is None:

@@ -22,7 +22,7 @@ from pathlib import Path
 from avow.base.verdict import Link, Outcome, Verdict
 from avow.base.workspace import Workspace
 from avow.evidence.ledger import ledger_of
-from avow.evidence.obligation import Obligation
+from avow.evidence.obligation import Kind, Obligation
 from avow.evidence.record import RETRY, Evidence
 from avow.pipeline import asking
 from avow.pipeline.mutant_systems import Altered, chosen
@@ -93,7 +93,7 @@ def _reads_formulas(work: Work) -> bool:
 def _tasks(workspace: Workspace, work: Work) -> list[_Task]:
     ledger = ledger_of(workspace.ledger(work.system.name))
     found = []
-    for obligation in work.obligations:
+    for obligation in (o for o in work.obligations if o.kind is Kind.GUARANTEE):
         records = [e.evidence for e in ledger.current(obligation.id, work.keys[obligation.id])]
         if records and records[-1].verdict.supports and not records[-1].vacuous:
             found.append((work, obligation, records[-1]))

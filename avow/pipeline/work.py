@@ -20,7 +20,8 @@ from avow.base.diagnostics import Diagnostic, Rejected, Severity
 from avow.base.files import digest, digest_file
 from avow.base.remembered import by_identity
 from avow.base.tools import package_digest
-from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation
+from avow.evidence.obligation import SYSTEM_LEVEL, Kind, Obligation, ProgramClaim
+from avow.formulas.formula import digest as formula_digest
 from avow.formulas.formula import node_digest, sort_digest
 from avow.language.contract import Contract, Node
 from avow.language.printer import show_term
@@ -167,7 +168,7 @@ def method_work(system: System, node: Node, method: Method) -> Work:
         system,
         node.name,
         method.id,
-        job.obligations,
+        job.every,
         *parts,
         engine=tool.name,
         limits=_limits(method, options),
@@ -225,7 +226,24 @@ def method_backend(system: System, method: Method) -> Backend:
 
 
 def method_job(system: System, node: Node, method: Method) -> Job:
-    return Job(system, node, method, tuple(guarantee(system, node, name) for name in method.guarantees))
+    claims = tuple(program_claim(system, node, name) for name in method_backend(system, method).claims)
+    return Job(system, node, method, tuple(guarantee(system, node, name) for name in method.guarantees), claims)
+
+
+_CLAIMED = {
+    ProgramClaim.FAULTLESS: "runs without fault wherever its assumptions hold",
+    ProgramClaim.LINKED: "answers as the model that was verified in its place",
+}
+
+
+@by_identity(50_000)
+def program_claim(system: System, node: Node, name: ProgramClaim) -> Obligation:
+    """Something of the node's program: its meaning hangs on the node's ports and assumptions."""
+    ports = sorted((p.variable.qualified, sort_digest(p.sort)) for p in (*node.inputs, *node.outputs))
+    assumed = sorted(formula_digest(clause.formula) for clause in node.assumptions)
+    meaning = digest(json.dumps([name, ports, assumed]))
+    claim = f"The program of {node.name} {_CLAIMED[name]}"
+    return Obligation(system.name, node.name, Kind.PROGRAM, name, claim, "", meaning, (), node.span)
 
 
 @by_identity(50_000)
@@ -283,6 +301,7 @@ def catalogue(system: System) -> Catalogue:
     guarantees = (guarantee(system, node, c.name) for node in own for c in node.guarantees)
     every = {o.id: o for work in works if work.is_engine for o in work.obligations}
     every |= {o.id: o for o in guarantees}
+    every |= {o.id: o for work in works for o in work.obligations if o.kind is Kind.PROGRAM}
     return Catalogue(system, tuple(every.values()), works)
 
 

@@ -182,7 +182,12 @@ def _discharge(request: Request, system: System, work: Work) -> Report:
         for name, text in one_step.export(tool, method_job(system, node, method)).items():
             write(folder / name, text)
     job, wanted = method_job(system, node, method), {o.id for o in claims}
-    job = replace(job, obligations=tuple(o for o in job.obligations if o.id in wanted), kept=request.kept)
+    job = replace(
+        job,
+        obligations=tuple(o for o in job.obligations if o.id in wanted),
+        claims=tuple(o for o in job.claims if o.id in wanted),
+        kept=request.kept,
+    )
     report = one_step.discharge(tool, job, folder, request.limits)
     if request.root and not request.altered:  # tools read the plan's files by themselves, at any time until now
         again = _method_work(system, work.node, work.method)

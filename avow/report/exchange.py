@@ -155,6 +155,7 @@ def _rule_text(view: ObligationView) -> str:
         Kind.COMPOSITION: "The nodes' contracts may be composed",
         Kind.GUARANTEE: "The node meets its guarantee",
         Kind.REQUIREMENT: "The system meets its requirement",
+        Kind.PROGRAM: f"The node's program {view.obligation.name.replace('-', ' ')}",
     }
     return texts[view.obligation.kind]
 

@@ -31,7 +31,7 @@ from avow.report.support_counts import resting
 from avow.report.wording import history
 from avow.tuning.shown import ARGUMENT_ELEMENTS, FINDING_CHARACTERS, GUARANTEE_ROWS, OBLIGATIONS_IN_FULL, ROWS_UNFOLDED
 
-KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.WELL_FORMED)
+KINDS = (Kind.GUARANTEE, Kind.SANITY, Kind.COMPOSITION, Kind.REQUIREMENT, Kind.PROGRAM, Kind.WELL_FORMED)
 
 
 _Matrix = list[tuple[str, str, list[tuple[ObligationView, list[Status | None]]]]]

@@ -87,7 +87,7 @@ def rerun(view: ObligationView, evidence: Evidence) -> str:
             task = f"compose:{o.system}"
         case Kind.WELL_FORMED:
             task = f"check:{o.system}"
-        case Kind.GUARANTEE:
+        case Kind.GUARANTEE | Kind.PROGRAM:
             task = f"discharge:{o.system}:{o.node}:{evidence.method}"
     return f"AVOW_FRESH=1 doit {shlex.quote(task)}"
 

@@ -51,3 +51,15 @@ to do."""
 
 READER_SECONDS = 2
 """How long a pipe that is written to may have no reader yet: who starts both starts the reader at once."""
+
+SAMPLE_TRIES = 12
+"""Draws for one case that meets the assumptions; then any is taken, which validates all the same."""
+
+SAMPLE_LENGTHS = (0, 1, 2, 3, 4, 5, 8, 12)
+"""Lengths of drawn sequences: none, few, and more than any window of a filter that is written out."""
+
+SUBJECT_BATCH = 100
+"""Cases in one message to the class' process: each message wakes another process."""
+
+SAMPLES_SHIFTED = 150
+"""Cases with the differences of a solver's values: one in some ten of them rounds as the solver says."""

@@ -22,11 +22,11 @@ from avow.solving.second import CONTRADICTED, contradicted
 from avow.solving.settling import Settler
 from avow.solving.smtlib import export
 from avow.solving.translation import Unsupported
+from avow.stepping.samples import around
 
 from .invariants import Sequences, candidates
 from .program import Step
 from .reading import Reading
-from .rounding import around
 from .symbolic import Candidate, Check, End, Run, TooMuch
 from .tuning import CANDIDATE_SECONDS, COMBINED, ROUNDS, SHOWN_SECONDS
 

@@ -12,11 +12,11 @@ from typing import Any
 
 from avow.backend_kit.protocol import Job
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.stepping.cpython import Subject
 from avow.system.parameters import parameters
 from avow.system.paths import inside
 from avow.system.plan import Numbers, Source
 
-from .cpython import Subject
 from .program import Step
 from .translate import Translator
 from .whole_file import Refusal, read

@@ -16,6 +16,7 @@ from fractions import Fraction
 from avow.formulas.formula import conjunction
 from avow.language.sorts import REAL
 from avow.language.terms import Arithmetic, Compare, Conditional, Iff, Implies, Literal, Negative, Term, Variable
+from avow.stepping.samples import around
 
 LARGEST = Fraction(sys.float_info.max)
 """The largest finite double."""
@@ -100,17 +101,3 @@ def gaps(term: Term, constants: Iterable[Fraction]) -> Iterator[Term]:
         low, high = around(constant)
         if low != high and math.isfinite(low) and math.isfinite(high):
             yield Implies(Compare(">", term, number(low)), Compare(">=", term, number(high)))
-
-
-def around(constant: Fraction) -> tuple[float, float]:
-    """The largest double that is not above, the smallest that is not below; both the same where it is one."""
-    try:
-        near = float(constant)
-    except OverflowError:
-        return (math.inf, math.inf)
-    if math.isinf(near):
-        return near, near
-    exact = Fraction(near)
-    if exact == constant:
-        return near, near
-    return (near, math.nextafter(near, math.inf)) if exact < constant else (math.nextafter(near, -math.inf), near)

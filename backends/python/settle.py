@@ -29,14 +29,14 @@ from avow.language.terms import Variable
 from avow.solving.limits import from_seconds, until
 from avow.solving.questions import z3_version
 from avow.solving.settling import Settler
+from avow.stepping.cpython import Told, ask, case_of
+from avow.stepping.judging import Formula, NoValue, Seen, meets, returned, seen
+from avow.stepping.samples import Drawing, beside, numbers_of, pool, shifted
 from avow.tuning.bounds import CASES_KEPT
 
 from .conditions import Conditions, Found
-from .cpython import Told, ask, case_of
-from .judging import Formula, NoValue, Seen, meets, returned, seen
 from .machine import fraction, run
 from .reading import Reading, load
-from .samples import Drawing, beside, numbers_of, pool, shifted
 from .translate import kind_of
 from .tuning import APART, RUN_SECONDS, VALIDATED
 

@@ -3,15 +3,6 @@
 VALIDATED = 1000
 """Inputs on which class and translation are compared on every run: a tenth of a second's work."""
 
-TRIES = 12
-"""Draws for one case that meets the assumptions; then any is taken, which validates all the same."""
-
-LENGTHS = (0, 1, 2, 3, 4, 5, 8, 12)
-"""Lengths of drawn sequences: none, few, and more than any window of a filter that is written out."""
-
-BATCH = 100
-"""Cases in one message to the class' process: each message wakes another process."""
-
 APART = 20
 """Cases beside which each REAL input is NaN and infinite, where that is possible."""
 
@@ -20,9 +11,6 @@ BESIDE = 6
 
 COMBINED = 10
 """Numbers whose sums and products of two are thresholds on a second try: more would drown the solver."""
-
-SHIFTED = 150
-"""Cases with the differences of a solver's values: one in some ten of them rounds as the solver says."""
 
 UNROLLED = 16
 """Turns of a loop over `range` of a constant that are run one by one, without an invariant: windows of filters."""

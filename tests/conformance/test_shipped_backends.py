@@ -13,6 +13,7 @@ from avow.backends.ajpf import BACKEND as AJPF
 from avow.backends.ajpf import spin_tool
 from avow.backends.dafny import BACKEND as DAFNY
 from avow.backends.experiment import BACKEND as EXPERIMENT
+from avow.backends.fuzz import BACKEND as FUZZ
 from avow.backends.hoare import BACKEND as HOARE
 from avow.backends.hypothesis import BACKEND as HYPOTHESIS
 from avow.backends.python import BACKEND as PYTHON
@@ -94,6 +95,42 @@ class TestPython(Conformance):
             one_refuted(Verdict.PROVED),
             {"src/node.py": STEP, "config/node.yaml": "limit: 120.5\n"},
             declared=DECLARED,
+        ),
+    )
+
+
+ADAPTER = """\
+#include "avow_node.hpp"
+struct AvowNode {
+  double limit;
+  explicit AvowNode(const avow::Parameters& given) : limit(given.real("limit")) {}
+  void step(const avow::Inputs& in, avow::Outputs& out) { out.truth("high", in.real("r") > limit); }
+};
+"""
+COMPILED = {"source": {"cpp": "src/node.hpp", "parameters": "config/node.yaml"}}
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+class TestFuzz(Conformance):
+    backend = FUZZ
+    seeded = (
+        Seeded(
+            "right",
+            CONTRACT,
+            {"runs": 300},
+            both(Verdict.TESTED),
+            {"src/node.hpp": ADAPTER, "config/node.yaml": "limit: 100.0\n"},
+            SCENARIO,
+            COMPILED,
+        ),
+        Seeded(
+            "wrong",
+            CONTRACT,
+            {"runs": 300},
+            one_refuted(Verdict.TESTED),
+            {"src/node.hpp": ADAPTER, "config/node.yaml": "limit: 120.5\n"},
+            declared=COMPILED,
         ),
     )
 

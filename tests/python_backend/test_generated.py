@@ -17,7 +17,6 @@ import pytest
 
 from avow.backends.python.machine import run
 from avow.backends.python.program import Step
-from avow.backends.python.samples import Drawing, pool
 from avow.backends.python.symbolic import Run
 from avow.backends.python.translate import Translator
 from avow.backends.python.whole_file import read
@@ -28,6 +27,7 @@ from avow.language.contract import Node
 from avow.language.load import load_contract
 from avow.language.sorts import EnumSort
 from avow.language.terms import And, Arithmetic, Compare, Iff, Implies, Term, Variable
+from avow.stepping.samples import Drawing, pool
 
 CONTRACT = """context { MODE : { idle, busy, done }; }
 node made {

@@ -15,9 +15,7 @@ from avow.formulas.traversal import subterms
 from avow.language.bounds import constant
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
 from avow.language.terms import Term
-
-from .rounding import around
-from .tuning import LENGTHS, SHIFTED, TRIES
+from avow.tuning.running import SAMPLE_LENGTHS, SAMPLE_TRIES, SAMPLES_SHIFTED
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +50,7 @@ def pool(numbers: Iterable[Fraction]) -> Pool:
     whole = {math.floor(n) for n in exact} | {math.ceil(n) for n in exact}
     ints = tuple(sorted({*range(-2, 5), *(n + d for n in whole for d in (-1, 0, 1))}))
     counted = {n + d for n in whole if 0 <= n <= 64 for d in (-1, 0, 1)}
-    lengths = tuple(sorted({*LENGTHS, *(n for n in counted if n >= 0)}))
+    lengths = tuple(sorted({*SAMPLE_LENGTHS, *(n for n in counted if n >= 0)}))
     return Pool(floats, tuple(sorted(doubles | {0.0})), ints, lengths)
 
 
@@ -83,7 +81,7 @@ class Drawing:
     def cases(self, number: int, meets: Callable[[Mapping[str, Any]], bool]) -> Iterator[dict[str, Any]]:
         """So many cases, most of which meet the assumptions where that is not rare."""
         for _ in range(number):
-            for _ in range(TRIES):
+            for _ in range(SAMPLE_TRIES):
                 case = self.case()
                 if meets(case):
                     break
@@ -115,7 +113,7 @@ class Drawing:
             case SequenceSort(item=item):
                 length = self.chance.choice(self.pool.lengths)
                 if length > 12 and self.chance.random() < 0.7:
-                    length = self.chance.choice(LENGTHS)
+                    length = self.chance.choice(SAMPLE_LENGTHS)
                 return [self.value(item, base, wild) for _ in range(length)]
         raise TypeError(f"no value of {sort} is drawn")
 
@@ -170,7 +168,21 @@ def shifted(case: Mapping[str, Any], chance: random.Random) -> Iterator[dict[str
     if not numbers or any(abs(value) > 10**12 for value in numbers.values()):
         return
     least = min(numbers.values())
-    for _ in range(SHIFTED):
+    for _ in range(SAMPLES_SHIFTED):
         start = Fraction(chance.uniform(0.0, 2.0 ** chance.randrange(-4, 5)))
         ends = {name: around(value - least + start) for name, value in numbers.items()}
         yield {**case, **{name: chance.choice(pair) for name, pair in ends.items()}}
+
+
+def around(constant: Fraction) -> tuple[float, float]:
+    """The largest double that is not above, the smallest that is not below; both the same where it is one."""
+    try:
+        near = float(constant)
+    except OverflowError:
+        return (math.inf, math.inf)
+    if math.isinf(near):
+        return near, near
+    exact = Fraction(near)
+    if exact == constant:
+        return near, near
+    return (near, math.nextafter(near, math.inf)) if exact < constant else (math.nextafter(near, -math.inf), near)

@@ -11,8 +11,10 @@ from typing import Any
 from avow.drive.steps import plain
 from avow.evaluation.evaluate import Evaluator, NotEvaluable, compile_term
 from avow.evaluation.truth import judge
+from avow.formulas.conditions import Condition, conditions
 from avow.formulas.values import Binary, Element, Sequence, Value, show
 from avow.language.contract import Clause, Node
+from avow.language.printer import show_term
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, Sort
 from avow.language.terms import Term
 from avow.tuning.effort import JUDGE_EFFORT
@@ -50,6 +52,20 @@ class Formula:
             return bool(self.evaluator({**values, name: put})) if self.evaluator is not None else None
         except (NotEvaluable, ValueError, ArithmeticError, TypeError):
             return None
+
+
+def triggers(clause: Clause) -> tuple[Formula, ...]:
+    """The conditions under which a clause demands something: one that no case met was not tried."""
+
+    def ready(condition: Condition) -> Formula:
+        term = condition.formula
+        name = show_term(term, "unicode").replace("\n", " ")
+        try:
+            return Formula(name, term, compile_term(term))
+        except NotEvaluable:
+            return Formula(name, term, None)
+
+    return tuple(map(ready, conditions(clause.formula)))
 
 
 class NoValue(ValueError):  # noqa: N818 - it says what it is

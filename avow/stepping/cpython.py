@@ -67,7 +67,7 @@ def case_of(inputs: Mapping[str, Any], memory: Mapping[str, Any]) -> str:
 
 def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: int) -> Told:
     """Run the cases, each on an object of its own. Raises ToolMissing."""
-    from .tuning import BATCH
+    from avow.tuning.running import SUBJECT_BATCH
 
     with tempfile.TemporaryDirectory(prefix="avow-") as scratch:
         place = Path(scratch) / "cases.json"
@@ -77,7 +77,7 @@ def ask(subject: Subject, cases: Sequence[str], *, seconds: float, megabytes: in
             "spec": subject.spec,
             "cases": list(cases),
             "seconds": seconds,
-            "batch": BATCH,
+            "batch": SUBJECT_BATCH,
         }
         place.write_text(json.dumps(question), encoding="utf-8")
         done, answer = judge.ask(

@@ -1,0 +1,99 @@
+"""A node's C++ source, fuzzed with sanitizers; what is new among its runs is run again, alone, and judged exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.verdict import Link, Object, Verdict
+from avow.evidence.obligation import ProgramClaim
+
+from .codes import CODES
+
+_LISTED = {"type": "array", "items": {"type": "string", "minLength": 1}, "uniqueItems": True}
+
+
+class FuzzBackend(Backend):
+    """See `docs/backends/fuzz.md`."""
+
+    name = "fuzz"
+    title = "libFuzzer with sanitizers on the node's C++ source; kept runs judged against the contract"
+    version = "1"
+    strength = Verdict.TESTED
+    link = Link.GENERATED
+    of = Object.BINARY
+    claims = (ProgramClaim.FAULTLESS,)
+    uses_scenario = False
+    uses_wiring = False
+    uses_source = True
+    options_schema = {
+        "type": "object",
+        "properties": {
+            "runs": {
+                "type": "integer",
+                "minimum": 1,
+                "maximum": 100_000_000,
+                "default": 20_000,
+                "description": "how many runs libFuzzer makes",
+            },
+            "steps": {
+                "type": "integer",
+                "minimum": 1,
+                "maximum": 1_000,
+                "default": 8,
+                "description": "how many steps a run has at most",
+            },
+            "sources": {**_LISTED, "description": "further files to compile, relative to the system's folder"},
+            "include": {**_LISTED, "description": "folders in which included files are looked for"},
+            "nan": {
+                "const": "possible",
+                "description": "a REAL input may be NaN or an infinity: what goes wrong then refutes",
+            },
+        },
+        "additionalProperties": False,
+    }
+    codes = CODES
+    green_means = (
+        "libFuzzer made so many runs of the compiled source without a report of a sanitizer; on those of them that are "
+        "new, and on others at thresholds, a plain build gave outputs that meet the guarantee, judged exactly. It says "
+        "nothing certain of other runs, of another compiler, or of another machine."
+    )
+
+    def tools(self) -> tuple[Tool, ...]:
+        from .building import clang
+
+        return (clang(),)
+
+    def check(self, job: Job) -> tuple[Diagnostic, ...]:
+        from .reading import load
+
+        try:
+            load(job)
+        except Rejected as rejected:
+            return rejected.diagnostics
+        return ()
+
+    def files(self, job: Job) -> tuple[Path, ...]:
+        from .reading import files
+
+        return files(job)
+
+    def export(self, job: Job) -> Mapping[str, str]:
+        from .reading import load
+        from .tables import TABLES, drawable, native, tables
+
+        try:
+            reading = load(job)
+        except Rejected:
+            return {}
+        return {**native(), TABLES: tables(reading, drawable(reading))}
+
+    def discharge(self, job: Job, folder: Path, limits: Limits) -> Report:
+        from .settle import settle
+
+        return settle(job, limits)
+
+
+BACKEND = FuzzBackend()

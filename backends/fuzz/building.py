@@ -1,0 +1,136 @@
+"""Clang: the harness with its sanitizers, and the plain program, from the same generated files."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from avow.base import process
+from avow.base.process import Completed, ToolMissing
+from avow.base.tools import Tool, find_tool
+from avow.isolation.observed import Observed, recorded
+
+from .reading import Reading
+from .tables import TABLES, Drawable, native, tables
+from .tuning import BUILD_MEGABYTES, BUILD_SECONDS
+
+_INSTALL = "sudo apt install clang"
+_COMMON = (
+    "-std=c++17",
+    "-g1",
+    "-ffp-contract=off",
+    "-fno-fast-math",
+    "-Wno-builtin-macro-redefined",
+    '-D__DATE__="Jan 01 1970"',
+    '-D__TIME__="00:00:00"',
+    '-D__TIMESTAMP__="Thu Jan 01 00:00:00 1970"',
+)
+# Comparisons are not traced: the addresses among them would make each process find other runs.
+_SANITIZED = (
+    "-O1",
+    "-fno-omit-frame-pointer",
+    "-fno-pie",
+    "-no-pie",
+    "-fno-sanitize-recover=all",
+    "-fsanitize=address,undefined",
+)
+_FUZZED = ("-fsanitize=fuzzer,address,undefined", "-fno-sanitize-coverage=trace-cmp")
+
+
+class NotBuilt(Exception):  # noqa: N818 - it names what happened
+    """Clang refuses the source; the message is its first error."""
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """What one build made, and what it read."""
+
+    program: Path
+    read: tuple[Path, ...]
+
+
+def clang() -> Tool:
+    return find_tool("clang++", install=_INSTALL, optional=False)
+
+
+def write(reading: Reading, made: Drawable, folder: Path) -> None:
+    """The generated files and the fixed ones."""
+    for name, text in {**native(), TABLES: tables(reading, made)}.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def fuzzed(reading: Reading, folder: Path, seconds: float) -> Built:
+    """The harness. Raises NotBuilt and ToolMissing."""
+    return _build(reading, folder, "harness.cpp", (*_SANITIZED, *_FUZZED), "fuzz", seconds)
+
+
+def sanitized(reading: Reading, folder: Path, seconds: float) -> Built:
+    """The plain program with sanitizers: what tells where a fault is. Raises NotBuilt and ToolMissing."""
+    return _build(reading, folder, "replay.cpp", _SANITIZED, "sanitized", seconds)
+
+
+def plain(reading: Reading, folder: Path, seconds: float) -> Built:
+    """The program whose answers are judged. Raises NotBuilt and ToolMissing."""
+    return _build(reading, folder, "replay.cpp", ("-O2",), "replay", seconds)
+
+
+def _build(reading: Reading, folder: Path, main: str, flags: tuple[str, ...], name: str, seconds: float) -> Built:
+    tool = clang()
+    if tool.path is None:
+        raise ToolMissing(f"clang++ is not here ({_INSTALL})")
+    includes = [f"-I{folder}", *(f"-I{path}" for path in reading.include)]
+    objects: list[str] = []
+    read: list[Path] = []
+    for k, source in enumerate((folder / main, *reading.sources)):
+        object_file = folder / f"{name}-{k}.o"
+        listed = folder / f"{name}-{k}.d"
+        quoted = str(reading.adapter).replace("\\", "\\\\").replace('"', '\\"')
+        adapter = f'-DADAPTER="{quoted}"'
+        words = [*_COMMON, *flags, *includes, adapter, "-MMD", "-MF", str(listed)]
+        done = _clang(tool, [*words, "-c", str(source), "-o", str(object_file)], folder, seconds)
+        if done.code != 0 or not object_file.is_file():
+            raise NotBuilt(_first(done, reading, folder))
+        objects.append(str(object_file))
+        read += _listed(listed, folder)
+    program = folder / name
+    done = _clang(tool, [*flags, *objects, "-o", str(program), "-lpthread"], folder, seconds)
+    if done.code != 0 or not program.is_file():
+        raise NotBuilt(_first(done, reading, folder))
+    return Built(program, tuple(dict.fromkeys(read)))
+
+
+def _clang(tool: Tool, words: list[str], folder: Path, seconds: float) -> Completed:
+    """Nothing of the environment but the way to its own programs: variables could add files and flags."""
+    bare = ["env", "-i", f"PATH={os.environ.get('PATH', os.defpath)}", f"TMPDIR={folder}", "LC_ALL=C.UTF-8"]
+    limit = max(5.0, min(seconds, BUILD_SECONDS))
+    return process.run([*bare, str(tool.path), *words], cwd=folder, seconds=limit, megabytes=BUILD_MEGABYTES)
+
+
+def _first(done: Completed, reading: Reading, folder: Path) -> str:
+    """Clang's first error, with a place that is the same on every machine."""
+    if done.timed_out:
+        return "clang did not end in the time given"
+    lines = [line for line in done.stderr.splitlines() if "error:" in line or "undefined reference" in line]
+    said = (lines or done.stderr.strip().splitlines() or [f"clang ended with code {done.code}"])[0]
+    root = str(reading.job.root.resolve()) + os.sep
+    return said.replace(root, "").replace(str(folder) + os.sep, "")[:300]
+
+
+def _listed(path: Path, folder: Path) -> list[Path]:
+    """What a build read of files that are no system's: as make writes it, beside what we generated."""
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return []
+    words = re.findall(r"(?:\\.|\$\$|[^\s\\])+", text.partition(": ")[2].replace("\\\n", " "))
+    found = [Path(re.sub(r"\\(.)", r"\1", word).replace("$$", "$")) for word in words]
+    return [p.resolve() for p in found if not p.resolve().is_relative_to(folder.resolve())]
+
+
+def observed(reading: Reading, built: tuple[Built, ...]) -> tuple[Observed, ...]:
+    """What the builds read; and the folders in which another file of the same name would have been found first."""
+    read = dict.fromkeys(path for one in built for path in one.read)
+    folders = dict.fromkeys([*(path.parent for path in read), *reading.include])
+    return recorded([*(("read", str(p)) for p in read), *(("list", str(p)) for p in folders)])

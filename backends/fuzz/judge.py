@@ -1,0 +1,216 @@
+"""Runs what was built, apart from everything: a script that says through its channel what came of it.
+
+``python judge.py CHANNEL FILE``: the file's question is a campaign of libFuzzer, or runs for the plain program.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import secrets
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from avow.backends.fuzz.tuning import MOST_CRASHES
+from avow.base import process
+from avow.isolation import judge
+from avow.isolation.level import Isolation, available, sealed
+from avow.isolation.observed import to_json
+from avow.isolation.program import Program
+from avow.isolation.subject import SubjectFailed
+from avow.tuning.running import SUBJECT_PATIENCE
+
+_OPTIONS = {
+    "ASAN_OPTIONS": "detect_leaks=0:symbolize=1:handle_abort=0:allocator_may_return_null=0",
+    "UBSAN_OPTIONS": "print_stacktrace=0:halt_on_error=1",
+}
+_SCRATCH = "/tmp/avow-scratch"
+
+
+def campaign(question: dict[str, Any]) -> dict[str, Any]:
+    """One run of libFuzzer. `done`: it ended as it should, with so many runs; nothing that the subject prints says
+    so."""
+    level = available()
+    folder, kept = Path(question["folder"]), Path(question["kept"])
+    nonce = secrets.token_hex(16)
+    ours, theirs = os.pipe()
+    source, nonces = os.pipe()
+    os.write(nonces, nonce.encode() + b"\n")
+    os.close(nonces)
+    command = [str(folder / "fuzz"), *question["options"], f"-artifact_prefix={kept}/fault-", str(kept / "corpus")]
+    environment = {
+        **_OPTIONS,
+        "PATH": os.environ.get("PATH", os.defpath),
+        "AVOW_CHANNEL": str(theirs),
+        "AVOW_NONCE": str(source),
+        "HOME": str(kept),
+        "TMPDIR": str(kept),
+        "LC_ALL": "C.UTF-8",
+    }
+    if level is Isolation.SEALED:
+        command = sealed(command, (folder, Path(question["root"])), _SCRATCH, (kept,))
+    with tempfile.TemporaryFile() as log:
+        started = subprocess.Popen(
+            command,
+            cwd=kept,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=log,
+            env=environment,
+            start_new_session=True,
+            pass_fds=(theirs, source),
+        )
+        process.watch(started.pid)
+        os.close(theirs)
+        os.close(source)
+        try:
+            code: int | None = started.wait(question["seconds"])
+        except subprocess.TimeoutExpired:
+            code = None
+        process.kill_tree(started.pid)
+        started.wait()
+        process.unwatch(started.pid)
+        left = process.end_orphans()
+        said = _read(ours)
+        log.seek(0)
+        text = log.read(1 << 20).decode("utf-8", "replace")
+    words = said.split()
+    closed = len(words) == 3 and said.endswith("\n") and words[0] == nonce
+    done = closed and words[1] == "done" and code == 0
+    fault = "the source left processes behind" if left and level is not Isolation.SEALED else ""
+    if closed and words[1] == "left":
+        fault = fault or "the source ended the process within a step"
+    return {
+        "code": code,
+        "done": int(words[2]) if done and words[2].isdigit() else 0,
+        "fault": fault,
+        "log": text[-20_000:],
+        "isolation": level.value,
+    }
+
+
+def _read(channel: int) -> str:
+    parts: list[bytes] = []
+    os.set_blocking(channel, False)
+    try:
+        while len(parts) < 100 and (part := os.read(channel, 1 << 16)):
+            parts.append(part)
+    except BlockingIOError:  # somebody still holds the other end
+        pass
+    os.close(channel)
+    return b"".join(parts).decode("utf-8", "replace")
+
+
+def asked(question: dict[str, Any]) -> dict[str, Any]:
+    """The runs, each on a node of its own; and once more in the other order, by another process: what comes of chance,
+    of the clock, or of the runs before is no answer to a run."""
+    end = time.monotonic() + question["seconds"]
+    runs: list[list[str]] = question["runs"]
+    first, faults, program = _all(question, runs, end)
+    unsteady = None
+    if question["twice"] and not faults:
+        order = [k for k in reversed(range(len(first))) if not first[k]["crash"]]
+        again, more, _ = _all(question, [runs[k] for k in order], end)
+        faults = more
+        for k, other in zip(order, again, strict=False):
+            if other != first[k]:
+                unsteady = k
+    return {
+        "runs": first,
+        "fault": faults,
+        "unsteady": unsteady,
+        "observed": to_json(program.observed()[1:]),  # no interpreter runs it
+        "isolation": program.isolation.value,
+    }
+
+
+def _all(question: dict[str, Any], runs: list[list[str]], end: float) -> tuple[list[dict[str, Any]], str, Program]:
+    program = Program(Path(question["program"]), SUBJECT_PATIENCE, Path(question["root"]))
+    found: list[dict[str, Any]] = []
+    crashes = 0
+    fault = ""
+    try:
+        for run in runs:
+            if time.monotonic() > end:
+                break
+            replies = program.ask_all([{"command": command} for command in ("N", *run)])
+            failed = next((r for r in replies if isinstance(r, SubjectFailed)), None)
+            crash = program.crashed() if failed is not None else ""
+            if failed is not None and (program.fault or not crash):
+                fault = str(failed)
+                break
+            found.append({"replies": [r for r in replies if not isinstance(r, SubjectFailed)], "crash": crash})
+            crashes += bool(crash)
+            if crashes >= MOST_CRASHES:
+                break
+    finally:
+        fault = program.close() or fault
+    return found, fault, program
+
+
+def shown(question: dict[str, Any]) -> dict[str, Any]:
+    """One run by the program with sanitizers: its answers as far as they go, and the report with which it ends."""
+    level = available()
+    program = Path(question["program"])
+    ours, theirs = os.pipe()
+    with tempfile.TemporaryFile() as lines, tempfile.TemporaryFile() as log:
+        for k, command in enumerate(("N", *question["runs"][0])):
+            lines.write(f"{k}|{command}\n".encode())
+        lines.flush()
+        lines.seek(0)
+        command = [str(program), str(lines.fileno()), str(theirs), "/avow-unmarked", "alone"]
+        if level is Isolation.SEALED:
+            command = sealed(command, (program.parent, Path(question["root"])), _SCRATCH)
+        started = subprocess.Popen(
+            command,
+            cwd=question["root"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=log,
+            env={**_OPTIONS, "PATH": os.environ.get("PATH", os.defpath), "LC_ALL": "C.UTF-8"},
+            start_new_session=True,
+            pass_fds=(theirs, lines.fileno()),
+        )
+        process.watch(started.pid)
+        os.close(theirs)
+        try:
+            code: int | None = started.wait(question["seconds"])
+        except subprocess.TimeoutExpired:
+            code = None
+        process.kill_tree(started.pid)
+        started.wait()
+        process.unwatch(started.pid)
+        process.end_orphans()
+        said = _read(ours)
+        log.seek(0)
+        text = log.read(1 << 20).decode("utf-8", "replace")
+    replies: list[Any] = []
+    for line in said.splitlines():
+        try:
+            message = json.loads(line)
+        except ValueError:
+            break
+        if message.get("turn") == str(len(replies)):
+            replies.append(message["replies"][0]["value"])
+    return {"replies": replies, "code": code, "log": text[:20_000]}
+
+
+_QUESTIONS = {"campaign": campaign, "runs": asked, "shown": shown}
+
+
+def main() -> None:
+    channel = int(sys.argv[1])
+    os.set_inheritable(channel, False)
+    process.adopt_orphans()
+    question = json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    judge.say(channel, _QUESTIONS[question["what"]](question))
+
+
+if __name__ == "__main__":
+    main()

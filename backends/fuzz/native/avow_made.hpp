@@ -1,0 +1,34 @@
+// A node made with its parameters, and what its values look like to Avow.
+#pragma once
+
+#include "avow_tables.hpp"
+#include "contract.inc"
+
+namespace avow {
+
+inline Parameters parameters() {
+  Parameters made;
+  for (std::size_t k = 0; k < PARAMETER_COUNT; ++k) {
+    const Parameter& given = PARAMETERS[k];
+    Value value;
+    value.sort = given.sort;
+    if (given.sort == Sort::real) value.reals = {given.real};
+    else if (given.sort == Sort::element) value.elements = {given.text};
+    else value.integers = {given.integer};
+    made.put(given.name, std::move(value));
+  }
+  return made;
+}
+
+// Memory that a node says it has; nothing where the contract has none.
+template <class Node>
+inline void remembered(const Node& node, Outputs& out) {
+#if AVOW_MEMORY
+  node.memory(out);
+#else
+  (void)node;
+  (void)out;
+#endif
+}
+
+}  // namespace avow

@@ -1,0 +1,299 @@
+"""Settling a node's guarantees of its C++ source: fuzz it, run again what is new, and judge that exactly."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from avow.backend_kit.given import told
+from avow.backend_kit.protocol import Job, Limits, Report
+from avow.base.diagnostics import Rejected
+from avow.base.files import digest
+from avow.base.plain import ALLOWS_MORE
+from avow.base.process import ToolMissing
+from avow.base.verdict import Object, Outcome, Verdict
+from avow.drive.steps import coded, plain
+from avow.isolation import judge
+from avow.isolation.level import Isolation, Unavailable, available
+from avow.isolation.observed import Observed, from_json
+
+from . import building
+from .building import NotBuilt
+from .drawn import Drawn, Step, command
+from .reading import Reading, load
+from .tables import drawable
+from .tuning import HANGS, LONGEST_RUN, MOST_JUDGED, RESIDENT, SEED_BYTES, SEEDS, SHORTENED, SWEPT
+from .verdicts import Bench, Broken, Counts, Misused
+
+TOOL = "libfuzzer"
+
+
+def settle(job: Job, limits: Limits) -> Report:
+    """One outcome for each obligation and claim."""
+    tool = building.clang()
+    version = f"clang {tool.version}"
+    if not job.every:
+        return Report((), TOOL, version)
+    try:
+        available()
+        if not tool.present:
+            raise ToolMissing(f"clang++ is not here: {tool.install}")
+        reading = load(job)
+    except (Unavailable, ToolMissing) as missing:
+        return Report.alike(job, Verdict.NOT_RUN, str(missing), TOOL, version)
+    except Rejected as rejected:
+        return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), TOOL, version)
+    with tempfile.TemporaryDirectory(prefix="avow-fuzz-") as scratch:
+        work = Work(reading, limits, Path(scratch).resolve())
+        try:
+            outcomes = work.outcomes()
+        except NotBuilt as error:
+            outcomes = work.alike(Verdict.ERROR, f"it cannot be compiled: {error}")
+        except Misused as error:
+            outcomes = work.alike(Verdict.ERROR, str(error))
+        except Unanswered as error:
+            outcomes = work.alike(error.verdict, str(error))
+        except ToolMissing as missing:
+            outcomes = work.alike(Verdict.NOT_RUN, str(missing))
+    what = {"of": Object.BINARY, "numbers": reading.source.numbers.value}
+    outcomes = tuple(replace(o, **what) for o in outcomes)  # type: ignore[arg-type]
+    return Report(outcomes, TOOL, version, work.command, work.logs, tuple(work.observed), work.isolation)
+
+
+class Unanswered(Exception):  # noqa: N818 - it names what happened
+    """The judge gave no answer, or the subject did what no subject may do: of nothing anything is concluded."""
+
+    def __init__(self, verdict: Verdict, why: str) -> None:
+        super().__init__(why)
+        self.verdict = verdict
+
+
+@dataclass(slots=True)
+class Work:
+    reading: Reading
+    limits: Limits
+    folder: Path
+    observed: dict[Observed, None] = field(default_factory=dict)
+    isolation: Isolation = Isolation.SEALED
+    logs: dict[str, str] = field(default_factory=dict)
+    command: tuple[str, ...] = ()
+    _end: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._end = time.monotonic() + self.limits.seconds * 0.9
+
+    @property
+    def job(self) -> Job:
+        return self.reading.job
+
+    def alike(self, verdict: Verdict, summary: str) -> tuple[Outcome, ...]:
+        return tuple(Outcome(o.id, verdict, summary) for o in self.job.every)
+
+    def outcomes(self) -> tuple[Outcome, ...]:
+        reading = self.reading
+        made = drawable(reading)
+        building.write(reading, made, self.folder)
+        built = [
+            building.fuzzed(reading, self.folder, self._left()),
+            building.plain(reading, self.folder, self._left()),
+        ]
+        self.observed.update(dict.fromkeys(building.observed(reading, tuple(built))))
+        bench = Bench(reading)
+        kept = self.folder / "kept"
+        seeds = self._seeds(kept / "corpus")
+        campaign = self._campaign(kept)
+        faults = _files(kept, "fault-", 10)
+        found = [Drawn(data, made, reading.single) for data in (*seeds, *_files(kept / "corpus", "", MOST_JUDGED * 2))]
+        drawn = [one.steps(reading.asked, reading.steps) for one in found]
+        runs = _different([*self._earlier(), *bench.sweep(made, SWEPT), *drawn])[: MOST_JUDGED + SEEDS]
+        answer = self._asked(built[1].program, runs, twice=True)
+        judged = 0
+        for run, reply in zip(runs, answer["runs"], strict=False):
+            bench.judge(run, reply)
+            judged += 1
+        self._confirm(bench, built[1].program)
+        if answer["unsteady"] is not None and not bench.broken:
+            said = bench.words(runs[answer["unsteady"]])
+            raise Unanswered(Verdict.UNKNOWN, f"undeclared input: asked again, it answers otherwise ({said})")
+        fault = self._fault([Drawn(data, made, reading.single).steps(reading.asked, reading.steps) for data in faults])
+        if not faults and campaign["done"] < reading.runs and not bench.crash:
+            raise Unanswered(Verdict.ERROR, "libFuzzer ended without having made its runs, and without a report")
+        apart = bench.apart(self._special(bench, built[1].program)) if judged else []
+        return bench.outcomes(
+            Counts(campaign["done"], len(runs), judged, self.limits.seed), fault, bool(faults), tuple(apart)
+        )
+
+    # -- the steps of it ---------------------------------------------------------------------------------
+
+    def _left(self) -> float:
+        return max(1.0, self._end - time.monotonic())
+
+    def _ask(self, question: dict[str, Any]) -> dict[str, Any]:
+        place = self.folder / "question.json"
+        place.write_text(json.dumps({**question, "seconds": self._left()}), encoding="utf-8")
+        done, answer = judge.ask(
+            str(Path(__file__).with_name("judge.py").resolve()),
+            [str(place)],
+            cwd=self.folder,
+            seconds=self._left() + 20.0,
+            megabytes=0,  # sanitizers reserve terabytes of addresses
+            env={"PYTHONHASHSEED": "0"},
+        )
+        if answer is None:
+            if done.timed_out:
+                raise Unanswered(Verdict.UNKNOWN, f"it did not end within {self.limits.seconds:g} s; {ALLOWS_MORE}")
+            last = done.stderr.strip().splitlines()[-1:] or ["no message"]
+            raise Unanswered(Verdict.ERROR, f"its judge ended without an answer: {last[0][:200]}")
+        return answer
+
+    def _seeds(self, corpus: Path) -> list[bytes]:
+        corpus.mkdir(parents=True)
+        chance = random.Random(self.limits.seed)
+        seeds = [chance.randbytes(SEED_BYTES[k % len(SEED_BYTES)]) for k in range(SEEDS)]
+        for seed in seeds:
+            (corpus / digest(seed.hex())[:40]).write_bytes(seed)
+        return seeds
+
+    def _campaign(self, kept: Path) -> dict[str, Any]:
+        options = [
+            f"-runs={self.reading.runs}",
+            f"-seed={self.limits.seed + 1}",  # 0 is chance
+            f"-max_len={LONGEST_RUN}",
+            f"-timeout={HANGS}",
+            f"-rss_limit_mb={RESIDENT}",
+            "-detect_leaks=0",
+            "-verbosity=0",
+        ]
+        self.command = ("./fuzz", *options)
+        answer = self._ask(
+            {
+                "what": "campaign",
+                "folder": str(self.folder),
+                "kept": str(kept),
+                "root": str(self.job.root.resolve()),
+                "options": options,
+            }
+        )
+        self._kept_apart(answer)
+        if answer["log"].strip():
+            self.logs["libfuzzer.log"] = answer["log"].replace(str(self.folder), ".")
+        if answer["fault"]:
+            raise Unanswered(Verdict.ERROR, answer["fault"])
+        if answer["code"] is None:
+            why = f"libFuzzer did not make its {self.reading.runs} runs in the time given; {ALLOWS_MORE}"
+            raise Unanswered(Verdict.UNKNOWN, why)
+        return answer
+
+    def _kept_apart(self, answer: dict[str, Any]) -> None:
+        self.isolation = min(self.isolation, Isolation(answer["isolation"]), key=lambda level: level.rank)
+
+    def _asked(self, program: Path, runs: Sequence[list[Step]], *, twice: bool = False) -> dict[str, Any]:
+        words = [[command(self.reading.asked, step) for step in run] for run in runs]
+        root = str(self.job.root.resolve())
+        answer = self._ask({"what": "runs", "program": str(program), "root": root, "runs": words, "twice": twice})
+        self._kept_apart(answer)
+        self.observed.update(dict.fromkeys(from_json(answer["observed"])))
+        if answer["fault"]:
+            raise Unanswered(Verdict.ERROR, answer["fault"])
+        return answer
+
+    def _earlier(self) -> Iterator[list[Step]]:
+        """What refuted a guarantee once, as far as it fits the node as it is now."""
+        names = {port.name for port in self.reading.asked}
+        for cases in self.job.kept.values():
+            for case in cases:
+                try:
+                    run = [{name: plain(value) for name, value in step.items()} for step in case]
+                    _ = [command(self.reading.asked, step) for step in run]
+                except (ValueError, TypeError, KeyError, AttributeError):
+                    continue
+                if all(set(step) == names for step in run):
+                    yield run
+
+    def _confirm(self, bench: Bench, program: Path) -> None:
+        """Each run that breaks something, cut down, and broken once more by a process that was asked nothing else."""
+        for name, broken in list(bench.broken.items()):
+            best: Broken | None = None
+            tries = [broken.run[-1:], broken.run]
+            tried = 0
+            while tries and tried < SHORTENED:
+                run = tries.pop(0)
+                tried += 1
+                found = bench.again(name, run, self._asked(program, [run])["runs"])
+                if found is not None and (best is None or len(found.run) < len(best.run)):
+                    best = found
+                    tries = [best.run[:k] + best.run[k + 1 :] for k in range(len(best.run) - 1)]
+            if best is None:
+                said = bench.words(broken.run)
+                raise Unanswered(Verdict.UNKNOWN, f"undeclared input: asked alone, it answers otherwise ({said})")
+            bench.broken[name] = best
+
+    def _fault(self, runs: list[list[Step]]) -> Broken | None:
+        """The first run that libFuzzer stopped at and that the program with sanitizers stops at too, within what the
+        assumptions allow."""
+        if not runs:
+            return None
+        program = building.sanitized(self.reading, self.folder, self._left()).program
+        for run in runs:
+            words = [command(self.reading.asked, step) for step in run]
+            root = str(self.job.root.resolve())
+            answer = self._ask({"what": "shown", "program": str(program), "root": root, "runs": [words]})
+            self.logs["fault.log"] = answer["log"].replace(str(self.folder), ".")
+            found = Bench(self.reading).stopped(run, answer["replies"])
+            if found is not None and answer["code"] not in (0, None):
+                return replace(found, why=self._said(answer["log"]))
+        return None
+
+    def _said(self, log: str) -> str:
+        """What a sanitizer reports, with a place that is the same on every machine."""
+        root = str(self.job.root.resolve()) + os.sep
+        text = log.replace(root, "").replace(str(self.folder) + os.sep, "")
+        plainly = re.search(r"^(\S+:\d+:\d+): (runtime error: .+)$", text, re.MULTILINE)
+        if plainly:
+            return f"{plainly[1]}: {plainly[2]}"
+        summary = re.search(r"^SUMMARY: (\w+): (.+)$", text, re.MULTILINE)
+        own = re.search(
+            r"^\s+#\d+ \S+ in .*? ((?!harness|replay|avow_)[^/\s][^\s:]*:\d+(?::\d+)?)$", text, re.MULTILINE
+        )
+        if summary:
+            at = f" ({own[1]})" if own and own[1] not in summary[2] else ""
+            return f"{summary[1]}: {summary[2]}{at}"
+        return "the program ends by a signal or an exception"
+
+    def _special(self, bench: Bench, program: Path) -> list[tuple[list[Step], str, str, Any]]:
+        """Each REAL input in its turn NaN and infinite, beside a few steps' others; with what came of it."""
+        asked = bench.special()
+        replies = self._asked(program, [run for run, _, _ in asked])["runs"] if asked else []
+        return [(run, name, word, reply) for (run, name, word), reply in zip(asked, replies, strict=False)]
+
+
+def _files(folder: Path, prefix: str, most: int) -> list[bytes]:
+    """What stands in plain files of a folder in which a subject could write; the shortest first."""
+    found: list[bytes] = []
+    names = sorted(entry.name for entry in os.scandir(folder) if entry.is_file(follow_symlinks=False))
+    for name in names:
+        if not name.startswith(prefix) or name.startswith(f"{prefix}slow-unit") or len(found) >= most:
+            continue
+        try:
+            handle = os.open(folder / name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+            with os.fdopen(handle, "rb") as file:
+                found.append(file.read(LONGEST_RUN))
+        except OSError:
+            continue
+    return sorted(found, key=lambda data: (len(data), data))
+
+
+def _different(runs: Sequence[list[Step]]) -> list[list[Step]]:
+    found: dict[str, list[Step]] = {}
+    for run in runs:
+        if run:
+            found.setdefault(json.dumps([{name: coded(v) for name, v in step.items()} for step in run]), run)
+    return list(found.values())

@@ -1,0 +1,433 @@
+"""What the plain program answered, judged exactly; and what that says of each obligation."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
+from avow.drive.steps import coded, plain
+from avow.evidence.obligation import Obligation
+from avow.evidence.record import CASE
+from avow.formulas.formula import free_variables
+from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
+from avow.stepping.judging import Formula, NoValue, Seen, exact, returned, seen, triggers
+
+from .drawn import Step
+from .reading import Reading
+from .tables import Drawable
+from .tuning import APART
+
+SPECIAL = {"NaN": math.nan, "infinity": math.inf, "-infinity": -math.inf}
+_MADE = "made"
+
+
+class Misused(Exception):  # noqa: N818 - it names what happened
+    """The adapter does not fit the contract."""
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """What was done: libFuzzer's runs, runs to be judged, runs judged, the seed."""
+
+    fuzzed: int
+    kept: int
+    judged: int
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A run whose last step breaks something: its inputs, its steps in the contract's words, and why."""
+
+    run: list[Step]
+    trace: tuple[Seen, ...]
+    why: str
+
+    def shown(self) -> Counterexample:
+        steps = tuple(step.pairs() for step in self.trace)
+        return Counterexample(steps[-1] if steps else (), self.why, steps if len(steps) > 1 else ())
+
+
+@dataclass(slots=True)
+class Guarded:
+    """A guarantee, and how often what makes it say something was met."""
+
+    formula: Formula
+    triggers: tuple[Formula, ...]
+    hits: list[int]
+    undecided: int = 0
+
+
+@dataclass(slots=True)
+class Bench:
+    """Judges the steps of runs, and counts them."""
+
+    reading: Reading
+    assumed: tuple[Formula, ...] = field(init=False)
+    guarded: dict[str, Guarded] = field(init=False)
+    broken: dict[str, Broken] = field(default_factory=dict)
+    """Guarantee → the first run that breaks it."""
+    crash: Broken | None = None
+    """The first run in which the program ended by a signal or an exception."""
+    begun: Counterexample | None = None
+    """What the constructor makes of memory, where that is not allowed."""
+    steps: int = 0
+    undecided: int = 0
+    samples: list[list[Step]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        job = self.reading.job
+        self.assumed = tuple(map(Formula.of, job.node.assumptions))
+        self.guarded = {}
+        for o in job.obligations:
+            found = triggers(job.clause(o))
+            self.guarded[o.name] = Guarded(Formula.of(job.clause(o)), found, [0] * len(found))
+
+    def words(self, run: list[Step]) -> str:
+        last = run[-1] if run else {}
+        return ", ".join(f"in.{name} = {value}" for name, value in last.items())
+
+    # -- judging -----------------------------------------------------------------------------------------
+
+    def judge(self, run: list[Step], reply: Mapping[str, Any]) -> None:
+        """Count a run's steps, and keep what it breaks."""
+        if run and len(self.samples) < APART:
+            self.samples.append(run)
+        for at, step in self._steps(run, reply):
+            self.steps += 1
+            for name, each in self.guarded.items():
+                if name in self.broken:
+                    continue
+                for k, trigger in enumerate(each.triggers):
+                    each.hits[k] += trigger.holds(step[-1].values) is True
+                held = each.formula.holds(step[-1].values) if not step[-1].wrong else False
+                if held is None:
+                    each.undecided += 1
+                elif not held:
+                    why = step[-1].wrong or f"guarantee {name} does not hold of these"
+                    self.broken[name] = Broken(
+                        run[: at + 1], step, f"{why}: there is no output"[:400] if step[-1].wrong else why
+                    )
+
+    def again(self, name: str, run: list[Step], replies: Sequence[Mapping[str, Any]]) -> Broken | None:
+        """What a run breaks of a guarantee, asked anew; None where it breaks nothing."""
+        other = Bench(replace(self.reading))
+        for reply in replies:
+            other.judge(run, reply)
+        return other.broken.get(name)
+
+    def _steps(self, run: list[Step], reply: Mapping[str, Any]) -> Iterator[tuple[int, tuple[Seen, ...]]]:
+        """The steps that the assumptions allow, each with those before it, up to the first that they do not."""
+        node, memory = self.reading.job.node, dict.fromkeys(self.reading.memory, "")
+        answers = list(reply["replies"])
+        trace: tuple[Seen, ...] = ()
+        if not answers:
+            self.crash = self.crash or Broken(run[:1], (Seen({}),), f"making the node ends with {reply['crash']}")
+            return
+        held = self._held(answers[0], "held")
+        if not self._begins(held):
+            return
+        for at, step in enumerate(run):
+            answer = answers[at + 1] if at + 1 < len(answers) else None
+            if answer is None and not reply["crash"]:
+                return
+            if answer is not None and "misuse" in answer:
+                raise Misused(f"the adapter does not fit the contract: {answer['why']}")
+            if answer is not None and "before" in answer:
+                held = self._held(answer, "before")
+            case = {**step, **held}
+            allowed = self._allowed(case)
+            if allowed is None:
+                self.undecided += 1
+            if not allowed:
+                if answer is not None and answer.get("skipped"):
+                    continue
+                return
+            if answer is not None and answer.get("skipped"):
+                continue
+            if answer is None or "error" in answer:
+                why = (
+                    f"the program ends with {reply['crash']}" if answer is None else f"the step throws {answer['why']}"
+                )
+                values = {f"in.{name}": exact(value) for name, value in case.items()}
+                found = (*trace, Seen(values, why))
+                self.crash = self.crash or Broken(run[: at + 1], found, why)
+                yield at, found
+                return
+            self._fits(answer)
+            trace = (*trace, seen(node, memory, case, {"steps": [answer]}))
+            yield at, trace
+            if trace[-1].wrong:
+                return
+            held = self._held(answer, "memory")
+
+    def stopped(self, run: list[Step], answers: Sequence[Mapping[str, Any]]) -> Broken | None:
+        """The step at which a program stopped that answered so far; None where the assumptions do not allow it, or no
+        step was under way."""
+        quiet: dict[str, Any] = {"replies": list(answers), "crash": "a fault"}
+        for _ in self._steps(run, quiet):
+            pass
+        return self.crash if self.begun is None else None
+
+    def _held(self, answer: Mapping[str, Any], key: str) -> dict[str, Any]:
+        if "misuse" in answer:
+            raise Misused(f"the adapter does not fit the contract: {answer['why']}")
+        data = answer.get(key)
+        if not isinstance(data, dict) or set(data) != self.reading.memory:
+            names = ", ".join(sorted(self.reading.memory)) or "nothing"
+            raise Misused(f"memory() of the adapter has to give {names}")
+        return {name: plain(value) for name, value in data.items()}
+
+    def _fits(self, answer: Mapping[str, Any]) -> None:
+        """Raises Misused where the outputs are not the contract's: no fault of the node."""
+        names = {p.name for p in self.reading.job.node.outputs} - self.reading.memory
+        given = {name for name, _ in answer["value"]["d"]}
+        if given != names:
+            missing, extra = sorted(names - given), sorted(given - names)
+            said = [f"lacks {', '.join(missing)}"] if missing else []
+            said += [f"has {', '.join(extra)}, which is no output"] if extra else []
+            raise Misused(f"what the adapter gives {' and '.join(said)}")
+        sorts = {p.name: p.sort for p in self.reading.job.node.outputs}
+        odd = [
+            name for name, data in (*answer["value"]["d"], *answer["memory"].items()) if not _of(data, sorts.get(name))
+        ]
+        if odd:
+            raise Misused(f"the adapter gives {odd[0]} as another type than the contract's")
+
+    def _begins(self, held: Mapping[str, Any]) -> bool:
+        """Whether what the constructor makes of memory meets what is assumed of memory alone."""
+        node = self.reading.job.node
+        try:
+            values = {f"in.{n}": returned(n, v, node.input(n).sort) for n, v in held.items()}
+        except NoValue as wrong:
+            self.begun = self.begun or Counterexample((), f"this is what the constructor makes of memory: {wrong}")
+            return False
+        for formula in self.assumed:
+            names = {v.qualified for v in free_variables(formula.term)}
+            if names and names <= values.keys() and formula.holds(values) is False:
+                pairs = Seen({name: values[name] for name in sorted(names)}).pairs()
+                why = f"this is what the constructor makes, and assumption {formula.name} does not hold of it"
+                self.begun = self.begun or Counterexample(pairs, why)
+                return False
+        return True
+
+    def _allowed(self, case: Mapping[str, Any]) -> bool | None:
+        node = self.reading.job.node
+        try:
+            values = {
+                f"in.{n}": returned(n, v, node.input(n).sort) if not isinstance(v, list) else exact(v)
+                for n, v in case.items()
+            }
+        except NoValue:
+            return False
+        unknown = False
+        for assumption in self.assumed:
+            holds = assumption.holds(values)
+            if holds is False:
+                return False
+            unknown = unknown or holds is None
+        return None if unknown else True
+
+    # -- runs that are no chance -------------------------------------------------------------------------
+
+    def sweep(self, made: Drawable, most: int) -> list[list[Step]]:
+        """Each threshold, and the numbers beside it, in its turn for each input, all else simple."""
+        ports = self.reading.asked
+        simple: Step = {p.name: _simple(p.sort) for p in ports}
+        streams = [[(p.name, value) for value in _values(p.sort, made, self.reading.single)] for p in ports]
+        found = [
+            [{**simple, name: value}]
+            for row in itertools.zip_longest(*streams)
+            for pair in row
+            if pair is not None
+            for name, value in [pair]
+        ]
+        return found[:most]
+
+    def special(self) -> list[tuple[list[Step], str, str]]:
+        """Runs of one step in which one REAL is none: the run, the input, the word for its value."""
+        found = []
+        for run in self.samples:
+            for port, word in itertools.product(self.reading.asked, SPECIAL):
+                value = run[0][port.name]
+                if isinstance(port.sort, RealSort):
+                    found.append(([{**run[0], port.name: SPECIAL[word]}], port.name, word))
+                elif isinstance(port.sort, SequenceSort) and isinstance(port.sort.item, RealSort) and value:
+                    found.append(([{**run[0], port.name: [SPECIAL[word], *value[1:]]}], port.name, word))
+        return found
+
+    def apart(self, asked: Sequence[tuple[list[Step], str, str, Any]]) -> list[Counterexample]:
+        """What went wrong with inputs that are no REAL: no output, or one that is none, or a guarantee that does not
+        hold as IEEE 754 compares."""
+        node, memory = self.reading.job.node, dict.fromkeys(self.reading.memory, "")
+        found: dict[str, Counterexample] = {}
+        for run, name, word, reply in asked:
+            zero = {k: _finite(v) for k, v in run[0].items()}
+            answers = reply["replies"]
+            answer = answers[1] if len(answers) > 1 else None
+            if answer is not None and (answer.get("skipped") or "misuse" in answer):
+                continue
+            case = {**zero, **self._held(answers[0], "held")} if answers else zero
+            if not self._allowed(case):
+                continue
+            if answer is None:
+                step = Seen({f"in.{k}": exact(v) for k, v in case.items()}, f"the program ends with {reply['crash']}")
+            else:
+                step = seen(node, memory, case, {"steps": [answer]})
+            broken = [g.formula.name for g in self.guarded.values() if self._breaks(g, step, name, word)]
+            why = step.wrong or (f"as IEEE 754 compares, {', '.join(broken)} does not hold of it" if broken else "")
+            pairs = tuple((n, word if n == f"in.{name}" else v) for n, v in step.pairs())
+            if why:
+                found.setdefault(why, Counterexample(pairs, why))
+        return list(found.values())
+
+    def _breaks(self, each: Guarded, step: Seen, name: str, word: str) -> bool:
+        return not step.wrong and each.formula.compared(step.values, f"in.{name}", SPECIAL[word]) is False
+
+    # -- outcomes ----------------------------------------------------------------------------------------
+
+    def outcomes(
+        self, counts: Counts, fault: Broken | None, stopped: bool, apart: tuple[Counterexample, ...]
+    ) -> tuple[Outcome, ...]:
+        job = self.reading.job
+        faulty = self.crash or fault
+        refuting = job.options.get("nan") == "possible"
+        own = tuple(self._own(o, counts, stopped and faulty is None, apart, refuting) for o in job.obligations)
+        claims = tuple(self._claim(c, counts, faulty, stopped) for c in job.claims)
+        rests = tuple(
+            Hypothesis(HypothesisKind.CLAIM, claim.local_id, claim.digest, claim.claim) for claim in job.claims
+        )
+        return (*(replace(o, rests_on=rests) if o.verdict is Verdict.TESTED else o for o in own), *claims)
+
+    def _own(
+        self,
+        o: Obligation,
+        counts: Counts,
+        unclear: bool,
+        apart: tuple[Counterexample, ...],
+        refuting: bool,
+    ) -> Outcome:
+        each = self.guarded[o.name]
+        met = [{"trigger": t.name, "met": n} for t, n in zip(each.triggers, each.hits, strict=True)]
+        details: dict[str, object] = {"triggers": met}
+        if apart:
+            details["no numbers"] = [one.text() for one in apart]
+        bound: dict[str, object] = {"cases": self.steps, "kept_runs": counts.judged, "fuzzed_runs": counts.fuzzed}
+        bound |= {"seed": counts.seed}
+        outcome = Outcome(o.id, Verdict.UNKNOWN, "", bound=bound, details=details)
+        if o.name in self.broken:
+            shown = self.broken[o.name].shown()
+            case = [{name: coded(v) for name, v in step.items()} for step in self.broken[o.name].run]
+            told = {**details, CASE: case}
+            return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown, details=told)
+        if self.begun is not None:
+            return replace(outcome, verdict=Verdict.REFUTED, summary=self.begun.text(), counterexample=self.begun)
+        if apart and refuting:
+            return replace(outcome, verdict=Verdict.REFUTED, summary=apart[0].text(), counterexample=apart[0])
+        why = self._doubt(each, counts, unclear)
+        if why:
+            return replace(outcome, summary=why)
+        unmet = [t.name for t, n in zip(each.triggers, each.hits, strict=True) if not n]
+        if unmet:
+            return replace(
+                outcome, summary=f"in none of {self.steps} steps was its condition met: {unmet[0]}", vacuous=True
+            )
+        if each.hits:
+            bound["triggered"] = min(each.hits)
+        summary = (
+            f"{self.steps} steps of {counts.judged} runs judged, none breaks it (what was new in {counts.fuzzed} runs "
+            f"of libFuzzer, seed {counts.seed})"
+        )
+        return replace(outcome, verdict=Verdict.TESTED, summary=summary)
+
+    def _doubt(self, each: Guarded, counts: Counts, unclear: bool) -> str:
+        if counts.judged < counts.kept:
+            return f"only {counts.judged} of {counts.kept} runs were judged in the time given"
+        if not self.steps:
+            return "the assumptions are met too rarely: no step was judged"
+        if unclear:
+            return "libFuzzer stopped at a run that the assumptions do not allow, or that does not stop again"
+        if each.undecided:
+            return f"{each.undecided} of {self.steps} steps could not be judged"
+        if self.undecided:
+            return f"of {self.undecided} inputs it could not be told whether they meet the assumptions"
+        return ""
+
+    def _claim(self, claim: Obligation, counts: Counts, faulty: Broken | None, stopped: bool) -> Outcome:
+        bound: dict[str, object] = {"runs": counts.fuzzed, "failures": int(faulty is not None), "seed": counts.seed}
+        outcome = Outcome(claim.id, Verdict.UNKNOWN, "", bound=bound)
+        if faulty is not None:
+            shown = faulty.shown()
+            return replace(outcome, verdict=Verdict.REFUTED, summary=shown.text(), counterexample=shown)
+        if stopped or not self.steps or counts.judged < counts.kept:
+            why = self._doubt(Guarded(Formula("", claim, None), (), []), counts, stopped)  # type: ignore[arg-type]
+            return replace(outcome, summary=why)
+        summary = f"{counts.fuzzed} runs with sanitizers of addresses and undefined behaviour, none reports a fault"
+        return replace(outcome, verdict=Verdict.TESTED, summary=f"{summary} (seed {counts.seed})")
+
+
+def _of(data: Any, sort: Sort | None) -> bool:
+    """Whether the adapter gave a value by the function of its type; memory that is no output has none."""
+    match sort, data:
+        case None, _:
+            return True
+        case SequenceSort(item=item), {"l": list(items)}:
+            return all(_of(each, item) for each in items)
+        case RealSort(), {"f": _}:
+            return True
+        case ((IntegerSort() | NaturalSort()), {"i": _}):
+            return True
+        case BoolSort(), bool():
+            return True
+        case EnumSort(), str():
+            return True
+    return False
+
+
+def _simple(sort: Sort) -> Any:
+    match sort:
+        case BoolSort():
+            return False
+        case EnumSort(members=members):
+            return members[0]
+        case RealSort():
+            return 0.0
+        case SequenceSort():
+            return []
+        case _:  # a whole number
+            return 0
+
+
+def _values(sort: Sort, made: Drawable, single: bool) -> list[Any]:
+    from .drawn import as_single, next_single
+
+    match sort:
+        case BoolSort():
+            return [True]
+        case EnumSort(members=members):
+            return list(members)
+        case RealSort() if single:
+            found = [n for r in made.reals for n in (r, next_single(r, math.inf), next_single(r, -math.inf))]
+            return [as_single(n) for n in found if math.isfinite(n)]
+        case RealSort():
+            found = [n for r in made.reals for n in (r, math.nextafter(r, math.inf), math.nextafter(r, -math.inf))]
+            return [n for n in found if math.isfinite(n)]
+        case IntegerSort():
+            return list(made.integers)
+        case NaturalSort():
+            return [n for n in made.integers if n >= 0]
+        case SequenceSort(item=item):
+            one = _values(item, made, single)
+            return [[_simple(item)] * n for n in made.lengths] + [row for v in one for row in ([v], [_simple(item), v])]
+        case _:  # refused when the source is read
+            return []
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return 0.0 if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,181 @@
+"""Five C++ nodes through the backend: the right ones are tested, every mutant is refuted; the same each time."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from helpers import some
+
+from avow.backends.fuzz.building import clang
+from avow.backends.fuzz.drawn import Drawn, command
+from avow.backends.fuzz.reading import load
+from avow.backends.fuzz.tables import drawable
+from avow.base.verdict import Object, Verdict
+from avow.isolation.tracing import traces
+from fuzz.cpp_nodes import DEBOUNCER, FIVE, LIMITER, MEDIAN, SCAN, WATCHDOG, Cpp, adapter
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not clang().present, reason="clang++ is not here"),
+    pytest.mark.skipif(not traces(), reason="strace is not here: what a compiled program reads is told by nothing"),
+]
+
+MUTANTS = [(cpp, k) for cpp in FIVE for k in range(1, 5)]
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("cpp", FIVE, ids=lambda cpp: cpp.node)
+def test_the_right_ones_are_tested(cpp: Cpp, tmp_path: Path) -> None:
+    report = cpp.report(tmp_path)
+    assert {o.verdict for o in report.outcomes} == {Verdict.TESTED}, [o.summary for o in report.outcomes]
+    assert {(o.of, o.numbers) for o in report.outcomes} == {(Object.BINARY, "float64")}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("cpp", "mutant"), MUTANTS, ids=lambda x: x.node if isinstance(x, Cpp) else str(x))
+def test_every_mutant_is_refuted(cpp: Cpp, mutant: int, tmp_path: Path) -> None:
+    found = cpp.mutant(mutant).verdicts(tmp_path)
+    assert Verdict.REFUTED in found.values(), found
+    assert set(found.values()) <= {Verdict.REFUTED, Verdict.TESTED}
+    assert found["runs-without-fault"] is Verdict.TESTED
+
+
+def test_a_right_one_and_a_mutant(tmp_path: Path) -> None:
+    """Of those above, each time: with memory, through several steps."""
+    right = WATCHDOG.outcomes(tmp_path / "right")
+    assert {o.verdict for o in right.values()} == {Verdict.TESTED}, [o.summary for o in right.values()]
+    assert right["late"].bound["fuzzed_runs"] >= 500
+    wrong = DEBOUNCER.mutant(2).outcomes(tmp_path / "wrong")
+    assert wrong["reset"].verdict is Verdict.REFUTED
+    shown = wrong["reset"].counterexample
+    assert shown is not None
+    assert len(shown.trace) == 3, "two steps count, the third breaks it"
+    assert wrong["inv"].verdict is Verdict.TESTED
+
+
+FAULTY = LIMITER.adapter.replace("{ out.real", '{ double room[8] = {}; room[int(in.real("v")) & 15] = 1; out.real')
+
+
+def test_a_fault_is_a_claim_of_its_own(tmp_path: Path) -> None:
+    """Index 8 of eight: the line is told, the guarantees are judged by themselves, and rest on it."""
+    report = replace(LIMITER, adapter=FAULTY).report(tmp_path)
+    found = {o.obligation.rpartition("/")[2]: o for o in report.outcomes}
+    fault = found["runs-without-fault"]
+    assert fault.verdict is Verdict.REFUTED
+    assert "src/adapter.hpp:" in fault.summary
+    assert "out of bounds" in fault.summary or "overflow" in fault.summary
+    assert all("runs-without-fault" in str(o.rests_on) for o in found.values() if o.verdict is Verdict.TESTED)
+
+
+ENDINGS = {
+    "abort": ("#include <cstdlib>\n", 'if (in.real("v") > 1e3) std::abort();'),
+    "throw": ("#include <stdexcept>\n", 'if (in.real("v") > 1e3) throw std::runtime_error("far");'),
+}
+
+
+@pytest.mark.parametrize("name", some(ENDINGS, 1))
+def test_no_output_refutes(name: str, tmp_path: Path) -> None:
+    head, body = ENDINGS[name]
+    text = head + LIMITER.adapter.replace("{ out.real", f"{{ {body} out.real")
+    found = replace(LIMITER, adapter=text).verdicts(tmp_path)
+    assert found["runs-without-fault"] is Verdict.REFUTED
+    assert found["upper"] is Verdict.REFUTED
+
+
+HOSTILE = {
+    "exit": 'if (in.real("v") > 2) exit(0);',
+    "_exit": 'if (in.real("v") > 2) _exit(0);',
+    "fork": 'if (in.real("v") > 2) { if (fork() == 0) { setsid(); if (fork() == 0) { sleep(600); } _exit(0); } }',
+    "channel": (
+        'for (int fd = 3; fd < 40; ++fd) if (write(fd, "{\\"turn\\": \\"\\", \\"replies\\": []}\\n", 29) < 0) continue;'
+    ),
+    "prints": 'if (in.real("v") > 2) { puts("Done 500 runs in 0 second(s)"); fflush(stdout); _exit(0); }',
+}
+
+
+@pytest.mark.parametrize("name", some(HOSTILE, 1))
+def test_a_hostile_subject_is_an_error(name: str, tmp_path: Path) -> None:
+    text = LIMITER.adapter.replace("{ out.real", f"{{ {HOSTILE[name]} out.real")
+    head = "#include <cstdio>\n#include <cstdlib>\n#include <unistd.h>\n"
+    found = replace(LIMITER, adapter=head + text).verdicts(tmp_path)
+    assert set(found.values()) == {Verdict.ERROR}, found
+
+
+@pytest.mark.nightly
+def test_what_is_read_at_run_time_is_recorded(tmp_path: Path) -> None:
+    text = LIMITER.adapter.replace("{ node.vmax = given", '{ std::ifstream("limit.txt") >> node.vmax; (void)given')
+    text = text.replace('.real("vmax");', ";", 1)
+    (tmp_path / "limit.txt").write_text("1.5\n")
+    report = replace(LIMITER, adapter="#include <fstream>\n" + text).report(tmp_path)
+    assert {o.verdict for o in report.outcomes} == {Verdict.TESTED}, [o.summary for o in report.outcomes]
+    assert str(tmp_path / "limit.txt") in {o.path for o in report.observed}
+    assert str(tmp_path / "src" / "nodes.hpp") in {o.path for o in report.observed}
+
+
+@pytest.mark.nightly
+def test_chance_is_no_answer(tmp_path: Path) -> None:
+    text = "static int calls = 0;\n" + LIMITER.adapter.replace(
+        "{ out.real", '{ if (++calls == 700) return out.real("u", 0); out.real'
+    )
+    found = replace(LIMITER, adapter=text).outcomes(tmp_path)
+    assert not any(o.verdict.supports for o in found.values()), [o.summary for o in found.values()]
+
+
+@pytest.mark.nightly
+def test_integers_wrap_and_singles_round(tmp_path: Path) -> None:
+    """What a machine's numbers do to a contract over all of them."""
+    rcl = "node n { inputs( k : INTEGER, x : REAL ) outputs( m : INTEGER, y : REAL ) topics()\n"
+    rcl += " guarantee more ( out.m > in.k ) guarantee tenth ( out.y == in.x ) }"
+    text = adapter("Limiter", "", 'out.integer("m", int(in.integer("k")) + 1LL); out.real("y", float(in.real("x")));')
+    cpp = Cpp("n", rcl, text, numbers="float32")
+    found = cpp.outcomes(tmp_path / "single")
+    assert found["more"].verdict is Verdict.REFUTED
+    assert found["tenth"].verdict is Verdict.TESTED
+    assert found["tenth"].numbers == "float32"
+    assert replace(cpp, numbers="float64").verdicts(tmp_path / "double")["tenth"] is Verdict.REFUTED
+
+
+@pytest.mark.nightly
+def test_no_numbers_refute_where_they_are_possible(tmp_path: Path) -> None:
+    """NaN passes through the right limiter: told beside, and a refutation where the plan says that it may come."""
+    told = LIMITER.outcomes(tmp_path / "beside")["bounded"]
+    assert told.verdict is Verdict.TESTED
+    assert "no numbers" in told.details
+    possible = replace(LIMITER, options={"nan": "possible"}).verdicts(tmp_path / "possible")
+    assert possible["bounded"] is Verdict.REFUTED
+
+
+MISFITS = {
+    'out.truth("u", true);': "has to give",
+    "": "lacks u",
+    'out.real("u", in.real("w"));': "there is no w",
+    'out.real("u", 1); out.real("w", 1);': "no output",
+}
+
+
+@pytest.mark.parametrize("step", some(MISFITS, 1))
+def test_an_adapter_that_does_not_fit(step: str, tmp_path: Path) -> None:
+    found = replace(LIMITER, adapter=adapter("Limiter", "", f"(void)in; (void)out; {step}")).outcomes(tmp_path)
+    assert not any(o.verdict.supports for o in found.values()), {o.verdict: o.summary for o in found.values()}
+
+
+def test_it_does_not_compile(tmp_path: Path) -> None:
+    found = replace(LIMITER, adapter="struct AvowNode { int x = ; };\n").outcomes(tmp_path)
+    assert {o.verdict for o in found.values()} == {Verdict.ERROR}
+    assert "src/adapter.hpp:1" in found["same"].summary
+
+
+@pytest.mark.parametrize("cpp", [MEDIAN, SCAN, DEBOUNCER], ids=lambda cpp: cpp.node)
+def test_bytes_are_the_same_run_twice(cpp: Cpp, tmp_path: Path) -> None:
+    """What Python draws of some bytes can be said, and is no more than the harness' own limits."""
+    reading = load(cpp.written(tmp_path))
+    made, chance = drawable(reading), random.Random(1)
+    for _ in range(200):
+        data = chance.randbytes(chance.randrange(60))
+        steps = Drawn(data, made, reading.single).steps(reading.asked, reading.steps)
+        assert 1 <= len(steps) <= reading.steps
+        assert steps == Drawn(data, made, reading.single).steps(reading.asked, reading.steps)
+        assert all(command(reading.asked, step).startswith("S") for step in steps)
