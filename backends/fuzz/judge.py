@@ -16,7 +16,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from avow.backends.fuzz.tuning import MOST_CRASHES
 from avow.base import process
 from avow.isolation import judge
 from avow.isolation.level import Isolation, available, sealed
@@ -112,17 +111,19 @@ def asked(question: dict[str, Any]) -> dict[str, Any]:
     end = time.monotonic() + question["seconds"]
     runs: list[list[str]] = question["runs"]
     first, faults, program = _all(question, runs, end)
+    silent = bool(program.silent)
     unsteady = None
     if question["twice"] and not faults:
         order = [k for k in reversed(range(len(first))) if not first[k]["crash"]]
-        again, more, _ = _all(question, [runs[k] for k in order], end)
-        faults = more
+        again, faults, twin = _all(question, [runs[k] for k in order], end)
+        silent = bool(twin.silent)
         for k, other in zip(order, again, strict=False):
             if other != first[k]:
                 unsteady = k
     return {
         "runs": first,
         "fault": faults,
+        "silent": silent,
         "unsteady": unsteady,
         "observed": to_json(program.observed()[1:]),  # no interpreter runs it
         "isolation": program.isolation.value,
@@ -146,7 +147,7 @@ def _all(question: dict[str, Any], runs: list[list[str]], end: float) -> tuple[l
                 break
             found.append({"replies": [r for r in replies if not isinstance(r, SubjectFailed)], "crash": crash})
             crashes += bool(crash)
-            if crashes >= MOST_CRASHES:
+            if crashes >= question["crashes"]:
                 break
     finally:
         fault = program.close() or fault

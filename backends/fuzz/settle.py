@@ -30,7 +30,7 @@ from .building import NotBuilt
 from .drawn import Drawn, Step, command
 from .reading import Reading, load
 from .tables import drawable
-from .tuning import HANGS, LONGEST_RUN, MOST_JUDGED, RESIDENT, SEED_BYTES, SEEDS, SHORTENED, SWEPT
+from .tuning import HANGS, LONGEST_RUN, MOST_CRASHES, MOST_JUDGED, RESIDENT, SEED_BYTES, SEEDS, SHORTENED, SWEPT
 from .verdicts import Bench, Broken, Counts, Misused
 
 TOOL = "libfuzzer"
@@ -198,11 +198,12 @@ class Work:
     def _asked(self, program: Path, runs: Sequence[list[Step]], *, twice: bool = False) -> dict[str, Any]:
         words = [[command(self.reading.asked, step) for step in run] for run in runs]
         root = str(self.job.root.resolve())
-        answer = self._ask({"what": "runs", "program": str(program), "root": root, "runs": words, "twice": twice})
+        question = {"what": "runs", "program": str(program), "root": root, "runs": words, "twice": twice}
+        answer = self._ask({**question, "crashes": MOST_CRASHES})
         self._kept_apart(answer)
         self.observed.update(dict.fromkeys(from_json(answer["observed"])))
         if answer["fault"]:
-            raise Unanswered(Verdict.ERROR, answer["fault"])
+            raise Unanswered(Verdict.UNKNOWN if answer["silent"] else Verdict.ERROR, answer["fault"])
         return answer
 
     def _earlier(self) -> Iterator[list[Step]]:
