@@ -24,6 +24,7 @@ from avow.language.terms import FALSE, TRUE, Compare, Iff, Implies, Quantified, 
 from avow.sanity.realizability import realizable
 from avow.solving.quantifier_elimination import eliminable, eliminated
 from avow.solving.questions import entails, solve
+from avow.solving.second import CONTRADICTED, contradicted
 from avow.temporal.cells import Remembering
 from avow.tuning.bounds import GAME_ANSWERS, GAME_MEMORIES, VIABILITY_ROUNDS
 
@@ -94,6 +95,11 @@ class Contract:
     def at_first(self, region: Term) -> Term:
         return substitute(region, self.first)
 
+    def asked_again(self, impossible: Sequence[Term]) -> None:
+        """Ask cvc5, where it is installed, of what Z3 said that nothing meets it. Raises Contradicted."""
+        if contradicted(impossible, effort=self.effort):
+            raise Contradicted
+
     def closed(self, region: Term) -> bool:
         """Whether the solver shows that from each memory of a region every allowed input has an output that stays in
         it, and that the first memory is in it."""
@@ -111,9 +117,17 @@ class Contract:
             fails = [
                 negation(substitute(whole, dict(zip(self.outputs, choice, strict=True)))) for choice in product(*terms)
             ]
-            return solve([*known.values(), *fails], effort=self.effort, seed=self.seed, shown=False).status == "unsat"
+            none = [*known.values(), *fails]
+            if solve(none, effort=self.effort, seed=self.seed, shown=False).status != "unsat":
+                return False
+            self.asked_again([conjunction(none)])
+            return True
         answer = realizable(inputs, self.outputs, known, wanted, effort=self.effort, seed=self.seed)
         return answer.verdict is Verdict.PROVED
+
+
+class Contradicted(Exception):  # noqa: N818 - it says what happened
+    """cvc5 says the opposite of what Z3 does."""
 
 
 def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> Viability:
@@ -127,12 +141,15 @@ def viable(remembering: Remembering, *, effort: int = 10_000, seed: int = 0) -> 
     if any(v in free_variables(f) for f in contract.assumed.values() for v in contract.outputs):
         return Viability(Verdict.UNKNOWN, "an assumption speaks of an output at the same step")
     apart, about = contract.divided()
-    if apart:
+    try:
         found = _decided(about)
+    except Contradicted:
+        return Viability(Verdict.ERROR, CONTRADICTED)
+    if apart:
         possible = solve(apart, effort=effort, seed=seed, shown=False).status == "sat"
         sure = found.verdict is Verdict.PROVED or possible
         return found if sure else Viability(Verdict.UNKNOWN, "whether its assumptions can be met is open")
-    return _decided(about)
+    return found
 
 
 def _decided(contract: Contract) -> Viability:
@@ -237,7 +254,7 @@ class _Game:
 
     def _confirmed(self) -> bool:
         """Whether the solver shows of each memory that the environment's moves lead to that no answer leads out."""
-        asked, waiting = set[_Memory](), [self.first]
+        asked, waiting, none = set[_Memory](), [self.first], list[Term]()
         contract = self.contract
         while waiting:
             memory = waiting.pop()
@@ -253,7 +270,9 @@ class _Game:
             escapes = solve(out, effort=contract.effort, shown=False)
             if allowed.status != "sat" or escapes.status != "unsat":
                 return False
+            none.append(conjunction(out))
             waiting += [left for _, left in answers]
+        contract.asked_again(none)
         return True
 
     def _run(self) -> Counterexample:

@@ -131,6 +131,14 @@ def test_a_refutation_is_a_run_of_the_environment() -> None:
     assert dict(found.run.trace[-1]) == {"in.a": "TRUE", "in.b": "TRUE"}
 
 
+@pytest.mark.parametrize("name", ["an arbiter that answers one at once", "the same, where requests are apart"])
+def test_where_the_second_solver_says_the_opposite_it_is_an_error(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("avow.sanity.viability.contradicted", lambda *_, **__: True)
+    contract, found = check_text(f"node n {{ {KNOWN[name][0]} }}", "n.rcl")
+    assert contract is not None, found
+    assert viable(compile_node(contract.nodes[0])).verdict is Verdict.ERROR
+
+
 def test_claims_are_about_what_runs_can_reach() -> None:
     """What no memory that a run comes to allows is refuted, also where some memory would."""
     text = """node n { inputs( a : BOOL ) outputs( b : BOOL ) topics()
