@@ -7,7 +7,7 @@ import click
 
 @click.command()
 def command() -> int:
-    """Serve an editor on standard input and output: diagnostics, hover, definition, outline, formatting."""
+    """Serve an editor on standard input and output: messages, fixes, completion, rename, references, sanity."""
     from avow.base.diagnostics import Diagnostic, Rejected
 
     try:

@@ -57,14 +57,15 @@ class LintedFile:
     reports: Reports
 
 
-def lint(files: Sequence[LintedFile], contract: Contract | None, off: frozenset[str]) -> None:
-    """Report every warning about the files, and (where it is sound) about the contract that they declare."""
+def lint(files: Sequence[LintedFile], nodes: Sequence[Node], contract: Contract | None, off: frozenset[str]) -> None:
+    """Report every warning about the files, about the nodes that are sound, and (where all of it is) about the contract
+    that the files declare."""
     found: list[Diagnostic] = []
     for file in files:
         found.extend(_about_text(file))
+    for node in nodes:
+        found.extend(_about_node(node))
     if contract is not None:
-        for node in contract.nodes:
-            found.extend(_about_node(node))
         found.extend(_spellings(contract))
     by_name = {file.reports.source.file: file for file in files}
     allowances = {name: _allowances(file) for name, file in by_name.items()}

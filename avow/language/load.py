@@ -19,7 +19,7 @@ from avow.language.environment import of_contract
 from avow.language.lexer import Token, tokens
 from avow.language.lints import LintedFile, lint
 from avow.language.nodes import check_node, check_ports
-from avow.language.outline import FileSyntax, read
+from avow.language.outline import FileSyntax, NodeSyntax, read
 from avow.language.parser import parse
 from avow.language.scope import BOTH_ROLES, Scope
 from avow.language.sorts import Sort
@@ -198,9 +198,33 @@ def _checked(texts: tuple[_Text, ...], off: frozenset[str], partial: bool) -> tu
         declarations.environment.broken.add("*")
     declarations.elaborate()
     contract = _contract(parsed, declarations)
-    sound = not partial and not any(reports.failed for _, reports in parsed)
-    lint(linted, contract if sound else None, off)
+    sound = () if partial else sound_nodes(contract, [syntax for syntax, _ in parsed])
+    faulty = partial or any(reports.failed for _, reports in parsed)
+    lint(linted, sound, None if faulty else contract, off)
     return contract, tuple(d for _, reports in parsed for d in in_order(reports))
+
+
+def check_in_part(
+    sources: Sequence[Source], *, off: frozenset[str] = frozenset()
+) -> tuple[Contract, tuple[Diagnostic, ...]]:
+    """As `check_sources`, with as much of the contract as can be read where something is wrong: to help its author,
+    never to verify."""
+    return _checked(tuple(map(_as_read, sources)), off, False)
+
+
+def sound_nodes(contract: Contract, files: Sequence[FileSyntax]) -> tuple[Node, ...]:
+    """The nodes of a contract of which nothing is missing for an error in it."""
+    written = {node.name.text: node for syntax in files for node in syntax.nodes}
+    return tuple(node for node in contract.nodes if node.name in written and _is_whole(node, written[node.name]))
+
+
+def _is_whole(node: Node, written: NodeSyntax) -> bool:
+    lists = ((node.inputs, written.inputs), (node.outputs, written.outputs), (node.topics, written.topics))
+    return (
+        not written.broken
+        and all(tree is not None and len(found) == len(tree.items) for found, tree in lists)
+        and len(node.clauses) == len(written.clauses)
+    )
 
 
 def unless_torn(reports: Reports) -> Reports:

@@ -5,22 +5,28 @@ Places are offsets into the text; the server converts them to the protocol's lin
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from avow.base.diagnostics import Diagnostic, Span
-from avow.language.contract import Clause, Contract, Node, Port
-from avow.language.lexer import Token, tokens
-from avow.language.load import check_sources, clean_text
-from avow.language.outline import FileSyntax, NodeSyntax, read
+from avow.language.contract import Clause, Node, Port
+from avow.language.environment import of_contract
+from avow.language.lexer import Token
+from avow.language.load import clean_text
 from avow.language.printer import show_sort, show_term, show_type
-from avow.language.source import Reports, Source
+from avow.language.source import Source
 from avow.language.syntax import TypeDeclaration
 from avow.language.terms import Quantified, Variable
+from avow.lsp.background import Answer
+from avow.lsp.names import CLAUSES, PORTS, Meaning, Occurrence, Text, What, at_offset, clause_names, taken_apart
+from avow.lsp.project import Project, about_plan, is_plan, project_of
+from avow.lsp.renaming import all_occurrences, renamed_with
+from avow.lsp.vocabulary import BUILTIN_TYPES, FORMS
 
 StatusLookup = Callable[[str, str], str | None]
 """(node, clause) → what the ledger says of it, in a few words; None where it says nothing."""
+SanityLookup = Callable[[Node], tuple[Answer, ...] | None]
+"""What is known of a node's sanity; None while it is not asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,83 +43,117 @@ class Symbol:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A text as far as it could be understood. `contract` is the last sound one: hovering works while typing."""
+    """A text, what there is to say of it, and the system that it belongs to, as far as that can be read."""
 
     file: str
     text: str
+    project: Project
     diagnostics: tuple[Diagnostic, ...]
-    contract: Contract | None
-    syntax: FileSyntax
-    tokens: tuple[Token, ...]
+    names: tuple[Occurrence, ...] = field(repr=False)
+    """Every name in every file of the system that stands for something."""
+
+    @property
+    def taken_apart(self) -> Text:
+        return taken_apart(self.file, self.text)
+
+    @property
+    def tokens(self) -> tuple[Token, ...]:
+        return self.taken_apart.tokens
 
 
-def analyse(
-    text: str,
-    file: str,
-    before: Document | None = None,
-    others: tuple[Source, ...] = (),
-    off: frozenset[str] = frozenset(),
-) -> Document:
-    """Check a text. `others` are the other files of its system, `off` the codes of lints that are not wanted; `before`
-    is what was known before the last change."""
+def analyse(text: str, file: str, texts: Mapping[str, str] | None = None) -> Document:
+    """Check a text. `texts` are the other documents that are open, by file."""
+    project = project_of(file, {**(texts or {}), file: text})
+    names = all_occurrences(project)
+    if is_plan(file):
+        return Document(file, text, project, about_plan(file), names)
     source = clean_text(text, file)
     if isinstance(source, Diagnostic):
-        return Document(file, text, (source,), before.contract if before else None, FileSyntax(), ())
-    contract, found = check_sources([source, *others], off=off)
-    reports = Reports(source)
-    stream = tokens(reports)
-    syntax = read(stream, reports)
-    mine = tuple(d for d in found if d.span is None or d.span.file == file)
-    known = contract or (before.contract if before is not None else None)
-    return Document(file, source.text, mine, known, syntax, tuple(stream))
+        return Document(file, text, project, (source,), names)
+    mine = tuple(d for d in project.diagnostics if d.span is None or d.span.file == file)
+    return Document(file, source.text, project, mine, names)
 
 
-def token_at(document: Document, offset: int) -> int | None:
-    """The position of the token at (or just before) an offset."""
-    at = bisect_right(document.tokens, offset, key=lambda t: t.start) - 1
-    if at >= 0 and offset <= document.tokens[at].end:
-        return at
+def name_at(document: Document, offset: int) -> Occurrence | None:
+    """The name at (or just before) an offset that stands for something."""
+    return at_offset(document.names, document.file, offset)
+
+
+def _token_at(document: Document, offset: int) -> Token | None:
+    if is_plan(document.file):
+        return None
+    touching = [t for t in document.tokens if t.start <= offset <= t.end]
+    return touching[-1] if touching else None
+
+
+def hover(
+    document: Document,
+    offset: int,
+    status: StatusLookup = lambda node, clause: None,
+    sanity: SanityLookup = lambda node: None,
+) -> str | None:
+    """Markdown about the thing at an offset: its type, where it comes from, and how its guarantee stands."""
+    name = name_at(document, offset)
+    if name is not None:
+        return _about(document, name, status, sanity)
+    token = _token_at(document, offset)
+    if token is None:
+        return None
+    if token.type in ("ASSUME", "GUARANTEE") or token.text in ("A", "G"):
+        clause = next((o for o in document.names if o.file == document.file and _begins(document, o, token)), None)
+        return _about(document, clause, status, sanity) if clause is not None else None
+    if token.type == "BUILTIN":
+        return f"`{token.text}`: a built-in type, {_plain(BUILTIN_TYPES[token.text])}"
+    if token.text in FORMS:
+        form = FORMS[token.text]
+        return f"`{form.label}`\n\n{_plain(form.meaning)}"
     return None
 
 
-def hover(document: Document, offset: int, status: StatusLookup = lambda node, clause: None) -> str | None:
-    """Markdown about the thing at an offset: its type, where it comes from, and how its guarantee stands."""
-    at = token_at(document, offset)
-    if at is None:
-        return None
-    token = document.tokens[at]
-    clause = _clause_at(document, offset)
-    if token.type in ("ASSUME", "GUARANTEE") or (clause is not None and _names_clause(document, clause, token)):
-        return _about_clause(document, clause, status) if clause is not None else None
-    found = _resolve(document, at)
-    return found[0] if found is not None else None
+def _begins(document: Document, clause: Occurrence, token: Token) -> bool:
+    """Whether the clause whose name (or, without one, first letter) this is begins with the token."""
+    if not clause.declares or clause.meaning.what not in CLAUSES:
+        return False
+    between = document.text[token.end : clause.start]
+    return clause.start == token.start or (token.end <= clause.start and not between.strip())
 
 
-def definition(document: Document, offset: int) -> Span | None:
+def definition(document: Document, offset: int) -> tuple[Occurrence, ...]:
     """Where the name at an offset is declared."""
-    at = token_at(document, offset)
-    if at is None:
-        return None
-    found = _resolve(document, at)
-    return found[1] if found is not None else None
+    name = name_at(document, offset)
+    return tuple(o for o in document.names if o.declares and o.meaning == name.meaning) if name is not None else ()
+
+
+def references(document: Document, offset: int, declarations: bool = True) -> tuple[Occurrence, ...]:
+    """Every place, in all files of the system, where the thing whose name is at an offset is named."""
+    name = name_at(document, offset)
+    if name is None:
+        return ()
+    found = (o for o in document.names if o.written and o.meaning == name.meaning)
+    return tuple(o for o in found if declarations or not o.declares)
+
+
+def linked(document: Document, offset: int) -> tuple[Occurrence, ...]:
+    """As `references`, of all that a rename would change: ports of one name are one thing to a system."""
+    name = name_at(document, offset)
+    return tuple(o for o in document.names if name is not None and o.written and renamed_with(name.meaning, o.meaning))
 
 
 def symbols(document: Document) -> tuple[Symbol, ...]:
     """The outline: the context's declarations, the nodes, and their clauses."""
-    source = Source(document.file, document.text)
+    if is_plan(document.file):
+        return ()
+    source, syntax = Source(document.file, document.text), document.taken_apart.syntax
     found = [
         Symbol(tree.name.text, kind, kind, source.span(tree.start, tree.end))
-        for tree in document.syntax.declarations
+        for tree in syntax.declarations
         for kind in ("type" if isinstance(tree, TypeDeclaration) else "constant",)
     ]
-    for node in document.syntax.nodes:
+    for node in syntax.nodes:
         inner = []
-        counts = {"assumption": 0, "guarantee": 0}
-        for clause in node.clauses:
-            counts[clause.kind] += 1
-            name = clause.name.text if clause.name else f"{clause.kind[0].upper()}{counts[clause.kind]}"
+        for clause, (meaning, _, _, _) in zip(node.clauses, clause_names(node), strict=True):
             detail = clause.sentence.text.strip('"') if clause.sentence else ""
-            inner.append(Symbol(name, detail, str(clause.kind), source.span(clause.start, clause.end)))
+            inner.append(Symbol(meaning.name, detail, str(clause.kind), source.span(clause.start, clause.end)))
         found.append(Symbol(node.name.text, "node", "node", source.span(node.start, node.end), tuple(inner)))
     return tuple(found)
 
@@ -121,92 +161,79 @@ def symbols(document: Document) -> tuple[Symbol, ...]:
 # --- finding out -----------------------------------------------------------------------------------------------------
 
 
-def _node_at(document: Document, offset: int) -> NodeSyntax | None:
-    return next((n for n in document.syntax.nodes if n.start <= offset <= n.end), None)
+def _about(document: Document, name: Occurrence, status: StatusLookup, sanity: SanityLookup) -> str | None:
+    meaning, contract = name.meaning, document.project.contract
+    owner = next((n for n in contract.nodes if n.name in (meaning.owner, meaning.name)), None)
+    match meaning.what:
+        case What.NODE:
+            return "\n\n".join([f"node `{meaning.name}`", *_sane(owner, None, sanity)])
+        case What.INPUT | What.OUTPUT:
+            ports = [p for p in (*owner.inputs, *owner.outputs) if p.name == meaning.name] if owner else []
+            port = (
+                next((p for p in ports if (p in owner.inputs) == (meaning.what is What.INPUT)), None) if owner else None
+            )
+            return _about_port(port, owner) if port is not None and owner is not None else None
+        case What.ASSUMPTION | What.GUARANTEE:
+            clause = next((c for c in owner.clauses if c.name == meaning.name), None) if owner else None
+            return _about_clause(clause, owner, status, sanity) if clause is not None and owner is not None else None
+        case What.TYPE:
+            return f"type `{meaning.name}` = `{show_type(dict(contract.types)[meaning.name])}`"
+        case What.CONSTANT:
+            return f"constant `{meaning.name}` = `{show_term(dict(contract.constants)[meaning.name], 'rcl')}`"
+        case What.ELEMENT:
+            sort = of_contract(contract).elements.get(meaning.name)
+            return f"`{meaning.name}`: an element of `{sort.name}`" if sort is not None else None
+        case What.VARIABLE:
+            return _about_variable(document, meaning)
 
 
-def _checked_node(document: Document, offset: int) -> Node | None:
-    syntax = _node_at(document, offset)
-    if syntax is None or document.contract is None:
-        return None
-    return next((n for n in document.contract.nodes if n.name == syntax.name.text), None)
+def _about_variable(document: Document, meaning: Meaning) -> str:
+    """A quantified variable, with its sort where its clause could be read."""
+    place = next((o for o in document.names if o.declares and o.meaning == meaning), None)
+    source = Source(document.file, document.project.text_of(document.file))
+    for clause in (c for node in document.project.contract.nodes for c in node.clauses):
+        if place is None or clause.span is None or clause.span.file != place.file:
+            continue
+        line, _ = source.place(place.start)
+        if clause.span.line <= line <= clause.span.end_line:
+            for variable in _bound(clause, meaning.name):
+                return f"`{variable.name}` : `{show_sort(variable.sort)}` (quantified)"
+    return f"`{meaning.name}` (quantified)"
 
 
-def _clause_at(document: Document, offset: int) -> Clause | None:
-    """The clause at an offset, by its position in its node."""
-    syntax, node = _node_at(document, offset), _checked_node(document, offset)
-    if syntax is None or node is None:
-        return None
-    counts = {"assumption": 0, "guarantee": 0}
-    for clause in syntax.clauses:
-        counts[clause.kind] += 1
-        if clause.start <= offset <= clause.end:
-            found = [c for c in node.clauses if c.kind == clause.kind and c.position == counts[clause.kind]]
-            return found[0] if found else None
-    return None
+def _bound(clause: Clause, name: str) -> list[Variable]:
+    found, stack = [], [clause.formula]
+    while stack:
+        term = stack.pop()
+        if isinstance(term, Quantified):
+            found += [variable for variable in term.variables if variable.name == name]
+        stack.extend(term.children)
+    return found
 
 
-def _names_clause(document: Document, clause: Clause, token: Token) -> bool:
-    node = _node_at(document, token.start)
-    return node is not None and any(c.name is not None and c.name.start == token.start for c in node.clauses)
-
-
-def _about_clause(document: Document, clause: Clause, status: StatusLookup) -> str:
-    node = next((n for n in document.contract.nodes if clause in n.clauses), None) if document.contract else None
-    lines = [f"**{clause.kind} {clause.name}**"]
+def _about_clause(clause: Clause, node: Node, status: StatusLookup, sanity: SanityLookup) -> str:
+    lines = [f"**{clause.kind} {_plain(clause.name)}**"]
     if clause.sentence:
         lines.append(_plain(clause.sentence))
-    lines.append(f"```\n{show_term(clause.formula, 'unicode')}\n```")
-    said = status(node.name, clause.name) if node is not None else None
+    lines.append(f"```\n{show_term(clause.written or clause.formula, 'unicode')}\n```")
+    said = status(node.name, clause.name)
     if said:
         lines.append(_plain(said))
-    return "\n\n".join(lines)
+    return "\n\n".join([*lines, *_sane(node, clause.name, sanity)])
+
+
+def _sane(node: Node | None, subject: str | None, sanity: SanityLookup) -> list[str]:
+    """A line for each sanity claim about a clause, or (None) about the node and its outputs."""
+    clauses = {c.name for c in node.clauses} if node is not None else set()
+    found = (sanity(node) or ()) if node is not None else ()
+    mine = [a for a in found if (a.subject == subject if subject is not None else a.subject not in clauses)]
+    lines = [f"- {_plain(f'{a.verdict}: {a.claim} {a.explanation}'.strip())}" for a in mine]
+    return ["\n".join(lines)] if lines else []
 
 
 def _plain(text: str) -> str:
     """Text that Markdown leaves as it is."""
     return "".join(f"\\{c}" if c in "\\`*_{}[]()#+-.!|<>~&" else c for c in text)
-
-
-def _resolve(document: Document, at: int) -> tuple[str, Span | None] | None:
-    """What the name at a token means: Markdown, and the place of its declaration."""
-    token = document.tokens[at]
-    contract = document.contract
-    if token.type == "BUILTIN":
-        return f"`{token.text}`: a built-in type", None
-    if token.type != "NAME" or contract is None:
-        return None
-    node = _checked_node(document, token.start)
-    before = document.tokens[at - 2] if at > 1 and document.tokens[at - 1].type == "DOT" else None
-    if node is not None:
-        clause = _clause_at(document, token.start)
-        bound = _bound(clause, token.text, document) if clause is not None and before is None else None
-        if bound is not None:
-            return f"`{bound.name}` : `{show_sort(bound.sort)}` (quantified)", bound.span
-        ports = [p for p in (*node.inputs, *node.outputs) if p.name == token.text]
-        if before is not None:
-            ports = [p for p in ports if p.role == before.text]
-        declared_here = [p for p in ports if p.span is not None and _starts(document, p.span, token)]
-        ports = declared_here or ports
-        if ports:
-            return _about_port(ports[0], node), ports[0].span
-    return _declared(document, contract, token.text)
-
-
-def _starts(document: Document, span: Span, token: Token) -> bool:
-    return Source(document.file, document.text).place(token.start) == (span.line, span.column)
-
-
-def _bound(clause: Clause, name: str, document: Document) -> Variable | None:
-    stack = [clause.formula]
-    while stack:
-        term = stack.pop()
-        if isinstance(term, Quantified):
-            for variable in term.variables:
-                if variable.name == name:
-                    return variable
-        stack.extend(term.children)
-    return None
 
 
 def _about_port(port: Port, node: Node) -> str:
@@ -218,34 +245,4 @@ def _about_port(port: Port, node: Node) -> str:
     return f"`{port.role}.{port.name}` : `{port.type_name}`{more} ({words[port.role]} of {_plain(node.name)}){carried}"
 
 
-def _declared(document: Document, contract: Contract, name: str) -> tuple[str, Span | None] | None:
-    source = Source(document.file, document.text)
-    places = {t.name.text: t.name for t in document.syntax.declarations}
-    place = source.span(places[name].start, places[name].end) if name in places else None
-    for type_name, sort in contract.types:
-        if type_name == name:
-            return f"type `{name}` = `{show_type(sort)}`", place
-    for constant, term in contract.constants:
-        if constant == name:
-            return f"constant `{name}` = `{show_term(term, 'rcl')}`", place
-    for type_name, sort in contract.types:
-        members = getattr(sort, "members", None) or tuple(c.name for c in getattr(sort, "constructors", ()))
-        if name in members:
-            return f"`{name}`: an element of `{type_name}`", _element_place(document, source, name)
-    node = next((n for n in contract.nodes if n.name == name), None)
-    return (f"node `{name}`", node.span) if node is not None else None
-
-
-def _element_place(document: Document, source: Source, name: str) -> Span | None:
-    for tree in document.syntax.declarations:
-        for token in _tokens_within(document, tree.start, tree.end):
-            if token.text == name:
-                return source.span(token.start, token.end)
-    return None
-
-
-def _tokens_within(document: Document, start: int, end: int) -> Iterator[Token]:
-    at = bisect_right(document.tokens, start - 1, key=lambda t: t.start)
-    while at < len(document.tokens) and document.tokens[at].start < end:
-        yield document.tokens[at]
-        at += 1
+__all__ = ["CLAUSES", "PORTS", "Document", "Symbol", "analyse", "definition", "hover", "references", "symbols"]

@@ -1,239 +1,392 @@
-"""The language server over pygls: diagnostics, hover, definition, outline, formatting."""
+"""The language server over pygls: which answer (`avow.lsp.answers` and its neighbours) goes with which question."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from lsprotocol import types
+from pygls.exceptions import JsonRpcInvalidRequest
 from pygls.lsp.server import LanguageServer
 
 from avow import __version__
-from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
+from avow.base.diagnostics import Diagnostic, Rejected
 from avow.language.format import format_text
-from avow.language.load import read_source
-from avow.language.outline import FileSyntax
-from avow.language.source import Source
-from avow.lsp import answers
-from avow.lsp.answers import Document, StatusLookup, Symbol
-from avow.lsp.surroundings import about_plan, companions, file_of
-from avow.system.load import PLAN_FILE
-from avow.tuning.running import CHARACTERS_PER_SECOND, NOTICED_SECONDS
-
-_SEVERITIES = {
-    Severity.ERROR: types.DiagnosticSeverity.Error,
-    Severity.WARNING: types.DiagnosticSeverity.Warning,
-    Severity.NOTE: types.DiagnosticSeverity.Information,
-}
-_KINDS = {
-    "node": types.SymbolKind.Class,
-    "type": types.SymbolKind.Struct,
-    "constant": types.SymbolKind.Constant,
-    "assumption": types.SymbolKind.Event,
-    "guarantee": types.SymbolKind.Function,
-}
+from avow.language.load import check_in_part, clean_text
+from avow.lsp import answers, protocol
+from avow.lsp.answers import Document, StatusLookup
+from avow.lsp.appearance import coloured, folds
+from avow.lsp.background import Answer, Asked, askable
+from avow.lsp.completion import offers, signature
+from avow.lsp.names import CLAUSES, Occurrence, What
+from avow.lsp.plan_completion import plan_offers
+from avow.lsp.project import file_of, is_plan
+from avow.lsp.protocol import Lines
+from avow.lsp.quick_fixes import fixes
+from avow.lsp.renaming import Refused, elsewhere, is_renameable, rename
+from avow.tuning.running import CHARACTERS_PER_SECOND, NOTICED_SECONDS, SANITY_PAUSE
 
 
 def _nothing(file: str) -> StatusLookup:
     return lambda node, clause: None
 
 
-def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageServer:
-    """A server with every answer registered; `status` gives, for a file, how the clauses in it stand in the ledger."""
-    server = LanguageServer("avow", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Incremental)
-    documents: dict[str, Document] = {}
-    open_now: set[str] = set()
-    later: dict[str, asyncio.TimerHandle] = {}
-    """Documents that have changed and are read again in a moment, if nothing more comes in before."""
+class Server:
+    """What is open, what is known of it, and an answer to every question. `status` gives, for a file, how the clauses
+    in it stand in the ledger."""
 
-    def publish(uri: str, document: Document) -> None:
-        documents[uri] = document
-        if uri not in open_now:
-            return  # asked about, but not open
-        server.text_document_publish_diagnostics(
-            types.PublishDiagnosticsParams(
-                uri=uri, diagnostics=[_diagnostic(d, document) for d in document.diagnostics]
-            )
-        )
+    def __init__(self, language_server: LanguageServer, status: Callable[[str], StatusLookup]) -> None:
+        self.server = language_server
+        self.status = status
+        self.documents: dict[str, Document] = {}
+        self.open_now: set[str] = set()
+        self.later: dict[str, asyncio.TimerHandle] = {}
+        """Documents that have changed and are read again in a moment, if nothing more comes in before."""
+        self.asked = Asked(self.settled)
+        self.soon: asyncio.TimerHandle | None = None
 
-    def refresh(uri: str) -> tuple[str, ...]:
-        """Reads a document again; the other files of its system."""
+    # -- texts ---------------------------------------------------------------------------------------------------------
+
+    def text(self, uri: str) -> str:
+        """A document's text; of one that is not open, the file's; nothing where there is none."""
+        try:
+            text: str = self.server.workspace.get_text_document(uri).source
+        except (OSError, ValueError):
+            return ""
+        return text
+
+    def refresh(self, uri: str) -> tuple[str, ...]:
+        """Reads a document again; the files of its system."""
         file = file_of(uri)
-        text = _text(server, uri)
-        waiting = later.pop(uri, None)
+        waiting = self.later.pop(uri, None)
         if waiting is not None:
             waiting.cancel()
-        if Path(file).name == PLAN_FILE:
-            publish(uri, Document(file, text, about_plan(file), None, FileSyntax(), ()))
-            return ()
-        others, off = companions(file, {d.file: d.text for u, d in documents.items() if u != uri})
-        publish(uri, answers.analyse(text, file, documents.get(uri), others, off))
-        return tuple(other.file for other in others)
+        texts = {d.file: d.text for u, d in self.documents.items() if u != uri and u in self.open_now}
+        document = self.documents[uri] = answers.analyse(self.text(uri), file, texts)
+        self.publish(uri)
+        plan = (document.project.plan.file,) if document.project.plan is not None else ()
+        return (*(source.file for source in document.project.sources), *plan)
 
-    def refresh_all(uri: str) -> None:
-        """Reads a document again, and those open beside it that use what it declares."""
-        files = {Path(f).resolve() for f in refresh(uri)}
-        folder = Path(file_of(uri)).parent if Path(file_of(uri)).name == PLAN_FILE else None
-        for other, document in list(documents.items()):
+    def refresh_all(self, uri: str) -> None:
+        """Reads a document again, and those open beside it that belong to the same system."""
+        files = {Path(f).resolve() for f in self.refresh(uri)}
+        folder = Path(file_of(uri)).parent if is_plan(file_of(uri)) else None
+        for other, document in list(self.documents.items()):
             path = Path(document.file)
             if other != uri and (path.resolve() in files or path.parent == folder):
-                refresh(other)
+                self.refresh(other)
+        if self.soon is not None:
+            self.soon.cancel()
+        self.soon = asyncio.get_running_loop().call_later(SANITY_PAUSE, self.ask, uri)
 
-    def current(uri: str) -> Document:
-        if uri in later:
-            refresh_all(uri)
-        elif uri not in documents:
-            refresh(uri)
-        return documents[uri]
+    def current(self, uri: str) -> Document:
+        if uri in self.later:
+            self.refresh_all(uri)
+        elif uri not in self.documents:
+            self.refresh(uri)
+        return self.documents[uri]
 
-    def opened(params: types.DidOpenTextDocumentParams) -> None:
-        open_now.add(params.text_document.uri)
-        refresh_all(params.text_document.uri)
+    def opened(self, params: types.DidOpenTextDocumentParams) -> None:
+        self.open_now.add(params.text_document.uri)
+        self.refresh_all(params.text_document.uri)
 
-    def changed(params: types.DidChangeTextDocumentParams) -> None:
+    def changed(self, params: types.DidChangeTextDocumentParams) -> None:
         uri = params.text_document.uri
-        if Path(file_of(uri)).name == PLAN_FILE:
-            return  # a plan is read from the disk, once it is saved
-        pause = len(_text(server, uri)) / CHARACTERS_PER_SECOND
+        self.asked.give_up()
+        pause = len(self.text(uri)) / CHARACTERS_PER_SECOND
         if pause < NOTICED_SECONDS:
-            refresh_all(uri)
+            self.refresh_all(uri)
             return
-        if uri in later:
-            later[uri].cancel()
-        later[uri] = asyncio.get_running_loop().call_later(pause, refresh_all, uri)
+        if uri in self.later:
+            self.later[uri].cancel()
+        self.later[uri] = asyncio.get_running_loop().call_later(pause, self.refresh_all, uri)
 
-    def saved(params: types.DidSaveTextDocumentParams) -> None:
-        refresh_all(params.text_document.uri)
+    def saved(self, params: types.DidSaveTextDocumentParams) -> None:
+        self.refresh_all(params.text_document.uri)
 
-    def closed(params: types.DidCloseTextDocumentParams) -> None:
+    def closed(self, params: types.DidCloseTextDocumentParams) -> None:
         uri = params.text_document.uri
-        documents.pop(uri, None)
-        open_now.discard(uri)
-        if uri in later:
-            later.pop(uri).cancel()
-        server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri=uri, diagnostics=[]))
+        self.documents.pop(uri, None)
+        self.open_now.discard(uri)
+        if uri in self.later:
+            self.later.pop(uri).cancel()
+        self.server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri=uri, diagnostics=[]))
 
-    def hover(params: types.HoverParams) -> types.Hover | None:
-        document = current(params.text_document.uri)
-        said = answers.hover(document, _offset(document.text, params.position), status(document.file))
+    def stopped(self, _: None) -> None:
+        if self.soon is not None:
+            self.soon.cancel()
+        self.asked.give_up()
+
+    # -- sanity --------------------------------------------------------------------------------------------------------
+
+    def ask(self, uri: str) -> None:
+        """Ask of the sanity of the nodes of a document's system."""
+        self.soon = None
+        document = self.documents.get(uri)
+        if document is not None and uri in self.open_now:
+            project = document.project
+            self.asked.ask(project.sources, askable(project.sources, project.contract))
+
+    def settled(self) -> None:
+        """Something more is known: the messages and hints of every open document are shown again."""
+        for uri in self.open_now & self.documents.keys():
+            self.publish(uri)
+        workspace = self.server.client_capabilities.workspace
+        if workspace is not None and workspace.inlay_hint is not None and workspace.inlay_hint.refresh_support:
+            self.server.workspace_inlay_hint_refresh(None)
+
+    def sane(self, document: Document) -> Iterator[tuple[Occurrence, tuple[Answer, ...]]]:
+        """What is known of each node and clause of a document, at its name."""
+        nodes = {node.name: node for node in askable(document.project.sources, document.project.contract)}
+        for name in document.names:
+            if name.file != document.file or not name.declares or name.meaning.what not in (*CLAUSES, What.NODE):
+                continue
+            is_node = name.meaning.what is What.NODE
+            node = nodes.get(name.meaning.name if is_node else name.meaning.owner)
+            found = (self.asked.of(node) or ()) if node is not None else ()
+            clauses = {clause.name for clause in node.clauses} if node is not None else set()
+            mine = (a for a in found if (a.subject not in clauses if is_node else a.subject == name.meaning.name))
+            if answered := tuple(mine):
+                yield name, answered
+
+    def publish(self, uri: str) -> None:
+        if uri not in self.open_now:
+            return  # asked about, but not open
+        document = self.documents[uri]
+        lines = Lines(document.text)
+        found = [protocol.diagnostic(d, document, lines) for d in document.diagnostics]
+        for name, answered in self.sane(document):
+            place = lines.range(name.start, name.end)
+            found += [protocol.refuted(a, place) for a in answered if a.is_bad and a.severity != "note"]
+        self.server.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri=uri, diagnostics=found))
+
+    def inlay_hints(self, params: types.InlayHintParams) -> list[types.InlayHint]:
+        document = self.current(params.text_document.uri)
+        lines, found = Lines(document.text), []
+        for name, answered in self.sane(document):
+            place = lines.position(name.end if name.written else name.start)
+            if not params.range.start.line <= place.line <= params.range.end.line:
+                continue
+            told = "\n".join(
+                f"{a.verdict}: {a.claim}{f' ({a.explanation})' if a.explanation else ''}" for a in answered
+            )
+            found.append(types.InlayHint(place, _mark(answered), tooltip=told, padding_left=True, padding_right=True))
+        return found
+
+    # -- questions -----------------------------------------------------------------------------------------------------
+
+    def hover(self, params: types.HoverParams) -> types.Hover | None:
+        document = self.current(params.text_document.uri)
+        offset = Lines(document.text).offset(params.position)
+        said = answers.hover(document, offset, self.status(document.file), self.asked.of)
         return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, said)) if said else None
 
-    def definition(params: types.DefinitionParams) -> types.Location | None:
-        document = current(params.text_document.uri)
-        span = answers.definition(document, _offset(document.text, params.position))
-        if span is None:
+    def definition(self, params: types.DefinitionParams) -> list[types.Location]:
+        document = self.current(params.text_document.uri)
+        found = answers.definition(document, Lines(document.text).offset(params.position))
+        return list(self.locations(document, found))
+
+    def references(self, params: types.ReferenceParams) -> list[types.Location]:
+        document = self.current(params.text_document.uri)
+        offset = Lines(document.text).offset(params.position)
+        return list(self.locations(document, answers.references(document, offset, params.context.include_declaration)))
+
+    def highlights(self, params: types.DocumentHighlightParams) -> list[types.DocumentHighlight]:
+        document = self.current(params.text_document.uri)
+        lines = Lines(document.text)
+        found = answers.references(document, lines.offset(params.position))
+        return [types.DocumentHighlight(lines.range(o.start, o.end)) for o in found if o.file == document.file]
+
+    def locations(self, document: Document, found: Sequence[Occurrence]) -> Iterator[types.Location]:
+        lines = {file: Lines(document.project.text_of(file)) for file in {o.file for o in found}}
+        for one in found:
+            shown = lines[one.file].range(one.start, one.end)
+            yield types.Location(self.uri_of(one.file), shown)
+
+    def uri_of(self, file: str) -> str:
+        """The URI by which an editor knows a file."""
+        open_ = next((uri for uri, d in self.documents.items() if d.file == file), None)
+        return open_ if open_ is not None else Path(file).resolve().as_uri()
+
+    def prepare_rename(self, params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
+        document = self.current(params.text_document.uri)
+        lines = Lines(document.text)
+        name = answers.name_at(document, lines.offset(params.position))
+        if name is None or not is_renameable(document.project, name.meaning):
             return None
-        if span.file == document.file:
-            return types.Location(params.text_document.uri, _range(span, document.text))
-        for uri, other in documents.items():
-            if Path(other.file).resolve() == Path(span.file).resolve():
-                return types.Location(uri, _range(span, other.text))
-        source = read_source(Path(span.file))
-        text = source.text if isinstance(source, Source) else ""
-        return types.Location(Path(span.file).resolve().as_uri(), _range(span, text))
+        return types.PrepareRenamePlaceholder(lines.range(name.start, name.end), name.meaning.name)
 
-    def outline(params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
-        document = current(params.text_document.uri)
-        return [_symbol(s, document) for s in answers.symbols(document)]
+    def rename(self, params: types.RenameParams) -> types.WorkspaceEdit | None:
+        document = self.current(params.text_document.uri)
+        name = answers.name_at(document, Lines(document.text).offset(params.position))
+        if name is None:
+            return None
+        try:
+            edits = rename(document.project, name.meaning, params.new_name)
+        except Refused as refused:
+            raise JsonRpcInvalidRequest(str(refused)) from None
+        lines = {file: Lines(document.project.text_of(file)) for file in {e.file for e in edits}}
+        changes: dict[str, list[types.TextEdit]] = {}
+        for edit in edits:
+            shown = lines[edit.file].range(edit.start, edit.end)
+            changes.setdefault(self.uri_of(edit.file), []).append(types.TextEdit(shown, edit.text))
+        if left := elsewhere(document.project, name.meaning):
+            told = f"`{name.meaning.name}` also stands in {', '.join(left)}: avow does not change these"
+            self.server.window_show_message(types.ShowMessageParams(types.MessageType.Warning, told))
+        return types.WorkspaceEdit(changes)
 
-    def formatting(params: types.DocumentFormattingParams) -> list[types.TextEdit]:
-        document = current(params.text_document.uri)
+    def completion(self, params: types.CompletionParams) -> types.CompletionList:
+        document = self.current(params.text_document.uri)
+        offset, contract = Lines(document.text).offset(params.position), document.project.contract
+        if is_plan(document.file):
+            found = plan_offers(document.text, contract, offset)
+        else:
+            found = offers(document.taken_apart, contract, offset)
+        snippets = _takes_snippets(self.server.client_capabilities)
+        items = [protocol.completion_item(offer, k, snippets) for k, offer in enumerate(found)]
+        return types.CompletionList(is_incomplete=False, items=items)
+
+    def signature_help(self, params: types.SignatureHelpParams) -> types.SignatureHelp | None:
+        document = self.current(params.text_document.uri)
+        if is_plan(document.file):
+            return None
+        offset = Lines(document.text).offset(params.position)
+        found = signature(document.taken_apart, document.project.contract, offset)
+        return protocol.signature_help(found) if found is not None else None
+
+    def code_actions(self, params: types.CodeActionParams) -> list[types.CodeAction]:
+        document = self.current(params.text_document.uri)
+        if is_plan(document.file) or not document.project.sources:
+            return []
+        lines, found = Lines(document.text), []
+
+        def check(text: str) -> tuple[Diagnostic, ...]:
+            source = clean_text(text, document.file)
+            if isinstance(source, Diagnostic):
+                return (source,)
+            others = [s for s in document.project.sources if s.file != document.file]
+            return check_in_part([source, *others], off=document.project.off)[1]
+
+        for each in document.diagnostics:
+            if each.span is None or not _touches(lines.of_span(each.span), params.range):
+                continue
+            for fix in fixes(each, document.text, check):
+                edit = types.TextEdit(lines.range(fix.start, fix.end), fix.text)
+                found.append(
+                    types.CodeAction(
+                        fix.title,
+                        types.CodeActionKind.QuickFix,
+                        diagnostics=[protocol.diagnostic(each, document, lines)],
+                        edit=types.WorkspaceEdit({params.text_document.uri: [edit]}),
+                    )
+                )
+        return found
+
+    def outline(self, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
+        document = self.current(params.text_document.uri)
+        lines = Lines(document.text)
+        return [protocol.symbol(s, lines) for s in answers.symbols(document)]
+
+    def folding(self, params: types.FoldingRangeParams) -> list[types.FoldingRange]:
+        document = self.current(params.text_document.uri)
+        if is_plan(document.file):
+            return []
+        lines = Lines(document.text)
+        return [
+            types.FoldingRange(
+                lines.position(f.start).line, lines.position(f.end).line, kind=types.FoldingRangeKind(f.kind)
+            )
+            for f in folds(document.taken_apart)
+        ]
+
+    def semantic_tokens(self, params: types.SemanticTokensParams) -> types.SemanticTokens:
+        document = self.current(params.text_document.uri)
+        if is_plan(document.file):
+            return types.SemanticTokens([])
+        return protocol.semantic_tokens(coloured(document.taken_apart, document.names), Lines(document.text))
+
+    def formatting(self, params: types.DocumentFormattingParams) -> list[types.TextEdit]:
+        document = self.current(params.text_document.uri)
+        if is_plan(document.file):
+            return []
         try:
             formatted = format_text(document.text, document.file)
         except Rejected:
             return []
-        lines = document.text.count("\n") + 1
-        whole = types.Range(types.Position(0, 0), types.Position(lines, 0))
+        whole = types.Range(types.Position(0, 0), types.Position(document.text.count("\n") + 1, 0))
         return [types.TextEdit(whole, formatted)] if formatted != document.text else []
 
-    for feature, answer in (
-        (types.TEXT_DOCUMENT_DID_OPEN, opened),
-        (types.TEXT_DOCUMENT_DID_CHANGE, changed),
-        (types.TEXT_DOCUMENT_DID_SAVE, saved),
-        (types.TEXT_DOCUMENT_DID_CLOSE, closed),
-        (types.TEXT_DOCUMENT_HOVER, hover),
-        (types.TEXT_DOCUMENT_DEFINITION, definition),
-        (types.TEXT_DOCUMENT_DOCUMENT_SYMBOL, outline),
-        (types.TEXT_DOCUMENT_FORMATTING, formatting),
-    ):
-        server.feature(feature)(answer)
-    return server
+
+def _mark(answered: Sequence[Answer]) -> str:
+    """What a hint shows: the claims that do not hold, or are open, by name; else that all do.
+
+    What is only worth knowing stands in its tooltip.
+    """
+    bad = [a.name for a in answered if a.is_bad and a.severity != "note"]
+    unsettled = [a.name for a in answered if a.verdict == "unknown"]
+    if bad:
+        return f"✗ {', '.join(bad)}"
+    return f"? {', '.join(unsettled)}" if unsettled else "✓ sane"
+
+
+def _touches(one: types.Range, other: types.Range) -> bool:
+    return (one.start.line, one.start.character) <= (other.end.line, other.end.character) and (
+        (other.start.line, other.start.character) <= (one.end.line, one.end.character)
+    )
+
+
+def _takes_snippets(capabilities: types.ClientCapabilities) -> bool:
+    document = capabilities.text_document
+    item = document.completion.completion_item if document is not None and document.completion is not None else None
+    return bool(item is not None and item.snippet_support)
+
+
+def make_server(status: Callable[[str], StatusLookup] = _nothing) -> LanguageServer:
+    """A server with every answer registered; `status` gives, for a file, how the clauses in it stand in the ledger."""
+    language_server = LanguageServer(
+        "avow", __version__, text_document_sync_kind=types.TextDocumentSyncKind.Incremental
+    )
+    server = Server(language_server, status)
+    registered: tuple[tuple[str, Callable[[Any], Any], Any], ...] = (
+        (types.TEXT_DOCUMENT_DID_OPEN, server.opened, None),
+        (types.TEXT_DOCUMENT_DID_CHANGE, server.changed, None),
+        (types.TEXT_DOCUMENT_DID_SAVE, server.saved, None),
+        (types.TEXT_DOCUMENT_DID_CLOSE, server.closed, None),
+        (types.SHUTDOWN, server.stopped, None),
+        (types.TEXT_DOCUMENT_HOVER, server.hover, None),
+        (types.TEXT_DOCUMENT_DEFINITION, server.definition, None),
+        (types.TEXT_DOCUMENT_REFERENCES, server.references, None),
+        (types.TEXT_DOCUMENT_DOCUMENT_HIGHLIGHT, server.highlights, None),
+        (types.TEXT_DOCUMENT_PREPARE_RENAME, server.prepare_rename, None),
+        (types.TEXT_DOCUMENT_RENAME, server.rename, types.RenameOptions(prepare_provider=True)),
+        (types.TEXT_DOCUMENT_COMPLETION, server.completion, types.CompletionOptions(trigger_characters=["."])),
+        (
+            types.TEXT_DOCUMENT_SIGNATURE_HELP,
+            server.signature_help,
+            types.SignatureHelpOptions(trigger_characters=["(", ","]),
+        ),
+        (
+            types.TEXT_DOCUMENT_CODE_ACTION,
+            server.code_actions,
+            types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix]),
+        ),
+        (types.TEXT_DOCUMENT_DOCUMENT_SYMBOL, server.outline, None),
+        (types.TEXT_DOCUMENT_FOLDING_RANGE, server.folding, None),
+        (types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, server.semantic_tokens, protocol.LEGEND),
+        (types.TEXT_DOCUMENT_INLAY_HINT, server.inlay_hints, None),
+        (types.TEXT_DOCUMENT_FORMATTING, server.formatting, None),
+    )
+    for feature, answer, options in registered:
+
+        def answering(params: Any, answer: Callable[[Any], Any] = answer) -> Any:
+            return answer(params)
+
+        language_server.feature(feature, options)(answering)
+    return language_server
 
 
 def serve(status: Callable[[str], StatusLookup] = _nothing) -> None:
     """Run on standard input and output until the editor leaves."""
     make_server(status).start_io()
-
-
-def _text(server: LanguageServer, uri: str) -> str:
-    """A document's text; of one that is not open, the file's; nothing where there is none."""
-    try:
-        text: str = server.workspace.get_text_document(uri).source
-    except (OSError, ValueError):
-        return ""
-    return text
-
-
-# --- the protocol's words --------------------------------------------------------------------------------------------
-
-
-def _units(text: str) -> int:
-    """The length in UTF-16 code units, in which the protocol counts columns."""
-    return len(text.encode("utf-16-le", "surrogatepass")) // 2
-
-
-def _position(line: int, column: int, lines: list[str]) -> types.Position:
-    content = lines[line - 1] if 0 < line <= len(lines) else ""
-    return types.Position(max(line - 1, 0), _units(content[: max(column - 1, 0)]))
-
-
-def _range(span: Span, text: str) -> types.Range:
-    lines = text.split("\n")
-    return types.Range(_position(span.line, span.column, lines), _position(span.end_line, span.end_column, lines))
-
-
-def _offset(text: str, position: types.Position) -> int:
-    lines = text.split("\n")
-    if position.line >= len(lines):
-        return len(text)
-    line = lines[position.line]
-    column = units = 0
-    while column < len(line) and units < position.character:
-        units += _units(line[column])
-        column += 1
-    return sum(len(row) + 1 for row in lines[: position.line]) + column
-
-
-def _diagnostic(diagnostic: Diagnostic, document: Document) -> types.Diagnostic:
-    nowhere = Span(document.file, 1, 1, 1, 1)
-    message = diagnostic.message + (f"\n{diagnostic.hint}" if diagnostic.hint else "")
-    related = [
-        types.DiagnosticRelatedInformation(
-            types.Location(Path(place.file).resolve().as_uri(), _range(place, document.text)), note
-        )
-        for note, place in diagnostic.notes
-        if place is not None and place.file == document.file
-    ]
-    arguments: dict[str, Any] = {"related_information": related} if related else {}
-    return types.Diagnostic(
-        range=_range(diagnostic.span or nowhere, document.text),
-        message=message,
-        severity=_SEVERITIES[diagnostic.severity],
-        code=diagnostic.code,
-        source="avow",
-        **arguments,
-    )
-
-
-def _symbol(symbol: Symbol, document: Document) -> types.DocumentSymbol:
-    place = _range(symbol.span, document.text)
-    return types.DocumentSymbol(
-        name=symbol.name or "(no name)",
-        kind=_KINDS[symbol.kind],
-        range=place,
-        selection_range=place,
-        detail=symbol.detail,
-        children=[_symbol(s, document) for s in symbol.inner],
-    )

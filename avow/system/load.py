@@ -14,8 +14,9 @@ from avow.system.include import include, still_open
 from avow.system.launched import started
 from avow.system.links import with_links
 from avow.system.names import check_names
-from avow.system.plan import System
+from avow.system.plan import Plan, System
 from avow.system.plan_file import bare_plan, fill_methods, read_plan
+from avow.system.strict_yaml import Piece
 from avow.system.subsystems import check_subsystems, resolved
 from avow.system.topics import heard
 from avow.tuning.sizes import SYSTEMS_WITHIN
@@ -49,6 +50,28 @@ def _load(folder: Path, within: tuple[Path, ...], known: dict[Path, System]) -> 
     faults += more
     if contract is None:
         raise Rejected(*faults)
+    return _linked(folder, plan, root, faults, contract, within, known)
+
+
+def load_texts(path: Path, text: str, contract: Contract) -> System:
+    """The system that a plan's file would be the plan of, if `text` were its text and its files declared `contract`.
+
+    Raises Rejected, with what stops the loading.
+    """
+    plan, root, faults = read_plan(path, text)
+    return _linked(path.parent, plan, root, faults, contract, (), {})
+
+
+def _linked(
+    folder: Path,
+    plan: Plan,
+    root: Piece,
+    faults: tuple[Diagnostic, ...],
+    contract: Contract,
+    within: tuple[Path, ...],
+    known: dict[Path, System],
+) -> System:
+    """The system of a plan and its contract; `faults` are those of the plan's values."""
     chain = (*within, folder.resolve())
 
     def part(inner: Path) -> System:

@@ -51,12 +51,13 @@ RESERVED = ("interpret", "domains", "steps")
 """Keys of `scenario` that are not tables."""
 
 
-def read_plan(path: Path) -> tuple[Plan, Piece, tuple[Diagnostic, ...]]:
-    """The plan in a file, its names not yet held against a contract; the document; what is wrong with its values.
+def read_plan(path: Path, text: str | None = None) -> tuple[Plan, Piece, tuple[Diagnostic, ...]]:
+    """The plan in a file (or in a `text` that is to be the file's), its names not yet held against a contract; the
+    document; what is wrong with its values.
 
     Raises Rejected where the file cannot be read or its shape is wrong: then nothing more can be said of it.
     """
-    root, faults = _document(path)
+    root, faults = _document(path) if text is None else read_yaml(text.encode("utf-8", "replace"), str(path))
     faults += check_shape(root)
     if faults:
         raise Rejected(*faults)

@@ -63,3 +63,21 @@ SUBJECT_BATCH = 100
 
 SAMPLES_SHIFTED = 150
 """Cases with the differences of a solver's values: one in some ten of them rounds as the solver says."""
+
+SANITY_PAUSE = 0.4
+"""Seconds without a change of a text after which the sanity of its nodes is asked: as long as between two words."""
+
+NODES_REMEMBERED = 400
+"""Nodes whose sanity the language server remembers, by their meaning: more than a system has."""
+
+SANITY_LINE = 1 << 24
+"""Bytes of the answers about one node."""
+
+FILES_LOOKED_THROUGH = 2_000
+"""Files of a system's folder in which a rename looks for the old name: more are data."""
+
+BYTES_LOOKED_THROUGH = 1_000_000
+"""Bytes of a file that it reads: larger ones are recordings."""
+
+FIXES_TRIED = 12
+"""Ways of doing what one hint says that the language server tries: each is a check of the text."""

@@ -1,0 +1,150 @@
+"""Sanity while one writes: a process of its own, which ends when the text has changed.
+
+``python -m avow.lsp.background PARENT`` reads the texts of a system from its standard input, asks the sanity claims of
+the nodes that are wanted, and writes a line of JSON for each node as soon as it is settled. It opens no file and runs
+nothing of the workspace: what a plan says (scenario, environment, providers) is asked by ``avow sanity``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from avow.base.process import die_with, kill_tree, unwatch, watch
+from avow.language.contract import Contract, Node
+from avow.language.load import check_in_part, sound_nodes
+from avow.language.source import Source
+from avow.lsp.names import taken_apart
+from avow.sanity.claims import node_key
+from avow.tuning.running import NODES_REMEMBERED, SANITY_LINE
+
+_NEUTRAL = "/"
+"""Where it runs: nothing of a workspace is found from there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What became of one sanity claim. `subject` is the clause or output that it is about, if it is about one."""
+
+    name: str
+    subject: str
+    claim: str
+    verdict: str
+    severity: str
+    explanation: str
+    example: str
+    because: str
+
+    @property
+    def is_bad(self) -> bool:
+        """Whether it is refuted or broken, and no mere consequence of another."""
+        return self.verdict in ("refuted", "error") and not self.because
+
+
+def askable(sources: Sequence[Source], contract: Contract) -> tuple[Node, ...]:
+    """The nodes of which nothing is missing for an error."""
+    return sound_nodes(contract, [taken_apart(s.file, s.text).syntax for s in sources])
+
+
+class Asked:
+    """The answers known, by the meaning of a node; and the process that looks for more. At most one runs."""
+
+    def __init__(self, told: Callable[[], None]) -> None:
+        self.told = told
+        self.answers: dict[str, tuple[Answer, ...]] = {}
+        self.wanted: frozenset[str] = frozenset()
+        """The keys of the nodes that are being asked about."""
+        self.task: asyncio.Task[None] | None = None
+
+    def of(self, node: Node) -> tuple[Answer, ...] | None:
+        """What is known of a node; None while it is not asked."""
+        return self.answers.get(_key(node))
+
+    def ask(self, sources: Sequence[Source], nodes: Sequence[Node]) -> None:
+        """Ask of the nodes of which nothing is known yet; whatever else is under way is given up."""
+        missing = frozenset(_key(node) for node in nodes) - self.answers.keys()
+        if missing == self.wanted and self.task is not None and not self.task.done():
+            return
+        self.give_up()
+        if missing:
+            self.wanted = missing
+            self.task = asyncio.get_running_loop().create_task(self._run(sources, missing))
+
+    def give_up(self) -> None:
+        """End the process that is under way, if there is one."""
+        if self.task is not None:
+            self.task.cancel()
+        self.task, self.wanted = None, frozenset()
+
+    async def _run(self, sources: Sequence[Source], missing: frozenset[str]) -> None:
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-P", "-m", "avow.lsp.background", str(os.getpid())),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.DEVNULL,
+            cwd=_NEUTRAL,
+            start_new_session=True,
+            limit=SANITY_LINE,
+        )
+        watch(process.pid)
+        try:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            texts = [[s.file, s.text] for s in sources]
+            process.stdin.write(json.dumps({"texts": texts, "nodes": sorted(missing)}).encode())
+            process.stdin.close()
+            while line := await process.stdout.readline():
+                found = json.loads(line)
+                self.answers[found["key"]] = tuple(Answer(**answer) for answer in found["answers"])
+                while len(self.answers) > NODES_REMEMBERED:
+                    del self.answers[next(iter(self.answers))]
+                self.told()
+        except (OSError, ValueError):
+            pass  # it died: nothing is known of the rest
+        finally:
+            with suppress(ProcessLookupError):
+                kill_tree(process.pid)
+            unwatch(process.pid)
+
+
+def _key(node: Node) -> str:
+    """Of all that the answers depend on, and of what their sentences say."""
+    return f"{node.name} {node_key(node)}"
+
+
+def main(parent: int) -> None:
+    """What the process does."""
+    die_with(parent)
+    os.nice(10)  # whoever writes comes first
+    from avow.sanity.analysis import analyse
+
+    asked: dict[str, Any] = json.load(sys.stdin)
+    contract, _ = check_in_part([Source(file, text) for file, text in asked["texts"]])
+    for node in contract.nodes:
+        key = _key(node)
+        if key not in asked["nodes"]:
+            continue
+        answers = [
+            {
+                "name": result.name,
+                "subject": result.subject or "",
+                "claim": result.claim,
+                "verdict": str(result.verdict),
+                "severity": str(result.severity),
+                "explanation": result.explanation,
+                "example": result.counterexample.text() if result.counterexample is not None else "",
+                "because": result.because or "",
+            }
+            for result in analyse(node, contract)
+        ]
+        print(json.dumps({"key": key, "answers": answers}), flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

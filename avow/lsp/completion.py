@@ -1,0 +1,197 @@
+"""What may be written at a place, and what the arguments of an operator or function are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from avow.language.contract import Contract, Node, Port
+from avow.language.environment import of_contract
+from avow.language.lexer import LONG_UNITS, STEPS, UNITS
+from avow.language.nodes import ROS_BUILTINS
+from avow.language.printer import show_sort, show_term, show_type
+from avow.language.sorts import DataSort, FunctionSort, SequenceSort
+from avow.language.terms import Role
+from avow.lsp.names import Text
+from avow.lsp.places import Place, place_of
+from avow.lsp.vocabulary import BUILTIN_TYPES, CONNECTIVES, CONTEXT, FORMS, NODE, QUANTIFIERS, SECTIONS
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """Something that may be written. `template` is a snippet in the protocol's words; empty: the label itself."""
+
+    label: str
+    kind: str
+    """keyword, operator, function, type, element, constant, input, output, variable, node, guarantee, unit, key"""
+    detail: str = ""
+    template: str = ""
+    about: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """How an operator or function is applied, and which of its arguments the place is in."""
+
+    label: str
+    parameters: tuple[str, ...]
+    active: int
+    about: str = ""
+
+
+def offers(text: Text, contract: Contract, offset: int) -> tuple[Offer, ...]:
+    """All that may be written at an offset of a contract."""
+    place = place_of(text, offset)
+    if place is None:
+        return ()
+    once: dict[str, Offer] = {}
+    for offer in _offers(place, contract):
+        once.setdefault(offer.label, offer)
+    return tuple(once.values())
+
+
+def _offers(place: Place, contract: Contract) -> Iterator[Offer]:
+    node = next((n for n in contract.nodes if n.name == place.node), None)
+    match place.top, place.section:
+        case "", _:
+            yield Offer("node", "keyword", "a node's contract", NODE)
+            yield Offer("context", "keyword", "types and constants", CONTEXT)
+        case "CONTEXT", _:
+            if place.last == "COLON" or any(t.type == "COLON" for t in place.before):
+                yield from _types(contract)
+            elif any(t.type == "EQUALS" for t in place.before):
+                yield from _values(contract)
+        case "NODE", "":
+            for word, (template, detail) in SECTIONS.items():
+                yield Offer(word, "keyword", detail, template)
+        case "NODE", "INPUTS" | "OUTPUTS":
+            if any(t.type == "COLON" for t in place.before):
+                yield from _types(contract)
+        case "NODE", "TOPICS":
+            yield from _of_topic(place, node)
+        case "NODE", "ASSUME" | "GUARANTEE":
+            yield from _of_formula(place, node, contract)
+        case _:  # a name that is yet to be made up
+            return
+
+
+def _of_topic(place: Place, node: Node | None) -> Iterator[Offer]:
+    words = [t.type for t in place.before]
+    if words[-2:-1] in (["IN"], ["OUT"]) and words[-1] == "DOT":
+        yield from _ports(node, Role.INPUT if words[-2] == "IN" else Role.OUTPUT, "")
+    elif words[-2:] == ["MATCHES", "LPAR"]:
+        yield from _ports(node, Role.INPUT, "in.")
+        yield from _ports(node, Role.OUTPUT, "out.")
+    elif words[-1:] in (["LPAR"], ["COMMA"]):
+        yield from (Offer(name, "type", "a built-in type of ROS") for name in ROS_BUILTINS)
+    elif words[-1:] == ["NAME"]:
+        yield Offer("matches", "keyword", "the input or output that it carries", "matches(${1:in.name})")
+
+
+def _of_formula(place: Place, node: Node | None, contract: Contract) -> Iterator[Offer]:
+    words = [t.type for t in place.before]
+    if len(words) > 1 and words[-1] == "DOT" and words[-2] in ("IN", "OUT"):
+        yield from _ports(node, Role.INPUT if words[-2] == "IN" else Role.OUTPUT, "")
+        return
+    if words[-1:] == ["DOT"]:
+        return
+    if words[-1:] == ["NUMBER"] and "LSQUARE" in words and "RSQUARE" not in words[words.index("LSQUARE") :]:
+        yield from (Offer(unit, "unit") for unit in (*STEPS, *UNITS, *LONG_UNITS))
+        return
+    if words[-1:] in (["IN"], ["NOT_IN"]):
+        yield from _types(contract)
+    yield from (Offer(name, "variable", "quantified") for name in place.bound)
+    for role in (Role.INPUT, Role.OUTPUT):
+        yield from _ports(node, role, f"{role}.")
+    yield from _values(contract)
+    for form in FORMS.values():
+        yield Offer(form.name, "function", form.label, form.template, form.meaning)
+    for word, meaning in QUANTIFIERS.items():
+        yield Offer(word, "operator", f"{word}(x in S | F)", f"{word}(${{1:x}} in ${{2:REAL}} | ${{3:F}})", meaning)
+    yield Offer("if", "operator", "if F then s else t", "if ${1:F} then ${2:s} else ${3:t}")
+    yield from (Offer(word, "operator", detail) for word, detail in CONNECTIVES.items())
+    yield from (Offer(word, "constant", "BOOL") for word in ("TRUE", "FALSE"))
+
+
+def _ports(node: Node | None, role: Role, before: str) -> Iterator[Offer]:
+    for port in (node.inputs if role is Role.INPUT else node.outputs) if node is not None else ():
+        detail = f"{port.type_name} = {shown}" if (shown := show_type(port.sort)) != port.type_name else shown
+        yield Offer(before + port.name, "input" if role is Role.INPUT else "output", detail)
+
+
+def _types(contract: Contract) -> Iterator[Offer]:
+    yield from (Offer(name, "type", show_type(sort)) for name, sort in contract.types)
+    yield from (Offer(name, "type", detail) for name, detail in BUILTIN_TYPES.items())
+
+
+def _values(contract: Contract) -> Iterator[Offer]:
+    for name, sort in of_contract(contract).elements.items():
+        parameters = sort.constructor(name).parameters if isinstance(sort, DataSort) else ()
+        stops = ", ".join(f"${{{k}:{show_sort(p)}}}" for k, p in enumerate(parameters, 1))
+        yield Offer(name, "element", f"an element of {sort.name}", f"{name}({stops})" if parameters else "")
+    yield from (Offer(name, "constant", show_term(term, "rcl")) for name, term in contract.constants)
+
+
+# --- signatures ------------------------------------------------------------------------------------------------------
+
+
+def signature(text: Text, contract: Contract, offset: int) -> Signature | None:
+    """How what stands before the innermost open parenthesis is applied."""
+    place = place_of(text, offset)
+    if place is None or place.section not in ("ASSUME", "GUARANTEE"):
+        return None
+    commas, closed = 0, 0
+    for at in range(len(place.before) - 1, 0, -1):
+        kind = place.before[at].type
+        if kind in ("RPAR", "RBRACE", "RSQUARE"):
+            closed += 1
+        elif kind in ("LPAR", "LBRACE", "LSQUARE") and closed:
+            closed -= 1
+        elif kind == "LPAR":
+            return _of_head(place, at, contract, commas)
+        elif kind == "COMMA" and not closed:
+            commas += 1
+    return None
+
+
+def _of_head(place: Place, opening: int, contract: Contract, active: int) -> Signature | None:
+    at = opening - 1
+    if place.before[at].type == "RSQUARE":
+        while at > 0 and place.before[at].type != "LSQUARE":
+            at -= 1
+        at -= 1
+    name = place.before[at]
+    if name.text in QUANTIFIERS:
+        label = f"{name.text}(x in S | F)"
+        bar = any(t.type in ("BAR", "SEMICOLON") for t in place.before[opening:])
+        return Signature(label, ("x in S", "F"), int(bar), QUANTIFIERS[name.text])
+    if name.type != "NAME":
+        return None
+    role = place.before[at - 2].text if at > 1 and place.before[at - 1].type == "DOT" else None
+    found = _applied(place, name.text, role, contract)
+    if found is None and name.text in FORMS and role is None:
+        form = FORMS[name.text]
+        found = Signature(form.label, form.parameters, 0, form.meaning)
+    return replace(found, active=min(active, max(len(found.parameters) - 1, 0))) if found is not None else None
+
+
+def _applied(place: Place, name: str, role: str | None, contract: Contract) -> Signature | None:
+    """A port or constructor of the contract."""
+    node = next((n for n in contract.nodes if n.name == place.node), None)
+    ports: list[Port] = [p for p in (*node.inputs, *node.outputs) if p.name == name] if node is not None else []
+    for port in ports:
+        if role is not None and port.role != role:
+            continue
+        match port.sort:
+            case FunctionSort(parameters=parameters, result=result):
+                shown = tuple(map(show_sort, parameters))
+                return Signature(f"{name}({', '.join(shown)})", shown, 0, f"→ {show_sort(result)}")
+            case SequenceSort(item=item):
+                return Signature(f"{name}(i)", ("i",), 0, f"the element at position i, from 0: {show_sort(item)}")
+            case _:  # takes no arguments
+                pass
+    sort = of_contract(contract).elements.get(name)
+    if role is None and isinstance(sort, DataSort) and (parameters := sort.constructor(name).parameters):
+        shown = tuple(map(show_sort, parameters))
+        return Signature(f"{name}({', '.join(shown)})", shown, 0, f"an element of {sort.name}")
+    return None

@@ -1,0 +1,284 @@
+"""What every name in the contracts of a system stands for, and where it stands: a table, made from the syntax.
+
+It says the same as the checker (`avow.language.check_names`), for every clause that parses; a clause that does not is
+looked through word by word, which is enough for hovering. Places are offsets into the texts.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import assert_never
+
+from avow.language.contract import ClauseKind, Contract
+from avow.language.environment import Environment, of_contract
+from avow.language.lexer import Token, tokens
+from avow.language.load import unless_torn
+from avow.language.outline import FileSyntax, NodeSyntax, read
+from avow.language.parser import QUANTIFIERS
+from avow.language.source import Reports, Source
+from avow.language.syntax import (
+    ConstantDeclaration,
+    Element,
+    NamedType,
+    NodePort,
+    PortName,
+    Quantification,
+    SetDisplay,
+    Syntax,
+    TypeDeclaration,
+    children,
+    unparenthesised,
+    walk,
+)
+from avow.language.syntax import Name as NameSyntax
+from avow.language.terms import Role
+
+
+class What(StrEnum):
+    """What a name may stand for."""
+
+    NODE = "node"
+    INPUT = "input"
+    OUTPUT = "output"
+    ASSUMPTION = "assumption"
+    GUARANTEE = "guarantee"
+    TYPE = "type"
+    CONSTANT = "constant"
+    ELEMENT = "element"
+    VARIABLE = "variable"
+
+
+PORTS = (What.INPUT, What.OUTPUT)
+CLAUSES = (What.ASSUMPTION, What.GUARANTEE)
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """One thing that names stand for. `owner` is the node of a port or clause; of a quantified variable, where it is
+    bound."""
+
+    what: What
+    name: str
+    owner: str = ""
+
+    @property
+    def shown(self) -> str:
+        """``input agent.at``, for messages."""
+        return f"{self.what} {f'{self.owner}.' if self.what in (*PORTS, *CLAUSES) else ''}{self.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class Occurrence:
+    """A place where the name of something stands. One that is not `written` is where a clause without a name begins."""
+
+    meaning: Meaning
+    file: str
+    start: int
+    end: int
+    declares: bool = False
+    written: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Text:
+    """A contract's text, taken apart; of one text there is one, while it is remembered."""
+
+    file: str
+    text: str
+    syntax: FileSyntax
+    tokens: tuple[Token, ...]
+    comments: tuple[Token, ...]
+
+
+@functools.lru_cache(maxsize=64)
+def taken_apart(file: str, text: str) -> Text:
+    """The tokens and clauses of a text; what is wrong in it is not said here."""
+    reports, comments = Reports(Source(file, text)), list[Token]()
+    found = tokens(reports, comments)
+    return Text(file, text, read(found, unless_torn(reports)), tuple(found), tuple(comments))
+
+
+@functools.lru_cache(maxsize=16)
+def occurrences(texts: tuple[Text, ...], contract: Contract) -> tuple[Occurrence, ...]:
+    """Every name in the texts that stands for something, in each text by its place. `contract` is what they declare, as
+    far as it can be read."""
+    reader = _Reader(of_contract(contract), {t.name.text: _ports(t) for text in texts for t in text.syntax.nodes})
+    found: dict[tuple[str, int], Occurrence] = {}
+    for text in texts:
+        for one in reader.text(text):
+            found.setdefault((one.file, one.start), one)
+    order = {text.file: k for k, text in enumerate(texts)}
+    return tuple(sorted(found.values(), key=lambda o: (order[o.file], o.start)))
+
+
+def clause_names(node: NodeSyntax) -> Iterator[tuple[Meaning, int, int, bool]]:
+    """Each clause of a node by its name, with the place of the name, or (False) of the clause's first word."""
+    counts = dict.fromkeys(ClauseKind, 0)
+    for clause in node.clauses:
+        counts[clause.kind] += 1
+        letter = "A" if clause.kind is ClauseKind.ASSUMPTION else "G"
+        what = What.ASSUMPTION if clause.kind is ClauseKind.ASSUMPTION else What.GUARANTEE
+        name = clause.name.text if clause.name is not None else f"{letter}{counts[clause.kind]}"
+        place = clause.name or Token("", "", clause.start, clause.start + 1)
+        yield Meaning(what, name, node.name.text), place.start, place.end, clause.name is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """The names of a node's ports, by role."""
+
+    inputs: frozenset[str] = frozenset()
+    outputs: frozenset[str] = frozenset()
+
+    def meaning(self, node: str, name: str, role: str | None = None) -> Meaning | None:
+        """The port of that name; of an input and an output, the input."""
+        if role != Role.OUTPUT and name in self.inputs:
+            return Meaning(What.INPUT, name, node)
+        if role != Role.INPUT and name in self.outputs:
+            return Meaning(What.OUTPUT, name, node)
+        return None
+
+
+def _ports(node: NodeSyntax) -> Ports:
+    both = (frozenset(p.name.text for p in (t.items if t else ())) for t in (node.inputs, node.outputs))
+    return Ports(*both)
+
+
+@dataclass(slots=True)
+class _Reader:
+    environment: Environment
+    nodes: Mapping[str, Ports]
+    node: str = ""
+    text_: Text = field(default_factory=lambda: Text("", "", FileSyntax(), (), ()))
+
+    def at(self, meaning: Meaning | None, start: int, end: int, declares: bool = False) -> Iterator[Occurrence]:
+        if meaning is not None and meaning.name and self.text_.text[start:end] == meaning.name:
+            yield Occurrence(meaning, self.text_.file, start, end, declares)
+
+    def global_name(self, name: str) -> Meaning | None:
+        """What a name means wherever it stands."""
+        environment = self.environment
+        if name in environment.elements:
+            return Meaning(What.ELEMENT, name)
+        if name in environment.constants:
+            return Meaning(What.CONSTANT, name)
+        return Meaning(What.TYPE, name) if name in environment.types else None
+
+    def text(self, text: Text) -> Iterator[Occurrence]:
+        self.text_ = text
+        for declaration in text.syntax.declarations:
+            name = declaration.name
+            yield from self.at(self.global_name(name.text), name.start, name.end, True)
+            match declaration:
+                case TypeDeclaration(type=type_):
+                    yield from self.in_type(type_)
+                case ConstantDeclaration(value=value):
+                    body = unparenthesised(value)
+                    names_set = isinstance(body, SetDisplay) and name.text in self.environment.types
+                    for one in self.in_formula(value, {}):
+                        yield _declaring(one) if names_set and one.meaning.what is What.ELEMENT else one
+                case _:
+                    assert_never(declaration)
+        for node in text.syntax.nodes:
+            yield from self.of_node(node)
+
+    def of_node(self, node: NodeSyntax) -> Iterator[Occurrence]:
+        self.node = node.name.text
+        yield from self.at(Meaning(What.NODE, self.node), node.name.start, node.name.end, True)
+        for what, listing in ((What.INPUT, node.inputs), (What.OUTPUT, node.outputs)):
+            for port in listing.items if listing is not None else ():
+                yield from self.at(Meaning(what, port.name.text, self.node), port.name.start, port.name.end, True)
+                yield from self.in_type(port.type)
+        for topic in node.topics.items if node.topics is not None else ():
+            if topic.port is not None:
+                meaning = self.nodes[self.node].meaning(self.node, topic.port.text, topic.role)
+                yield from self.at(meaning, topic.port.start, topic.port.end)
+        for clause, (meaning, start, end, written) in zip(node.clauses, clause_names(node), strict=True):
+            yield Occurrence(meaning, self.text_.file, start, end, True, written)
+            if clause.formula is not None:
+                yield from self.in_formula(clause.formula, {})
+            else:
+                yield from self.in_words([t for t in self.text_.tokens if _within(t, clause.inside)])
+        self.node = ""
+
+    def in_type(self, tree: Syntax) -> Iterator[Occurrence]:
+        for part in walk(tree):
+            match part:
+                case NamedType(text=name):
+                    if name in self.environment.types:
+                        yield from self.at(Meaning(What.TYPE, name), part.start, part.end)
+                case Element(name=token):
+                    yield from self.at(Meaning(What.ELEMENT, token.text), token.start, token.end, True)
+                case _:  # names nothing by itself
+                    pass
+
+    def in_formula(self, tree: Syntax, bound: Mapping[str, Meaning]) -> Iterator[Occurrence]:
+        stack: list[tuple[Syntax, Mapping[str, Meaning]]] = [(tree, bound)]
+        while stack:
+            part, scope = stack.pop()
+            match part:
+                case NameSyntax(text=name):
+                    yield from self.at(scope.get(name) or self.meaning(name), part.start, part.end)
+                case PortName(role=role, name=name):
+                    ports = self.nodes.get(self.node, Ports())
+                    yield from self.at(ports.meaning(self.node, name, role), part.end - len(name), part.end)
+                case NodePort():
+                    pass  # a contract speaks of its own ports only
+                case Quantification(binders=binders, body=body):
+                    inner = dict(scope)
+                    for binder in binders:
+                        stack.append((binder.domain, dict(inner)))
+                        for token in binder.names:
+                            place = f"{self.text_.file}:{token.start}"
+                            inner[token.text] = Meaning(What.VARIABLE, token.text, place)
+                            yield from self.at(inner[token.text], token.start, token.end, True)
+                    stack.append((body, inner))
+                case _:  # whatever else has parts
+                    stack.extend((each, scope) for each in children(part))
+
+    def meaning(self, name: str) -> Meaning | None:
+        ports = self.nodes.get(self.node, Ports())
+        return ports.meaning(self.node, name) or self.global_name(name)
+
+    def in_words(self, found: Sequence[Token]) -> Iterator[Occurrence]:
+        """The names of a clause that does not parse."""
+        bound: dict[str, Meaning] = {}
+        for at, token in enumerate(found):
+            if token.type in QUANTIFIERS:
+                for name in _bound_after(found, at):
+                    bound[name.text] = Meaning(What.VARIABLE, name.text, f"{self.text_.file}:{name.start}")
+                    yield from self.at(bound[name.text], name.start, name.end, True)
+            if token.type != "NAME":
+                continue
+            if at > 1 and found[at - 1].type == "DOT":
+                ports, role = self.nodes.get(self.node, Ports()), found[at - 2].text
+                meaning = ports.meaning(self.node, token.text, role) if role in (Role.INPUT, Role.OUTPUT) else None
+            else:
+                meaning = bound.get(token.text) or self.meaning(token.text)
+            yield from self.at(meaning, token.start, token.end)
+
+
+def _bound_after(found: Sequence[Token], at: int) -> Iterator[Token]:
+    """The names between a quantifier's parenthesis and its first ``in``."""
+    for token in found[at + 2 :]:
+        if token.type == "NAME":
+            yield token
+        elif token.type != "COMMA":
+            return
+
+
+def _within(token: Token, inside: tuple[int, int]) -> bool:
+    return inside[0] <= token.start < inside[1]
+
+
+def _declaring(one: Occurrence) -> Occurrence:
+    return Occurrence(one.meaning, one.file, one.start, one.end, True)
+
+
+def at_offset(found: Iterable[Occurrence], file: str, offset: int) -> Occurrence | None:
+    """The name at (or just before) an offset."""
+    touching = [o for o in found if o.file == file and o.written and o.start <= offset <= o.end]
+    return touching[-1] if touching else None

@@ -1,0 +1,275 @@
+"""What the names in a plan stand for: nodes, ports and clauses of the contract, elements and types in its formulas.
+
+Keys and values that the plan's schema gives a meaning are read as that. In a method's options, which its backend
+knows, ``in.v`` and ``out.v`` are read as ports of the method's node and ``guarantee:`` as names of its guarantees;
+other words of a text that names a port so are looked up as in a formula. All else is left alone.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from avow.base.diagnostics import Rejected, Span
+from avow.language.contract import Contract
+from avow.language.environment import of_contract
+from avow.language.terms import Role
+from avow.lsp.names import Meaning, Occurrence, Ports, What
+from avow.system.strict_yaml import Piece, read_yaml
+
+_WORD = re.compile(r"\"(?:[^\"\\\n]|\\.)*\"|[A-Za-z_][A-Za-z0-9_']*|[0-9]+(?:\.[0-9]+)?|\.")
+_PORT = re.compile(r"\b(?:in|out)\s*\.\s*[A-Za-z_]")
+_ROLES = (str(Role.INPUT), str(Role.OUTPUT))
+_FINDINGS = ("expected", "accepted")
+_CLAUSE_KINDS = {"guarantee": What.GUARANTEE, "assumption": What.ASSUMPTION}
+
+
+@dataclass(frozen=True, slots=True)
+class PlanText:
+    """A plan's file and its text."""
+
+    file: str
+    text: str
+
+
+def plan_occurrences(plan: PlanText, contract: Contract) -> tuple[Occurrence, ...]:
+    """Every name in a plan that stands for something in the contract; none where the text is no YAML."""
+    try:
+        root, _ = read_yaml(plan.text.encode("utf-8", "replace"), plan.file)
+    except Rejected:
+        return ()
+    found = {(o.start, o.end): o for o in _Reader(plan, contract).everything(root)}
+    return tuple(found[place] for place in sorted(found))
+
+
+@dataclass(frozen=True, slots=True)
+class _Region:
+    """A stretch of the plan's text that holds one scalar, without quotation marks."""
+
+    start: int
+    end: int
+
+
+class _Reader:
+    def __init__(self, plan: PlanText, contract: Contract) -> None:
+        self.plan = plan
+        self.starts = [0, *(m.end() for m in re.finditer("\n", plan.text))]
+        self.environment = of_contract(contract)
+        self.ports = {
+            n.name: Ports(frozenset(p.name for p in n.inputs), frozenset(p.name for p in n.outputs))
+            for n in contract.nodes
+        }
+        self.named = {
+            n.name: {
+                What.ASSUMPTION: {c.name for c in n.assumptions},
+                What.GUARANTEE: {c.name for c in n.guarantees},
+            }
+            for n in contract.nodes
+        }
+
+    # -- places --------------------------------------------------------------------------------------------------------
+
+    def region(self, span: Span) -> _Region:
+        start, end = (self.starts[line - 1] + column - 1 for line, column in _corners(span))
+        raw = self.plan.text[start:end]
+        if raw[:1] in ("'", '"'):
+            return _Region(start + 1, max(end - 1, start + 1))
+        if raw[:1] in ("|", ">"):
+            return _Region(start + raw.find("\n") + 1 if "\n" in raw else end, end)
+        return _Region(start, end)
+
+    def one(self, meaning: Meaning | None, start: int) -> Iterator[Occurrence]:
+        if meaning is not None and self.plan.text.startswith(meaning.name, start):
+            yield Occurrence(meaning, self.plan.file, start, start + len(meaning.name))
+
+    def scalar(self, piece: Piece | None, what: Callable[[str], Meaning | None]) -> Iterator[Occurrence]:
+        """A scalar, or each of a list, that is one name."""
+        for item in _items(piece):
+            region = self.region(item.span)
+            if self.plan.text[region.start : region.end] == item.text:
+                yield from self.one(what(item.text), region.start)
+
+    def keys(self, piece: Piece | None) -> Iterator[tuple[str, int, Piece]]:
+        """Each key of a mapping, with the place of its text."""
+        if piece is None or piece.entries is None:
+            return
+        for name, inner in piece.entries.items():
+            yield name, self.region(piece.key_span(name)).start, inner
+
+    # -- meanings ------------------------------------------------------------------------------------------------------
+
+    def node(self, name: str) -> Meaning | None:
+        return Meaning(What.NODE, name) if name in self.ports else None
+
+    def clause(self, node: str, what: What, name: str) -> Meaning | None:
+        return Meaning(what, name, node) if name in self.named.get(node, {}).get(what, ()) else None
+
+    def guarantee(self, node: str) -> Callable[[str], Meaning | None]:
+        return lambda name: self.clause(node, What.GUARANTEE, name)
+
+    def element(self, name: str) -> Meaning | None:
+        if name in self.environment.elements:
+            return Meaning(What.ELEMENT, name)
+        if name in self.environment.constants:
+            return Meaning(What.CONSTANT, name)
+        return Meaning(What.TYPE, name) if name in self.environment.types else None
+
+    def port(self, node: str, name: str, role: str | None = None) -> Meaning | None:
+        """A port of a node; of any node that has it, where no node is named."""
+        nodes = [node] if node else list(self.ports)
+        return next((m for n in nodes if n in self.ports and (m := self.ports[n].meaning(n, name, role))), None)
+
+    # -- texts ---------------------------------------------------------------------------------------------------------
+
+    def words(self, region: _Region, node: str | None, side: Role = Role.OUTPUT) -> Iterator[Occurrence]:
+        """The names of a formula, or of a path such as ``node.port``. `node`: whose ports ``in.v`` and ``v`` are;
+        empty: those of any node; None: it has to be named. `side`: which port ``node.v`` is, where there are two."""
+        before: list[tuple[str, int]] = []
+        for match in _WORD.finditer(self.plan.text, region.start, region.end):
+            word, at = match.group(), match.start()
+            if word[0] == '"' or word[0].isdigit():
+                before = []
+            elif word == ".":
+                before.append((word, at))
+            elif before and before[-1][0] == ".":
+                path = [text for text, _ in before if text != "."]
+                yield from self.last_of(path, word, at, node, side)
+                before.append((word, at))
+            else:
+                before = [(word, at)]
+                if not self.plan.text[match.end() : region.end].lstrip().startswith("."):
+                    meaning = self.port(node, word) if node else None
+                    yield from self.one(meaning or self.element(word), at)
+                elif word not in _ROLES:
+                    yield from self.one(self.node(word), at)
+
+    def last_of(self, path: Sequence[str], name: str, at: int, node: str | None, side: Role) -> Iterator[Occurrence]:
+        match list(path):
+            case ["in" | "out" as role] if node is not None:
+                yield from self.one(self.port(node, name, role), at)
+            case [owner] if owner in self.ports and name not in _ROLES:
+                ports = self.ports[owner]
+                meaning = ports.meaning(owner, name, side) or ports.meaning(owner, name)
+                yield from self.one(meaning or self.clause(owner, What.GUARANTEE, name), at)
+            case [owner, "in" | "out" as role] if owner in self.ports:
+                yield from self.one(self.ports[owner].meaning(owner, name, role), at)
+            case _:  # not the contract's
+                pass
+
+    def formula(self, piece: Piece | None, node: str | None, side: Role = Role.OUTPUT) -> Iterator[Occurrence]:
+        for item in _items(piece):
+            yield from self.words(self.region(item.span), node, side)
+
+    # -- the plan ------------------------------------------------------------------------------------------------------
+
+    def everything(self, root: Piece) -> Iterator[Occurrence]:
+        for connection in _items(root.at("connections")):
+            for key, side in (("from", Role.OUTPUT), ("to", Role.INPUT)):
+                yield from self.formula(connection.at(key), None, side)
+            source = connection.at("from")
+            yield from self.formula(connection.at("initial"), source.text.partition(".")[0] if source else "")
+        for name, at, entry in self.keys(root.at("environment")):
+            yield from self.words(_Region(at, at + len(name)), "", Role.INPUT)
+            owner = name.partition(".")[0]
+            yield from self.formula(entry.at("assume"), owner if owner in self.ports else "")
+        yield from self.requirements(root)
+        for key in ("compose", "subsystems"):
+            for _, _, goal in self.keys(root.at(key)):
+                for inner in ("select", "nodes"):
+                    yield from self.scalar(goal.at(inner), self.node)
+        for path in (("model", "compound"), ("model", "external"), ("ros", "nodes"), ("nodes",)):
+            for name, at, _ in self.keys(root.at(*path)):
+                yield from self.one(self.node(name), at)
+        for name, _, entry in self.keys(root.at("nodes")):
+            yield from self.method_options(entry.at("methods"), name)
+            for attribute, at, _ in self.keys(entry.at("source", "memory")):
+                yield from self.words(_Region(at, at + len(attribute)), name)
+        yield from self.scenario(root)
+        for _, _, picture in self.keys(root.at("pictures")):
+            yield from self.scalar(picture.at("places"), self.element)
+        for key in _FINDINGS:
+            for finding in _items(root.at(key)):
+                for inner in ("obligation", "matched"):
+                    for item in _items(finding.at(inner)):
+                        yield from self.obligation(item)
+
+    def requirements(self, root: Piece) -> Iterator[Occurrence]:
+        for _, _, requirement in self.keys(root.at("requirements")):
+            for key in ("formula", "temporal"):
+                yield from self.formula(requirement.at(key), None)
+            for item in _items(requirement.at("supported_by")):
+                node, dot, name = item.text.partition(".")
+                region = self.region(item.span)
+                yield from self.one(self.node(node), region.start)
+                if dot:
+                    yield from self.one(self.clause(node, What.GUARANTEE, name), region.start + len(node) + 1)
+
+    def scenario(self, root: Piece) -> Iterator[Occurrence]:
+        for key in ("interpret", "domains"):
+            for name, at, _ in self.keys(root.at("scenario", key)):
+                yield from self.words(_Region(at, at + len(name)), "")
+        for name, _, table in self.keys(root.at("scenario")):
+            if name not in ("interpret", "steps"):
+                for item in _scalars(table):
+                    yield from self.scalar(item, self.element)
+
+    def method_options(self, piece: Piece | None, node: str) -> Iterator[Occurrence]:
+        """The names in the options of a node's methods, at any depth."""
+        for inner in _items(piece) if piece is not None and piece.items is not None else ():
+            yield from self.method_options(inner, node)
+        if piece is not None and piece.entries is None and piece.items is None:
+            region = self.region(piece.span)
+            if _PORT.search(self.plan.text, region.start, region.end):
+                yield from self.words(region, node)
+        for name, at, inner in self.keys(piece):
+            if _PORT.search(name):
+                yield from self.words(_Region(at, at + len(name)), node)
+            if name in ("guarantee", "guarantees"):
+                yield from self.scalar(inner, self.guarantee(node))
+                for one, place, _ in self.keys(inner):
+                    yield from self.one(self.guarantee(node)(one), place)
+            else:
+                yield from self.method_options(inner, node)
+
+    def obligation(self, piece: Piece) -> Iterator[Occurrence]:
+        """``node/guarantee/name``, ``node/sanity/not-vacuous-name``."""
+        region = self.region(piece.span)
+        node, _, rest = piece.text.partition("/")
+        kind, _, name = rest.partition("/")
+        yield from self.one(self.node(node), region.start)
+        at = region.start + len(node) + len(kind) + 2
+        if kind in _CLAUSE_KINDS:
+            yield from self.one(self.clause(node, _CLAUSE_KINDS[kind], name), at)
+        elif kind == "sanity":
+            for what, names in self.named.get(node, {}).items():
+                subject = next((n for n in sorted(names, key=len, reverse=True) if name.endswith(f"-{n}")), None)
+                if subject is not None:
+                    yield from self.one(Meaning(what, subject, node), at + len(name) - len(subject))
+            if name.startswith(("constrained-", "determined-")):
+                output = name.partition("-")[2]
+                yield from self.one(self.port(node, output, Role.OUTPUT), at + len(name) - len(output))
+
+
+def _items(piece: Piece | None) -> list[Piece]:
+    if piece is None:
+        return []
+    return piece.items if piece.items is not None else [piece]
+
+
+def _scalars(piece: Piece) -> Iterator[Piece]:
+    """The scalars of a list or mapping, at any depth."""
+    for inner in piece.items or (piece.entries or {}).values():
+        yield from _scalars(inner)
+    if piece.items is None and piece.entries is None:
+        yield piece
+
+
+def _corners(span: Span) -> tuple[tuple[int, int], tuple[int, int]]:
+    return (span.line, span.column), (span.end_line, span.end_column)
+
+
+def line_of(plan: PlanText, offset: int) -> int:
+    """The line of an offset, from 1."""
+    return bisect_right([0, *(m.end() for m in re.finditer("\n", plan.text))], offset)

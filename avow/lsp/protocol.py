@@ -1,0 +1,179 @@
+"""Answers in the protocol's words: lines and UTF-16 columns for offsets, and the protocol's kinds for ours."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from lsprotocol import types
+
+from avow.base.diagnostics import Diagnostic, Severity, Span
+from avow.lsp.answers import Document, Symbol
+from avow.lsp.appearance import MODIFIERS, TOKEN_TYPES, Coloured
+from avow.lsp.background import Answer
+from avow.lsp.completion import Offer, Signature
+
+SEVERITIES = {
+    Severity.ERROR: types.DiagnosticSeverity.Error,
+    Severity.WARNING: types.DiagnosticSeverity.Warning,
+    Severity.NOTE: types.DiagnosticSeverity.Information,
+}
+_SYMBOLS = {
+    "node": types.SymbolKind.Class,
+    "type": types.SymbolKind.Struct,
+    "constant": types.SymbolKind.Constant,
+    "assumption": types.SymbolKind.Event,
+    "guarantee": types.SymbolKind.Function,
+}
+_OFFERS = {
+    "keyword": types.CompletionItemKind.Keyword,
+    "operator": types.CompletionItemKind.Operator,
+    "function": types.CompletionItemKind.Function,
+    "type": types.CompletionItemKind.Struct,
+    "element": types.CompletionItemKind.EnumMember,
+    "constant": types.CompletionItemKind.Constant,
+    "input": types.CompletionItemKind.Field,
+    "output": types.CompletionItemKind.Field,
+    "variable": types.CompletionItemKind.Variable,
+    "node": types.CompletionItemKind.Class,
+    "guarantee": types.CompletionItemKind.Method,
+    "unit": types.CompletionItemKind.Unit,
+    "key": types.CompletionItemKind.Property,
+}
+
+
+class Lines:
+    """A text's lines, to go from offsets to the protocol's positions and back."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.starts = [0]
+        at = text.find("\n")
+        while at >= 0:
+            self.starts.append(at + 1)
+            at = text.find("\n", at + 1)
+
+    def position(self, offset: int) -> types.Position:
+        """The position of an offset."""
+        line = bisect_right(self.starts, offset) - 1
+        return types.Position(line, units(self.text[self.starts[line] : offset]))
+
+    def offset(self, position: types.Position) -> int:
+        """The offset of a position; what is beyond a line's end is that end."""
+        if position.line >= len(self.starts):
+            return len(self.text)
+        at: int = self.starts[position.line]
+        end = self.text.find("\n", at)
+        end = len(self.text) if end < 0 else end
+        left: int = position.character
+        while at < end and left > 0:
+            left -= units(self.text[at])
+            at += 1
+        return at
+
+    def range(self, start: int, end: int) -> types.Range:
+        return types.Range(self.position(start), self.position(end))
+
+    def of_span(self, span: Span) -> types.Range:
+        return types.Range(self._of(span.line, span.column), self._of(span.end_line, span.end_column))
+
+    def _of(self, line: int, column: int) -> types.Position:
+        if not 0 < line <= len(self.starts):
+            return types.Position(max(line - 1, 0), 0)
+        start = self.starts[line - 1]
+        end = self.text.find("\n", start)
+        end = len(self.text) if end < 0 else end
+        return types.Position(line - 1, units(self.text[start : min(start + max(column - 1, 0), end)]))
+
+
+def units(text: str) -> int:
+    """The length in UTF-16 code units, in which the protocol counts columns."""
+    return len(text.encode("utf-16-le", "surrogatepass")) // 2
+
+
+def diagnostic(found: Diagnostic, document: Document, lines: Lines) -> types.Diagnostic:
+    """A message, with its hint on a line of its own."""
+    nowhere = Span(document.file, 1, 1, 1, 1)
+    related = [
+        types.DiagnosticRelatedInformation(
+            types.Location(Path(place.file).resolve().as_uri(), lines.of_span(place)), note
+        )
+        for note, place in found.notes
+        if place is not None and place.file == document.file
+    ]
+    arguments: dict[str, Any] = {"related_information": related} if related else {}
+    return types.Diagnostic(
+        range=lines.of_span(found.span or nowhere),
+        message=found.message + (f"\n{found.hint}" if found.hint else ""),
+        severity=SEVERITIES[found.severity],
+        code=found.code,
+        source="avow",
+        **arguments,
+    )
+
+
+def refuted(answer: Answer, place: types.Range) -> types.Diagnostic:
+    """A sanity claim that does not hold, at its clause or node."""
+    severity = types.DiagnosticSeverity.Error if answer.severity == "error" else types.DiagnosticSeverity.Warning
+    said = [f"{answer.name} is {answer.verdict}: {answer.explanation or answer.claim}"]
+    said += [answer.example] if answer.example else []
+    return types.Diagnostic(place, "\n".join(said), severity=severity, code=answer.name, source="avow sanity")
+
+
+def symbol(found: Symbol, lines: Lines) -> types.DocumentSymbol:
+    place = lines.of_span(found.span)
+    return types.DocumentSymbol(
+        name=found.name or "(no name)",
+        kind=_SYMBOLS[found.kind],
+        range=place,
+        selection_range=place,
+        detail=found.detail,
+        children=[symbol(s, lines) for s in found.inner],
+    )
+
+
+def completion_item(offer: Offer, number: int, snippets: bool) -> types.CompletionItem:
+    """`number`: its place in the list, which is the order in which the editor shows it."""
+    template = offer.template if snippets and offer.template else ""
+    return types.CompletionItem(
+        label=offer.label,
+        kind=_OFFERS[offer.kind],
+        detail=offer.detail or None,
+        documentation=offer.about or None,
+        insert_text=template or offer.label,
+        insert_text_format=types.InsertTextFormat.Snippet if template else types.InsertTextFormat.PlainText,
+        sort_text=f"{number:04}",
+    )
+
+
+def signature_help(found: Signature) -> types.SignatureHelp:
+    """Each parameter as the stretch of the label where it stands."""
+    parameters, at = [], found.label.find("(") + 1
+    for name in found.parameters:
+        start = max(found.label.find(name, at), 0)
+        at = start + len(name)
+        parameters.append(types.ParameterInformation((units(found.label[:start]), units(found.label[:at]))))
+    shown = types.SignatureInformation(found.label, found.about or None, parameters, found.active)
+    return types.SignatureHelp([shown], 0, found.active)
+
+
+def semantic_tokens(found: Sequence[Coloured], lines: Lines) -> types.SemanticTokens:
+    """The protocol's five numbers for each stretch, each place relative to the one before."""
+    return types.SemanticTokens(list(_numbers(found, lines)))
+
+
+def _numbers(found: Sequence[Coloured], lines: Lines) -> Iterator[int]:
+    line = column = 0
+    for each in found:
+        place = lines.position(each.start)
+        yield place.line - line
+        yield place.character - column if place.line == line else place.character
+        yield units(lines.text[each.start : each.end])
+        yield TOKEN_TYPES.index(each.kind)
+        yield sum(1 << MODIFIERS.index(modifier) for modifier in each.modifiers)
+        line, column = place.line, place.character
+
+
+LEGEND = types.SemanticTokensLegend(list(TOKEN_TYPES), list(MODIFIERS))

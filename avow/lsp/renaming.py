@@ -1,0 +1,252 @@
+"""Renaming in all files of a system: the contracts and the plan.
+
+The new texts are checked before any edit is proposed: they declare the same contract as the old ones but for the name,
+no name in them means anything else than it did, and the plan names nothing that is not there. What does not come out so
+is refused with the reason. Ports that share a name are one thing to a system (they link, or the environment gives them
+one value), so they are renamed together.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from avow.base.diagnostics import Diagnostic, Rejected
+from avow.formulas.formula import digest
+from avow.language.contract import Contract, Node, Port
+from avow.language.lexer import KEYWORDS, LIMITED
+from avow.language.load import check_in_part
+from avow.language.sorts import Constructor, DataSort, EnumSort, OpaqueSort
+from avow.language.source import Source
+from avow.language.terms import Builtin, Construct, EnumValue, Past, Role, Variable
+from avow.lsp.names import CLAUSES, PORTS, Meaning, Occurrence, What, occurrences, taken_apart
+from avow.lsp.plan_names import PlanText, plan_occurrences
+from avow.lsp.project import Project
+from avow.system.load import load_texts
+from avow.tuning.running import BYTES_LOOKED_THROUGH, FILES_LOOKED_THROUGH
+
+_WORDS = {*KEYWORDS, *LIMITED, *Builtin, *Past, "length", "indices", "A", "G", "x"}
+"""Words of the language, operators among them that a name may shadow: a name that is one of these is read twice."""
+
+
+class Refused(Exception):  # noqa: N818 - it reads as what happened
+    """A rename that would not leave everything as it is; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """A stretch of a file's text, and what is to stand there."""
+
+    file: str
+    start: int
+    end: int
+    text: str
+
+
+def all_occurrences(project: Project) -> tuple[Occurrence, ...]:
+    """Every name in every file of the system that stands for something."""
+    found = occurrences(tuple(taken_apart(s.file, s.text) for s in project.sources), project.contract)
+    return (*found, *(plan_occurrences(project.plan, project.contract) if project.plan is not None else ()))
+
+
+def renamed_with(meaning: Meaning, other: Meaning) -> bool:
+    """Whether two meanings are renamed together."""
+    if meaning.what in PORTS:
+        return other.what in PORTS and other.name == meaning.name
+    return other == meaning
+
+
+def is_renameable(project: Project, meaning: Meaning) -> bool:
+    """Whether a name is written anywhere: that of a clause without one is not."""
+    return any(o.declares and o.written and o.meaning == meaning for o in all_occurrences(project))
+
+
+def rename(project: Project, meaning: Meaning, new: str) -> tuple[Edit, ...]:
+    """The edits that give something another name. Raises Refused."""
+    _check_name(new)
+    if any(d.is_error for d in project.diagnostics):
+        raise Refused("the contract has errors: a name is changed where all that it stands for is known")
+    before = all_occurrences(project)
+    places = [o for o in before if o.written and renamed_with(meaning, o.meaning)]
+    if not any(o.declares for o in places):
+        raise Refused(f"{meaning.shown} has no name of its own that could be changed")
+    if new == meaning.name:
+        return ()
+    edits = tuple(Edit(o.file, o.start, o.end, new) for o in places)
+    after = _after(project, edits)
+    found = Counter(d.code for d in after.diagnostics) - Counter(d.code for d in project.diagnostics)
+    if wrong := [d for d in after.diagnostics if d.code in found and d.is_error]:
+        raise Refused(f"`{new}` does not do here: {wrong[0].message}")
+    _compare(project, after, before, meaning, new)
+    return edits
+
+
+def elsewhere(project: Project, meaning: Meaning) -> tuple[str, ...]:
+    """The other files of the system's folder in which the name stands as a word: programs, tables, traces. What it
+    means there is not known here."""
+    if project.plan is None or meaning.what is What.VARIABLE:
+        return ()
+    folder, word = Path(project.plan.file).parent, re.compile(rf"(?<!\w){re.escape(meaning.name)}(?!\w)")
+    known = {Path(project.plan.file).resolve(), *(Path(s.file).resolve() for s in project.sources)}
+    found = []
+    for path in islice(sorted(folder.rglob("*")), FILES_LOOKED_THROUGH):
+        try:
+            if path.is_symlink() or not path.is_file() or path.resolve() in known:
+                continue
+            if path.stat().st_size <= BYTES_LOOKED_THROUGH and word.search(path.read_text("utf-8")):
+                found.append(str(path.relative_to(folder)))
+        except (OSError, UnicodeError):
+            continue  # no text
+    return tuple(found)
+
+
+def _check_name(new: str) -> None:
+    found = taken_apart("", new).tokens
+    if len(found) != 1 or found[0].type != "NAME" or found[0].text != new:
+        raise Refused(f"`{new[:60]}` is no name: a name is made of letters, digits, `_` and primes")
+    if new in _WORDS:
+        raise Refused(f"`{new}` is a word of the language")
+
+
+def _after(project: Project, edits: Sequence[Edit]) -> Project:
+    sources = tuple(Source(s.file, _edited(s.text, s.file, edits)) for s in project.sources)
+    contract, diagnostics = check_in_part(sources, off=project.off)
+    plan = project.plan
+    if plan is not None:
+        plan = PlanText(plan.file, _edited(plan.text, plan.file, edits))
+    return Project(sources, contract, diagnostics, project.off, plan)
+
+
+def _edited(text: str, file: str, edits: Sequence[Edit]) -> str:
+    for edit in sorted((e for e in edits if e.file == file), key=lambda e: -e.start):
+        text = text[: edit.start] + edit.text + text[edit.end :]
+    return text
+
+
+def _compare(project: Project, after: Project, before: Sequence[Occurrence], meaning: Meaning, new: str) -> None:
+    def to(one: Meaning) -> Meaning:
+        if one.what is What.VARIABLE:
+            return replace(one, name=new if one == meaning else one.name, owner="")
+        if renamed_with(meaning, one):
+            return replace(one, name=new)
+        of_node = meaning.what is What.NODE and one.what in (*PORTS, *CLAUSES) and one.owner == meaning.name
+        return replace(one, owner=new) if of_node else one
+
+    now = [_bare(o.meaning) for o in all_occurrences(after)]
+    if now != [to(o.meaning) for o in before]:
+        raise Refused(f"`{new}` would stand for something else in another place")
+    if _flat(_with_name(project.contract, meaning, new), meaning, new) != _flat(after.contract, None, ""):
+        raise Refused(f"with `{new}` the contract would say something else")
+    if meaning.what is What.VARIABLE:
+        clauses = zip(_clauses(project.contract), _clauses(after.contract), strict=True)
+        if any(digest(one) != digest(other) for one, other in clauses):
+            raise Refused(f"with `{new}` a clause would say something else")
+    if wrong := _new_faults(project, after):
+        raise Refused(f"the plan would no longer fit: {wrong[0].message}")
+
+
+def _bare(one: Meaning) -> Meaning:
+    return replace(one, owner="") if one.what is What.VARIABLE else one
+
+
+def _clauses(contract: Contract) -> Iterator[Any]:
+    return (clause.formula for node in contract.nodes for clause in node.clauses)
+
+
+def _new_faults(project: Project, after: Project) -> list[Diagnostic]:
+    """What is wrong with the plan and was not before."""
+    old, new = _faults(project), _faults(after)
+    more = Counter(d.code for d in new) - Counter(d.code for d in old)
+    return [d for d in new if more[d.code]]
+
+
+def _faults(project: Project) -> tuple[Diagnostic, ...]:
+    if project.plan is None:
+        return ()
+    try:
+        load_texts(Path(project.plan.file), project.plan.text, project.contract)
+    except Rejected as rejected:
+        return rejected.diagnostics
+    return ()
+
+
+# --- the same contract but for a name --------------------------------------------------------------------------------
+
+
+def _with_name(contract: Contract, meaning: Meaning, new: str) -> Contract:
+    """The contract with the name changed where it is the name of a part of it."""
+    nodes = tuple(_node_with(node, meaning, new) for node in contract.nodes)
+    if meaning.what is What.TYPE:
+        types = tuple((new if name == meaning.name else name, sort) for name, sort in contract.types)
+        return replace(contract, nodes=nodes, types=types)
+    if meaning.what is What.CONSTANT:
+        constants = tuple((new if name == meaning.name else name, term) for name, term in contract.constants)
+        return replace(contract, nodes=nodes, constants=constants)
+    return replace(contract, nodes=nodes)
+
+
+def _node_with(node: Node, meaning: Meaning, new: str) -> Node:
+    if meaning.what is What.NODE and node.name == meaning.name:
+        return replace(node, name=new)
+    if meaning.what in CLAUSES and node.name == meaning.owner:
+        assumptions, guarantees = (
+            tuple(replace(c, name=new) if c.name == meaning.name else c for c in each)
+            for each in (node.assumptions, node.guarantees)
+        )
+        return replace(node, assumptions=assumptions, guarantees=guarantees)
+    return node
+
+
+def _flat(value: object, meaning: Meaning | None, new: str) -> list[object]:
+    """Everything that a contract says, in one list, with the name of a port, element or type changed on the way. Names
+    of quantified variables are left out (a digest compares them), and types as they are written."""
+    out: list[object] = []
+    stack: list[object] = [value]
+    while stack:
+        part = stack.pop()
+        if isinstance(part, tuple):
+            out.append(len(part))
+            stack.extend(reversed(part))
+        elif is_dataclass(part) and not isinstance(part, type):
+            out.append(type(part).__name__)
+            for each in reversed(fields(part)):
+                if each.compare and not _is_left_out(part, each.name):
+                    stack.append(_changed(part, each.name, getattr(part, each.name), meaning, new))
+        else:
+            out.append(part)
+    return out
+
+
+def _is_left_out(part: object, name: str) -> bool:
+    match part:
+        case Variable(role=Role.BOUND):
+            return name == "name"
+        case Port():
+            return name == "type_name"
+        case EnumSort() | DataSort() | OpaqueSort():
+            return name == "name"  # what has none is called by its elements; names of types stand in the contract
+        case Contract():
+            return name == "files"
+        case _:  # all of it counts
+            return False
+
+
+def _changed(part: object, name: str, value: object, meaning: Meaning | None, new: str) -> object:
+    if meaning is None:
+        return value
+    match part:
+        case Port() | Variable() if name == "name" and meaning.what in PORTS and value == meaning.name:
+            return new
+        case EnumSort() if name == "members" and meaning.what is What.ELEMENT and isinstance(value, tuple):
+            return tuple(new if member == meaning.name else member for member in value)
+        case EnumValue() | Constructor() if name == "name" and meaning.what is What.ELEMENT and value == meaning.name:
+            return new
+        case Construct() if name == "constructor" and meaning.what is What.ELEMENT and value == meaning.name:
+            return new
+        case _:  # no name, or another
+            return value
