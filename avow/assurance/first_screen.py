@@ -29,6 +29,7 @@ from avow.assurance.relied import (
     OBJECTS,
     Relied,
     examined,
+    linked,
     looked_at,
     seen,
     weakness,
@@ -193,8 +194,9 @@ def _basis(
     own = [v for v in views if v.obligation.kind is Kind.GUARANTEE and v.obligation.node == node.name]
     marks = [(_mark(view, relied), view) for view in own]
     by_object: dict[str, Counter[str]] = {}
+    link = linked(node.name, views)
     for (said, _), view in marks:
-        by_object.setdefault(_examined(view, relied), Counter())[said] += 1
+        by_object.setdefault(_examined(view, relied, link), Counter())[said] += 1
     counted = {what: ", ".join(f"{many} {said}" for said, many in of.items()) for what, of in by_object.items()}
     words = "; ".join(" ".join((many, what)).strip() for what, many in counted.items()) or "no guarantees"
     squares = tuple((LETTERS.get(said, "✘"), tone) for (said, tone), _ in marks)
@@ -203,9 +205,9 @@ def _basis(
     return NodeBasis(node.name, node.title, squares if len(squares) <= SQUARES else (), words), (worst, -share)
 
 
-def _examined(view: ObligationView, relied: Mapping[str, Relied]) -> str:
+def _examined(view: ObligationView, relied: Mapping[str, Relied], link: str) -> str:
     """What was looked at, where the claim is relied upon; else nothing."""
-    return examined(relied[view.id]) if view.id in relied and view.standing.supports else ""
+    return examined(relied[view.id], link) if view.id in relied and view.standing.supports else ""
 
 
 def _objects(views: Sequence[ObligationView], relied: Mapping[str, Relied]) -> str:

@@ -7,13 +7,14 @@ makes a case look better: what is left was there to be chosen before.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 from avow.assurance.model import ObligationView
 from avow.base.plain import count
 from avow.base.verdict import HypothesisKind, Object, in_words
+from avow.evidence.obligation import Kind, ProgramClaim
 from avow.evidence.record import Evidence
 from avow.evidence.status import Status, weigh
 from avow.isolation.level import Isolation
@@ -106,13 +107,23 @@ def looked_at(relied: Relied) -> Object | None:
     return relied.record.of if relied.status in (*EXHAUSTIVE, Status.TESTED, Status.MONITORED) else None
 
 
-def examined(relied: Relied) -> str:
-    """What was looked at: ``(source in float64)``; empty of a person's word."""
+def linked(node: str, views: Iterable[ObligationView]) -> str:
+    """Where the node's program was held against the models that were verified in its place: how that stands, in words;
+    empty where it was not."""
+    for view in views:
+        o = view.obligation
+        if o.node == node and o.kind is Kind.PROGRAM and o.name == ProgramClaim.LINKED:
+            return f"program agrees: {view.standing.word}"
+    return ""
+
+
+def examined(relied: Relied, link: str = "") -> str:
+    """What was looked at: ``(source in float64)``; empty of a person's word. `link` is what `linked` says."""
     match looked_at(relied):
         case None:
             return ""
         case Object.MODEL:
-            return "(model)"
+            return f"(model; {link})" if link else "(model)"
         case Object.SOURCE:
             return f"(source in {relied.record.numbers})"
         case Object.BINARY:

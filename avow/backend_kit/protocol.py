@@ -8,7 +8,7 @@ tool) and makes the evidence records; a backend never writes to the ledger and n
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,13 @@ from avow.base.diagnostics import Diagnostic
 from avow.base.tools import Tool
 from avow.base.verdict import Link, Object, Outcome, Verdict
 from avow.evidence.obligation import Obligation, ProgramClaim
+from avow.formulas.values import Value
 from avow.isolation.level import Isolation
 from avow.isolation.observed import Observed
 from avow.language.contract import Clause, Contract, Node
 from avow.system.plan import Method, Source, System
 
-__all__ = ["COMMON_OPTIONS", "Backend", "Job", "Limits", "Report", "Tool", "Translated", "lacks"]
+__all__ = ["COMMON_OPTIONS", "Backend", "Job", "Limits", "NoModel", "Report", "Tool", "Translated", "lacks"]
 
 
 COMMON_OPTIONS = frozenset({"id", "guarantees", "seconds", "megabytes", "seed"})
@@ -129,6 +130,10 @@ class Translated:
     """A warning for each guarantee that is not in them, with the reason."""
 
 
+class NoModel(Exception):  # noqa: N818 - it names a state
+    """There is no model to be run, or it has no answer."""
+
+
 class Backend(ABC):
     """A verification method. What has no value here, a backend must say; the rest may stay as it is.
 
@@ -168,6 +173,8 @@ class Backend(ABC):
     in the job at all."""
     claims: tuple[ProgramClaim, ...] = ()
     """What it says of the node's program besides its guarantees (`Job.claims`)."""
+    runs_models: bool = False
+    """Whether what it verifies is a model that can be run on single inputs (`model`)."""
     of: Object = Object.MODEL
     """What is verified; an outcome may say otherwise for itself."""
     portable: bool = False
@@ -212,6 +219,11 @@ class Backend(ABC):
         """Settle `job.obligations` and `job.claims`, one outcome for each. `folder` holds the exported files. Never
         raises for what the contract, the plan or a tool may do: a crash, a time-out, a missing tool are outcomes."""
 
+    def model(self, job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
+        """What it verifies, to be run on one step's inputs: both by qualified name. Raises Rejected where the plan's
+        input is at fault, and NoModel where there is nothing to be run; so does a call that has no answer."""
+        raise NoModel(f"{self.name} has no model that can be run")
+
     def translate(self, notation: str, system: System, node: Node) -> Translated:
         """The node in one of `translations`. Pure, like `export`. Raises Rejected where the input is at fault: what the
         notation merely cannot say is `Translated.missing`."""
@@ -233,6 +245,7 @@ _REQUIRED: Mapping[str, type | tuple[type, ...]] = {
     "remembers": bool,
     "uses_source": bool,
     "claims": tuple,
+    "runs_models": bool,
     "of": Object,
     "portable": bool,
     "codes": Mapping,

@@ -10,10 +10,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from avow.backend_kit.protocol import Backend, Job
+from avow.backend_kit.registry import backend
 from avow.base.diagnostics import Span
 from avow.calculus.interpretation import interpretation, ranges
 from avow.calculus.providers import ProviderClaim, provider_claims
 from avow.calculus.variables import Frame
+from avow.evidence.obligation import ProgramClaim
 from avow.formulas.finite import Ranges
 from avow.formulas.values import Value
 from avow.language.contract import Clause, Contract, Node
@@ -104,7 +106,7 @@ def method_slice(tool: Backend, job: Job, *, sentences: bool = False) -> MethodS
     cut = replace(
         _bare(plan),
         nodes=(
-            _planned(tool, plan.node(job.node.name), job.method),
+            _planned(tool, plan.node(job.node.name), job.method, plan.plugins),
             *(_told(plan.node(name), tool.name) for name in sorted(sources)),
         ),
         connections=tuple(_connection(edge) for edge in edges),
@@ -144,8 +146,11 @@ def _bare_clause(clause: Clause) -> Clause:
     return replace(clause, position=0, text="", sentence=None)
 
 
-def _planned(tool: Backend, node: NodePlan, method: Method) -> NodePlan:
-    return replace(node, methods=(method,), source=node.source if tool.uses_source else None)
+def _planned(tool: Backend, node: NodePlan, method: Method, plugins: tuple[str, ...]) -> NodePlan:
+    """With the methods whose models the program is held against."""
+    others = (m for m in node.methods if m.id != method.id and backend(m.backend, plugins).runs_models)
+    beside = tuple(replace(m, guarantees=()) for m in others) if ProgramClaim.LINKED in tool.claims else ()
+    return replace(node, methods=(method, *beside), source=node.source if tool.uses_source else None)
 
 
 def _told(node: NodePlan, backend: str) -> NodePlan:

@@ -14,6 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from avow.backend_kit.linked import models
 from avow.backend_kit.protocol import Backend, Job, Limits
 from avow.backend_kit.registry import backend, names
 from avow.base.diagnostics import Diagnostic, Rejected, Severity
@@ -163,6 +164,7 @@ def method_work(system: System, node: Node, method: Method) -> Work:
         told,
         _files(tool, job),
         surroundings(tool, job, told),
+        *_compared(system, job),
     )
     return _work(
         system,
@@ -176,6 +178,20 @@ def method_work(system: System, node: Node, method: Method) -> Work:
         shown=lambda: method_slice(tool, job, sentences=True),
         files=tool.files(job),
     )
+
+
+def _compared(system: System, job: Job) -> tuple[str, ...]:
+    """The models that the program is held against: their programs and options."""
+    if not any(claim.name == ProgramClaim.LINKED for claim in job.claims):
+        return ()
+    found = []
+    for method in models(system, job.node.name):
+        tool = method_backend(system, method)
+        other = replace(job, method=method, obligations=(), claims=())
+        found.append(
+            [method.id, tool.name, tool.version, backend_digest(tool), method_options(method), _files(tool, other)]
+        )
+    return (json.dumps(found),)
 
 
 _BOUNDS = {"seconds": (0.1, 604_800), "megabytes": (64, 10_000_000), "seed": (0, 2**31 - 1)}
@@ -226,8 +242,14 @@ def method_backend(system: System, method: Method) -> Backend:
 
 
 def method_job(system: System, node: Node, method: Method) -> Job:
-    claims = tuple(program_claim(system, node, name) for name in method_backend(system, method).claims)
+    names = [c for c in method_backend(system, method).claims if _can_be_claimed(system, node, c)]
+    claims = tuple(program_claim(system, node, name) for name in names)
     return Job(system, node, method, tuple(guarantee(system, node, name) for name in method.guarantees), claims)
+
+
+def _can_be_claimed(system: System, node: Node, name: ProgramClaim) -> bool:
+    """A program agrees with a model where the plan has one that can be run."""
+    return name is not ProgramClaim.LINKED or bool(models(system, node.name))
 
 
 _CLAIMED = {

@@ -192,3 +192,6 @@ person wrote; what is not found is asked of the claim itself."""
 COUNTS_GUESSED = 6
 """Numbers below which a counter of a program and one that its contract has are guessed to agree, beside the limits that
 the contract writes down: programs that keep less than they count saturate early."""
+
+ROUNDED_PART = 2**-40
+"""The part of a REAL by which a program may differ from its model for rounding: thousands of roundings of a double."""

@@ -24,7 +24,7 @@ class FuzzBackend(Backend):
     strength = Verdict.TESTED
     link = Link.GENERATED
     of = Object.BINARY
-    claims = (ProgramClaim.FAULTLESS,)
+    claims = (ProgramClaim.FAULTLESS, ProgramClaim.LINKED)
     uses_scenario = False
     uses_wiring = False
     uses_source = True

@@ -8,11 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from avow.backend_kit.linked import settled
 from avow.base.verdict import Counterexample, Hypothesis, HypothesisKind, Outcome, Verdict
 from avow.drive.steps import coded, plain
-from avow.evidence.obligation import Obligation
+from avow.evidence.obligation import Obligation, ProgramClaim
 from avow.evidence.record import CASE
 from avow.formulas.formula import free_variables
+from avow.formulas.values import Value
 from avow.language.sorts import BoolSort, EnumSort, IntegerSort, NaturalSort, RealSort, SequenceSort, Sort
 from avow.stepping.judging import Formula, NoValue, Seen, exact, returned, seen, triggers
 
@@ -78,6 +80,8 @@ class Bench:
     steps: int = 0
     undecided: int = 0
     samples: list[list[Step]] = field(default_factory=list)
+    compared: list[Mapping[str, Value]] = field(default_factory=list)
+    """What the program made of allowed steps."""
 
     def __post_init__(self) -> None:
         job = self.reading.job
@@ -99,6 +103,7 @@ class Bench:
             self.samples.append(run)
         for at, step in self._steps(run, reply):
             self.steps += 1
+            self.compared += [step[-1].values] if not step[-1].wrong else []
             for name, each in self.guarded.items():
                 if name in self.broken:
                     continue
@@ -297,10 +302,9 @@ class Bench:
         faulty = self.crash or fault
         refuting = job.options.get("nan") == "possible"
         own = tuple(self._own(o, counts, stopped and faulty is None, apart, refuting) for o in job.obligations)
-        claims = tuple(self._claim(c, counts, faulty, stopped) for c in job.claims)
-        rests = tuple(
-            Hypothesis(HypothesisKind.CLAIM, claim.local_id, claim.digest, claim.claim) for claim in job.claims
-        )
+        faultless = [claim for claim in job.claims if claim.name == ProgramClaim.FAULTLESS]
+        claims = (*(self._claim(c, counts, faulty, stopped) for c in faultless), *settled(job, self.compared))
+        rests = tuple(Hypothesis(HypothesisKind.CLAIM, c.local_id, c.digest, c.claim) for c in faultless)
         return (*(replace(o, rests_on=rests) if o.verdict is Verdict.TESTED else o for o in own), *claims)
 
     def _own(

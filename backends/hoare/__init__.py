@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import metadata
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.backend_kit.runs import unsaid
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
+from avow.formulas.values import Value
 from avow.language.contract import Clause, Node
 
 from .codes import CODES
@@ -54,6 +55,7 @@ class Hoare(Backend):
     uses_wiring = False
     remembers = True
     portable = True
+    runs_models = True
     link = Link.GENERATED
     options_schema = {
         "type": "object",
@@ -75,6 +77,11 @@ class Hoare(Backend):
 
     def tools(self) -> tuple[Tool, ...]:
         return (Tool("z3", metadata.version("z3-solver"), None, "pip install z3-solver", optional=False, package="z3"),)
+
+    def model(self, job: Job) -> Callable[[Mapping[str, Value]], Mapping[str, Value]]:
+        from .answering import answering
+
+        return answering(job)
 
     def unsaid(self, node: Node, clause: Clause) -> str | None:
         return unsaid(self.name, node, clause, functions=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Object, Verdict
+from avow.evidence.obligation import ProgramClaim
 
 from .codes import CODES
 
@@ -24,6 +25,7 @@ class PythonBackend(Backend):
     uses_scenario = False
     uses_wiring = False
     uses_source = True
+    claims = (ProgramClaim.LINKED,)
     options_schema = {
         "type": "object",
         "properties": {

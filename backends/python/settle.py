@@ -12,6 +12,7 @@ from fractions import Fraction
 from typing import Any
 
 from avow.backend_kit.given import told
+from avow.backend_kit.linked import settled
 from avow.backend_kit.protocol import Job, Limits, Report
 from avow.base.diagnostics import Rejected
 from avow.base.process import ToolMissing
@@ -20,7 +21,7 @@ from avow.drive.steps import coded
 from avow.evidence.obligation import Obligation
 from avow.evidence.record import OUTPUT_FOR_EVERY_INPUT, RETRY
 from avow.formulas.formula import free_variables
-from avow.formulas.values import Element
+from avow.formulas.values import Element, Value
 from avow.formulas.values import Sequence as SequenceValue
 from avow.isolation.level import Isolation, Unavailable, available
 from avow.isolation.observed import Observed
@@ -55,11 +56,11 @@ def settle(job: Job, limits: Limits) -> Report:
         return Report.alike(job, Verdict.NOT_RUN, str(missing), TOOL, version)
     except Rejected as rejected:
         return Report.alike(job, Verdict.ERROR, told(job, rejected.diagnostics), TOOL, version)
-    if not job.obligations:
+    if not job.every:
         return Report((), TOOL, version)
     try:
         work = Work(reading, limits)
-        outcomes = work.outcomes()
+        outcomes = (*work.outcomes(), *settled(job, work.compared))
     except ToolMissing as missing:
         return Report.alike(job, Verdict.NOT_RUN, str(missing), TOOL, version)
     what = {"of": Object.SOURCE, "numbers": reading.source.numbers.value}
@@ -86,6 +87,8 @@ class Work:
     """What is assumed of memory and not shown of every step."""
     allowed: int = 0
     """Cases that met the assumptions."""
+    compared: list[Mapping[str, Value]] = field(default_factory=list)
+    """What CPython made of them."""
 
     @property
     def job(self) -> Job:
@@ -194,7 +197,9 @@ class Work:
                 continue
             if allowed(case):
                 self.allowed += 1
-                self.judge(seen(self.job.node, memory, case, reply), formulas)
+                found_now = seen(self.job.node, memory, case, reply)
+                self.compared += [found_now.values] if not found_now.wrong else []
+                self.judge(found_now, formulas)
         if exactly:
             return ""
         self.ran += len(cases)
