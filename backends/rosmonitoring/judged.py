@@ -29,6 +29,8 @@ class Judgement:
     time: Fraction
     verdict: str
     margin: float | None
+    now: Fraction
+    """When it was judged: later than `time` where the answer had to wait."""
 
 
 Margin = Callable[[Mapping[str, Value]], float | None]
@@ -88,7 +90,7 @@ class Telling(Monitor):
     def _tell(self, watched: Watched, before: Tally, event: int, time: Fraction, margin: float | None) -> None:
         verdict = _verdict_between(before, watched.tally)
         if verdict:
-            self.tell(Judgement(self.setup.node.name, watched.clause.name, event, time, verdict, margin))
+            self.tell(Judgement(self.setup.node.name, watched.clause.name, event, time, verdict, margin, self._now))
 
 
 def _verdict_between(before: Tally, after: Tally) -> str:

@@ -48,6 +48,7 @@ class Recorder:
         self._channels: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self._latest = 0
+        self._logged = 0
 
     def __enter__(self) -> Self:
         return self
@@ -59,6 +60,7 @@ class Recorder:
     def judged(self, judgement: Judgement) -> None:
         topic = f"/avow/{judgement.node}/{judgement.clause}"
         self._latest = _nanoseconds(judgement.time)
+        self._logged = max(self._logged, _nanoseconds(judgement.now))
         said = {"verdict": judgement.verdict, "value": _VALUES[judgement.verdict], "event": judgement.event}
         self._write(f"{topic}/verdict", "verdict", said)
         if judgement.margin is not None:
@@ -76,12 +78,14 @@ class Recorder:
             self._channels[topic] = self._writer.register_channel(topic, "json", self._schema(schema))
         number = self._counts[topic] = self._counts.get(topic, 0) + 1
         data = json.dumps(message).encode()
-        self._writer.add_message(self._channels[topic], self._latest, data, self._latest, number % 2**32)
+        self._logged = max(self._logged, self._latest)  # what is said later is logged later, of whatever event it is
+        self._writer.add_message(self._channels[topic], self._logged, data, self._latest, number % 2**32)
 
     def _schema(self, name: str) -> int:
         if name not in self._schemas:
             fields = {of: {"type": kind} for of, kind in _SCHEMAS[name].items()}
-            text = json.dumps({"title": f"avow.{name}", "type": "object", "properties": fields})
+            whole = {"title": f"avow.{name}", "type": "object", "properties": fields, "required": list(fields)}
+            text = json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **whole})
             self._schemas[name] = self._writer.register_schema(f"avow.{name}", "jsonschema", text.encode())
         return self._schemas[name]
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import jsonschema
 import pytest
 
 from avow.backends.rosmonitoring import live
@@ -68,7 +69,13 @@ def channels(path: Path) -> dict[str, list[tuple[int, dict[str, Any]]]]:
             said = json.loads(message.data)
             known = json.loads(schema.data)["properties"]
             assert (schema.encoding, channel.message_encoding, set(said)) == ("jsonschema", "json", set(known))
-            found.setdefault(channel.topic.removeprefix("/avow/limits/"), []).append((message.log_time, said))
+            jsonschema.validate(said, json.loads(schema.data))
+            found.setdefault(channel.topic.removeprefix("/avow/limits/"), []).append((message.publish_time, said))
+    with path.open("rb") as file:  # as they stand in the file
+        stream = pytest.importorskip("mcap.stream_reader").StreamReader(file, validate_crcs=True)
+        logged = [record.log_time for record in stream.records if hasattr(record, "publish_time")]
+    assert logged == sorted(logged)
+    assert len(logged) == sum(map(len, found.values()))
     return found
 
 
@@ -133,6 +140,25 @@ def test_a_paired_answer_has_the_margin_to_its_own_input(tmp_path: Path) -> None
         (3_000_000_000, 3, 1.0),
         (4_000_000_000, 4, 0.5),
     ]
+
+
+def test_what_is_judged_late_is_published_at_its_event_and_logged_when_it_was_said(tmp_path: Path) -> None:
+    """With a latency, an answer is judged once all inputs are there that it may have answered."""
+    limits(tmp_path, {"latency": "500 ms", "jitter": "300 ms", "because": "a test"})
+    out = tmp_path / "verdicts.mcap"
+    events = [
+        {"topic": "a", "time": 0, "data": 1.0},
+        {"topic": "b", "time": 1.25, "data": 2.0},
+        {"topic": "a", "time": 1.5, "data": 1.5},
+        {"topic": "a", "time": 3, "data": 1.75},
+        {"topic": "b", "time": 3.5, "data": 2.0},
+    ]
+    monitor(tmp_path, str(written(tmp_path, events)), "--mcap", str(out))
+    with out.open("rb") as file:
+        messages = pytest.importorskip("mcap.reader").make_reader(file).iter_messages()
+        times = {(c.topic, m.publish_time, m.log_time) for _, c, m in messages if c.topic.endswith("above/verdict")}
+    assert ("/avow/limits/above/verdict", 1_250_000_000, 3_000_000_000) in times
+    assert [at for at, m in channels(out)["above/verdict"] if m["event"] == 2] == [1_250_000_000]
 
 
 def test_silence_is_a_finding(tmp_path: Path) -> None:
