@@ -260,7 +260,7 @@ def _judge(job: Job, name: str, monitors: Sequence[Monitor], deadline: float) ->
         where = origin(job.system)
         if wrong := readable(monitor.setup, path, where):
             raise Rejected(*wrong)
-        for _, found in judge(monitors, path, where, whole.told):
+        for _, found in judge(monitors, path, where, whole.told, whole.heard):
             run.note(found)
             if time.monotonic() > deadline:
                 run.unknown = f"{name}: time was up after {monitor.events} events"

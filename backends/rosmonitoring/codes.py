@@ -108,5 +108,11 @@ CODES = register(
         "DDS says what a topic's type is called, not what its messages are made of, and nothing else does.",
         "Name its `.msg` files under `messages`, or the distribution: `ros: {distro: humble}`.",
     ),
+    declare(
+        "MON307",
+        "cannot be filtered",
+        "`--enforce` passes on a message once it is judged: of one topic of ROS 1, by itself, as it comes.",
+        "Name the outputs under `filter`; filter what one message decides.",
+    ),
     declare("MON302", "cannot listen", "The port is taken or not allowed.", "Choose another with `--serve`."),
 )

@@ -43,6 +43,9 @@ if TYPE_CHECKING:
     "--for", "seconds", type=click.FloatRange(min=0), help="With --live: for so many seconds (else until Ctrl-C)."
 )
 @click.option("--host", default="127.0.0.1", help="With --live: where the graph's nodes find this one (127.0.0.1).")
+@click.option(
+    "--enforce", is_flag=True, help="With --live: what is filtered is passed on only while nothing is broken."
+)
 @click.option("--record", type=click.Path(path_type=Path), help="With --live: write all that is heard, as a trace.")
 @click.option(
     "--verdicts", metavar="TOPIC", help="With --live: say verdicts there, as diagnostic_msgs/DiagnosticArray."
@@ -66,6 +69,7 @@ def command(
     live: str | None,
     seconds: float | None,
     host: str,
+    enforce: bool,
     record: Path | None,
     verdicts: str | None,
     timeline: Path | None,
@@ -91,6 +95,8 @@ def command(
     if configuration is not None:
         _configure(loaded, nodes, configuration)
         return 0
+    if enforce and live is None:
+        raise click.UsageError("--enforce goes with --live")
     if live is not None:
         if trace is not None or port is not None:
             raise click.UsageError("give a TRACE, --live or --serve")
@@ -100,7 +106,7 @@ def command(
             raise click.UsageError(
                 f"--record writes JSON lines, not {record.suffix}; --mcap writes verdicts and margins"
             )
-        return _live(loaded, nodes, live, (seconds, host, record, verdicts), telling)
+        return _live(loaded, nodes, live, (seconds, host, enforce, record, verdicts), telling)
     if timeline is not None and trace in (None, "-"):
         raise click.UsageError("--timeline needs a TRACE that can be read twice: a file, or a folder")
     if port is not None:
@@ -149,14 +155,14 @@ def _configure(system: System, nodes: tuple[str, ...], path: Path) -> None:
 
 def _live(
     system: System, nodes: tuple[str, ...], live: str,
-    how: tuple[float | None, str, Path | None, str | None], telling: _Telling,
+    how: tuple[float | None, str, bool, Path | None, str | None], telling: _Telling,
 ) -> int:  # fmt: skip
     from .live import follow, graph_of
     from .session import session
 
-    seconds, host, record, verdicts = how
+    seconds, host, enforce, record, verdicts = how
     running = session(system, nodes, make=telling.monitor)
-    graph = graph_of(live, running, host)
+    graph = graph_of(live, running, host, enforce=enforce)
     with _until(seconds) as over:
         found = ((0, violation) for violation in follow(running, graph, over, record, verdicts, _warn))
         return _told(running, found, str(record or ""), telling)
@@ -311,6 +317,8 @@ def _print_summary(running: Session) -> None:
         click.echo(f"messages lost, by their numbers: {', '.join(gone)}")
     if mixed := [f"{topic} {p.disordered}" for topic, p in passages.items() if p.disordered]:
         click.echo(f"messages out of order: {', '.join(mixed)}")
+    if running.withheld:
+        click.echo(f"withheld: {', '.join(f'{topic} {count}' for topic, count in running.withheld.items())}")
     if unmonitored := running.unmonitored():
         click.echo(f"unmonitored, since too little was decided: {', '.join(unmonitored)}")
     if running.unheard:

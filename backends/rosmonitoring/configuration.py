@@ -99,7 +99,7 @@ def _monitor(setup: Setup, options: Mapping[str, Any]) -> dict[str, Any]:
             "action": str(oracle.get("action", "nothing")),
             "timeout": float(oracle.get("timeout", 2.0)),
         }
-    filtered = {same_topic(getattr(setup.rules.get(name), "topic", "")) for name in options.get("filter", ())}
+    filtered = setup.filtered if "oracle" in monitor else frozenset[str]()  # it is the oracle that says what is broken
     monitor["topics"] = []
     for name, kind in topic_types(setup).items():
         topic: dict[str, Any] = {"name": name, "type": kind, "action": "log"}

@@ -26,6 +26,8 @@ class Heard:
     time: float
     read: Callable[[], Event] | None
     trouble: str = ""
+    forward: Callable[[], None] | None = None
+    """Of a topic that is filtered: passes the message on."""
 
 
 class Inbox:
@@ -36,11 +38,11 @@ class Inbox:
         self._lock = threading.Lock()
         self.dropped = 0
 
-    def message(self, topic: str, read: Callable[[float], Event]) -> None:
+    def message(self, topic: str, read: Callable[[float], Event], forward: Callable[[], None] | None = None) -> None:
         """A message has come just now; it is read, as an event of that time, when it is judged."""
         with self._lock:
             now = time.time()
-            self._put(Heard(topic, now, lambda: read(now)))
+            self._put(Heard(topic, now, lambda: read(now), forward=forward))
 
     def trouble(self, topic: str, text: str) -> None:
         with self._lock:

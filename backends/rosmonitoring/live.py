@@ -16,6 +16,7 @@ from avow.base.diagnostics import Diagnostic, Rejected
 from .bags import Event
 from .coverage import coverage
 from .dds import Dds, domain_of
+from .enforce import RAW, filtered
 from .graphs import ERROR, OK, STALE, WARN, Graph, Heard, Status
 from .ros1 import Ros1, master_of
 from .rosbridge import Rosbridge
@@ -28,7 +29,8 @@ def follow(
     running: Session, graph: Graph, over: Callable[[], bool], record: Path | None, verdicts: str | None,
     warn: Callable[[str], None],
 ) -> Iterator[Violation]:  # fmt: skip
-    """Judge what a graph says until it is `over`. Deadlines pass by this machine's clock. Raises Rejected where the
+    """Judge what a graph says until it is `over`, and pass on what is filtered. Deadlines pass by this machine's clock.
+    Raises Rejected where the
     record cannot be written."""
     with ExitStack() as stack:
         try:
@@ -48,9 +50,17 @@ def follow(
                 break
             event = None if heard is None else trouble.event(heard)
             if event is not None:
+                lines = [event]
+                if heard is not None and heard.forward is not None:
+                    said = {**event, "topic": heard.topic.removesuffix(RAW)}
+                    found, passed = running.offer(said)
+                    if passed:
+                        heard.forward()
+                        lines.append(said)
+                else:
+                    found = list(running.step(event))
                 if file is not None:
-                    file.write(json.dumps(event) + "\n")
-                found = list(running.step(event))
+                    file.writelines(json.dumps(line) + "\n" for line in lines)
                 if board is not None and found:
                     board.broken(found)
                 yield from found
@@ -130,11 +140,14 @@ class Board:
             yield Status(name, ERROR, violation.text())
 
 
-def graph_of(text: str, running: Session, host: str) -> Graph:
+def graph_of(text: str, running: Session, host: str, *, enforce: bool = False) -> Graph:
     """``ros1``, ``ros1:http://host:11311``, ``dds``, ``dds:42``, ``rosbridge:ws://host:9090``. Raises Rejected."""
     kind, _, address = text.partition(":")
+    topics = filtered(monitor.setup for monitor in running.monitors) if enforce else frozenset[str]()
     if kind == "ros1":
-        return Ros1(master_of(text), running.topics, host)
+        return Ros1(master_of(text), running.topics, host, topics)
+    if enforce:
+        raise Rejected(Diagnostic("MON307", "messages are filtered on ROS 1 alone", hint="--live ros1 --enforce"))
     if kind == "dds":
         return Dds(domain_of(text), running.topics, running.kinds, running.known, host)
     if kind == "rosbridge" and address.startswith(("ws://", "wss://")):

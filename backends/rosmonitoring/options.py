@@ -66,6 +66,8 @@ class Setup:
     """How old the inputs of an answer may be, for it to be evidence."""
     losses: int | None = None
     """How many messages may have been lost; None: however many."""
+    filtered: frozenset[str] = frozenset()
+    """The topics (without their leading slash) whose messages a filter passes on only while nothing is broken."""
     shared: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
     """Each output whose topic other nodes publish too: this node, and all of them, by their whole names."""
 
@@ -109,7 +111,7 @@ def setup(
     for port in (*node.inputs, *node.outputs):
         work.port(port)
     work.shared_fields()
-    work.filtered()
+    filtered = work.filtered()
     data = options.data if options is not None and isinstance(options.data, Mapping) else {}
     named = tuple((_called(system, node, topic), topic.ros_type) for topic in node.topics)
     made = Setup(
@@ -125,6 +127,7 @@ def setup(
         work.rates(data.get("rate")),
         work.duration("max_age", data["max_age"]) if "max_age" in data else None,
         data.get("losses"),
+        filtered,
         work.shared,
     )
     return made, tuple(work.faults)
@@ -245,8 +248,8 @@ class _Work:
                 self.faults.append(Diagnostic("MON101", text, self.options.at("rate", name)))
         return found
 
-    def filtered(self) -> None:
-        """What can be filtered: outputs that messages carry, where an oracle is asked."""
+    def filtered(self) -> frozenset[str]:
+        """The topics of the outputs that are filtered: messages have to carry these."""
         data = self.options.data if self.options is not None and isinstance(self.options.data, Mapping) else {}
         names = data.get("filter", ())
         outputs = [n for n, r in self.rules.items() if n.startswith("out.") and isinstance(r, Fields | Choice)]
@@ -255,10 +258,8 @@ class _Work:
                 text = f"filter: {name} is no output that messages carry"
                 span = self.options.at("filter", at)
                 self.faults.append(Diagnostic("MON101", text, span, hint=suggest(str(name), outputs)))
-        if names and "oracle" not in data and self.options is not None:
-            text = "filter: a message is held back by what an oracle says, and the plan names none"
-            span = self.options.at("filter")
-            self.faults.append(Diagnostic("MON101", text, span, hint="oracle: {port: 8080}"))
+        rules = (self.rules[name] for name in names if name in outputs)
+        return frozenset(same_topic(rule.topic) for rule in rules if isinstance(rule, Fields | Choice))
 
     def heard(self, key: str, entry: Any) -> list[str]:
         """The variables of an option that messages carry; the others are faults."""

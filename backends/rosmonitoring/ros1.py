@@ -13,7 +13,7 @@ import struct
 import threading
 import time
 import xmlrpc.client
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from contextlib import suppress
 from functools import partial
 from socketserver import ThreadingMixIn
@@ -24,6 +24,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.ros.bags import Event, enveloped, plainer
 
+from .enforce import raw
 from .graphs import Inbox, Status
 from .tuning import FRAME_BYTES, HEADER_BYTES
 
@@ -42,10 +43,13 @@ class _Handler(SimpleXMLRPCRequestHandler):
 class Ros1:
     """Hears the topics of a graph; use it as a context."""
 
-    def __init__(self, master: str, topics: Iterable[str], host: str = HOST) -> None:
-        """`host`: the name or address at which the graph's nodes find this one."""
+    def __init__(self, master: str, topics: Iterable[str], host: str = HOST, filtered: Set[str] = frozenset()) -> None:
+        """`host`: the name or address at which the graph's nodes find this one. `filtered`: of these topics (without
+        their leading slash) only what is passed on is published, of what is said where `raw` calls it."""
         self.host = host
-        self.topics = tuple(topic if topic.startswith("/") else f"/{topic}" for topic in topics)
+        topics = tuple(topic if topic.startswith("/") else f"/{topic}" for topic in topics)
+        self._filtered = {raw(topic): topic for topic in topics if topic[1:] in filtered}
+        self.topics = (*topics, *self._filtered)
         self.inbox = Inbox()
         self._uri = master
         self._master = xmlrpc.client.ServerProxy(master, allow_none=True)
@@ -53,6 +57,7 @@ class Ros1:
         self._lock = threading.Lock()
         self._over = threading.Event()
         self._spoken: dict[str, Spoken] = {}
+        self._speaking = threading.Lock()
 
     def __enter__(self) -> Ros1:
         """Raises Rejected where there is no master."""
@@ -85,9 +90,21 @@ class Ros1:
         self._slave.shutdown()
         self._slave.server_close()
 
-    def speak(self, topic: str, kind: str, definition: str, digest: str) -> Spoken:
+    def _forward(self, topic: str, fields: Mapping[str, str]) -> Callable[[bytes], None] | None:
+        """What passes a topic's messages on, as they are; None for one that is not filtered."""
+        target = self._filtered.get(topic)
+        if target is None:
+            return None
+        with self._speaking:
+            if target not in self._spoken:
+                latch = fields.get("latching") == "1"
+                self.speak(target, fields["type"], fields["message_definition"], fields["md5sum"], latch=latch)
+            return self._spoken[target].say
+
+    def speak(self, topic: str, kind: str, definition: str, digest: str, *, latch: bool = True) -> Spoken:
         """Advertise a topic."""
-        spoken = Spoken(self.host, topic, {"type": kind, "message_definition": definition, "md5sum": digest})
+        fields = {"type": kind, "message_definition": definition, "md5sum": digest}
+        spoken = Spoken(self.host, topic, fields, latch=latch)
         self._spoken[topic] = spoken
         self._asked("registerPublisher", CALLER, topic, kind, self.uri)
         return spoken
@@ -137,6 +154,12 @@ class Ros1:
     def _publishers(self, caller: str, topic: str, publishers: list[str]) -> tuple[int, str, int]:
         """The master says who publishes a topic now."""
         with self._lock:
+            if topic in self._filtered.values():
+                for uri in publishers:
+                    if uri != getattr(self, "uri", None):
+                        text = f"{uri} publishes {topic} past the filter: start its node with {topic}:={raw(topic)}"
+                        self.inbox.trouble(topic, text)
+                return 1, "", 0
             for uri in publishers:
                 if (topic, uri) not in self._known and uri != getattr(self, "uri", None):
                     self._known.add((topic, uri))
@@ -158,9 +181,11 @@ class Ros1:
                 line.sendall(header(wanted))
                 fields = read_header(line)
                 read = reader(topic, fields)
+                forward = self._forward(topic, fields)
                 while not self._over.is_set():
-                    raw = frame(line, FRAME_BYTES)
-                    self.inbox.message(topic, partial(_event, topic, fields.get("callerid", ""), read, raw))
+                    said = frame(line, FRAME_BYTES)
+                    on = None if forward is None else partial(forward, said)
+                    self.inbox.message(topic, partial(_event, topic, fields.get("callerid", ""), read, said), on)
         except (OSError, ValueError, xmlrpc.client.Error) as error:
             if not self._over.is_set() and not isinstance(error, EOFError):
                 self.inbox.trouble(topic, f"{topic} from {uri}: {error}")
@@ -174,11 +199,12 @@ def _event(topic: str, by: str, read: Callable[[bytes], dict[str, Any]], raw: by
 
 
 class Spoken:
-    """A topic that is published; the latest message is kept for whoever comes later."""
+    """A topic that is published; `latch`: the latest message is kept for whoever comes later."""
 
-    def __init__(self, host: str, topic: str, fields: Mapping[str, str]) -> None:
+    def __init__(self, host: str, topic: str, fields: Mapping[str, str], *, latch: bool = True) -> None:
         self.topic = topic
-        self._header = header({"callerid": CALLER, "topic": topic, "latching": "1", **fields})
+        self._latch = latch
+        self._header = header({"callerid": CALLER, "topic": topic, "latching": str(int(latch)), **fields})
         self._listening = socket.create_server((host, 0))
         self.port = int(self._listening.getsockname()[1])
         self._lines: list[socket.socket] = []
@@ -193,7 +219,7 @@ class Spoken:
                 read_header(line)
                 line.sendall(self._header)
                 with self._lock:
-                    if self._latest:
+                    if self._latest and self._latch:
                         line.sendall(self._latest)
                     self._lines.append(line)
             except (OSError, ValueError):

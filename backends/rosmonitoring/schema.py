@@ -134,7 +134,7 @@ SCHEMA: dict[str, Any] = {
         "filter": {
             "type": "array",
             "items": {"type": "string"},
-            "description": "outputs whose messages the ROS monitor passes on only if the oracle finds nothing broken",
+            "description": "outputs whose messages --enforce and the ROS monitor pass on only while nothing is broken",
         },
         "ordered": {**_DURATION, "description": "the ROS monitor sorts by time what comes within so long"},
         "package": {"type": "string", "description": "the ROS package of the node, for instrumentation"},

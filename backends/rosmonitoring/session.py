@@ -17,6 +17,7 @@ from .bags import Origin, is_bag
 from .blame import Blame
 from .compiled import Compiled
 from .coverage import Tally
+from .enforce import WITHHELD, raw, told_withheld
 from .engine import Monitor
 from .options import NAME, Setup, known_types, origin, same_topic, setup
 from .rules import NOTHING_KNOWN
@@ -35,9 +36,17 @@ class Session:
     counts: dict[Fault, int] = field(default_factory=dict)
     unheard: dict[str, int] = field(default_factory=dict)
     """Topics of the trace that no monitor listens to, and their events."""
+    withheld: dict[str, int] = field(default_factory=dict)
+    """Topics of which messages were not passed on, and how many."""
+    behind_filters: dict[str, int] = field(init=False)
+    """The messages of topics that are filtered, as they are said and as they are passed on."""
     asked: frozenset[str] = frozenset()
     """The nodes that are to be monitored: those named, else those with such a method in the plan, else all."""
     _blame: Blame | None = None
+
+    def __post_init__(self) -> None:
+        topics = (topic for monitor in self.monitors for topic in monitor.setup.filtered)
+        self.behind_filters = {name: 0 for topic in topics for name in (topic, raw(topic))}
 
     def listens(self, topic: str) -> bool:
         return any(monitor.listens(topic) for monitor in self.monitors)
@@ -47,6 +56,20 @@ class Session:
         self.heard(topic if isinstance(topic, str) else "", 1)
         yield from self.told([v for monitor in self.monitors for v in monitor.step(event)])
 
+    def offer(self, event: Mapping[str, Any]) -> tuple[list[Violation], bool]:
+        """What is found in a message of a topic that is filtered, and whether it may be passed on. Others than its node
+        hear it only then."""
+        topic = str(event["topic"])
+        self.heard(topic, 1)
+        own = [m for m in self.monitors if same_topic(topic) in m.setup.filtered]
+        found = [v for monitor in own for v in monitor.step(event)]
+        passed = not any(v.fault in WITHHELD for v in found)
+        if not passed:
+            self.withheld[topic] = self.withheld.get(topic, 0) + 1
+        others = event if passed else {"topic": raw(topic), "time": event["time"]}
+        found += [v for m in self.monitors if m not in own for v in m.step(others)]
+        return list(self.told(found)), passed
+
     def tick(self, event: Mapping[str, Any]) -> Iterator[Violation]:
         """Time has passed without a message."""
         yield from self.told([v for monitor in self.monitors for v in monitor.tick(event)])
@@ -54,6 +77,8 @@ class Session:
     def heard(self, topic: str, count: int) -> None:
         """So many events of a topic (without a name: of none) have come."""
         self.events += count
+        if same_topic(topic) in self.behind_filters:
+            self.behind_filters[same_topic(topic)] += count
         if topic and not self.listens(topic):
             self.unheard[topic] = self.unheard.get(topic, 0) + count
 
@@ -89,6 +114,7 @@ class Session:
     def finish(self) -> Iterator[Violation]:
         """What is judged only once the run is over."""
         yield from self.told([v for monitor in self.monitors for v in monitor.finish()], over=True)
+        told_withheld(self.monitors, self.behind_filters)
 
     def unmonitored(self) -> list[str]:
         """The clauses, of the nodes that are to be monitored, of whose publications too few were decided."""
@@ -176,6 +202,7 @@ class Session:
             "nodes": nodes,
             "listened": list(self.topics),
             "unknown_topics": dict(self.unheard),
+            "withheld": dict(self.withheld),
         }
 
 

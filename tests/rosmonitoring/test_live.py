@@ -134,6 +134,69 @@ def test_a_silent_topic_is_told_while_nothing_comes(
     assert "was silent for" in found[-1].explanation
 
 
+def test_a_filter_passes_on_what_breaks_nothing(
+    master: Master, make_system: Callable[..., System], tmp_path: Path
+) -> None:
+    """What the node says as /s_mon is heard as /s, but for what is wrong or unreadable; what goes past it is told."""
+    record = tmp_path / "run.jsonl"
+    system = make_system(RCL, MAPPING, filter=["out.s"])
+    running = session(system)
+    warned: list[str] = []
+    done = threading.Event()
+    with Ros1(master.uri, ()) as node:
+        spoken = node.speak("/s_mon", *FLOAT64)
+        graph = graph_of(f"ros1:{master.uri}", running, "127.0.0.1", enforce=True)
+        judged = follow(running, graph, until(done.is_set), record, None, warned.append)
+        found: list[Violation] = []
+        judging = threading.Thread(target=lambda: found.extend(judged))
+        judging.start()
+        wait_for(lambda: "/s" in master.publishers)
+        with Ros1(master.uri, ("s",)) as other:
+            wait_for(lambda: graph._spoken["/s"].listeners == 1)  # type: ignore[union-attr]
+            for raw in (float64(1.5), float64(130.0), b"short", float64(7.0)):
+                spoken.say(raw)
+            heard = [other.inbox.get(60) for _ in range(2)]
+            assert [one.read()["data"] for one in heard if one is not None and one.read is not None] == [1.5, 7.0]
+            assert other.inbox.get(0) is None
+        node.speak("/s", *FLOAT64)
+        graph._publishers("", "/s", master.publishers["/s"])  # type: ignore[union-attr]
+        wait_for(lambda: any("past the filter" in one for one in warned))
+        done.set()
+        judging.join()
+    assert [(v.clause, v.fault) for v in found] == [("low", Fault.GUARANTEE), ("out.s", Fault.MAPPING)]
+    assert running.withheld == {"/s": 2}
+    topics = [json.loads(line)["topic"] for line in record.read_text("utf-8").splitlines()]
+    assert topics == ["/s_mon", "/s", "/s_mon", "/s_mon", "/s_mon", "/s"]
+    again = session(system)
+    assert list(again.run(record)) == []
+    assert again.unmonitored() == ["n.low"]
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ({}, "the plan filters nothing"),
+        ({"filter": ["out.s"], "answers": {"by": "order", "because": "a test"}}, "shows only later"),
+    ],
+)
+def test_what_cannot_be_filtered_is_refused(make_system: Callable[..., System], more: dict[str, Any], why: str) -> None:
+    with pytest.raises(Rejected, match=why):
+        graph_of("ros1", session(make_system(RCL, MAPPING, **more)), "127.0.0.1", enforce=True)
+
+
+def test_a_guarantee_of_two_topics_is_not_filtered(make_system: Callable[..., System]) -> None:
+    rcl = RCL.replace("outputs( s : REAL )", "outputs( s : REAL, t : REAL )").replace(
+        "matches(out.s) )", "matches(out.s), std_msgs/Float64 t matches(out.t) )"
+    )
+    system = make_system(
+        rcl.replace("out.s <= 120", "out.s <= out.t"), MAPPING | {"out.t": "data"}, filter=["out.s", "out.t"]
+    )
+    with pytest.raises(Rejected, match="speaks of several topics"):
+        graph_of("ros1", session(system), "127.0.0.1", enforce=True)
+    with pytest.raises(Rejected, match="ROS 1 alone"):
+        graph_of("dds", session(make_system(RCL, MAPPING, filter=["out.s"])), "127.0.0.1", enforce=True)
+
+
 def test_a_wrong_digest_is_told(master: Master, make_system: Callable[..., System], tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="digest"):
         reader("/s", {"type": "std_msgs/Float64", "message_definition": "float64 data\n", "md5sum": "0" * 32})

@@ -190,7 +190,7 @@ class Spoken:
 def test_a_running_graph_gives_record_timeline_and_mcap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     limits(tmp_path)
     events = pairs(40)
-    monkeypatch.setattr(live, "graph_of", lambda *_: Spoken(events))
+    monkeypatch.setattr(live, "graph_of", lambda *_, **__: Spoken(events))
     record, drawn, out = tmp_path / "r.jsonl", tmp_path / "t.svg", tmp_path / "v.mcap"
     files = ("--record", str(record), "--timeline", str(drawn), "--mcap", str(out))
     assert monitor(tmp_path, "--live", "ros1", "--for", "0", *files) == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -57,6 +58,52 @@ def test_a_fault_is_found_and_laid_at_the_right_door(fault: str, told: list[str]
         assert next(k for k, (a, b) in enumerate(zip(good, bad, strict=False), start=1) if a != b) == at
 
 
+def until_told(words: str, robot: list[object], how: list[object], folder: Path) -> tuple[str, str, int]:
+    """The robot on ROS 1, driving towards radiation, under a monitor until that says some words: its line with them,
+    all that it says then, its code. Its record is run.jsonl."""
+    port = a_free_port()
+    command = [sys.executable, ROBOT / "ros1.py", "--port", port, "--source=4,-15.3,106560", *robot]
+    monitor = [sys.executable, "-m", "avow", "monitor", ROBOT, "--live", f"ros1:http://127.0.0.1:{port}"]
+    monitor += ["--record", folder / "run.jsonl", *how]
+    with running(command, env={**os.environ, "ROS_HOME": str(folder / "ros")}):
+        wait_for(lambda: answers(port))
+        with running(monitor, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as watching:
+            assert watching.stdout is not None
+            first = next((line for line in watching.stdout if words in line), "")
+            watching.send_signal(signal.SIGINT)
+            rest, wrong = watching.communicate()
+    return first, rest + wrong, watching.returncode
+
+
+@pytest.mark.slow
+@pytest.mark.needs_ros1
+def test_on_ros_1_a_wrong_command_is_withheld(tmp_path: Path) -> None:
+    robot = ["--fault", "ignore_orange", "--enforce"]
+    _, rest, code = until_told("agent.exit_on_danger", robot, ["--enforce"], tmp_path)
+    assert code == 1
+    assert re.search(r"withheld: /?command \d+\n", rest), rest
+    said = [json.loads(line) for line in (tmp_path / "run.jsonl").read_text("utf-8").splitlines()]
+    commands = [event["topic"] for event in said if event["topic"].startswith("/command")]
+    assert commands.count("/command_mon") > commands.count("/command") > 0
+
+
+def test_on_the_bus_a_wrong_command_is_withheld_and_its_record_is_no_evidence(tmp_path: Path) -> None:
+    record = tmp_path / "run.jsonl"
+    done = drive("--fault", "ignore_orange", "--seconds", "40", "--enforce", "--record", str(record))
+    assert done.returncode == 1
+    assert "withheld: command 1\n" in done.stdout
+    said = [json.loads(line) for line in record.read_text("utf-8").splitlines()]
+    wrong = [event for event in said if event["topic"].startswith("command") and event["id"] == 3]
+    assert [event["topic"] for event in wrong if event["command"] == "inspect"] == ["command_mon"]
+    again = session(load_system(ROBOT))
+    assert "exit_on_danger" not in {v.clause for _, v in again.run(record)}
+    assert "agent.exit_on_danger" in again.unmonitored()
+    good = drive("--enforce", "--record", str(record))
+    assert good.returncode == 0
+    passed = [line for line in record.read_text("utf-8").splitlines() if "command_mon" not in line]
+    assert passed == (ROBOT / "traces/mission.jsonl").read_text("utf-8").splitlines()
+
+
 @pytest.mark.slow
 @pytest.mark.needs_ros1
 @pytest.mark.needs_roscpp
@@ -66,19 +113,9 @@ def test_on_ros_1_with_a_node_in_cpp_among_those_in_python(tmp_path: Path) -> No
     sensor = tmp_path / "radiation_sensor"
     flags = subprocess.check_output(["pkg-config", "--cflags", "--libs", "roscpp"], text=True).split()
     subprocess.run(["g++", ROBOT / "nodes/radiation_sensor.cpp", "-o", sensor, *flags], check=True, timeout=300)
-    port = a_free_port()
-    robot = [sys.executable, ROBOT / "ros1.py", "--port", port, "--sensor", sensor]
-    robot += ["--fault", "mislabel", "--source=4,-15.3,106560"]  # orange from the first waypoint on
-    monitor = [sys.executable, "-m", "avow", "monitor", ROBOT, "--live", f"ros1:http://127.0.0.1:{port}"]
-    monitor += ["--record", tmp_path / "run.jsonl", "--node", "radiationSensor"]
-    with running(robot, env={**os.environ, "ROS_HOME": str(tmp_path / "ros")}):
-        wait_for(lambda: answers(port))
-        with running(monitor, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as watching:
-            assert watching.stdout is not None
-            first = next((line for line in watching.stdout if "radiationSensor.medium" in line), "")
-            watching.send_signal(signal.SIGINT)
-            rest, wrong = watching.communicate()
-    assert watching.returncode == 1, rest + wrong
+    robot = ["--sensor", sensor, "--fault", "mislabel"]
+    first, rest, code = until_told("radiationSensor.medium", robot, ["--node", "radiationSensor"], tmp_path)
+    assert code == 1, rest
     assert "guarantee broken: this node: radiationSensor.medium: Medium radiation is orange" in first
     low = re.search(r"radiationSensor\.low \(guarantee\): published \d+ times: held (\d+)", rest)
     assert low is not None, rest

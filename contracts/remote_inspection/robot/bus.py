@@ -26,7 +26,7 @@ class Bus:
         self.listeners.setdefault(topic, []).append(act)
 
     def tap(self, act):
-        """`act(topic, time, message)` for every message, before anybody hears it."""
+        """`act(topic, time, message)` for every message, before anybody hears it; where it says False, nobody does."""
         self.taps.append(act)
 
     def say(self, topic, message):
@@ -42,8 +42,9 @@ class Bus:
             while self.waiting:
                 topic, message = self.waiting.popleft()
                 self.now = round(self.now + DELIVERY, 4)
-                for act in self.taps:
-                    act(topic, self.now, message)
+                passed = [act(topic, self.now, message) is not False for act in self.taps]
+                if not all(passed):
+                    continue
                 for act in self.listeners.get(topic, ()):
                     act(message)
             count += 1

@@ -1,6 +1,7 @@
 """Start the rover.
 
     python contracts/remote_inspection/robot/drive.py [--fault NAME] [--record FILE] [--seconds N] [--unmonitored]
+                                                      [--enforce]
 
 All nodes on a bus of this process, in simulated time, under the monitors of their contracts. Code 1 where something was
 broken. No ROS is needed; `ros1.py` starts the same nodes on ROS 1.
@@ -73,24 +74,33 @@ def main():
     parser.add_argument("--fault", choices=faults.NAMES)
     parser.add_argument("--record", type=Path, help="write every message, as JSON lines")
     parser.add_argument("--seconds", type=float, default=400.0)
+    parser.add_argument("--enforce", action="store_true", help="what would break a guarantee is not delivered")
     parser.add_argument("--unmonitored", action="store_true")
     given = parser.parse_args()
+    from avow.backends.rosmonitoring.enforce import filtered, raw
     from avow.backends.rosmonitoring.session import session
     from avow.backends.rosmonitoring.traces import parse_event
     from avow.system.load import load_system
 
     running = None if given.unmonitored else session(load_system(HERE))
+    gates = filtered(monitor.setup for monitor in running.monitors) if given.enforce else ()
     lines = []
     found = []
 
     def tap(topic, at, message):
         line = json.dumps(event(topic, at, message))
-        lines.append(line)
-        if running is not None:
-            for violation in running.step(parse_event(line)):
-                found.append(violation)
-                if len(found) <= 10:
-                    print(violation.text())
+        if topic in gates:
+            lines.append(json.dumps(event(topic, at, message) | {"topic": raw(topic)}))
+            new, passed = running.offer(parse_event(line))
+        else:
+            new, passed = ([] if running is None else running.step(parse_event(line))), True
+        if passed:
+            lines.append(line)
+        for violation in new:
+            found.append(violation)
+            if len(found) <= 10:
+                print(violation.text())
+        return passed
 
     started = time.process_time()
     bus = drive(given.fault, given.seconds, tap)
@@ -99,6 +109,8 @@ def main():
     if given.record is not None:
         given.record.write_text("".join(line + "\n" for line in lines), encoding="utf-8")
     spent = time.process_time() - started
+    if running is not None and running.withheld:
+        print(f"withheld: {', '.join(f'{topic} {count}' for topic, count in running.withheld.items())}")
     print(f"{len(lines)} messages, {bus.now:.1f} s simulated in {spent:.2f} s: {len(found)} violations")
     return 1 if found else 0
 

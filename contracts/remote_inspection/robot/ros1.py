@@ -1,7 +1,7 @@
 """The same nodes on ROS 1: a master, the world, and each node as a process of its own, until Ctrl-C.
 
     python contracts/remote_inspection/robot/ros1.py [--port 11311] [--seconds N] [--fault NAME] [--source X,Y,STRENGTH]
-                                                     [--sensor FILE]
+                                                     [--sensor FILE] [--enforce]
 
 Needs Debian's python3-rospy and python3-rosmaster. To watch: avow monitor contracts/remote_inspection/robot --live ros1
 
@@ -28,6 +28,8 @@ from bus import TICK  # noqa: E402
 from drive import parameters  # noqa: E402
 from wiring import FIELDS, NODES, TYPE, Simulation  # noqa: E402
 
+FILTERED = {"agent": ("/command",)}
+"""As in the plan: what these say there comes to the monitor first."""
 DEFINITION = (HERE / "msg/rover/msg/Snapshot.msg").read_text(encoding="utf-8")
 
 
@@ -92,13 +94,16 @@ def command(name, given):
         return [str(given.sensor.resolve()), *(f"_{key}:={value}" for key, value in values.items())]
     found = [sys.executable, __file__, "--node", name]
     found += ["--fault", given.fault] if given.fault is not None else []
+    found += [f"{topic}:={topic}_mon" for topic in FILTERED.get(name, ()) if given.enforce]
     return found + [f"--source={','.join(map(str, source))}" for source in given.source or ()]
 
 
 def everything(given):
     environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{given.port}", "ROS_IP": "127.0.0.1"}
-    started = [subprocess.Popen(["rosmaster", "--core", "-p", str(given.port)], env=environment)]
+    started = []
     try:
+        if not given.master:
+            started.append(subprocess.Popen(["rosmaster", "--core", "-p", str(given.port)], env=environment))
         while not answers(given.port):
             time.sleep(0.05)
         for name in (*NODES, "world"):
@@ -122,12 +127,16 @@ def place(text):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--port", type=int, default=11311)
+    parser.add_argument("--master", action="store_true", help="there is a master at that port")
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--fault", choices=faults.NAMES)
     parser.add_argument("--source", type=place, action="append", help="radiation there, instead of at waypoint 7")
     parser.add_argument("--sensor", type=Path, help="the radiation sensor that was built from C++")
     parser.add_argument("--node", choices=(*NODES, "world"), help="be this one, and start nothing else")
-    given = parser.parse_args()
+    parser.add_argument(
+        "--enforce", action="store_true", help="what is filtered is remapped, for a monitor with --enforce"
+    )
+    given = parser.parse_args([word for word in sys.argv[1:] if ":=" not in word])
     if given.node is not None:
         one(given.node, given.fault, given.source)
     else:
