@@ -17,6 +17,7 @@ ROOT = Path(__file__).parent.parent
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+_DEBIAN = Path("/usr/lib/python3/dist-packages")
 _NEEDS = {
     "needs_ajpf": lambda: "AJPF_HOME" in os.environ,
     "needs_chromium": lambda: any(map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
@@ -26,10 +27,8 @@ _NEEDS = {
     "needs_dot": lambda: shutil.which("dot") is not None,
     "needs_latex": lambda: shutil.which("pdflatex") is not None,
     "needs_pacti": lambda: importlib.util.find_spec("pacti") is not None,
-    "needs_ros1": lambda: (
-        Path("/usr/lib/python3/dist-packages/rospy").is_dir() and shutil.which("rosmaster") is not None
-    ),
-    "needs_roscpp": lambda: Path("/usr/include/ros/ros.h").is_file() and shutil.which("g++") is not None,
+    "needs_ros1": lambda: all((_DEBIAN / name).is_dir() for name in ("rospy", "rosmaster", "diagnostic_msgs")),
+    "needs_roscpp": lambda: Path("/usr/include/ros/ros.h").is_file() and all(map(shutil.which, ("g++", "pkg-config"))),
     "needs_spin": lambda: shutil.which("spin") is not None and shutil.which("gcc") is not None,
 }
 

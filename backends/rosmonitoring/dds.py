@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -22,7 +22,7 @@ from avow.ros.definitions import Definitions
 
 from .dds_types import DIAGNOSTICS, NO_DDS, Types, dds_topic, dds_type, filled
 from .graphs import Inbox, Status
-from .tuning import DDS_HISTORY, DDS_MATCH, DDS_SETTLE, DDS_TAKEN, LAST_DOMAIN, LIVE_PAUSE
+from .tuning import DDS_MATCH, DDS_SETTLE, DDS_TAKEN, LAST_DOMAIN, LIVE_PAUSE
 
 LOOPBACK = ("127.0.0.1", "localhost")
 
@@ -171,7 +171,7 @@ class Dds:
 
     def _discover(self) -> None:
         """Who writes what is listened to."""
-        for found in self._publications.take(DDS_TAKEN):
+        for found in _all(self._publications):
             handle = found.sample_info.instance_handle
             if not found.sample_info.valid_data:
                 if handle in self._writers:
@@ -197,7 +197,7 @@ class Dds:
         key = (heard.topic, *map(repr, (*taken, *part)))
         if key not in self._readers:
             more = Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True)
-            qos = Qos(*taken, Policy.History.KeepLast(DDS_HISTORY), more)
+            qos = Qos(*taken, Policy.History.KeepAll, more)  # what it drops, it would not say
             subscriber = Subscriber(self._participant, Qos(*part)) if part else self._participant
             entity = DataReader(subscriber, heard.entity, qos)
             self._wait.attach(self._condition(entity))
@@ -206,7 +206,7 @@ class Dds:
 
     def _take(self) -> None:
         """What has come: of each writer by its own reader, in the order of their clocks."""
-        taken = [(reader, sample) for reader in self._readers.values() for sample in reader.entity.take(DDS_TAKEN)]
+        taken = [(reader, sample) for reader in self._readers.values() for sample in _all(reader.entity)]
         if any(sample.sample_info.publication_handle not in self._writers for _, sample in taken):
             self._discover()  # one who has come in between
         found: list[tuple[int, _Heard, bytes]] = []
@@ -234,6 +234,14 @@ class Dds:
             if lost != reader.lost:
                 reader.lost = lost
                 self.inbox.trouble(reader.heard.topic, f"{reader.heard.topic}: {lost} samples lost")
+
+
+def _all(reader: Any) -> Iterator[Any]:
+    """What a reader has, and takes no more of than a little at a time."""
+    while found := reader.take(DDS_TAKEN):
+        yield from found
+        if len(found) < DDS_TAKEN:
+            return
 
 
 def _event(heard: _Heard, data: bytes, now: float) -> Event:

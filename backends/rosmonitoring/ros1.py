@@ -26,7 +26,7 @@ from avow.ros.bags import Event, enveloped, plainer
 
 from .enforce import raw
 from .graphs import Inbox, Status
-from .tuning import FRAME_BYTES, HEADER_BYTES
+from .tuning import FRAME_BYTES, HEADER_BYTES, LISTENER_SECONDS
 
 CALLER = "/avow_monitor"
 HOST = "127.0.0.1"
@@ -99,6 +99,8 @@ class Ros1:
             if target not in self._spoken:
                 latch = fields.get("latching") == "1"
                 self.speak(target, fields["type"], fields["message_definition"], fields["md5sum"], latch=latch)
+            if self._spoken[target].digest != fields["md5sum"]:
+                raise ValueError(f"its {fields['type']} is made otherwise than that of another publisher")
             return self._spoken[target].say
 
     def speak(self, topic: str, kind: str, definition: str, digest: str, *, latch: bool = True) -> Spoken:
@@ -204,6 +206,7 @@ class Spoken:
     def __init__(self, host: str, topic: str, fields: Mapping[str, str], *, latch: bool = True) -> None:
         self.topic = topic
         self._latch = latch
+        self.digest = fields["md5sum"]
         self._header = header({"callerid": CALLER, "topic": topic, "latching": str(int(latch)), **fields})
         self._listening = socket.create_server((host, 0))
         self.port = int(self._listening.getsockname()[1])
@@ -216,6 +219,7 @@ class Spoken:
         while True:
             try:
                 line, _ = self._listening.accept()
+                line.settimeout(LISTENER_SECONDS)
                 read_header(line)
                 line.sendall(self._header)
                 with self._lock:
@@ -238,6 +242,7 @@ class Spoken:
                     line.sendall(self._latest)
                 except OSError:
                     self._lines.remove(line)
+                    line.close()  # half a message may be on it
 
     def close(self) -> None:
         self._listening.close()

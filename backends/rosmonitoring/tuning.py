@@ -92,10 +92,10 @@ DDS_SETTLE = 0.005
 DDS_TAKEN = 1_000
 """Samples, and writers, that are taken from DDS at a time."""
 
-DDS_HISTORY = 10_000
-"""Samples that DDS keeps for a reader until they are taken, every few milliseconds."""
+LISTENER_SECONDS = 1.0
+"""Seconds that one who listens may take for a message; who takes longer is left, so that nobody waits for him."""
 
-DDS_MATCH = 1.0
+DDS_MATCH = 5.0
 """Seconds after which a writer that was found and is not matched is told."""
 
 LAST_DOMAIN = 232

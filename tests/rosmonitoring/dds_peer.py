@@ -131,7 +131,8 @@ def main():
                 kind, writer = writers[said["name"]]
                 for given in said["values"]:
                     writer.write(value(kind, given), *((said["time"],) if "time" in said else ()))
-                    time.sleep(said.get("pause", 0))
+                    if "pause" in said:
+                        time.sleep(said["pause"])
             case "gone":
                 del writers[said["name"]]
             case "verdicts":

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from avow.backends.rosmonitoring import dds
 from avow.backends.rosmonitoring.live import follow, graph_of
 from avow.backends.rosmonitoring.session import Session, session
 from avow.backends.rosmonitoring.watched import Fault, Violation
@@ -154,6 +155,17 @@ def test_two_writers_one_that_goes_and_one_that_comes_late(peer: Peer, make_syst
 
 @pytest.mark.slow
 @needs_dds
+def test_nothing_is_lost_of_a_burst(peer: Peer, make_system: Callable[..., System]) -> None:
+    peer.write("s")
+    with Listening(peer, make_system(RCL, MAPPING)) as listening:
+        peer.heard("s")
+        peer.say("s", *(float(k % 121) for k in range(30_000)))
+        listening.until(lambda s: s.events == 30_000)
+    assert (listening.found, listening.warned) == ([], [])
+
+
+@pytest.mark.slow
+@needs_dds
 def test_a_silent_topic_is_told_while_nothing_comes(peer: Peer, make_system: Callable[..., System]) -> None:
     peer.write("s")
     with Listening(peer, make_system(RCL, MAPPING, fresh={"out.s": "300 ms"})) as listening:
@@ -184,8 +196,9 @@ def test_a_writer_whose_clock_jumps_is_no_false_alarm(peer: Peer, make_system: C
     [("Wrong", "is made otherwise"), ("Short", "is made otherwise"), ("Single", "is written as std_msgs/Float32")],
 )
 def test_another_layout_or_type_is_told_and_not_heard(
-    peer: Peer, make_system: Callable[..., System], kind: str, told: str
+    peer: Peer, make_system: Callable[..., System], monkeypatch: pytest.MonkeyPatch, kind: str, told: str
 ) -> None:
+    monkeypatch.setattr(dds, "DDS_MATCH", 0.5)
     peer.write("s", kind)
     with Listening(peer, make_system(RCL, MAPPING)) as listening:
         peer.say("s", 1)

@@ -172,6 +172,32 @@ def test_a_filter_passes_on_what_breaks_nothing(
     assert again.unmonitored() == ["n.low"]
 
 
+def test_one_who_listens_and_does_not_read_holds_nobody_up(master: Master) -> None:
+    with Ros1(master.uri, ()) as node, Ros1(master.uri, ()) as other:
+        spoken = node.speak("/s", *FLOAT64)
+        at = ("127.0.0.1", spoken.port)
+        with socket.create_connection(at), socket.create_connection(at) as slow:  # the first says not even who he is
+            slow.sendall(header({"callerid": "/slow", "topic": "/s", "type": "*", "md5sum": "*"}))
+            wait_for(lambda: spoken.listeners == 1)
+            for _ in range(100):
+                spoken.say(bytes(1 << 20))
+            assert spoken.listeners == 0
+        other._publishers("", "/s", [node.uri])
+        wait_for(lambda: spoken.listeners == 1)
+
+
+def test_publishers_of_a_filtered_topic_have_one_type(master: Master) -> None:
+    with Ros1(master.uri, ("s",), filtered={"s"}) as graph, Ros1(master.uri, ()) as one, Ros1(master.uri, ()) as other:
+        one.speak("/s_mon", *FLOAT64)
+        graph._publishers("", "/s_mon", [one.uri])
+        wait_for(lambda: "/s" in graph._spoken)
+        other.speak("/s_mon", "std_msgs/Bool", "bool data\n", "8b94c1b53db61fb6aed406028ad6332a")
+        graph._publishers("", "/s_mon", [one.uri, other.uri])
+        heard = graph.inbox.get(60)
+        assert heard is not None
+        assert "made otherwise" in heard.trouble
+
+
 @pytest.mark.parametrize(
     ("more", "why"),
     [
