@@ -18,7 +18,7 @@ from avow.formulas.formula import free_variables, substitute
 from avow.formulas.traversal import transform
 from avow.language.contract import Clause, ClauseKind, Contract, Node, Port
 from avow.language.definedness import with_value
-from avow.language.load import parse_formula
+from avow.language.load import NOTHING, parse_formula
 from avow.language.sorts import BOOL, INTEGER, NATURAL, REAL, EnumSort, Sort
 from avow.language.terms import (
     FALSE,
@@ -108,7 +108,11 @@ class Stepping:
 
 
 def stepping(
-    contract: Contract, node: Node, names: Iterable[str], held: Sequence[Held], stated: Iterable[tuple[str, Span]]
+    node: Node,
+    names: Iterable[str],
+    held: Sequence[Held] = (),
+    stated: Iterable[tuple[str, Span]] = (),
+    contract: Contract = NOTHING,
 ) -> Stepping:
     """The steps of a node, of which the guarantees `names` are asked. `stated` are the plan's invariants, each with its
     place: RCL about what is held, by name, and about the steps before (``previous(…)``, …). Raises Rejected (code

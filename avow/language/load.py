@@ -27,7 +27,7 @@ from avow.language.source import Reports, Source
 from avow.language.terms import Role, Term, Variable
 from avow.tuning.sizes import CONTRACT_BYTES, CONTRACTS_KEPT
 
-_NOTHING = Contract((), (), (), ())
+NOTHING = Contract((), (), (), ())
 
 
 def load_contract(paths: Sequence[Path]) -> Contract:
@@ -271,7 +271,7 @@ def in_order(reports: Reports) -> list[Diagnostic]:
 def parse_formula(
     text: str,
     node: Node | None = None,
-    contract: Contract = _NOTHING,
+    contract: Contract = NOTHING,
     span: Span | None = None,
     extra: Mapping[str, Sort] | None = None,
     *,
@@ -292,7 +292,7 @@ def parse_formula(
 def parse_term(
     text: str,
     node: Node | None = None,
-    contract: Contract = _NOTHING,
+    contract: Contract = NOTHING,
     span: Span | None = None,
     extra: Mapping[str, Sort] | None = None,
     *,

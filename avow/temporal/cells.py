@@ -85,6 +85,8 @@ class Cell:
     """What it is before the first step, at every argument; None: any value, which nothing looks at."""
     now: Term
     """What this step leaves, at the `parameters`: over the node's ports and what the step before has left."""
+    record: History | None = field(default=None, compare=False, repr=False)
+    """What it is kept for; None of whether a step is the first."""
 
     @property
     def name(self) -> str:
@@ -286,7 +288,7 @@ class Records:
         kept = FunctionSort(tuple(v.sort for v in parameters), sort) if parameters else sort
         before = Variable(Role.INPUT, f"{term.operator}{CELL}{digest(term)[:12]}", kept)
         read = _at(before, parameters)
-        cell = Cell(before, parameters, initial, now(read) if callable(now) else now)
+        cell = Cell(before, parameters, initial, now(read) if callable(now) else now, term)
         self.cells.append(cell)
         return cell
 

@@ -9,10 +9,11 @@ from typing import Any
 
 from avow.backend_kit.given import existing_file, file_path, told
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool, Translated
+from avow.backend_kit.runs import unsaid
 from avow.base import process
 from avow.base.diagnostics import Diagnostic, Rejected, Severity, Span
 from avow.base.verdict import Link, Outcome, Verdict
-from avow.language.contract import Node
+from avow.language.contract import Clause, Node
 from avow.system.plan import System
 
 from .codes import CODES
@@ -42,10 +43,11 @@ class DafnyBackend(Backend):
 
     name = "dafny"
     title = "a Dafny implementation, verified against the contract"
-    version = "4"
+    version = "5"
     strength = Verdict.PROVED
     uses_scenario = False
     uses_wiring = False
+    remembers = True
     portable = True
     link = Link.GENERATED
     options_schema = SCHEMA
@@ -59,6 +61,9 @@ class DafnyBackend(Backend):
 
     def tools(self) -> tuple[Tool, ...]:
         return (dafny(),)
+
+    def unsaid(self, node: Node, clause: Clause) -> str | None:
+        return unsaid(self.name, node, clause)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         try:
@@ -96,7 +101,7 @@ class DafnyBackend(Backend):
 
     def translate(self, notation: str, system: System, node: Node) -> Translated:
         """Types, contract, specification and skeleton, as `export` has them, of all the node's guarantees."""
-        names = [clause.name for clause in node.guarantees]
+        names = [clause.name for clause in node.guarantees if self.unsaid(node, clause) is None]
         try:
             generated = generate(node, names)
         except NotExpressible as problem:
@@ -183,7 +188,7 @@ def _generate(job: Job) -> Generated:
 
 
 def _scan(text: str, generated: Generated) -> Scan:
-    return scan(text, generated.spec_module, generated.impl_module, tuple(_specification(generated)))
+    return scan(text, generated.spec_module, generated.impl_module, tuple(_specification(generated)), generated.lemmas)
 
 
 def _specification(generated: Generated) -> dict[str, str]:

@@ -14,7 +14,7 @@ from avow.formulas.formula import free_variables
 from avow.formulas.values import Value, show
 from avow.language.contract import Node
 from avow.language.sorts import BoolSort, IntegerSort, NaturalSort, RealSort
-from avow.language.terms import Variable
+from avow.language.terms import Variable, histories
 from avow.tuning.effort import JUDGE_EFFORT
 
 from .names import Names
@@ -74,5 +74,7 @@ def _allowed(node: Node, values: Mapping[Variable, Value]) -> bool:
     """Whether no assumption about these inputs alone is known to be false of them."""
     from avow.solving.questions import replay  # Z3 is slow to import
 
-    spoken = [a.formula for a in node.assumptions if free_variables(a.formula) <= values.keys()]
+    spoken = [
+        a.formula for a in node.assumptions if free_variables(a.formula) <= values.keys() and not histories(a.formula)
+    ]
     return not spoken or replay(spoken, values, effort=JUDGE_EFFORT) is not False

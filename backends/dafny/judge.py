@@ -22,6 +22,7 @@ from avow.language.contract import Node
 
 from .answer import Member
 from .candidate import candidates
+from .history import FIRST
 from .modules import CALL, ENV_ALWAYS, PROBE_FILE, Generated, without_env_always
 from .runner import Audit, Run, audit, verify
 from .scanner import Scan, resolved_environment
@@ -165,7 +166,8 @@ def _lacking(members: tuple[Member, ...], scanned: Scan, generated: Generated, e
     there = {(m.module, m.name) for m in members if (m.kind, m.scope) == ("Impl", "_default")}
     names = {m.name for m in members if m.kind == "Impl"}
     found = [what for _, what in scanned.problems]
-    own = [(generated.impl_module, n) for n in ("EnvNotEmpty", "Step")] + [(generated.probe_module, CALL)]
+    own = [(generated.impl_module, n) for n in (*generated.lemmas, "Step")] + [(generated.probe_module, CALL)]
+    own += [(generated.probe_module, FIRST)] if generated.remembers else []
     if environment == "true":
         own.append((generated.probe_module, ENV_ALWAYS))
     found += [f"no answer about {name}" for module, name in own if (module, name) not in there]

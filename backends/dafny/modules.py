@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from avow.backend_kit.stepping import stepping
 from avow.formulas.formula import free_variables
 from avow.language.contract import Clause, Node
 from avow.language.operators import OPERATORS, Level
 from avow.language.sorts import DataSort, EnumSort, OpaqueSort
 from avow.language.terms import Variable
+from avow.temporal.cells import CELL, remembers
 
+from .history import ESTABLISHED, History, history
 from .names import RESERVED, Names, file_stem, identifier
-from .printer import NotExpressible, Predicate, Vocabulary, call, print_clause, sort_text
+from .printer import NotExpressible, Predicate, Vocabulary, print_clause, sort_text
 
 _MODULE = 'module {:options "--function-syntax:3"}'
 """Ignored by 2.3; makes `predicate` ghost in 4.x, as it is in 2.3."""
@@ -83,6 +86,13 @@ class Generated:
     """The same map for its `ensures`."""
     uncovered: tuple[tuple[str, str], ...]
     """Guarantees that cannot be expressed, with the reason."""
+    remembers: bool = False
+    """Whether the contract speaks of other steps, so that there is a history."""
+
+    @property
+    def lemmas(self) -> tuple[str, ...]:
+        """Those that an implementation has to give."""
+        return ("EnvNotEmpty", ESTABLISHED) if self.remembers else ("EnvNotEmpty",)
 
 
 PROBE_FILE = "probe.dfy"
@@ -94,7 +104,12 @@ def generate(node: Node, guarantees: Sequence[str]) -> Generated:
     names = Names()
     inputs = tuple(port.variable for port in node.inputs)
     outputs = tuple(port.variable for port in node.outputs)
-    words = Vocabulary(names, Names(), inputs + outputs)
+    steps = stepping(node, guarantees) if remembers(node) else None
+    cells = steps.cells if steps is not None else ()
+    names.taken |= {"History", "Begins", "Advance"} if steps is not None else set()
+    words = Vocabulary(names, Names(), (*inputs, *outputs, *(c.before for c in cells)))
+    for number, cell in enumerate(cells, start=1):
+        words.locals(str(cell.before.role), cell.name, f"{cell.name.partition(CELL)[0].replace(' ', '_')}{number}")
     stem = file_stem(node.name)
     title = identifier(node.name).replace("'", "")
     title = title[:1].upper() + title[1:]
@@ -105,6 +120,8 @@ def generate(node: Node, guarantees: Sequence[str]) -> Generated:
     for port in inputs + outputs:
         words.local(port)
         sort_text(port.sort, words)
+    past = history(steps, words) if steps is not None else History()
+    node = replace(node, assumptions=steps.node.assumptions, guarantees=steps.node.guarantees) if steps else node
     for clause in node.assumptions:
         if told := [v.name for v in free_variables(clause.formula) if v in outputs]:
             raise NotExpressible(f"assumption {clause.name}: it speaks of the output {told[0]}", clause.span)
@@ -121,13 +138,13 @@ def generate(node: Node, guarantees: Sequence[str]) -> Generated:
     types_file, contract_file, spec_file = "types.dfy", f"{stem}_contract.dfy", f"{stem}_spec.dfy"
     impl_file = f"{stem}_impl.dfy"
     clauses = list(zip(node.assumptions, assumed, strict=True)) + promised
-    contract = _contract(node, clauses, words, types_file)
-    spec, ensures = _spec(node, assumed, promised, words, spec_module, contract_file)
-    probe, probe_ensures = _probe(node, assumed, promised, words, probe_module, impl_module)
-    skeleton = _skeleton(inputs, outputs, words, spec_module, impl_module, spec_file)
+    written = _contract(past, clauses, words, types_file)
+    spec, ensures = _spec(node, past, assumed, promised, words, spec_module, contract_file)
+    probe, probe_ensures = _probe(node, past, assumed, promised, words, probe_module, impl_module)
+    skeleton = _skeleton(past, inputs, outputs, words, spec_module, impl_module, spec_file)
     return Generated(
-        node.name, spec_module, impl_module, types_file, contract_file, spec_file, impl_file, _types(words), contract,
-        spec, skeleton, ensures, probe_module, probe, probe_ensures, tuple(uncovered),
+        node.name, spec_module, impl_module, types_file, contract_file, spec_file, impl_file, _types(words), written,
+        spec, skeleton, ensures, probe_module, probe, probe_ensures, tuple(uncovered), bool(past.cells),
     )  # fmt: skip
 
 
@@ -189,13 +206,14 @@ def _local_type(sort: object, words: Vocabulary) -> str:
 
 
 def _contract(
-    node: Node, clauses: Sequence[tuple[Clause, tuple[Predicate, ...]]], words: Vocabulary, types_file: str
+    past: History, clauses: Sequence[tuple[Clause, tuple[Predicate, ...]]], words: Vocabulary, types_file: str
 ) -> str:
     lines = [
         "// Generated: one predicate for each clause of the contract, and one for each quantifier's body. Do not edit.",
         f'include "{types_file}"',
         f"{_MODULE} Contract {{",
         "  import Types",
+        *past.contract(words),
     ]
     for clause, predicates in clauses:
         lines.append("")
@@ -208,6 +226,7 @@ def _contract(
 
 def _spec(
     node: Node,
+    past: History,
     assumed: Sequence[tuple[Predicate, ...]],
     promised: Sequence[tuple[Clause, tuple[Predicate, ...]]],
     words: Vocabulary,
@@ -224,27 +243,33 @@ def _spec(
         "  import Types",
         "  import Contract",
         "",
+        *past.specification(),
         "  // The implementer's: what else is assumed of the inputs (reported as an added assumption), or true.",
         f"  predicate Env({inputs})",
         "",
         "  // The implementer's: inputs that meet every assumption, so that nothing is proved of no case at all.",
-        f"  lemma EnvNotEmpty(){f' returns ({inputs})' if inputs else ''}",
-        *(f"    ensures {call(p[-1], words, 'Contract.')}" for p in assumed),
+        f"  lemma EnvNotEmpty({past.given('', program=False)}){f' returns ({inputs})' if inputs else ''}",
+        *(("    requires Contract.Begins(h)",) if past.cells else ()),
+        *(f"    ensures {past.call(p[-1], words)}" for p in assumed),
         f"    ensures {env}",
         "",
-        f"  method Step({inputs})" + (f" returns ({outputs})" if outputs else ""),
-        *(f"    requires {call(p[-1], words, 'Contract.')}" for p in assumed),
+        f"  method Step({past.given(inputs)})" + (f" returns ({left})" if (left := past.left(outputs)) else ""),
+        *(f"    requires {past.call(p[-1], words)}" for p in assumed),
         f"    requires {env}",
+        *(("    requires Linked(h, m)",) if past.cells else ()),
     ]
     ensures = []
     for clause, predicates in promised:
-        lines.append(f"    ensures {call(predicates[-1], words, 'Contract.')}")
+        lines.append(f"    ensures {past.call(predicates[-1], words)}")
         ensures.append((len(lines), clause.name))
+    if past.cells:
+        lines.append(f"    ensures Linked({past.advanced(words)}, n)")
     return "\n".join([*lines, "}", ""]), tuple(ensures)
 
 
 def _probe(
     node: Node,
+    past: History,
     assumed: Sequence[tuple[Predicate, ...]],
     promised: Sequence[tuple[Clause, tuple[Predicate, ...]]],
     words: Vocabulary,
@@ -255,7 +280,11 @@ def _probe(
     given = signature([p.variable for p in node.outputs], words)
     arguments = ", ".join(words.local(p.variable) for p in node.inputs)
     results = ", ".join(words.local(p.variable) for p in node.outputs)
-    sane = [f"    requires {call(p[-1], words, 'Contract.')}" for p in assumed]
+    sane = [f"    requires {past.call(p[-1], words)}" for p in assumed]
+    left = past.left(given, "Implementation.Memory")
+    asked = past.given(taken).replace("m: Memory", "m: Implementation.Memory", 1)
+    passed = ", ".join((*(("h", "m") if past.cells else ()), *((arguments,) if arguments else ())))
+    found = ", ".join((*(("n",) if past.cells else ()), *((results,) if results else ())))
     lines = [
         f"// Generated: {impl_module} used from outside. Do not edit.",
         f"{_MODULE} {probe_module} {{",
@@ -263,18 +292,22 @@ def _probe(
         "  import Contract",
         f"  import Implementation = {impl_module}",
         "",
-        f"  method {CALL}({taken})" + (f" returns ({given})" if given else ""),
+        f"  method {CALL}({asked})" + (f" returns ({left})" if left else ""),
         *sane,
         f"    requires Implementation.Env({arguments})",
+        *(("    requires Implementation.Linked(h, m)",) if past.cells else ()),
     ]
     ensures = []
     for clause, predicates in promised:
-        lines.append(f"    ensures {call(predicates[-1], words, 'Contract.')}")
+        lines.append(f"    ensures {past.call(predicates[-1], words)}")
         ensures.append((len(lines), clause.name))
-    lines.append(f"  {{ {f'{results} := ' if results else ''}Implementation.Step({arguments}); }}")
+    if past.cells:
+        lines.append(f"    ensures Implementation.Linked({past.advanced(words)}, n)")
+    lines.append(f"  {{ {f'{found} := ' if found else ''}Implementation.Step({passed}); }}")
+    lines += past.probe()
     lines += [
         "",
-        f"  lemma {ENV_ALWAYS}({taken})",
+        f"  lemma {ENV_ALWAYS}({past.given(taken, program=False)})",
         *sane,
         f"    ensures Implementation.Env({arguments})",
         "  { }",
@@ -288,6 +321,7 @@ def without_env_always(probe: str) -> str:
 
 
 def _skeleton(
+    past: History,
     inputs: Sequence[Variable],
     outputs: Sequence[Variable],
     words: Vocabulary,
@@ -301,14 +335,15 @@ def _skeleton(
         "// A skeleton: copy it into the system's models/ and fill it in. Nothing is ever written over it there.",
         f'include "{spec_file}"',
         f"{_MODULE} {impl_module} refines {spec_module} {{",
+        *past.skeleton(),
         f"  predicate Env({taken}) {{ true }}",
         "",
-        f"  lemma EnvNotEmpty(){f' returns ({taken})' if taken else ''}",
+        f"  lemma EnvNotEmpty({past.given('', program=False)}){f' returns ({taken})' if taken else ''}",
         "  {",
         "    // give inputs that meet every assumption",
         "  }",
         "",
-        f"  method Step({taken})" + (f" returns ({given})" if given else ""),
+        f"  method Step({past.given(taken)})" + (f" returns ({left})" if (left := past.left(given)) else ""),
         "  {",
         "    // set the outputs; name the witnesses of existential guarantees, for example",
         "    // assert Contract.guarantee_ex1(…, witness);",

@@ -62,11 +62,17 @@ class Scan:
     """The file with its includes of generated files blanked out: the generated files are given to Dafny directly."""
 
 
-def scan(text: str, spec_module: str, impl_module: str, generated: Sequence[str]) -> Scan:
-    """`generated` are the names of the generated files."""
+def scan(
+    text: str,
+    spec_module: str,
+    impl_module: str,
+    generated: Sequence[str],
+    lemmas: Sequence[str] = ("EnvNotEmpty",),
+) -> Scan:
+    """`generated` are the names of the generated files, `lemmas` those that an implementation has to give."""
     # Dafny reads a lone carriage return as the end of a line, and so of a comment.
     text = text.replace("\r\n", "\n").replace("\r", "\n")
-    return _Scanner(text, spec_module, impl_module, generated).scan()
+    return _Scanner(text, spec_module, impl_module, generated, lemmas).scan()
 
 
 def tokens(text: str) -> list[Token]:
@@ -168,8 +174,11 @@ def _body(text: str, found: Sequence[Token], at: int, end: int) -> str | None:
 
 
 class _Scanner:
-    def __init__(self, text: str, spec_module: str, impl_module: str, generated: Sequence[str]) -> None:
+    def __init__(
+        self, text: str, spec_module: str, impl_module: str, generated: Sequence[str], lemmas: Sequence[str]
+    ) -> None:
         self.text = text
+        self.lemmas = lemmas
         self.tokens = tokens(text)
         self.spec_module, self.impl_module = spec_module, impl_module
         self.generated = frozenset(generated)
@@ -324,7 +333,7 @@ class _Scanner:
             there = f"; there is a module {named}" if named and named != self.impl_module else ""
             wanted = f"module {self.impl_module} refines {self.spec_module}"
             self.problems.append((1, f"the file must hold '{wanted}' once, at the top{there}"))
-        for kind, name in (("lemma", "EnvNotEmpty"), ("method", "Step")):
+        for kind, name in (*(("lemma", each) for each in self.lemmas), ("method", "Step")):
             if (kind, name) not in self.members:
                 self.problems.append((1, f"{kind} {name} is missing"))
 

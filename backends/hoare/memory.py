@@ -37,7 +37,7 @@ def steps_of(job: Job, source: Source) -> Stepping | None:
     if not source.memory and not stated and not remembers(job.node):
         return None
     held = tuple(_held(each, job) for each in source.memory)
-    return stepping(job.contract, job.node, (o.name for o in job.obligations), held, stated)
+    return stepping(job.node, (o.name for o in job.obligations), held, stated, job.contract)
 
 
 def _stated(job: Job) -> tuple[tuple[str, Span], ...]:
