@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 import yaml
+
+from avow.language import textmate
+from avow.language.lexer import KEYWORDS
+from avow.lsp.vocabulary import FORMS
 
 ROOT = Path(__file__).parents[2]
 KIT = ROOT / "docs/adoption"
@@ -125,6 +132,81 @@ def test_the_editors_package_names_files_that_are_there() -> None:
     assert "avow.command" in package["contributes"]["configuration"]["properties"]
     main = (place / package["main"]).read_text()
     assert "avow.command" in main or 'get("command"' in main
+
+
+def builder() -> Any:
+    spec = importlib.util.spec_from_file_location("vsix_builder", KIT / "vscode/build.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_editors_package_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without npm, whose library comes from its registry: CI builds the package as a whole, where it can."""
+    build = builder()
+    monkeypatch.setattr(build.shutil, "which", lambda name: None)
+    made = build.build(tmp_path)
+    assert build.faults(made) == []
+    assert not build.has_library(made)
+    assert made.read_bytes() == build.build(tmp_path / "again").read_bytes(), "the same files, the same package"
+    lock = json.loads((KIT / "vscode/package-lock.json").read_text())["packages"]
+    package = json.loads((KIT / "vscode/package.json").read_text())
+    assert lock[""]["dependencies"] == package["dependencies"]
+    assert all(each.get("integrity") for name, each in lock.items() if name), "every file of the library is pinned"
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("extension/extension.js", None),
+        ("extension/syntaxes/rcl.tmLanguage.json", None),
+        ("extension/README.md", None),
+        ("[Content_Types].xml", None),
+        ("[Content_Types].xml", "<Types/>"),
+        ("extension.vsixmanifest", "<PackageManifest/>"),
+        ("extension/../out.js", "x"),
+    ],
+)
+def test_a_package_that_is_not_whole_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, text: str | None
+) -> None:
+    build = builder()
+    monkeypatch.setattr(build.shutil, "which", lambda name: None)
+    with zipfile.ZipFile(build.build(tmp_path)) as whole:
+        files = {each: whole.read(each) for each in whole.namelist() if each != name}
+    if text is not None:
+        files[name] = text.encode()
+    with zipfile.ZipFile(tmp_path / "broken.vsix", "w") as broken:
+        for each, data in files.items():
+            broken.writestr(each, data)
+    assert build.faults(tmp_path / "broken.vsix")
+
+
+def test_the_editors_colours_are_made_from_the_language() -> None:
+    path = KIT / "vscode/syntaxes/rcl.tmLanguage.json"
+    if os.environ.get("AVOW_REFRESH"):
+        path.write_text(textmate.text(), "utf-8")
+    assert path.read_text("utf-8") == textmate.text(), "AVOW_REFRESH=1 .venv/bin/pytest tests/docs/test_adoption_kit.py"
+    patterns = [p for p in textmate.grammar()["patterns"] if "match" in p]
+
+    def kind(text: str) -> str:
+        """By the first pattern that begins earliest, as an editor does."""
+        found = [(m.start(), k) for k, p in enumerate(patterns) if (m := re.search(p["match"], text))]
+        pattern = patterns[min(found)[1]] if found else {}
+        return str(pattern.get("name") or pattern.get("captures", {}).get("2", {}).get("name", ""))
+
+    for word in KEYWORDS:
+        assert kind(word), word
+    for form in FORMS.values():
+        assert kind(f"{form.name}(x)"), form
+    for sign in ("->", "<=>", "==", "!=", "<=", "-->", "+"):
+        assert kind(sign) == "keyword.operator.rcl"
+    assert kind("node agent {") == "entity.name.type.rcl"
+    assert kind("guarantee low (") == "entity.name.function.rcl"
+    assert kind("held") == "", "a name where it is not applied"
+    assert kind("200 ms") == "constant.numeric.rcl"
 
 
 def test_the_ros_package_is_of_format_3() -> None:

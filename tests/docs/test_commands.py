@@ -140,11 +140,11 @@ ELSEWHERE = {
     "doit verify:nasa_rover": "tests/systems/test_nasa_rover.py",
     "eval ": "test_the_shell_completes_commands",
     "export ": "tests/scale/test_executors.py sets them",
-    "npm ": "it needs the registry; tests/docs/test_adoption_kit.py checks the package",
     "pip ": "it installs; test_what_pip_is_told_to_install_exists",
     "pytest ": "a run of tests, and of a backend's: tests/docs/test_adding_a_backend.py",
     "python -P": "tests/hypothesis_backend: how a generated test is started",
     "python benchmarks/": "a measurement of some minutes",
+    "python docs/adoption/vscode/": "it asks npm; tests/docs/test_adoption_kit.py builds without",
 }
 
 

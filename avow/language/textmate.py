@@ -1,0 +1,79 @@
+"""RCL for editors that colour by TextMate grammars: made from the same tables as the language.
+
+``python -m avow.language.textmate > rcl.tmLanguage.json`` prints it; the editor's package ships what it prints.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from avow.language.lexer import KEYWORDS, LONG_UNITS, STEPS, SYMBOLS, UNITS
+from avow.language.operators import OPERATORS
+from avow.language.terms import Builtin, Past
+
+SCOPE = "source.rcl"
+_STRUCTURE = ("context", "node", "inputs", "outputs", "topics", "matches", "assume", "guarantee")
+_CONTROL = ("forall", "exists", "exists_unique", "upto", "if", "then", "else")
+_CONSTANTS = ("TRUE", "FALSE")
+_PUNCTUATION = frozenset(":;,.|(){}=")
+
+
+def grammar() -> dict[str, Any]:
+    """The grammar, as plain data."""
+    types = [word for word, kind in KEYWORDS.items() if kind == "BUILTIN"]
+    infix = [word for word in KEYWORDS if word not in (*_STRUCTURE, *_CONTROL, *_CONSTANTS, *types)]
+    called = sorted({*Builtin, *Past, "length", "indices"} - set(KEYWORDS))
+    signs = sorted((set(SYMBOLS) | {name for name in OPERATORS if not name.isalpha()}) - _PUNCTUATION, key=_longest)
+    units = (*UNITS, *LONG_UNITS, *STEPS)
+    return {
+        "scopeName": SCOPE,
+        "name": "RCL",
+        "patterns": [
+            {"name": "comment.line.double-slash.rcl", "match": r"//.*$"},
+            {"name": "comment.block.rcl", "begin": r"/\*", "end": r"\*/"},
+            {
+                "name": "string.quoted.double.rcl",
+                "begin": '"',
+                "end": '"|$',
+                "patterns": [{"name": "constant.character.escape.rcl", "match": r"\\."}],
+            },
+            {
+                "match": rf"\b(node)\s+({_NAME})",
+                "captures": {"1": {"name": "keyword.control.rcl"}, "2": {"name": "entity.name.type.rcl"}},
+            },
+            {
+                "match": rf"\b(assume|guarantee|A|G)\s+({_NAME})(?=\s*[\"(])",
+                "captures": {"1": {"name": "keyword.control.rcl"}, "2": {"name": "entity.name.function.rcl"}},
+            },
+            {"name": "keyword.control.rcl", "match": _words((*_STRUCTURE, "A", "G"))},
+            {"name": "keyword.operator.word.rcl", "match": _words((*_CONTROL, *infix))},
+            {"name": "support.function.rcl", "match": _words(called) + r"(?=\s*[(\[])"},
+            {"name": "support.type.rcl", "match": _words(types)},
+            {"name": "constant.language.rcl", "match": _words(_CONSTANTS)},
+            {"name": "constant.numeric.rcl", "match": rf"\b[0-9]+(\.[0-9]+)?\b(\s*{_words(units)})?"},
+            {"name": "keyword.operator.rcl", "match": "|".join(map(re.escape, signs))},
+        ],
+    }
+
+
+_NAME = r"[A-Za-z_][A-Za-z0-9_']*"
+
+
+def _words(words: Iterable[str]) -> str:
+    return rf"\b({'|'.join(words)})\b(?!')"
+
+
+def _longest(sign: str) -> tuple[int, str]:
+    return -len(sign), sign
+
+
+def text() -> str:
+    """The grammar as the file that ships."""
+    return json.dumps(grammar(), indent=1, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    print(text(), end="")
