@@ -59,7 +59,7 @@ class Seeded:
             self.prepare(folder)
         system = load_system(folder)
         (method,) = system.plan.node(self.node).methods
-        return method_job(system, system.contract.node(self.node), method)
+        return method_job(system, system.contract.node(self.node), method, backend)
 
     def renamed(self, words: Mapping[str, str]) -> Seeded:
         """With names replaced wherever they stand as words: in the contract, the options, the files and the plan."""

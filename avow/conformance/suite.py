@@ -198,7 +198,7 @@ class Conformance:
                 continue
             nodes = tuple(node if other.name == node.name else other for other in job.contract.nodes)
             system = replace(job.system, contract=replace(job.contract, nodes=nodes))
-            other = method_job(system, node, job.method)
+            other = method_job(system, node, job.method, self.backend)
             report = settle(self.backend, other, tmp_path / where, _ENOUGH)
             for outcome in report.outcomes:
                 assert not outcome.verdict.supports, f"{outcome.obligation} is {outcome.verdict}"

@@ -241,8 +241,10 @@ def method_backend(system: System, method: Method) -> Backend:
     return backend(method.backend, system.plan.plugins)
 
 
-def method_job(system: System, node: Node, method: Method) -> Job:
-    names = [c for c in method_backend(system, method).claims if _can_be_claimed(system, node, c)]
+def method_job(system: System, node: Node, method: Method, tool: Backend | None = None) -> Job:
+    """`tool` is the method's backend, where it is at hand: one under test need not be installed."""
+    claimed = (tool or method_backend(system, method)).claims
+    names = [c for c in claimed if _can_be_claimed(system, node, c)]
     claims = tuple(program_claim(system, node, name) for name in names)
     return Job(system, node, method, tuple(guarantee(system, node, name) for name in method.guarantees), claims)
 
