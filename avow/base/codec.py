@@ -60,11 +60,17 @@ def to_json(value: object) -> Any:
         return value
     if isinstance(value, tuple):
         return [to_json(item) for item in value]
+    if isinstance(value, str):
+        return str(value)
     if not dataclasses.is_dataclass(value) or isinstance(value, type):
         return plain(value)
-    later = _later(kind)
-    found = {name: getattr(value, name) for name in _fields(kind)}
-    return {name: to_json(item) for name, item in found.items() if item or name not in later}
+    later, found = _later(kind), dict[str, Any]()
+    for name in _fields(kind):
+        item = getattr(value, name)
+        if item or name not in later:  # most parts are plain, and there are very many
+            plainly = item is None or type(item) in (str, bool, int)
+            found[name] = item if plainly else to_json(item)
+    return found
 
 
 def from_json(kind: type[T], data: object) -> T:

@@ -105,6 +105,12 @@ def _lexer(is_contract: bool) -> Lexer:
     return RclLexer(stripnl=False, ensurenl=False) if is_contract else YamlLexer(stripnl=False, ensurenl=False)
 
 
+@cache
+def _colour(kind: _TokenType) -> str:
+    """The name that a kind of token has in the style sheet; empty for most."""
+    return next((name for found, name in _COLOURS if kind in found), "")
+
+
 def _coloured(source: SourceView) -> list[str]:
     """The text's lines as HTML."""
     if len(source.text) > COLOURED_CHARACTERS:
@@ -112,7 +118,7 @@ def _coloured(source: SourceView) -> list[str]:
     text = "\n".join(visible_lines(source.text))
     lines = [""]
     for _, kind, value in _lexer(source.is_contract).get_tokens_unprocessed(text):
-        colour = next((name for found, name in _COLOURS if kind in found), "")
+        colour = _colour(kind)
         for at, piece in enumerate(value.split("\n")):
             if at:
                 lines.append("")
