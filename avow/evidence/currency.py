@@ -26,6 +26,8 @@ def stands(record: Evidence, root: Path) -> bool:
 
 def changed(record: Evidence, root: Path) -> tuple[str, ...]:
     """The paths that are not as they were; relative ones are under `root`, the workspace."""
+    if OBSERVED not in record.details:
+        return ()
     try:
         seen = from_json(record.details.get(OBSERVED, ()))
     except ValueError:

@@ -106,6 +106,8 @@ class Ledger:
         """What the backend once refuted by a case, of the obligation of that name or that meaning, oldest first."""
         with self._lock:
             self._refresh()
+            if not self._refuted:
+                return ()
             found = [e for name in (obligation, digest) for e in self._refuted.get((name, backend), ())]
             return tuple({e.number: e for e in sorted(found, key=lambda e: e.number)}.values())
 

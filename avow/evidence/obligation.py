@@ -57,7 +57,9 @@ class Obligation:
     @property
     def id(self) -> str:
         """``system/node/kind/name``: for people, stable under edits of the formula."""
-        return f"{self.system}/{self.node}/{self.kind}/{self.name}"
+        return (
+            f"{self.system}/{self.node}/{self.kind._value_}/{self.name}"  # asked very often: an enum's format is slow
+        )
 
     @property
     def local_id(self) -> str:

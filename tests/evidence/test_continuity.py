@@ -23,6 +23,7 @@ from avow.evidence.continuity import began, continuity
 from avow.evidence.heads import Anchor, Event, index_path, note, read_index, stated_heads
 from avow.evidence.ledger import Ledger
 from avow.pipeline.integrity import acknowledge, confirm, reported_heads
+from avow.report.layout import json_text
 
 TRUE = [evidence("n.a"), evidence("n.b", Verdict.REFUTED)]
 FALSE = [evidence("n.a"), evidence("n.b", Verdict.PROVED)]
@@ -321,3 +322,27 @@ def test_two_writers_and_a_kill(tmp_path: Path) -> None:
     index = read_index(path)
     assert index.damage == ()
     assert [s.records for s in index.of("a")] == [s.records for s in index.of("b")] == list(range(1, 31))
+
+
+def test_a_report_states_its_head_however_it_is_laid_out(tmp_path: Path) -> None:
+    """As Avow writes it only two of its lines are read; nothing that stands elsewhere in it is taken for them."""
+    true, false = "a" * 64, "b" * 64
+    case = {"schema": "s", "system": "rover", "ledger_head": true, "sources": [{"text": '\n "ledger_head": "b",\n'}]}
+    inner = {**case, "baseline": {"system": "other", "ledger_head": false}}
+    doubled = json_text(case).replace("{\n", f'{{\n "ledger_head": "{false}",\n', 1)
+    path = tmp_path / "report.json"
+    for text, said in {
+        json_text(case): true,
+        json_text(inner): true,
+        json.dumps(inner): true,
+        json.dumps(inner, indent=1): true,
+        json.dumps(inner, indent=4): true,
+        doubled: true,  # the last one counts, as it does for who reads it as JSON
+        json_text({**case, "ledger_head": '\u00e4\\"'}): '\u00e4\\"',
+    }.items():
+        path.write_text(text)
+        assert [(a.system, a.head) for a in stated_heads(path, "")] == [("rover", said)], text
+        assert json.loads(text)["ledger_head"] == said
+    for text in (json_text({"system": "rover"}), "{\n", "", json_text(case)[:30]):
+        path.write_text(text)
+        assert not stated_heads(path, "")
