@@ -17,6 +17,7 @@ _PACKAGES = (
     ("PDF report", "typst", "pip install typst", True),
     ("bag files", "rosbags", "pip install 'avow[bags]'", True),
     ("live monitoring", "websockets", "pip install 'avow[monitor]'", True),
+    ("ROS 2 over DDS", "cyclonedds", "pip install 'avow[dds]'", True),
     ("verdicts as MCAP", "mcap", "pip install 'avow[monitor]'", True),
     ("language server", "pygls", "pip install 'avow[lsp]'", True),
     ("signatures", "cryptography", "pip install 'avow[signing]'", True),

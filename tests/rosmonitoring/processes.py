@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-LONGEST = 60.0
+LONGEST = 150.0
 """Seconds after which something has gone wrong."""
 
 
