@@ -368,13 +368,11 @@ class Due:
 
 def due(formula: Term) -> Due | None:
     """When a clause that is a response demands something; None of other clauses."""
-    outer, inner = list[Variable](), formula
-    while isinstance(inner, Quantified) and inner.quantifier is Quantifier.FORALL:
-        outer.extend(inner.variables)
-        inner = inner.body
-    if (found := _response(inner)) is None:
+    found = responding(formula)
+    if found is None:
         return None
-    full, response = conjunction(found[0]), found[1]
+    outer, triggers, response = found
+    full = conjunction(triggers)
     match response.operator:
         case Past.NEXT:
             full = History(Past.PREVIOUS, (full, FALSE), BOOL)
@@ -383,7 +381,18 @@ def due(formula: Term) -> Due | None:
             full = History(Past.SINCE, (TRUE, full), BOOL, replace(response.limit, relation=">="))
         case _:  # with the trigger
             pass
-    return Due(tuple(outer), tuple(found[0]), full)
+    return Due(outer, triggers, full)
+
+
+def responding(formula: Term) -> tuple[tuple[Variable, ...], tuple[Term, ...], History] | None:
+    """Of a clause that is a response: the variables of the quantifiers around it, what triggers it, and the response;
+    None of other clauses."""
+    outer = list[Variable]()
+    while isinstance(formula, Quantified) and formula.quantifier is Quantifier.FORALL:
+        outer.extend(formula.variables)
+        formula = formula.body
+    found = _response(formula)
+    return None if found is None else (tuple(outer), tuple(found[0]), found[1])
 
 
 def fulfilled(formula: Term) -> Term | None:

@@ -12,7 +12,7 @@ from avow.backend_kit.given import file_path
 from avow.backend_kit.protocol import Backend, Job, Limits, Report, Tool
 from avow.base.diagnostics import Diagnostic, Rejected
 from avow.base.verdict import Link, Verdict
-from avow.language.contract import Node
+from avow.language.contract import Clause, Node
 
 from .codes import CODES
 from .schema import SCHEMA
@@ -23,10 +23,11 @@ class AjpfBackend(Backend):
 
     name = "ajpf"
     title = "agent programs (Gwendolen), model-checked against properties instantiated from the contract"
-    version = "7"
+    version = "8"
     strength = Verdict.CHECKED
     uses_steps = False
     uses_wiring = False
+    remembers = True
     link = Link.MAPPED
     options_schema = SCHEMA
     codes = CODES
@@ -45,6 +46,11 @@ class AjpfBackend(Backend):
         from .suits import looks_like_an_agent
 
         return looks_like_an_agent(node)
+
+    def unsaid(self, node: Node, clause: Clause) -> str | None:
+        from .timing import unsaid
+
+        return unsaid(self.name, node, clause)
 
     def check(self, job: Job) -> tuple[Diagnostic, ...]:
         from .instances import diagnose, instances

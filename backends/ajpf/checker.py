@@ -39,6 +39,8 @@ class Property:
     """The instance in words: ``i = 3``."""
     forbidden: Formula | None = None
     """What must not come once the trigger is met, of ``[] (trigger -> [] ~forbidden)``."""
+    indecisive: str = ""
+    """Why a run on which it fails refutes nothing, if it does not."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ from .psl_parser import instantiate
 from .reading import Left, read_properties
 from .scenario import Decider, domain_of, range_of
 from .shape import TooComplex
+from .timing import timed
 from .tuning import FORMULA_DEPTH, PROPERTIES
 
 
@@ -44,6 +45,8 @@ class Claim:
     """Rows that are true, or false, of every agent."""
     left: tuple[Left, ...] = ()
     """What it forbids, where a property of the plan stands for that."""
+    hypothesis: str = ""
+    """What is not shown of a guarantee about steps to come."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,14 +143,19 @@ def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], key
         raise TooComplex
     found: dict[Formula, Property] = {}
     about: dict[Formula, list[str]] = {}
+    timing = timed(clause.formula)
+    said_now = clause.formula if timing is None else timing.formula
     ranges: dict[str, str] = {}
     settled: list[str] = []
     left: dict[Left, None] = {}
     mapper.expanded.clear()
     mapper.granted.clear()
-    for variables, antecedent, consequent in _implications(clause.formula):
+    end = bound_names(timing.ends) if timing is not None and timing.ends is not None else frozenset[str]()
+    for variables, antecedent, consequent in _implications(said_now):
         used = [
-            v for v in variables if is_index(v.sort) and v.name in bound_names(antecedent) | bound_names(consequent)
+            v
+            for v in variables
+            if is_index(v.sort) and v.name in bound_names(antecedent) | bound_names(consequent) | end
         ]
         others = tuple(v for v in variables if not is_index(v.sort))
         domains = []
@@ -160,11 +168,11 @@ def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], key
         for choice in product(*domains):
             values_now = dict(zip(used, choice, strict=True))
             said = ", ".join(f"{v.name} = {n}" for v, n in values_now.items())
-            made = list(
-                read_properties(
-                    substituted(antecedent, values_now), substituted(consequent, values_now), others, mapper, stand_ins
-                )
-            )
+            left_side, right_side = substituted(antecedent, values_now), substituted(consequent, values_now)
+            ending = timing
+            if timing is not None and timing.ends is not None:
+                ending = replace(timing, ends=substituted(timing.ends, values_now))
+            made = list(read_properties(left_side, right_side, others, mapper, stand_ins, ending))
             for item in made:
                 if isinstance(item, Left):
                     left[item] = None
@@ -188,7 +196,8 @@ def _instantiate(clause: Clause, mapper: Mapper, stand_ins: Sequence[Extra], key
         ranges.setdefault(name, _span(numbers))
     indices = tuple(f"{name} in {values}" for name, values in ranges.items())
     granted = tuple(sorted(mapper.granted))
-    return Claim(clause.name, properties, None, clause.span, indices, tuple(settled), granted, tuple(left))
+    about_it = timing.hypothesis if timing is not None else ""
+    return Claim(clause.name, properties, None, clause.span, indices, tuple(settled), granted, tuple(left), about_it)
 
 
 def _implications(term: Term) -> Iterator[tuple[tuple[Variable, ...], Term, Term]]:

@@ -19,8 +19,9 @@ from .checker import Property
 from .mapping import Mapped, Mapper, NotCovered, Unit, clauses, to_formula
 from .matching import match
 from .options import Extra
-from .psl import Always, Eventually, Formula, Implies
+from .psl import Always, Eventually, Formula, Implies, Release
 from .shape import shape
+from .timing import Timed
 from .tuning import ALTERNATIVES
 
 
@@ -35,9 +36,15 @@ class Left:
 
 
 def read_properties(
-    antecedent: Term, consequent: Term, others: tuple[Variable, ...], mapper: Mapper, stand_ins: Sequence[Extra]
+    antecedent: Term,
+    consequent: Term,
+    others: tuple[Variable, ...],
+    mapper: Mapper,
+    stand_ins: Sequence[Extra],
+    timing: Timed | None = None,
 ) -> Iterator[Property | Left]:
-    """The properties, without keys; nothing where the consequent is true anyway."""
+    """The properties, without keys; nothing where the consequent is true anyway. With `timing`, what is demanded is of
+    steps to come."""
     left, right = shape(antecedent), shape(consequent)
     if left == FALSE:
         yield _eventually(psl.FALSE, psl.TRUE)
@@ -47,8 +54,15 @@ def read_properties(
         raise NotCovered(f"{shared[0]} joins what triggers the guarantee and what it demands", consequent.span)
     bound = tuple(v for v in others if v.name in bound_names(left))
     trigger = mapper.map(shape(Quantified(Quantifier.EXISTS, bound, left)) if bound else left)
-    demands, bans = _parted(mapper.map(right))
     condition = to_formula(trigger)
+    if timing is not None and timing.ends is not None:
+        kept, ended = to_formula(mapper.map(right)), to_formula(mapper.map(shape(timing.ends)))
+        for alternative in _alternatives(condition):
+            yield _until(alternative, kept, ended)
+        return
+    demands, bans = _parted(mapper.map(right))
+    if timing is not None and bans:
+        raise NotCovered(f"`{timing.operator}` of what is forbidden has no property", consequent.span)
     for inputs, demanded in demands:
         for alternative in _alternatives(_when(condition, inputs)):
             yield _eventually(alternative, demanded)
@@ -79,6 +93,13 @@ def _never(trigger: Formula, kept: Formula) -> Property:
     """What a guarantee forbids must not come from the trigger on. ("Eventually not" would ask next to nothing: the
     agent could do what is forbidden, and something else before or afterwards.)"""
     return Property("", Always(Implies(trigger, Always(kept))), trigger, forbidden=psl.negation(kept))
+
+
+def _until(trigger: Formula, kept: Formula, ended: Formula) -> Property:
+    """What is kept from the trigger on, until something comes, which need not come."""
+    said = Always(Implies(trigger, Release(ended, psl.disjunction([kept, ended]))))
+    why = "it fails in some state of the agent, and a step of the contract may have several: that refutes nothing"
+    return Property("", said, trigger, indecisive=why)
 
 
 def _stand_in(units: Sequence[Unit], least: Formula, extras: Sequence[Extra]) -> Left | None:

@@ -170,7 +170,7 @@ class _Run:
         unfinished = checker.graph.unfinished
         if result.holds and unfinished is not None and not checker.graph.settles:
             return Settled(Verdict.UNKNOWN, f"not refuted, but the state space is unfinished: {unfinished}")
-        refutes = p.forbidden is None or result.answered
+        refutes = (p.forbidden is None or result.answered) and not p.indecisive
         answer = Verdict.CHECKED if result.holds else Verdict.REFUTED
         verdict, reason = self.judged(p, answer, refutes)
         return Settled(verdict, reason, answer, result.vacuous, result.immediate, result.valid, refutes)
@@ -178,6 +178,8 @@ class _Run:
     def judged(self, p: Property, verdict: Verdict, refutes: bool) -> tuple[Verdict, str]:
         """What an answer for a property says of its guarantee. What is forbidden after the trigger may come much later,
         for another reason: a refutation it is only where it is the answer to the trigger (`Result.answered`)."""
+        if verdict is Verdict.REFUTED and p.indecisive:
+            return Verdict.UNKNOWN, p.indecisive
         if verdict is not Verdict.REFUTED or refutes or p.forbidden is None:
             return verdict, ""
         banned = self.wording.say(p.forbidden)

@@ -53,10 +53,12 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
     attached = [(e, ps) for e, ps in frame.made.extras if e.guarantee in (claim.guarantee, None)]
     hypotheses = (
         *_left_to_a_person(claim, attached),
+        *((claim.hypothesis,) if claim.hypothesis else ()),
         "the plan's table says truly which agent formulas stand for which contract formulas",
         f"percepts become events as in '{frame.setup.semantics}' percept semantics, in the order of their groups",
     )
     limits = (*frame.setup.environment.describe(), *_no_messages(frame.setup.programs))
+    late = (bound("deadline", claim.hypothesis),) if claim.hypothesis else ()
     details: dict[str, object] = {"engine": frame.engine, "percept_semantics": str(frame.setup.semantics)}
     if claim.not_covered is not None:
         summary = f"not covered: {claim.not_covered}"
@@ -93,7 +95,7 @@ def outcome(obligation: Obligation, claim: Claim, frame: Frame) -> Outcome:
         details,
         Link.MAPPED,
         vacuous=verdict is Verdict.CHECKED and len(hollow) == len(own),
-        rests_on=tuple(bound(f"environment.{at}", text) for at, text in enumerate(limits, start=1)),
+        rests_on=(*late, *(bound(f"environment.{at}", text) for at, text in enumerate(limits, start=1))),
     )
 
 

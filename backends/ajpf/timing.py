@@ -1,0 +1,85 @@
+"""Clauses that speak of steps to come, as temporal properties: what can be said of them without counting.
+
+`T -> eventually(R)` is ``[] (T -> <> R)``. `within` and `next` are that too, and that it comes in time is a hypothesis.
+`T -> R until U` is ``[] (T -> (U R (R || U)))``, of the agent's states: they are finer than the contract's steps, so
+that a run on which it fails refutes nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from avow.formulas.formula import conjunction, free_variables
+from avow.language.contract import Clause, Node
+from avow.language.printer import show_term
+from avow.language.terms import TRUE, History, Implies, Past, Quantified, Quantifier, Role, Term, histories
+from avow.temporal.cells import responding
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """A guarantee about steps to come. `formula` is ``T -> R`` under the quantifiers around it."""
+
+    operator: Past
+    formula: Term
+    ends: Term | None
+    """U, of `until`."""
+    hypothesis: str
+    """What is not shown of it."""
+
+
+def timed(formula: Term) -> Timed | None:
+    """A clause that is a response; None of one of a single step."""
+    found = responding(formula)
+    if found is None:
+        return None
+    outer, triggers, response = found
+    trigger, wanted = conjunction(triggers), response.arguments[0]
+    said: Term = wanted if trigger == TRUE else Implies(trigger, wanted)
+    whole = Quantified(Quantifier.FORALL, outer, said) if outer else said
+    ends = response.arguments[1] if response.operator is Past.UNTIL else None
+    return Timed(response.operator, whole, ends, _hypothesis(response))
+
+
+def _hypothesis(response: History) -> str:
+    match response.operator:
+        case Past.WITHIN:
+            assert response.limit is not None
+            limit = show_term(response.limit.amount)
+            return f"that it comes within {limit} steps: it was shown to come at some time"
+        case Past.NEXT:
+            return "that it comes at the next step: it was shown to come at some time"
+        case _:  # as it is written
+            return ""
+
+
+def unsaid(judge: str, node: Node, clause: Clause) -> str | None:
+    """Why the agent cannot be asked about a guarantee that speaks of other steps, or whose node assumes what does."""
+    for each in node.assumptions:
+        for record in histories(each.formula):
+            about = f"of which {node.name}'s assumption {each.name} speaks"
+            return f"{judge} judges runs of an agent and has no `{record.operator}`, {about}"
+    why = next(_lacking(clause.formula), None)
+    return (
+        None
+        if why is None
+        else f"{judge} judges runs of an agent and has no {why}, of which {node.name}.{clause.name} speaks"
+    )
+
+
+def _lacking(formula: Term) -> Iterator[str]:
+    found = responding(formula)
+    response = found[2] if found is not None else None
+    for record in histories(formula):
+        if record is not response:
+            yield f"`{record.operator}`"
+    if response is None:
+        return
+    if response.operator is Past.FOR:
+        yield "`for`"
+    if response.limit is not None and not response.limit.steps:
+        yield f"`{response.operator}` with a limit in seconds"
+    inputs = sorted(v.qualified for v in free_variables(response.arguments[0]) if v.role is Role.INPUT)
+    if inputs and response.operator is not Past.UNTIL:
+        yield f"`{response.operator}` of an input ({inputs[0]})"
