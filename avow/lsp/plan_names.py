@@ -7,6 +7,7 @@ other words of a text that names a port so are looked up as in a formula. All el
 
 from __future__ import annotations
 
+import functools
 import re
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
@@ -36,12 +37,19 @@ class PlanText:
 
 def plan_occurrences(plan: PlanText, contract: Contract) -> tuple[Occurrence, ...]:
     """Every name in a plan that stands for something in the contract; none where the text is no YAML."""
-    try:
-        root, _ = read_yaml(plan.text.encode("utf-8", "replace"), plan.file)
-    except Rejected:
+    root = _document(plan)
+    if root is None:
         return ()
     found = {(o.start, o.end): o for o in _Reader(plan, contract).everything(root)}
     return tuple(found[place] for place in sorted(found))
+
+
+@functools.lru_cache(maxsize=8)
+def _document(plan: PlanText) -> Piece | None:
+    try:
+        return read_yaml(plan.text.encode("utf-8", "replace"), plan.file)[0]
+    except Rejected:
+        return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from avow.language.contract import Contract
 from avow.language.load import check_in_part, clean_text, read_source
 from avow.language.source import Source
 from avow.lsp.plan_names import PlanText
-from avow.system.load import PLAN_FILE, load_system
+from avow.system.load import PLAN_FILE, load_system, load_texts
 from avow.system.plan_file import read_plan
 
 
@@ -75,6 +75,17 @@ def project_of(file: str, texts: Mapping[str, str]) -> Project:
 def _project(sources: tuple[Source, ...], off: frozenset[str], plan: PlanText | None) -> Project:
     contract, diagnostics = check_in_part(sources, off=off)
     return Project(sources, contract, diagnostics, off, plan)
+
+
+def faults_of_plan(project: Project) -> tuple[Diagnostic, ...]:
+    """What keeps a plan, with the text that it has here, from being loaded; empty where nothing does."""
+    if project.plan is None:
+        return ()
+    try:
+        load_texts(Path(project.plan.file), project.plan.text, project.contract)
+    except Rejected as rejected:
+        return rejected.diagnostics
+    return ()
 
 
 def about_plan(file: str) -> tuple[Diagnostic, ...]:

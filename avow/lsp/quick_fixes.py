@@ -16,7 +16,7 @@ from itertools import islice
 from avow.base.diagnostics import Diagnostic, Span
 from avow.tuning.running import FIXES_TRIED
 
-_QUOTED = re.compile(r"`` ?([^`]+) ?``|`([^`\n]+)`")
+_QUOTED = re.compile(r"`` ?([^`]+) ?``|`([^`\n]+)`|\bwrite '([^'\n]+)'")
 _MEANT = re.compile(r"did you mean ['`]([^'`\n]+)['`]\?")
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_']*")
 
@@ -73,7 +73,7 @@ def _candidates(diagnostic: Diagnostic, text: str, start: int, end: int) -> Iter
         yield from _closed(diagnostic, hint, text)
         return
     for match in _QUOTED.finditer(hint):
-        proposal = match[1] or match[2]
+        proposal = match[1] or match[2] or match[3]
         commented = "//" in shown or "/*" in shown
         if "…" in proposal or "NAME" in proposal or (commented and len(proposal.split()) > 1):
             continue

@@ -16,7 +16,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from avow.base.diagnostics import Diagnostic, Rejected
+from avow.base.diagnostics import Diagnostic
 from avow.formulas.formula import digest
 from avow.language.contract import Contract, Node, Port
 from avow.language.lexer import KEYWORDS, LIMITED
@@ -26,11 +26,11 @@ from avow.language.source import Source
 from avow.language.terms import Builtin, Construct, EnumValue, Past, Role, Variable
 from avow.lsp.names import CLAUSES, PORTS, Meaning, Occurrence, What, occurrences, taken_apart
 from avow.lsp.plan_names import PlanText, plan_occurrences
-from avow.lsp.project import Project
-from avow.system.load import load_texts
-from avow.tuning.running import BYTES_LOOKED_THROUGH, FILES_LOOKED_THROUGH
+from avow.lsp.project import Project, faults_of_plan
+from avow.system.load import PLAN_FILE
+from avow.tuning.running import BYTES_LOOKED_THROUGH, FILES_LOOKED_THROUGH, LINES_NAMED
 
-_WORDS = {*KEYWORDS, *LIMITED, *Builtin, *Past, "length", "indices", "A", "G", "x"}
+_WORDS = {*KEYWORDS, *LIMITED, *Builtin, *Past, "length", "indices"}
 """Words of the language, operators among them that a name may shadow: a name that is one of these is read twice."""
 
 
@@ -87,13 +87,25 @@ def rename(project: Project, meaning: Meaning, new: str) -> tuple[Edit, ...]:
 
 
 def elsewhere(project: Project, meaning: Meaning) -> tuple[str, ...]:
-    """The other files of the system's folder in which the name stands as a word: programs, tables, traces. What it
-    means there is not known here."""
+    """Where else the name stands as a word: lines of the plan, other files of the system's folder (programs, tables,
+    traces), plans beside it that speak of this system. What it means there is not known here."""
     if project.plan is None or meaning.what is What.VARIABLE:
         return ()
     folder, word = Path(project.plan.file).parent, re.compile(rf"(?<!\w){re.escape(meaning.name)}(?!\w)")
     known = {Path(project.plan.file).resolve(), *(Path(s.file).resolve() for s in project.sources)}
-    found = []
+    lines, starts = (
+        Source("", project.plan.text),
+        {o.start for o in all_occurrences(project) if o.file == project.plan.file},
+    )
+    left = (m.start() for m in word.finditer(project.plan.text) if m.start() not in starts)
+    found = [f"{PLAN_FILE}:{line}" for line in sorted({lines.place(at)[0] for at in left})[:LINES_NAMED]]
+    for path in folder.parent.glob(f"*/{PLAN_FILE}"):
+        try:
+            text = path.read_text("utf-8") if path.parent.resolve() != folder.resolve() else ""
+        except (OSError, UnicodeError):
+            continue  # no text
+        if folder.resolve().name in text and word.search(text):
+            found.append(f"../{path.parent.name}/{PLAN_FILE}")
     for path in islice(sorted(folder.rglob("*")), FILES_LOOKED_THROUGH):
         try:
             if path.is_symlink() or not path.is_file() or path.resolve() in known:
@@ -160,19 +172,9 @@ def _clauses(contract: Contract) -> Iterator[Any]:
 
 def _new_faults(project: Project, after: Project) -> list[Diagnostic]:
     """What is wrong with the plan and was not before."""
-    old, new = _faults(project), _faults(after)
+    old, new = faults_of_plan(project), faults_of_plan(after)
     more = Counter(d.code for d in new) - Counter(d.code for d in old)
     return [d for d in new if more[d.code]]
-
-
-def _faults(project: Project) -> tuple[Diagnostic, ...]:
-    if project.plan is None:
-        return ()
-    try:
-        load_texts(Path(project.plan.file), project.plan.text, project.contract)
-    except Rejected as rejected:
-        return rejected.diagnostics
-    return ()
 
 
 # --- the same contract but for a name --------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,8 @@ from avow.lsp.background import Answer, Asked, askable
 from avow.lsp.completion import offers, signature
 from avow.lsp.names import CLAUSES, Occurrence, What
 from avow.lsp.plan_completion import plan_offers
-from avow.lsp.project import file_of, is_plan
+from avow.lsp.plan_names import PlanText
+from avow.lsp.project import faults_of_plan, file_of, is_plan
 from avow.lsp.protocol import Lines
 from avow.lsp.quick_fixes import fixes
 from avow.lsp.renaming import Refused, elsewhere, is_renameable, rename
@@ -258,11 +260,13 @@ class Server:
 
     def code_actions(self, params: types.CodeActionParams) -> list[types.CodeAction]:
         document = self.current(params.text_document.uri)
-        if is_plan(document.file) or not document.project.sources:
+        if not document.project.sources:
             return []
         lines, found = Lines(document.text), []
 
         def check(text: str) -> tuple[Diagnostic, ...]:
+            if is_plan(document.file):
+                return faults_of_plan(replace(document.project, plan=PlanText(document.file, text)))
             source = clean_text(text, document.file)
             if isinstance(source, Diagnostic):
                 return (source,)

@@ -81,3 +81,6 @@ BYTES_LOOKED_THROUGH = 1_000_000
 
 FIXES_TRIED = 12
 """Ways of doing what one hint says that the language server tries: each is a check of the text."""
+
+LINES_NAMED = 5
+"""Lines of a plan that a rename names because the old name is left in them: a name may be a common word."""

@@ -269,6 +269,19 @@ def test_a_hint_can_be_done(editor: Editor, wrong: str) -> None:
     assert not [d for d in editor.published[uri] if d.severity == types.DiagnosticSeverity.Error]
 
 
+def test_a_plans_hint_can_be_done(editor: Editor, folder: Path) -> None:
+    text = PLAN.replace("sensor.high", "sensor.hihg").replace("sanity/determined", "sanity/undetermined")
+    (folder / "plan.yaml").write_text(text, "utf-8")
+    uri = editor.open(folder / "plan.yaml")
+    titles = set()
+    for found in editor.published[uri]:
+        params = types.CodeActionParams(
+            types.TextDocumentIdentifier(uri), found.range, types.CodeActionContext([found])
+        )
+        titles |= {action.title for action in editor.wait(editor.client.text_document_code_action_async(params))}
+    assert titles == {"Write `sensor.high`", "Write `agent/sanity/determined-command`"}
+
+
 def test_signatures(editor: Editor, folder: Path) -> None:
     text = CONTRACT.replace("in.r < Limit ->", "min(in.r, previous(in.r, 0)) < Limit ->")
     uri = editor.open("untitled:signature", text)
